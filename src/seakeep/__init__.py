@@ -1,0 +1,1 @@
+"""Data-driven models of vessels in waves."""

@@ -1,0 +1,266 @@
+"""Vocabulary: canonical channels with their units and symbols, and the units we understand.
+
+Inside seakeep everything is in SI units and radians; :func:`conversion` is the door.
+Frame: x along the direction in which the waves run, z up, angles right-handed about the axes
+(a positive pitch lifts the bow, which points against the waves).
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import pint
+
+from seakeep.errors import RequestError, did_you_mean
+
+__all__ = ["Channel", "canonical_channel", "canonical_names", "conversion", "si_unit"]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A canonical channel.
+
+    Parameters
+    ----------
+    name : str
+        Canonical name.
+    units : str
+        SI unit in which seakeep keeps it.
+    long_name : str
+        Name for labels.
+    symbol : str
+        Symbol of the paper, as matplotlib mathtext.
+    """
+
+    name: str
+    units: str
+    long_name: str
+    symbol: str
+
+
+_MOTIONS = {
+    "surge": ("m", "x"),
+    "sway": ("m", "y"),
+    "heave": ("m", "z"),
+    "roll": ("rad", r"\phi"),
+    "pitch": ("rad", r"\theta"),
+    "yaw": ("rad", r"\psi"),
+}
+_FIXED = {
+    "mooring_bow": ("N", "bow mooring load", r"M_\mathrm{bow}"),
+    "mooring_stern": ("N", "stern mooring load", r"M_\mathrm{stern}"),
+}
+_ELEVATION = re.compile(r"eta_([a-z0-9_]+)\Z")
+_MOORING = re.compile(r"mooring_([a-z0-9_]+)\Z")
+
+
+@lru_cache(maxsize=1)
+def _table() -> dict[str, Channel]:
+    table = {}
+    for motion, (unit, symbol) in _MOTIONS.items():
+        for suffix, per, accent in (
+            ("", "", "{}"),
+            ("_rate", "/s", r"\dot{{{}}}"),
+            ("_acceleration", "/s^2", r"\ddot{{{}}}"),
+        ):
+            name = motion + suffix
+            label = f"{motion} {suffix[1:]}".strip()
+            table[name] = Channel(name, unit + per, label, accent.format(symbol))
+    for name, (unit, label, symbol) in _FIXED.items():
+        table[name] = Channel(name, unit, label, symbol)
+    return table
+
+
+def canonical_names() -> list[str]:
+    """Names of the canonical channels that have a fixed name.
+
+    Returns
+    -------
+    list of str
+        Motions, their rates and accelerations, and the mooring loads. Besides these, any
+        ``eta_…`` is a wave elevation in metres and any ``mooring_…`` a load in newtons.
+    """
+    return list(_table())
+
+
+def canonical_channel(name: str) -> Channel | None:
+    r"""Look a canonical channel up.
+
+    Parameters
+    ----------
+    name : str
+        Name of a channel.
+
+    Returns
+    -------
+    Channel or None
+        None for a free name.
+
+    Examples
+    --------
+    >>> canonical_channel("pitch_rate")
+    Channel(name='pitch_rate', units='rad/s', long_name='pitch rate', symbol='\\dot{\\theta}')
+    >>> canonical_channel("eta_fwd").units
+    'm'
+    >>> canonical_channel("propeller_torque") is None
+    True
+    """
+    known = _table().get(name)
+    if known is not None:
+        return known
+    if match := _ELEVATION.match(name):
+        place = match[1].replace("_", " ")
+        symbol = rf"\eta_\mathrm{{{match[1].replace('_', ' ')}}}"
+        return Channel(name, "m", f"wave elevation {place}", symbol)
+    if match := _MOORING.match(name):
+        place = match[1].replace("_", " ")
+        return Channel(name, "N", f"mooring load {place}", rf"M_\mathrm{{{place}}}")
+    return None
+
+
+# The angle is a dimension of its own, so that degrees cannot pass for metres per metre.
+_UNITS = """
+centi- = 1e-2 = c-
+milli- = 1e-3 = m-
+micro- = 1e-6 = µ- = u-
+kilo- = 1e3 = k-
+mega- = 1e6 = M-
+metre = [length] = m = meter = meters = metres
+second = [time] = s = sec = secs = seconds
+kilogram = [mass] = kg = kilograms
+radian = [angle] = rad = radians
+volt = [potential] = V = volts
+kelvin = [temperature] = K
+gram = 1e-3 * kilogram = g_mass = grams
+inch = 0.0254 * metre = in = inches
+foot = 0.3048 * metre = ft = feet
+minute = 60 * second = min = minutes
+hour = 3600 * second = h = hours
+degree = 0.017453292519943295 * radian = deg = ° = degrees
+revolution = 6.283185307179586 * radian = rev = revolutions
+newton = kilogram * metre / second ** 2 = N = newtons
+pascal = newton / metre ** 2 = Pa
+bar = 1e5 * pascal = bar
+joule = newton * metre = J
+watt = joule / second = W
+hertz = 1 / second = Hz
+tonne = 1e3 * kilogram = t = tonnes
+standard_gravity = 9.80665 * metre / second ** 2 = g = gee = g0
+kilogram_force = 9.80665 * newton = kgf
+gram_force = 9.80665e-3 * newton = gf
+pound_force = 4.4482216152605 * newton = lbf
+knot = 0.5144444444444445 * metre / second = kn = knots = kt
+percent = 0.01 = pct
+"""
+
+
+@lru_cache(maxsize=1)
+def _registry() -> pint.UnitRegistry[Any]:
+    registry: pint.UnitRegistry[Any] = pint.UnitRegistry(None)
+    for line in _UNITS.strip().splitlines():
+        registry.define(line)
+    return registry
+
+
+_SPELLINGS = (
+    (re.compile(r"[·⋅×]"), "*"),
+    (re.compile(r"µ|μ"), "µ"),
+    (re.compile(r"%"), "percent"),
+    (re.compile("²"), "^2"),
+    (re.compile("³"), "^3"),
+    (re.compile("⁻¹"), "^-1"),
+    (re.compile("⁻²"), "^-2"),
+    (re.compile(r"(?<=[A-Za-z°])(-?[1-9])"), r"^\1"),
+    (re.compile(r"\^"), "**"),
+    (re.compile(r"(?<=[A-Za-z°0-9])[ .](?=[A-Za-z°])"), "*"),
+)
+
+
+@lru_cache(maxsize=256)
+def _parsed(unit: str) -> Any:
+    text = unit.strip()
+    if text in ("", "-", "1", "none", "nondimensional", "dimensionless"):
+        return _registry().dimensionless
+    for pattern, replacement in _SPELLINGS:
+        text = pattern.sub(replacement, text)
+    try:
+        return _registry().parse_units(text)
+    except Exception as error:
+        known = sorted({name for name in dir(_registry()) if not name.startswith("_")})
+        raise RequestError(
+            f"the unit {unit!r} is not known.{did_you_mean(unit, known)} Write it as 'mm', "
+            "'deg/s', 'm/s^2', 'kN', 'g' (standard gravity) or '-' (no unit), or convert the column and "
+            "state an SI unit."
+        ) from error
+
+
+@lru_cache(maxsize=256)
+def si_unit(unit: str) -> str:
+    """SI unit (radians for angles) of the same dimension as `unit`, in seakeep's spelling.
+
+    Parameters
+    ----------
+    unit : str
+        Any unit we understand: ``"mm"``, ``"deg/s"``, ``"m/s2"``, ``"kN"``, ``"-"`` …
+
+    Returns
+    -------
+    str
+        Its SI unit, ``"1"`` for a pure number.
+
+    Raises
+    ------
+    RequestError
+        If the unit is not known.
+
+    Examples
+    --------
+    >>> si_unit("deg/s"), si_unit("kN"), si_unit("-")
+    ('rad/s', 'N', '1')
+    """
+    base = _registry().get_base_units(_parsed(unit))[1]
+    for name in ("m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "N", "N*m", "Pa", "W", "Hz", "V"):
+        candidate = _parsed(name)
+        if _registry().get_base_units(candidate)[1] == base:
+            return "N m" if name == "N*m" else name
+    text = f"{base:~C}".replace("**", "^").replace("*", " ")
+    return text or "1"
+
+
+def conversion(unit: str, target: str, channel: str = "the channel") -> float:
+    """Factor that turns a value in `unit` into one in `target`.
+
+    Parameters
+    ----------
+    unit : str
+        Unit of the data.
+    target : str
+        Unit wanted.
+    channel : str, optional
+        Name for the message.
+
+    Returns
+    -------
+    float
+        The factor.
+
+    Raises
+    ------
+    RequestError
+        If a unit is not known, or the two measure different things.
+
+    Examples
+    --------
+    >>> conversion("mm", "m"), round(conversion("deg/s", "rad/s"), 6)
+    (0.001, 0.017453)
+    """
+    source, goal = _parsed(unit), _parsed(target)
+    if source.dimensionality != goal.dimensionality:
+        raise RequestError(
+            f"the unit '{unit}' does not fit {channel}, which is measured in '{target}'. "
+            "Correct the unit, or map the column to another channel."
+        )
+    return float(f"{_registry().convert(1.0, source, goal):.15g}")

@@ -1,0 +1,60 @@
+"""Errors and warnings of seakeep.
+
+Every message says the symptom, what was received, and how to mend it. The command line prints
+the message alone; ``exit_status`` is what it returns to the shell.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+__all__ = ["DataError", "RequestError", "SeakeepError", "SeakeepWarning", "did_you_mean"]
+
+
+class SeakeepError(Exception):
+    """Base of all errors that seakeep raises on purpose."""
+
+    exit_status = 1
+
+
+class RequestError(SeakeepError, ValueError):
+    """The request is wrong: an unknown name, a setting out of range, a key that does not exist."""
+
+    exit_status = 2
+
+
+class DataError(SeakeepError, ValueError):
+    """The data are wrong: gaps, unsorted times, a constant channel, a damaged file."""
+
+    exit_status = 1
+
+
+class SeakeepWarning(UserWarning):
+    """A result was produced, and something about it deserves a look."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return ``" Did you mean 'x'?"`` for the known name nearest to `name`, or an empty string.
+
+    Parameters
+    ----------
+    name : str
+        What was received.
+    known : iterable of str
+        The names that exist.
+
+    Returns
+    -------
+    str
+        A sentence with a leading space, ready to be appended, or ``""``.
+
+    Examples
+    --------
+    >>> did_you_mean("heeve", ["heave", "pitch"])
+    " Did you mean 'heave'?"
+    """
+    candidates = list(known)
+    lowered = {candidate.lower(): candidate for candidate in candidates}
+    near = difflib.get_close_matches(name.lower(), list(lowered), n=1, cutoff=0.6)
+    return f" Did you mean '{lowered[near[0]]}'?" if near else ""

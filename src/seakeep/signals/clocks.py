@@ -1,0 +1,194 @@
+"""Time axes: checks, the uniform step, and resampling onto another one."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.errors import DataError
+from seakeep.signals.filters import as_series, odd_extension, positive
+
+__all__ = ["resample", "uniform_step"]
+
+FloatArray = npt.NDArray[np.float64]
+
+STEP_TOLERANCE = 0.01
+"""A time axis is uniform if no instant is further than this part of a step from its grid."""
+
+
+def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
+    """Return the times as floats; refuse values that are not finite, repeated or unsorted.
+
+    Parameters
+    ----------
+    time : array_like, shape (time,)
+        Instants, s.
+    name : str, optional
+        What the message calls the owner of the times.
+
+    Returns
+    -------
+    ndarray
+        The times.
+
+    Raises
+    ------
+    DataError
+        If a time is not finite, repeated, or smaller than the one before.
+    """
+    t = np.asarray(time, dtype=float)
+    if t.ndim != 1 or t.size < 2:
+        raise DataError(f"{name} has {t.size} instant(s); a time axis needs at least two.")
+    if not np.all(np.isfinite(t)):
+        at = int(np.flatnonzero(~np.isfinite(t))[0])
+        raise DataError(
+            f"the times of {name} hold a value that is not finite at sample {at} "
+            f"({int(np.sum(~np.isfinite(t)))} in all). Remove these rows, or repair the times."
+        )
+    steps = np.diff(t)
+    if np.any(steps == 0):
+        at = int(np.flatnonzero(steps == 0)[0])
+        raise DataError(
+            f"the times of {name} repeat: {t[at]:g} s stands at samples {at} and {at + 1} "
+            f"({int(np.sum(steps == 0))} repetitions in all). Remove the double rows, or raise the "
+            "number of decimals the logger writes."
+        )
+    if np.any(steps < 0):
+        at = int(np.flatnonzero(steps < 0)[0])
+        raise DataError(
+            f"the times of {name} are not sorted: {t[at + 1]:g} s follows {t[at]:g} s at sample "
+            f"{at + 1}. Sort the rows by time, or split the file where the clock was restarted."
+        )
+    return t
+
+
+def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
+    """Time step of a uniformly sampled axis.
+
+    Parameters
+    ----------
+    time : array_like, shape (time,)
+        Instants, s.
+    name : str, optional
+        What a message calls the owner of the times.
+
+    Returns
+    -------
+    float
+        The step, s: the span divided by the number of intervals.
+
+    Raises
+    ------
+    DataError
+        If the times are unsorted, repeated, or further than a hundredth of a step from a
+        uniform grid.
+
+    Examples
+    --------
+    >>> uniform_step([0.0, 0.1, 0.2, 0.3])
+    0.1
+    """
+    t = check_order(time, name)
+    step = float((t[-1] - t[0]) / (t.size - 1))
+    off = np.abs(t - (t[0] + step * np.arange(t.size)))
+    if np.max(off) > STEP_TOLERANCE * step:
+        steps = np.diff(t)
+        at = int(np.argmax(np.abs(steps - np.median(steps))))
+        raise DataError(
+            f"the times of {name} are not uniform: steps run from {steps.min():g} to "
+            f"{steps.max():g} s (median {np.median(steps):g} s), the oddest after t = {t[at]:g} s. "
+            "Fill the gap or resample onto a uniform step (seakeep.signals.resample, or a campaign "
+            "with [preparation])."
+        )
+    # A decimal step such as 0.04 that was summed or printed comes back as what was meant.
+    rounded = float(f"{step:.10g}")
+    return rounded if abs(rounded - step) * t.size < 1e-6 * step else step
+
+
+def resample(
+    series: npt.ArrayLike,
+    time: npt.ArrayLike,
+    new_time: npt.ArrayLike,
+    attenuation: float = 60.0,
+    passband: float = 0.8,
+) -> FloatArray:
+    """Band-limited resampling of a uniform series onto another uniform time axis.
+
+    Each new sample is a Kaiser-windowed sinc sum over the old ones. Its cut lies between
+    `passband` times the lower of the two Nyquist frequencies and that frequency itself, so that
+    going to a larger step does not alias; phase is kept, and constants are kept exactly.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,) or (time, channel)
+        Uniformly sampled series without gaps.
+    time : array_like, shape (time,)
+        Its instants, s.
+    new_time : array_like, shape (new_time,)
+        The instants wanted, s, uniform and inside the span of `time`.
+    attenuation : float, optional
+        Attenuation above the new Nyquist frequency, dB.
+    passband : float, optional
+        Edge of the pass band as a part of the lower Nyquist frequency.
+
+    Returns
+    -------
+    ndarray, shape (new_time,) or (new_time, channel)
+        The series at the new instants. Where the instants coincide and the step is the same, the
+        samples are handed on untouched.
+
+    Raises
+    ------
+    DataError
+        If a time axis is not uniform, or new instants lie outside the old span.
+    RequestError
+        If the series has gaps.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> old, new = np.arange(0, 30, 0.01), np.arange(0, 29, 0.05)
+    >>> out = resample(np.sin(old), old, new)
+    >>> bool(np.max(np.abs(out - np.sin(new))[40:-40]) < 1e-3)
+    True
+    """
+    array = as_series(series)
+    t, wanted = np.asarray(time, dtype=float), np.asarray(new_time, dtype=float)
+    dt, new_dt = uniform_step(t, "the series"), uniform_step(wanted, "the new time axis")
+    if array.shape[0] != t.size:
+        raise DataError(
+            f"the series has {array.shape[0]} samples and the time axis {t.size}; they must agree. "
+            "Time runs along the first axis."
+        )
+    slack = 1e-6 * dt
+    if wanted[0] < t[0] - slack or wanted[-1] > t[-1] + slack:
+        raise DataError(
+            f"new instants from {wanted[0]:g} to {wanted[-1]:g} s lie outside the series, which "
+            f"runs from {t[0]:g} to {t[-1]:g} s. Shorten the new time axis."
+        )
+    position = (wanted - t[0]) / dt
+    nearest = np.rint(position)
+    if abs(new_dt - dt) < 1e-9 * dt and np.max(np.abs(position - nearest)) < 1e-6:
+        return array[nearest.astype(int)].copy()
+
+    nyquist = 0.5 * min(1.0, dt / new_dt)  # the lower one, in cycles an old sample
+    width = (1.0 - passband) * nyquist
+    cut = 0.5 * (1.0 + passband) * nyquist
+    beta = 0.1102 * (max(positive("the attenuation", attenuation, "dB"), 50.0) - 8.7)
+    half = int(np.ceil((attenuation - 7.95) / (4.57 * np.pi * width) + 1))  # Kaiser's formula
+    extended = odd_extension(array, half)
+    base = np.floor(position).astype(int)
+    offsets = np.arange(-half + 1, half + 1)
+    flat = extended.reshape(extended.shape[0], -1)
+    out = np.empty((wanted.size, flat.shape[1]))
+    rows_at_once = max(1, 2_000_000 // offsets.size)
+    for first in range(0, wanted.size, rows_at_once):
+        rows = slice(first, first + rows_at_once)
+        lag = position[rows, None] - (base[rows, None] + offsets)
+        window = np.i0(beta * np.sqrt(np.clip(1.0 - (lag / half) ** 2, 0.0, None)))
+        kernel = np.sinc(2 * cut * lag) * window
+        kernel /= kernel.sum(axis=1, keepdims=True)
+        indices = np.clip(base[rows, None] + offsets + half, 0, flat.shape[0] - 1)
+        out[rows] = np.einsum("rk,rkc->rc", kernel, flat[indices])
+    result: FloatArray = out.reshape((wanted.size, *array.shape[1:]))
+    return result
