@@ -192,8 +192,8 @@ def _parsed(unit: str) -> Any:
         known = sorted({name for name in dir(_registry()) if not name.startswith("_")})
         raise RequestError(
             f"the unit {unit!r} is not known.{did_you_mean(unit, known)} Write it as 'mm', "
-            "'deg/s', 'm/s^2', 'kN', 'g' (standard gravity) or '-' (no unit), or convert the column and "
-            "state an SI unit."
+            "'deg/s', 'm/s^2', 'kN', 'g' (standard gravity) or '-' (no unit), or convert the "
+            "column and state an SI unit."
         ) from error
 
 
