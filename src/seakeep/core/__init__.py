@@ -1,1 +1,1 @@
-"""Placeholder."""
+"""Regression, embedding and free runs: arrays in, arrays out."""
