@@ -1,1 +1,22 @@
-"""Data-driven models of vessels in waves."""
+"""Data-driven models of vessels in waves: Hankel dynamic mode decomposition with control."""
+
+from importlib import metadata
+
+from seakeep import core, metrics, signals
+from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
+from seakeep.models import HankelDMDc, HankelDMDcModel, load_model
+
+__version__ = metadata.version("seakeep")
+
+__all__ = [
+    "DataError",
+    "HankelDMDc",
+    "HankelDMDcModel",
+    "RequestError",
+    "SeakeepError",
+    "SeakeepWarning",
+    "core",
+    "load_model",
+    "metrics",
+    "signals",
+]

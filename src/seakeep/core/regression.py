@@ -11,6 +11,7 @@ One function, :func:`solve`, whatever the shape and the conditioning:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,7 +19,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import linalg
 
-__all__ = ["Method", "Solution", "solve"]
+from seakeep.core.embedding import TrainingWindow, snapshot_matrices
+
+__all__ = ["Method", "Solution", "identify", "solve"]
 
 FloatArray = npt.NDArray[np.float64]
 Method = Literal["primal", "dual", "svd"]
@@ -139,3 +142,57 @@ def _by_singular_values(
     weights = values / (values**2 + ridge)
     coefficients = ((targets @ right[:kept].T) * weights) @ left[:, :kept].T
     return Solution(coefficients, "svd", ridge, kept)
+
+
+def identify(
+    states: Sequence[FloatArray],
+    inputs: Sequence[FloatArray],
+    windows: Sequence[TrainingWindow],
+    *,
+    state_delays: int,
+    input_delays: int,
+    ridge: float,
+    per_snapshot: bool = False,
+    rank: int | None = None,
+    all_rows: bool = True,
+    method: Method | None = None,
+) -> Solution:
+    r"""Identify :math:`[\hat A\; \hat B]` from one or several runs.
+
+    Snapshot pairs of the runs stand side by side; none crosses a joint.
+
+    Parameters
+    ----------
+    states : sequence of ndarray, each (time, N)
+        States of the runs, standardised or not.
+    inputs : sequence of ndarray, each (time, Q)
+        Their inputs.
+    windows : sequence of TrainingWindow
+        The samples of each run that train.
+    state_delays, input_delays : int
+        s and z.
+    ridge : float
+        λ.
+    per_snapshot : bool, optional
+        Whether λ is multiplied by the number of columns.
+    rank : int, optional
+        Number of singular values, instead of λ.
+    all_rows : bool, optional
+        Whether the rows of the delayed states are regressed too, as in the paper, or the first N
+        alone.
+    method : {"primal", "dual", "svd"}, optional
+        As in :func:`solve`.
+
+    Returns
+    -------
+    Solution
+        Coefficients of shape (N(s+1) or N, N(s+1) + Q(z+1)).
+    """
+    pieces = [
+        snapshot_matrices(x, u, window, state_delays, input_delays, all_rows)
+        for x, u, window in zip(states, inputs, windows, strict=True)
+    ]
+    regressors = np.concatenate([piece[0] for piece in pieces], axis=1)
+    targets = np.concatenate([piece[1] for piece in pieces], axis=1)
+    effective = ridge * regressors.shape[1] if per_snapshot else ridge
+    return solve(regressors, targets, effective, rank, method)
