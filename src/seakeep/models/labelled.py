@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -55,8 +56,7 @@ def as_runs(runs: Runs) -> dict[str, xr.Dataset]:
     if isinstance(runs, xr.Dataset):
         named[run_name(runs, "run")] = runs
     elif isinstance(runs, Mapping):
-        for name in runs:
-            named[str(name)] = runs[name]
+        named.update(cast("Mapping[str, xr.Dataset]", runs))
     else:
         for number, run in enumerate(runs, start=1):
             name = run_name(run, f"run {number}")
