@@ -10,6 +10,10 @@ steps are one row :math:`v_k = [u_{k+K-1}; …; u_{k-z}]`, and
 the outputs of the second half are those of the first, from :math:`A_K \hat x_k + B_K v_k`. That
 costs a few large products and saves many small ones; :func:`doublings` weighs them.
 
+*Mirrored* Â: ridge on all rows makes those of the delayed states :math:`P - \lambda P (C + \lambda
+I)^{-1}`, so they are symmetric but for their last N columns. One window alone is bound by reading
+Â from memory, and half of it need not be read: :func:`mirrored` finds that half.
+
 *Exact shift* (N rows): the outputs are the state, so no :math:`A_K` is needed, and a further row
 of :math:`O_K` costs little: its product with the shift moves it by N, and that with the N rows of
 Â is its first block times them.
@@ -22,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Propagator", "doublings", "shifting_propagator", "square_propagator"]
+__all__ = ["Propagator", "doublings", "mirrored", "shifting_propagator", "square_propagator"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -33,6 +37,8 @@ GEMM_RATE = 50.0
 """Products of large matrices, multiply-adds in double-operations per nanosecond (rough)."""
 SKINNY_COST = (4000.0, 0.1, 0.055)
 """Nanoseconds of a product of a square matrix with w rows: fixed, per entry, per entry and row."""
+MIRRORED_COST = (2000.0, 0.065)
+"""Nanoseconds of a step with half of Â: fixed, per entry."""
 MOST_DOUBLINGS = 6
 
 
@@ -100,7 +106,7 @@ def shifting_propagator(a: FloatArray, b: FloatArray, channels: int, steps: int)
     return Propagator(K, output_state, output_input)
 
 
-def doublings(size: int, inputs: int, windows: int, steps: int) -> int:
+def doublings(size: int, inputs: int, windows: int, steps: int) -> tuple[int, float]:
     """How often to double the step of a square model so that the free run costs least.
 
     Parameters
@@ -112,8 +118,10 @@ def doublings(size: int, inputs: int, windows: int, steps: int) -> int:
 
     Returns
     -------
-    int
+    times : int
         Number of doublings; K is two to its power.
+    cost : float
+        Estimate of the time, ns.
     """
     fixed, entry, row = SKINNY_COST
     once = fixed + size * size * (entry + row * (windows - 1))
@@ -125,7 +133,37 @@ def doublings(size: int, inputs: int, windows: int, steps: int) -> int:
         if cost < least:
             best, least = count, cost
         preparation += 2.0 * size * size * (size + inputs) / GEMM_RATE
-    return best
+    return best, least
+
+
+def mirrored(a: FloatArray, inputs: int, count: int, steps: int) -> FloatArray | None:
+    """Rows of Â for the delayed states as the upper triangle of a symmetric matrix.
+
+    Parameters
+    ----------
+    a : ndarray, shape (N(s+1), N(s+1))
+        Â.
+    inputs, count, steps : int
+        Columns of B̂, N, and the steps of the one window.
+
+    Returns
+    -------
+    ndarray, shape (N(s+1), N(s+1)), or None
+        Its first Ns rows; None where Â is not of this kind, or several steps at once cost less.
+    """
+    size = len(a)
+    kept = size - count
+    fixed, entry = MIRRORED_COST
+    cost = steps * (fixed + entry * size * size + 2.0 * size * inputs / GEMM_RATE)
+    block = a[count:, :kept]
+    if kept == 0 or cost > doublings(size, inputs, 1, steps)[1]:
+        return None
+    # A corner tells most other matrices apart before all of it is read.
+    if not np.array_equal(block[:8, :8], block[:8, :8].T) or not np.array_equal(block, block.T):
+        return None
+    out = np.zeros((size, size))
+    out[:kept] = a[count:]
+    return out
 
 
 def square_propagator(

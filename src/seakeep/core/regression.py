@@ -93,7 +93,7 @@ def solve(
     if chosen == "primal":
         factor = _factor(regressors @ regressors.T, ridge)
         return Solution(_apply(factor, targets @ regressors.T), "primal", ridge, full_rank)
-    weights = _apply(_factor(regressors.T @ regressors, ridge), targets)
+    weights = _apply(_factor(regressors.T @ regressors, ridge), targets.copy())
     return Solution(weights @ regressors.T, "dual", ridge, full_rank)
 
 
@@ -259,12 +259,12 @@ class _Delayed:
     @property
     def states(self) -> int:
         """Rows of the extended state."""
-        return self.pieces[0].states.shape[1] * (self.state_delays + 1)
+        return int(self.pieces[0].states.shape[1]) * (self.state_delays + 1)
 
     @property
     def rows(self) -> int:
         """Regressors."""
-        return self.states + self.pieces[0].inputs.shape[1] * (self.input_delays + 1)
+        return self.states + int(self.pieces[0].inputs.shape[1]) * (self.input_delays + 1)
 
     @property
     def columns(self) -> int:
@@ -358,13 +358,16 @@ class _Delayed:
         factor = _factor(snapshot_gram(self.pieces, self.state_delays, self.input_delays), ridge)
         targets = np.concatenate([piece.targets for piece in self.pieces])
         if not self.all_rows:
-            weights, out, at = _apply(factor, targets.T.copy()).T, 0.0, 0
+            weights = _apply(factor, targets.T.copy()).T
+            top, at = np.zeros((targets.shape[1], self.rows)), 0
             for piece in self.pieces:
                 own = weights[at : at + piece.count]
+                at += piece.count
                 x = lagged_sums(own, piece.states, piece.first, self.state_delays + 1)
                 u = lagged_sums(own, piece.inputs, piece.first, self.input_delays + 1)
-                out, at = out + np.concatenate([x, u], axis=1), at + piece.count
-            return np.asarray(out)
+                top[:, : self.states] += x
+                top[:, self.states :] += u
+            return top
         N = targets.shape[1]
         stacked = np.concatenate([self.matrices()[0], targets.T])
         half = blas.dtrsm(1.0, factor, stacked.T, lower=1, overwrite_b=1)

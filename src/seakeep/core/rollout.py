@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import blas
 
 from seakeep.core.propagation import (
     Propagator,
     doublings,
+    mirrored,
     shifting_propagator,
     square_propagator,
 )
@@ -92,18 +94,34 @@ def rollout(
     if a.shape[0] == a.shape[1] and _shifts_exactly(a, b, count):
         a, b = a[:count], b[:count]
     channels, steps = _input_steps(b, driving)
-    shifting = a.shape[0] == count and a.shape[1] > count
-    if shifting:
-        propagator = shifting_propagator(a, b, channels, steps)
-    else:
-        times = doublings(a.shape[1], b.shape[1], len(start), steps)
-        propagator = square_propagator(a, b, count, channels, times)
     with np.errstate(over="ignore", invalid="ignore"):
-        out = _run(propagator, start, driving, steps, count)
+        symmetric, propagator = _prepare(a, b, count, channels, len(start), steps)
+        out = _run(propagator, symmetric, start, driving, steps, count)
         lost = ~(np.abs(out) <= limit).all(axis=2)
     if lost.any():
         out[np.logical_or.accumulate(lost, axis=1)] = np.nan
     return out
+
+
+def _prepare(
+    a: FloatArray, b: FloatArray, count: int, channels: int, windows: int, steps: int
+) -> tuple[FloatArray | None, Propagator]:
+    """Symmetric half of Â, where it is used, and the propagator."""
+    if a.shape[0] == count and a.shape[1] > count:
+        propagator = shifting_propagator(a, b, channels, steps)
+        if not np.isfinite(propagator.output_state).all():
+            propagator = shifting_propagator(a, b, channels, 1)
+        return None, propagator
+    symmetric = mirrored(a, b.shape[1], count, steps) if windows == 1 else None
+    times = 0
+    if symmetric is None:
+        times, _ = doublings(a.shape[1], b.shape[1], windows, steps)
+    propagator = square_propagator(a, b, count, channels, times)
+    assert propagator.state is not None
+    # A model that grows without bound overflows sooner in powers of Â than in single steps.
+    if times and not np.isfinite(propagator.state).all():
+        propagator = square_propagator(a, b, count, channels, 0)
+    return symmetric, propagator
 
 
 def _count_states(a: FloatArray, b: FloatArray, start: FloatArray, given: int | None) -> int:
@@ -155,7 +173,12 @@ def _input_steps(b: FloatArray, inputs: FloatArray) -> tuple[int, int]:
 
 
 def _run(
-    propagator: Propagator, start: FloatArray, inputs: FloatArray, steps: int, count: int
+    propagator: Propagator,
+    symmetric: FloatArray | None,
+    start: FloatArray,
+    inputs: FloatArray,
+    steps: int,
+    count: int,
 ) -> FloatArray:
     # In pieces of whole blocks of K steps; the state is handed on.
     windows, size = start.shape
@@ -171,6 +194,8 @@ def _run(
         rows = _input_rows(propagator, inputs, first, number)
         if propagator.state is None:
             newest_first, state = _run_shifting(propagator, state, rows)
+        elif symmetric is not None:
+            newest_first, state = _run_mirrored(propagator, symmetric, state, rows)
         else:
             newest_first, state = _run_square(propagator, state, rows)
         piece = out[:, first * K : (first + number) * K]
@@ -227,6 +252,26 @@ def _run_shifting(
             state = samples[:, at + width : at + width + size]
             samples[:, at : at + width] = state @ transposed + forcing[block]
     return samples[:, : number * width], samples[:, :size].copy()
+
+
+def _run_mirrored(
+    propagator: Propagator, symmetric: FloatArray, start: FloatArray, rows: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    assert propagator.state_input is not None
+    number, size, N = len(rows), start.shape[1], len(propagator.output_state)
+    # A row holds a state and, after it, what the symmetric product says beyond the oldest delay.
+    states = np.zeros((number + 1, size + N))
+    states[number, :size] = start[0]
+    np.matmul(rows, propagator.state_input.T, out=states[:number, :size])
+    half, newest = symmetric.T, np.ascontiguousarray(propagator.output_state).T
+    symv, gemv = blas.dsymv, blas.dgemv
+    state = states[number, :size]
+    for block in range(number - 1, -1, -1):
+        row = states[block]
+        symv(1.0, half, state, beta=1.0, y=row[N:], overwrite_y=1, lower=1)
+        gemv(1.0, newest, state, beta=1.0, y=row[:N], overwrite_y=1, trans=1)
+        state = row[:size]
+    return states[:number, :N].reshape(1, -1), states[:1, :size]
 
 
 def _run_square(

@@ -40,7 +40,7 @@ class ForecastWindow:
         Inputs after the start.
     steps : int
         Number of instants forecast.
-    time : DataArray, shape (steps,)
+    time : Variable, shape (steps,)
         These instants.
     """
 
@@ -50,7 +50,7 @@ class ForecastWindow:
     input_history: FloatArray
     input_future: FloatArray
     steps: int
-    time: xr.DataArray
+    time: xr.Variable
 
 
 def read_window(
@@ -104,7 +104,7 @@ def read_window(
         input_history=u[:needed],
         input_future=u[needed:],
         steps=count,
-        time=xr.DataArray(np.concatenate([instants, beyond]), dims="time", attrs=attrs),
+        time=xr.IndexVariable("time", np.concatenate([instants, beyond]), attrs),
     )
 
 
@@ -162,10 +162,10 @@ def label_forecast(
 ) -> xr.Dataset:
     """Dataset of a forecast of shape (steps, N), with units, spread in training, and status."""
     lost = np.flatnonzero(np.isnan(values).any(axis=1))
-    status = "ok" if lost.size == 0 else f"diverged at t = {float(window.time[lost[0]]):g} s"
+    status = "ok" if lost.size == 0 else f"diverged at t = {window.time.values[lost[0]]:g} s"
     variables = {
-        label.name: (
-            "time",
+        label.name: xr.Variable(
+            ("time",),
             values[:, column],
             {
                 "units": label.units,

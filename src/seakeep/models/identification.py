@@ -124,7 +124,8 @@ def gather(
     labels: tuple[tuple[ChannelLabel, ...], ...] = ()
     pieces = []
     for name, run in runs.items():
-        labelled.check_step(run, name, dt)
+        if run is not first_run:
+            labelled.check_step(run, name, dt)
         time = np.asarray(run["time"].values, dtype=float)
         last = _last_sample(time, stops[name], name)
         place = training_window(last, window, state_delays, input_delays, history)
