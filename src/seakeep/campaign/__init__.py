@@ -1,1 +1,16 @@
-"""Placeholder."""
+"""The campaign room: a TOML file and raw recordings in, analysis-ready runs out."""
+
+from seakeep.campaign.prepare import Campaign, read_campaign
+from seakeep.campaign.readers import read_table
+from seakeep.campaign.settings import ModelSettings, PriorSettings
+from seakeep.campaign.store import load_prepared, write_prepared
+
+__all__ = [
+    "Campaign",
+    "ModelSettings",
+    "PriorSettings",
+    "load_prepared",
+    "read_campaign",
+    "read_table",
+    "write_prepared",
+]
