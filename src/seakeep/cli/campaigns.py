@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 from rich import box
+from rich.markup import escape
 from rich.table import Table
 
 from seakeep.campaign import draft_campaign, read_campaign, write_prepared
@@ -86,12 +87,12 @@ def _list(context: typer.Context) -> None:
         table.add_row("origin", each.origin)
         table.add_row("licence", each.licence)
         table.add_row("cite", each.reference)
-        table.add_row("files", f"{len(each.files)}, SHA-256 of each below")
         table.add_row("here", state_of(each, folder))
         if each.note:
-            table.add_row("note", each.note)
+            table.add_row("note", escape(each.note))
+        table.add_row("files", "with their SHA-256")
         for name, checksum in each.files:
-            table.add_row("", f"{name}  {checksum}")
+            table.add_row("", escape(f"{name}  {checksum}"))
         table.add_section()
     results().print(table)
 
@@ -108,6 +109,7 @@ def _fetch(
 
     Example: seakeep datasets fetch ntnu_ship_section --to data
     """
+    dataset = find_dataset(name)
     folder = to or data_folder()
     if folder is None:
         raise RequestError(
@@ -115,6 +117,6 @@ def _fetch(
             "SEAKEEP_DATA_DIR."
         )
     with progress_bar("Fetching") as progress:
-        place = fetch(find_dataset(name), folder, progress)
+        place = fetch(dataset, folder, progress)
     typer.echo(str(place))
     messages().print(f"Set SEAKEEP_DATA_DIR={folder.resolve()} so that the examples find it.")

@@ -22,7 +22,7 @@ PIPE_WIDTH = 140
 def results() -> Console:
     """Console of results, on standard output."""
     width = None if sys.stdout.isatty() else PIPE_WIDTH
-    return Console(file=sys.stdout, width=width, highlight=False, soft_wrap=False)
+    return Console(file=sys.stdout, width=width, highlight=False, markup=False)
 
 
 def messages() -> Console:

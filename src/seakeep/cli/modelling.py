@@ -155,4 +155,6 @@ def _with_units(result: xr.Dataset) -> xr.Dataset:
         str(name): f"{name} [{variable.attrs.get('units', '')}]"
         for name, variable in result.data_vars.items()
     }
-    return result.rename({**names, "time": "time [s]"})
+    # Instants are multiples of a step; nine decimals hide the rounding of the product.
+    timed = result.assign_coords(time=result["time"].round(9))
+    return timed.rename({**names, "time": "time [s]"})
