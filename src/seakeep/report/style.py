@@ -43,7 +43,7 @@ _RC: Any = {
     "grid.color": "#D9D9D9",
     "grid.linewidth": 0.5,
     "legend.frameon": False,
-    "savefig.dpi": 150,
+    "savefig.dpi": 110,
     "svg.fonttype": "none",
 }
 
@@ -84,7 +84,9 @@ def save_figure(figure: Figure, path: Path) -> Path:
         If the file cannot be written.
     """
     with figure_style(), replacing(path) as temporary:
-        figure.savefig(temporary, format=path.suffix.removeprefix("."))
+        kind = path.suffix.removeprefix(".")
+        options = {"pil_kwargs": {"optimize": True}} if kind == "png" else {}
+        figure.savefig(temporary, format=kind, **options)
     return path
 
 
