@@ -21,6 +21,7 @@ from seakeep.campaign.validation import derivation_order
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError, SeakeepError
 from seakeep.signals import (
+    band_pass,
     differentiate,
     envelope_squared,
     integrate,
@@ -175,6 +176,9 @@ def _step(
         return integrate(series, dt, band, times), si_unit(f"({unit}) * s^{times}"), described
     if settings.step == "differentiate":
         return differentiate(series, dt), si_unit(f"({unit}) / s"), f"{name}, differentiated"
+    if settings.step == "band_pass":
+        band = settings.band or (0.0, 0.0)
+        return band_pass(series, dt, band), unit, f"{name}, {band[0]:g} to {band[1]:g} Hz"
     if settings.step == "low_pass":
         passband = settings.passband or 0.0
         described = f"{name}, low-passed at {passband:g} Hz"

@@ -132,6 +132,7 @@ class ChannelSettings(Table):
 
 
 _STEP_KEYS = {
+    "band_pass": {"band"},
     "integrate": {"times", "band"},
     "differentiate": set(),
     "low_pass": {"passband", "stopband"},
@@ -148,11 +149,13 @@ class DerivedSettings(Table):
     source: str | None = Field(
         default=None, alias="from", description="the channel that the step works on"
     )
-    step: Literal["integrate", "differentiate", "low_pass", "envelope_squared"] | None = Field(
-        default=None, description="what to do with the channel named by 'from'"
-    )
+    step: (
+        Literal["integrate", "differentiate", "band_pass", "low_pass", "envelope_squared"] | None
+    ) = Field(default=None, description="what to do with the channel named by 'from'")
     times: Literal[1, 2] | None = Field(default=None, description="integrate once or twice")
-    band: Span | None = Field(default=None, description="[low, high] in Hz, kept by 'integrate'")
+    band: Span | None = Field(
+        default=None, description="[low, high] in Hz, kept by 'integrate' and 'band_pass'"
+    )
     passband: Positive | None = Field(default=None, description="edge of the pass band, Hz")
     stopband: Positive | None = Field(default=None, description="edge of the stop band, Hz")
     unit: str | None = Field(
@@ -173,7 +176,11 @@ class DerivedSettings(Table):
             raise ValueError(f"step '{self.step}' needs 'from', the channel it works on")
         if extra := given - _STEP_KEYS[self.step]:
             raise ValueError(f"step '{self.step}' has no key {sorted(extra)[0]!r}; remove it")
-        for key, step in (("band", "integrate"), ("passband", "low_pass")):
+        for key, step in (
+            ("band", "integrate"),
+            ("band", "band_pass"),
+            ("passband", "low_pass"),
+        ):
             if self.step == step and getattr(self, key) is None:
                 raise ValueError(
                     f"step '{step}' needs '{key}' (Hz)"

@@ -1,1 +1,16 @@
-"""Placeholder."""
+"""The mathematics of the method: arrays in, arrays out, numpy and scipy only."""
+
+from seakeep.core.embedding import embed, snapshot_matrices, training_window, unembed
+from seakeep.core.regression import Solution, identify, solve
+from seakeep.core.rollout import rollout
+
+__all__ = [
+    "Solution",
+    "embed",
+    "identify",
+    "rollout",
+    "snapshot_matrices",
+    "solve",
+    "training_window",
+    "unembed",
+]

@@ -5,11 +5,12 @@ in hertz. Nothing here knows of files.
 """
 
 from seakeep.signals.clocks import resample, uniform_step
-from seakeep.signals.derive import differentiate, envelope_squared, integrate
+from seakeep.signals.derive import band_pass, differentiate, envelope_squared, integrate
 from seakeep.signals.filters import low_pass, lowpass_taps
 from seakeep.signals.spectra import encounter_period, zero_up_crossings
 
 __all__ = [
+    "band_pass",
     "differentiate",
     "encounter_period",
     "envelope_squared",

@@ -4,34 +4,167 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft
+from scipy import fft, signal
 
 from seakeep.errors import RequestError
 from seakeep.signals.filters import as_series, positive
 
-__all__ = ["differentiate", "envelope_squared", "integrate"]
+__all__ = ["band_pass", "differentiate", "envelope_squared", "integrate"]
 
 FloatArray = npt.NDArray[np.float64]
 
 
-def band_gain(
-    frequency: FloatArray, band: tuple[float, float], transition: float = 0.25
-) -> FloatArray:
-    """Gain of a band with raised-cosine flanks of `transition` times each edge outside it."""
+def band_gain(frequency: FloatArray, band: tuple[float, float]) -> FloatArray:
+    """Gain of a band with raised-cosine flanks, one half at either edge.
+
+    The lower flank is half the lower edge wide, the upper one a fifth of the upper edge.
+    """
     low, high = band
-    below = np.clip((frequency - (1 - transition) * low) / (transition * low), 0.0, 1.0)
-    above = np.clip(((1 + transition) * high - frequency) / (transition * high), 0.0, 1.0)
-    gain: FloatArray = np.sin(0.5 * np.pi * below) ** 2 * np.sin(0.5 * np.pi * above) ** 2
+    rise = np.clip((frequency - 0.75 * low) / (0.5 * low), 0.0, 1.0)
+    fall = np.clip((1.1 * high - frequency) / (0.2 * high), 0.0, 1.0)
+    gain: FloatArray = np.sin(0.5 * np.pi * rise) ** 2 * np.sin(0.5 * np.pi * fall) ** 2
     return gain
 
 
-def _filtered(array: FloatArray, dt: float, transfer: FloatArray, padding: int) -> FloatArray:
-    # Mirrored, not point-reflected: a reflection about the end value would shift the mean.
-    extended = np.pad(array, [(padding, padding)] + [(0, 0)] * (array.ndim - 1), mode="reflect")
-    shape = (-1,) + (1,) * (array.ndim - 1)
+def _filtered(extended: FloatArray, transfer: FloatArray, padding: int) -> FloatArray:
+    shape = (-1,) + (1,) * (extended.ndim - 1)
     spectrum = fft.rfft(extended, axis=0) * transfer.reshape(shape)
     out: FloatArray = fft.irfft(spectrum, n=extended.shape[0], axis=0)
-    return out[padding : padding + array.shape[0]]
+    return out[padding : extended.shape[0] - padding]
+
+
+def linear_prediction(series: FloatArray, order: int) -> FloatArray:
+    """Coefficients of an autoregressive model by Burg's method.
+
+    Parameters
+    ----------
+    series : ndarray, shape (time,)
+        Series with zero mean.
+    order : int
+        Order p, less than the number of samples.
+
+    Returns
+    -------
+    ndarray, shape (order,)
+        a with x[t] ≈ a[0] x[t−1] + … + a[p−1] x[t−p]. All poles lie inside the unit circle.
+
+    Notes
+    -----
+    J. P. Burg, Maximum entropy spectral analysis (1975): each reflection coefficient minimises
+    the sum of forward and backward prediction errors.
+    """
+    forward, backward = series[1:].copy(), series[:-1].copy()
+    polynomial = np.array([1.0])
+    floor = np.finfo(float).eps ** 2 * float(series @ series)
+    for _ in range(order):
+        power = float(forward @ forward + backward @ backward)
+        if power <= floor:
+            break
+        reflection = -2.0 * float(forward @ backward) / power
+        padded = np.append(polynomial, 0.0)
+        polynomial = padded + reflection * padded[::-1]
+        updated = forward + reflection * backward
+        backward = (backward + reflection * forward)[:-1]
+        forward = updated[1:]
+    out = np.zeros(order)
+    out[: polynomial.size - 1] = -polynomial[1:]
+    return out
+
+
+def predicted_extension(
+    array: FloatArray, count: int, fitted: int, order: int, fade: bool = True
+) -> FloatArray:
+    """Lengthen series at both ends by linear prediction from their own last samples.
+
+    A record that stops in the middle of a wave is continued by waves, so that a filter with a
+    long response is not fed a jump. The continuation fades out as a half cosine.
+
+    Parameters
+    ----------
+    array : ndarray, shape (time, …)
+        Series with zero mean.
+    count : int
+        Samples added at each end.
+    fitted : int
+        Samples from which each end's prediction is identified.
+    order : int
+        Order of the prediction.
+    fade : bool, optional
+        Whether the continuation fades out.
+
+    Returns
+    -------
+    ndarray, shape (time + 2 count, …)
+        The lengthened series.
+    """
+    flat = array.reshape(array.shape[0], -1)
+    fitted = min(fitted, flat.shape[0])
+    order = max(1, min(order, fitted // 3))
+    window = 0.5 * (1 + np.cos(np.pi * np.arange(1, count + 1) / (count + 1))) if fade else 1.0
+    out = np.empty((flat.shape[0] + 2 * count, flat.shape[1]))
+    for column, values in enumerate(flat.T):
+        ends = []
+        for inward in (values[::-1], values):
+            past = inward[-fitted:]
+            denominator = np.concatenate([[1.0], -linear_prediction(past, order)])
+            state = signal.lfiltic([1.0], denominator, past[: -order - 1 : -1])
+            ends.append(signal.lfilter([1.0], denominator, np.zeros(count), zi=state)[0] * window)
+        out[:, column] = np.concatenate([ends[0][::-1], values, ends[1]])
+    return out.reshape((-1, *array.shape[1:]))
+
+
+def _checked_band(band: tuple[float, float], dt: float) -> tuple[float, float]:
+    low, high = band
+    nyquist = 0.5 / positive("the time step", dt, "s")
+    if not 0 < low < high <= nyquist:
+        raise RequestError(
+            f"a band needs 0 < low < high, and high at most the Nyquist frequency ({nyquist:g} "
+            f"Hz); received ({low:g}, {high:g}) Hz. The lower edge keeps drift out: set it below "
+            "the slowest wave and above the drift."
+        )
+    return float(low), float(high)
+
+
+def _integrated(
+    series: npt.ArrayLike, dt: float, band: tuple[float, float], times: int
+) -> FloatArray:
+    array = as_series(series, minimum=4)
+    low, _ = edges = _checked_band(band, dt)
+    array = array - array.mean(axis=0)
+    # Eight periods of the lower edge outlast the ringing of its flank; a prediction needs to
+    # look back one and a half of them to tell the slowest wave from a trend.
+    padding = int(np.ceil(8.0 / (low * dt)))
+    order = min(int(np.ceil(1.6 / (low * dt))), 2000)
+    extended = predicted_extension(array, padding, fitted=padding, order=order)
+    frequency = fft.rfftfreq(extended.shape[0], dt)
+    gain = band_gain(frequency, edges)
+    omega = 2 * np.pi * np.where(gain > 0, frequency, 1.0)
+    return _filtered(extended, gain / (1j * omega) ** times, padding)
+
+
+def band_pass(series: npt.ArrayLike, dt: float, band: tuple[float, float]) -> FloatArray:
+    """Keep a band of frequencies, without phase shift.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,) or (time, channel)
+        Uniformly sampled series without gaps.
+    dt : float
+        Time step, s.
+    band : (float, float)
+        Lower and upper edge, Hz; the gain is one half there.
+
+    Returns
+    -------
+    ndarray
+        The series in the band, same shape and unit.
+
+    Raises
+    ------
+    RequestError
+        As :func:`integrate`, of which this is the case of no integration.
+    """
+    return _integrated(series, dt, band, 0)
 
 
 def integrate(
@@ -40,8 +173,10 @@ def integrate(
     r"""Integrate once or twice within a band of frequencies.
 
     The spectrum is divided by :math:`(i\omega)^n` inside the band and removed outside it, with
-    raised-cosine flanks a quarter of each edge wide. Drift, offset and slow trends lie below the
-    band and go; so does true motion that is slower than it.
+    raised-cosine flanks. Drift, offset and slow trends lie below the band and go; so does true
+    motion that is slower than it. Before that, either end of the record is continued by linear
+    prediction (Burg), because a record that stops in mid-wave otherwise spoils seconds of the
+    integral.
 
     Parameters
     ----------
@@ -50,14 +185,14 @@ def integrate(
     dt : float
         Time step, s.
     band : (float, float)
-        Lower and upper edge of the band kept, Hz.
+        Lower and upper edge of the band kept, Hz; the gain is one half there.
     times : {1, 2}, optional
         How often to integrate.
 
     Returns
     -------
     ndarray
-        The integral, same shape, its mean zero; the unit is the series' times s or s².
+        The integral, same shape; the unit is the series' times s or s².
 
     Raises
     ------
@@ -70,27 +205,12 @@ def integrate(
     >>> t = np.arange(0, 60, 0.01)
     >>> omega = 2 * np.pi * 0.8
     >>> heave = integrate(-omega**2 * np.cos(omega * t) + 0.3, 0.01, (0.3, 5.0), times=2)
-    >>> bool(np.max(np.abs(heave - np.cos(omega * t))[2000:-2000]) < 0.02)
+    >>> bool(np.max(np.abs(heave - np.cos(omega * t))) < 0.01)  # to the very ends
     True
     """
-    array = as_series(series, minimum=4)
-    low, high = band
     if times not in (1, 2):
         raise RequestError(f"integrate once or twice: times must be 1 or 2; received {times!r}.")
-    nyquist = 0.5 / positive("the time step", dt, "s")
-    if not 0 < low < high <= nyquist:
-        raise RequestError(
-            f"an integration band needs 0 < low < high, and high at most the Nyquist frequency "
-            f"({nyquist:g} Hz); received ({low:g}, {high:g}) Hz. The lower edge keeps drift out: "
-            "set it below the slowest wave and above the drift."
-        )
-    # The flank of the band rings for about the inverse of its width.
-    padding = min(array.shape[0] - 1, int(np.ceil(4.0 / (0.25 * low * dt))))
-    count = array.shape[0] + 2 * padding
-    frequency = fft.rfftfreq(count, dt)
-    omega = 2 * np.pi * np.maximum(frequency, 0.5 * low)
-    transfer = band_gain(frequency, (low, high)) / (1j * omega) ** times
-    return _filtered(array - array.mean(axis=0), dt, transfer, padding)
+    return _integrated(series, dt, band, times)
 
 
 def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
@@ -173,8 +293,8 @@ def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
     positive("the time step", dt, "s")
     array = array - array.mean(axis=0)
     padding = array.shape[0] - 1
-    count = array.shape[0] + 2 * padding
-    frequency = fft.rfftfreq(count)
-    quadrature = _filtered(array, dt, np.where(frequency > 0, -1j, 0.0), padding)
+    extended = np.pad(array, [(padding, padding)] + [(0, 0)] * (array.ndim - 1), mode="reflect")
+    frequency = fft.rfftfreq(extended.shape[0])
+    quadrature = _filtered(extended, np.where(frequency > 0, -1j, 0.0), padding)
     squared: FloatArray = array**2 + quadrature**2
     return squared

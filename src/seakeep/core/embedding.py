@@ -1,0 +1,163 @@
+r"""Delay embedding: training windows, extended snapshots and their matrices.
+
+The extended vectors are :math:`\hat x_j = [x_j; x_{j-1}; …; x_{j-s}]` and
+:math:`\hat u_j = [u_j; u_{j-1}; …; u_{j-z}]` (paper, equations of section HDMDc); the blocks are
+lag-major, the newest first. Series are ``(time, channel)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["History", "TrainingWindow", "embed", "snapshot_matrices", "training_window", "unembed"]
+
+FloatArray = npt.NDArray[np.float64]
+History = Literal["before", "inside"]
+
+
+@dataclass(frozen=True)
+class TrainingWindow:
+    """Which samples of a run train a model.
+
+    Parameters
+    ----------
+    first, last : int
+        First and last sample of the window, both included.
+    first_column : int
+        Sample j of the first snapshot pair (j, j+1).
+    """
+
+    first: int
+    last: int
+    first_column: int
+
+    @property
+    def columns(self) -> int:
+        """Number of snapshot pairs; zero or less where the run is too short."""
+        return self.last - self.first_column
+
+    @property
+    def samples(self) -> slice:
+        """The samples of the window, from which means and standard deviations are taken."""
+        return slice(self.first, self.last + 1)
+
+
+def training_window(
+    last: int, window: int | None, state_delays: int, input_delays: int, history: History
+) -> TrainingWindow:
+    """Place the window of `window` samples that ends at sample `last`.
+
+    Parameters
+    ----------
+    last : int
+        Last sample of the window.
+    window : int or None
+        Number of snapshots m; None takes all samples up to `last`.
+    state_delays, input_delays : int
+        s and z.
+    history : {"before", "inside"}
+        Whether the delay history of the first snapshot lies before the window (or, where the
+        run starts too late for that, as far into it as it must), or inside it.
+
+    Returns
+    -------
+    TrainingWindow
+        Its ``columns`` may be zero or negative: the caller knows the names for the message.
+    """
+    reach = max(state_delays, input_delays)
+    first = 0 if window is None else last - window + 1
+    earliest = first + reach if history == "inside" else reach
+    return TrainingWindow(first, last, max(first, earliest))
+
+
+def embed(series: FloatArray, delays: int, first: int, count: int) -> FloatArray:
+    """Extended snapshots as columns.
+
+    Parameters
+    ----------
+    series : ndarray, shape (time, channel)
+        Series.
+    delays : int
+        Number of delayed copies, s or z.
+    first, count : int
+        Sample of the first column, and the number of columns.
+
+    Returns
+    -------
+    ndarray, shape (channel * (delays + 1), count)
+        Column i holds sample ``first + i`` and the `delays` samples before it, newest first.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> embed(np.arange(5.0)[:, None], delays=1, first=1, count=4)
+    array([[1., 2., 3., 4.],
+           [0., 1., 2., 3.]])
+    """
+    channels = series.shape[1]
+    out = np.empty((channels * (delays + 1), count))
+    for lag in range(delays + 1):
+        out[lag * channels : (lag + 1) * channels] = series[first - lag : first - lag + count].T
+    return out
+
+
+def unembed(columns: FloatArray, channels: int) -> FloatArray:
+    """Recover the series from its extended snapshots; the inverse of :func:`embed`.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (channels * (delays + 1), count)
+        Extended snapshots of consecutive samples.
+    channels : int
+        Number of channels.
+
+    Returns
+    -------
+    ndarray, shape (delays + count, channels)
+        The samples from the oldest delayed one to the last column's newest.
+    """
+    blocks = columns.reshape(-1, channels, columns.shape[1])
+    oldest_first = blocks[:0:-1, :, 0]
+    return np.concatenate([oldest_first, blocks[0].T])
+
+
+def snapshot_matrices(
+    states: FloatArray,
+    inputs: FloatArray,
+    window: TrainingWindow,
+    state_delays: int,
+    input_delays: int,
+    all_rows: bool,
+) -> tuple[FloatArray, FloatArray]:
+    r"""Matrices :math:`\hat Y` and :math:`\hat X'` of one run (paper, equation of ``Y, X'``).
+
+    Parameters
+    ----------
+    states : ndarray, shape (time, N)
+        States x, standardised or not.
+    inputs : ndarray, shape (time, Q)
+        Inputs u; Q may be 0.
+    window : TrainingWindow
+        The samples to use.
+    state_delays, input_delays : int
+        s and z.
+    all_rows : bool
+        Whether the targets are all rows of the next extended snapshot, or its first N alone.
+
+    Returns
+    -------
+    regressors : ndarray, shape (N(s+1) + Q(z+1), columns)
+        Extended states over extended inputs.
+    targets : ndarray, shape (N(s+1) or N, columns)
+        Next extended states.
+    """
+    first, count = window.first_column, window.columns
+    regressors = np.concatenate(
+        [embed(states, state_delays, first, count), embed(inputs, input_delays, first, count)]
+    )
+    targets = embed(states, state_delays if all_rows else 0, first + 1, count)
+    return regressors, targets

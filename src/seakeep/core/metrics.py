@@ -1,0 +1,238 @@
+r"""Error measures of a forecast against a measurement (paper, section Performance metrics).
+
+Arrays are ``(…, time, channel)``; leading axes (members, windows) are kept. SD is the measured
+standard deviation over the window with ddof = 1, and k = 1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.errors import RequestError
+
+__all__ = [
+    "anrmse",
+    "error_over_time",
+    "fit_percent",
+    "nammae",
+    "normalised_extremes_error",
+    "nrmse",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+SLACK_PART = 0.01
+"""A channel whose measured SD is below this part of its training SD is not judged."""
+
+
+def paired(
+    predicted: npt.ArrayLike, measured: npt.ArrayLike, training_std: npt.ArrayLike | None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Check two histories and return them with the measured SD, NaN where a channel is slack."""
+    p, m = np.asarray(predicted, dtype=float), np.asarray(measured, dtype=float)
+    if m.ndim == 1 and p.ndim >= 1 and p.shape[-1:] == m.shape:
+        p, m = p[..., None], m[:, None]
+    if m.ndim < 2 or p.ndim < 2 or p.shape[-2:] != m.shape[-2:]:
+        hint = (
+            " One of them looks transposed."
+            if p.ndim == m.ndim == 2 and p.shape == m.shape[::-1]
+            else ""
+        )
+        raise RequestError(
+            f"predicted has shape {p.shape} and measured {m.shape}; both must end in "
+            f"(time, channel) of the same size.{hint}"
+        )
+    if m.shape[-2] < 2:
+        raise RequestError(
+            f"a window of {m.shape[-2]} sample(s) has no standard deviation; judge at least two."
+        )
+    spread = m.std(axis=-2, ddof=1)
+    reference = 0.0 if training_std is None else np.asarray(training_std, dtype=float)
+    slack = (spread <= 0) | (spread < SLACK_PART * reference)
+    return p, m, np.where(slack, np.nan, spread)
+
+
+def nrmse(
+    *,
+    predicted: npt.ArrayLike,
+    measured: npt.ArrayLike,
+    training_std: npt.ArrayLike | None = None,
+) -> FloatArray:
+    """Root mean square error of each channel, divided by its measured standard deviation.
+
+    Parameters
+    ----------
+    predicted, measured : array_like, shape (…, time, channel)
+        Histories in the same units.
+    training_std : array_like, shape (channel,), optional
+        Standard deviations in training; a channel whose measured SD is below 1 % of it (a slack
+        line) is NaN.
+
+    Returns
+    -------
+    ndarray, shape (…, channel)
+        NRMSE. A forecast that diverged (NaN) gives NaN too.
+
+    Raises
+    ------
+    RequestError
+        If the shapes differ or the window has fewer than two samples.
+    """
+    p, m, spread = paired(predicted, measured, training_std)
+    out: FloatArray = np.sqrt(np.mean((p - m) ** 2, axis=-2)) / spread
+    return out
+
+
+def anrmse(
+    *,
+    predicted: npt.ArrayLike,
+    measured: npt.ArrayLike,
+    training_std: npt.ArrayLike | None = None,
+) -> FloatArray:
+    """Average of :func:`nrmse` over the channels that can be judged (paper, equation ANRMSE).
+
+    Parameters
+    ----------
+    predicted, measured, training_std
+        As for :func:`nrmse`.
+
+    Returns
+    -------
+    ndarray, shape (…)
+        NaN if no channel can be judged, or the forecast diverged.
+
+    Raises
+    ------
+    RequestError
+        As :func:`nrmse`.
+    """
+    p, m, spread = paired(predicted, measured, training_std)
+    return _over_channels(np.sqrt(np.mean((p - m) ** 2, axis=-2)) / spread, spread)
+
+
+def error_over_time(
+    *,
+    predicted: npt.ArrayLike,
+    measured: npt.ArrayLike,
+    training_std: npt.ArrayLike | None = None,
+) -> FloatArray:
+    """ε(t): absolute error at each instant in measured SDs, averaged over the channels.
+
+    Parameters
+    ----------
+    predicted, measured, training_std
+        As for :func:`nrmse`.
+
+    Returns
+    -------
+    ndarray, shape (…, time)
+        ε (paper, equation of ε(t)).
+
+    Raises
+    ------
+    RequestError
+        As :func:`nrmse`.
+    """
+    p, m, spread = paired(predicted, measured, training_std)
+    return _over_channels(np.abs(p - m) / spread[..., None, :], spread[..., None, :])
+
+
+def normalised_extremes_error(
+    *,
+    predicted: npt.ArrayLike,
+    measured: npt.ArrayLike,
+    training_std: npt.ArrayLike | None = None,
+) -> FloatArray:
+    """Mean absolute error of minimum and maximum of each channel, in measured SDs.
+
+    Parameters
+    ----------
+    predicted, measured, training_std
+        As for :func:`nrmse`.
+
+    Returns
+    -------
+    ndarray, shape (…, channel)
+        The summand of :func:`nammae`.
+
+    Raises
+    ------
+    RequestError
+        As :func:`nrmse`.
+    """
+    p, m, spread = paired(predicted, measured, training_std)
+    low = np.abs(p.min(axis=-2) - m.min(axis=-2))
+    high = np.abs(p.max(axis=-2) - m.max(axis=-2))
+    out: FloatArray = 0.5 * (low + high) / spread
+    return out
+
+
+def nammae(
+    *,
+    predicted: npt.ArrayLike,
+    measured: npt.ArrayLike,
+    training_std: npt.ArrayLike | None = None,
+) -> FloatArray:
+    """Normalised average minimum/maximum absolute error (paper, equation NAMMAE).
+
+    Parameters
+    ----------
+    predicted, measured, training_std
+        As for :func:`nrmse`.
+
+    Returns
+    -------
+    ndarray, shape (…)
+        Average over the channels that can be judged.
+
+    Raises
+    ------
+    RequestError
+        As :func:`nrmse`.
+    """
+    each = normalised_extremes_error(
+        predicted=predicted, measured=measured, training_std=training_std
+    )
+    spread = paired(predicted, measured, training_std)[2]
+    return _over_channels(each, spread)
+
+
+def fit_percent(
+    *,
+    predicted: npt.ArrayLike,
+    measured: npt.ArrayLike,
+    training_std: npt.ArrayLike | None = None,
+) -> FloatArray:
+    r"""Fit of each channel as MATLAB's ``compare`` states it, percent.
+
+    Parameters
+    ----------
+    predicted, measured, training_std
+        As for :func:`nrmse`.
+
+    Returns
+    -------
+    ndarray, shape (…, channel)
+        :math:`100 (1 - \|y - \hat y\| / \|y - \bar y\|)`: 100 is perfect, 0 is no better than
+        the mean, negative is worse.
+
+    Raises
+    ------
+    RequestError
+        As :func:`nrmse`.
+    """
+    p, m, spread = paired(predicted, measured, training_std)
+    samples = m.shape[-2]
+    norm = np.sqrt(np.sum((p - m) ** 2, axis=-2))
+    out: FloatArray = 100.0 * (1.0 - norm / (spread * np.sqrt(samples - 1)))
+    return out
+
+
+def _over_channels(values: FloatArray, spread: FloatArray) -> FloatArray:
+    # A slack channel is left out; a diverged one (NaN with a sound spread) must not be.
+    judged = np.isfinite(np.broadcast_to(spread, values.shape))
+    count = judged.sum(axis=-1)
+    total = np.where(judged, values, 0.0).sum(axis=-1)
+    out: FloatArray = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    return out

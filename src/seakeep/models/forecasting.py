@@ -1,0 +1,258 @@
+"""Steps of a forecast: read the history, check it, label the result, say what a model is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.errors import RequestError
+from seakeep.models import labelled
+from seakeep.models.identification import Scale
+
+if TYPE_CHECKING:
+    from seakeep.models.model import HankelDMDcModel
+
+__all__ = ["ForecastWindow", "label_forecast", "modes", "read_window", "summary"]
+
+FloatArray = npt.NDArray[np.float64]
+
+DIVERGED = 1e6
+"""A free run is given up where a state is this many training SDs from its mean."""
+
+
+@dataclass(frozen=True, eq=False)
+class ForecastWindow:
+    """Measured samples that a forecast reads, and the instants it writes.
+
+    Parameters
+    ----------
+    name : str
+        The run.
+    start : float
+        Instant of the last measured state, s.
+    state_history, input_history : ndarray, shape (history_samples, channel)
+        Samples up to and including the start, physical units.
+    input_future : ndarray, shape (steps − 1, Q)
+        Inputs after the start.
+    steps : int
+        Number of instants forecast.
+    time : DataArray, shape (steps,)
+        These instants.
+    """
+
+    name: str
+    start: float
+    state_history: FloatArray
+    input_history: FloatArray
+    input_future: FloatArray
+    steps: int
+    time: xr.DataArray
+
+
+def read_window(
+    model: HankelDMDcModel, run: xr.Dataset, start: float, steps: int | None
+) -> ForecastWindow:
+    """Cut what a forecast needs out of a run; arguments and errors as ``forecast``."""
+    name = labelled.run_name(run, "the run")
+    labelled.check_run(run, name)
+    labelled.check_step(run, name, model.dt)
+    labelled.check_units(run, model.state_labels + model.input_labels, name)
+    time = np.asarray(run["time"].values, dtype=float)
+    at = labelled.nearest_sample(time, float(start), name)
+    needed = model.history_samples
+    if at + 1 < needed:
+        raise RequestError(
+            f"start = {time[at]:g} s leaves {at + 1} samples of history in {name} and the model "
+            f"needs {needed} (the start included): {needed - at - 1} are missing. Start at "
+            f"{time[0] + (needed - 1) * model.dt:g} s or later."
+        )
+    available = time.size - 1 - at
+    count = available if steps is None else steps
+    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
+        raise RequestError(
+            f"steps must be a positive integer; received {steps!r}"
+            f"{' at the end of the run' if steps is None else ''}. It counts the instants after "
+            "start."
+        )
+    count = int(count)
+    # The last input needed is the one an instant before the last state.
+    most = available + 1 if model.inputs else count
+    if count > most:
+        raise RequestError(
+            f"{count} steps from {time[at]:g} s need the input up to "
+            f"{time[at] + (count - 1) * model.dt:g} s and {name} ends at {time[-1]:g} s. "
+            f"At most {most} steps can be forecast from there."
+        )
+    first = at + 1 - needed
+    history = slice(first, at + 1)
+    inputs = slice(first, max(at + count, at + 1))
+    x = labelled.channel_matrix(run, model.states, name, history)
+    u = labelled.channel_matrix(run, model.inputs, name, inputs)
+    labelled.check_finite(x, model.states, name, first, time)
+    labelled.check_finite(u, model.inputs, name, first, time)
+    instants = time[at + 1 : at + 1 + count]
+    beyond = time[-1] + model.dt * np.arange(1, count - instants.size + 1)
+    attrs = dict(run["time"].attrs) or {"units": "s", "long_name": "time"}
+    return ForecastWindow(
+        name=name,
+        start=float(time[at]),
+        state_history=x,
+        input_history=u[:needed],
+        input_future=u[needed:],
+        steps=count,
+        time=xr.DataArray(np.concatenate([instants, beyond]), dims="time", attrs=attrs),
+    )
+
+
+def check_arrays(
+    model: HankelDMDcModel,
+    x_history: npt.ArrayLike,
+    u_history: npt.ArrayLike,
+    u_future: npt.ArrayLike,
+    steps: int,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the histories cut to (s+1, N) and (z + steps, Q); arguments as ``forecast_arrays``."""
+    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
+        raise RequestError(f"steps must be a positive integer; received {steps!r}.")
+    states, inputs = len(model.states), len(model.inputs)
+    s, z = model.state_delays, model.input_delays
+    x = _rows("x_history", x_history, s + 1, states, "s + 1")
+    if not inputs:
+        return x[-s - 1 :], np.zeros((int(steps), 0))
+    u = _rows("u_history", u_history, z + 1, inputs, "z + 1")
+    future = np.asarray(u_future, dtype=float)
+    if future.size == 0:
+        future = np.zeros((0, inputs))
+    future = _rows("u_future", future, int(steps) - 1, inputs, "steps − 1")
+    return x[-s - 1 :], np.concatenate([u[-z - 1 :], future[: int(steps) - 1]])
+
+
+def _rows(name: str, value: npt.ArrayLike, least: int, channels: int, meaning: str) -> FloatArray:
+    array = np.asarray(value, dtype=float)
+    if array.ndim != 2 or array.shape[1] != channels or array.shape[0] < least:
+        turned = array.ndim == 2 and array.shape[0] == channels and array.shape[1] >= least
+        raise RequestError(
+            f"{name} has shape {array.shape}; expected (time, channel) with at least {least} rows "
+            f"({meaning}) and {channels} columns.{' It looks transposed.' if turned else ''}"
+        )
+    if not np.all(np.isfinite(array)):
+        raise RequestError(
+            f"{name} holds {int(np.sum(~np.isfinite(array)))} values that are not finite. "
+            "Fill the gap first."
+        )
+    return array
+
+
+def cut_divergence(values: FloatArray, scale: Scale) -> FloatArray:
+    """NaN from the instant on at which a state is lost; values are (…, time, channel)."""
+    spread = np.where(scale.spread > 0, scale.spread, np.inf)
+    centre = scale.mean
+    lost = ~np.all(np.abs(values - centre) <= DIVERGED * spread, axis=-1)
+    if np.any(lost):
+        values[np.logical_or.accumulate(lost, axis=-1)] = np.nan
+    return values
+
+
+def label_forecast(
+    model: HankelDMDcModel, window: ForecastWindow, values: FloatArray
+) -> xr.Dataset:
+    """Dataset of a forecast of shape (steps, N), with units, spread in training, and status."""
+    lost = np.flatnonzero(np.isnan(values).any(axis=1))
+    status = "ok" if lost.size == 0 else f"diverged at t = {float(window.time[lost[0]]):g} s"
+    variables = {
+        label.name: (
+            "time",
+            values[:, column],
+            {
+                "units": label.units,
+                "long_name": label.long_name,
+                "training_std": float(model.state_scale.spread[column]),
+            },
+        )
+        for column, label in enumerate(model.state_labels)
+    }
+    return xr.Dataset(
+        variables,
+        coords={"time": window.time},
+        attrs={"run": window.name, "start": window.start, "status": status},
+    )
+
+
+def modes(eigenvalues: npt.NDArray[np.complex128], dt: float) -> xr.Dataset:
+    """Modes of a discrete system from its eigenvalues; see ``HankelDMDcModel.modes``."""
+    kept = eigenvalues[eigenvalues.imag >= 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        poles = np.log(kept.astype(complex)) / dt
+        natural = np.abs(poles)
+        frequency = np.abs(poles.imag) / (2 * np.pi)
+        damping = np.where(natural > 0, -poles.real / natural, 1.0)
+        decay = np.where(poles.real < 0, -1.0 / poles.real, np.inf)
+        period = np.where(frequency > 0, 1.0 / frequency, np.inf)
+    table = {
+        "eigenvalue": (kept, "1", "eigenvalue of the discrete system"),
+        "modulus": (np.abs(kept), "1", "modulus of the eigenvalue"),
+        "frequency": (frequency, "Hz", "damped frequency"),
+        "natural_frequency": (natural / (2 * np.pi), "Hz", "natural frequency"),
+        "period": (period, "s", "damped period"),
+        "damping_ratio": (damping, "1", "damping ratio"),
+        "decay_time": (decay, "s", "time to decay to 1/e"),
+    }
+    return xr.Dataset(
+        {
+            name: ("mode", values, {"units": units, "long_name": label})
+            for name, (values, units, label) in table.items()
+        }
+    )
+
+
+def summary(model: HankelDMDcModel) -> str:
+    """Text of ``HankelDMDcModel.summary``."""
+    settings, training = model.settings, model.training
+    states, inputs = len(model.states), len(model.inputs)
+    lines = [
+        f"Hankel DMD with control: {states} states, {inputs} inputs, dt {model.dt:g} s",
+        f"  states        {', '.join(_with_units(model.state_labels))}",
+        f"  inputs        {', '.join(_with_units(model.input_labels)) or 'none (autonomous)'}",
+        f"  delays        {model.state_delays} of the states ({model.state_delays * model.dt:g} s),"
+        f" {model.input_delays} of the inputs ({model.input_delays * model.dt:g} s)",
+        f"  history       {model.history_samples} samples up to the start of a forecast",
+        f"  regression    {_regression(model)}; delay rows "
+        f"{'exact' if settings.delay_rows == 'exact' else 'regressed'}",
+        f"  training      {sum(training.columns)} snapshot pairs of {len(training.runs)} run(s)",
+    ]
+    lines += [
+        f"    {name}: {columns} pairs, {first:g} to {stop:g} s"
+        for name, columns, first, stop in zip(
+            training.runs, training.columns, training.first, training.stop, strict=True
+        )
+    ]
+    radius = model.spectral_radius
+    verdict = "stable" if radius < 1 else "UNSTABLE: long forecasts diverge"
+    lines.append(f"  stability     spectral radius {radius:.6f} ({verdict})")
+    table = model.modes()
+    for mode in range(min(5, table.sizes["mode"])):
+        at = table.isel(mode=mode)
+        lines.append(
+            f"    mode {mode + 1}: {float(at.natural_frequency):.4g} Hz, damping ratio "
+            f"{float(at.damping_ratio):.3g}, |eigenvalue| {float(at.modulus):.6f}"
+        )
+    return "\n".join(lines)
+
+
+def _with_units(labels: tuple[labelled.ChannelLabel, ...]) -> list[str]:
+    return [f"{label.name} [{label.units or '?'}]" for label in labels]
+
+
+def _regression(model: HankelDMDcModel) -> str:
+    training = model.training
+    if model.settings.rank is not None:
+        return f"truncated SVD of rank {training.rank}"
+    form = {"primal": "primal form", "dual": "dual form", "svd": "singular values"}
+    per = ""
+    if model.settings.ridge_scale == "per_snapshot":
+        per = f" ({model.settings.ridge:g} a snapshot pair)"
+    return f"ridge {training.ridge:g}{per}, {form[training.method]}"

@@ -1,0 +1,239 @@
+"""The thin layer between labelled runs and arrays: Datasets in, arrays out, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.signals import uniform_step
+
+__all__ = ["ChannelLabel", "as_runs", "channel_labels", "channel_matrix", "nearest_sample"]
+
+FloatArray = npt.NDArray[np.float64]
+Runs = xr.Dataset | Sequence[xr.Dataset] | Mapping[str, xr.Dataset]
+
+
+@dataclass(frozen=True)
+class ChannelLabel:
+    """Name, unit and long name of a channel of a model.
+
+    Parameters
+    ----------
+    name, units, long_name : str
+        As in the variable and its attributes; empty where the run did not say.
+    """
+
+    name: str
+    units: str
+    long_name: str
+
+
+def as_runs(runs: Runs) -> dict[str, xr.Dataset]:
+    """Name the runs.
+
+    Parameters
+    ----------
+    runs : Dataset, sequence of Dataset, or mapping of names to Datasets
+        What the user passed. A run without a name takes its ``attrs["run"]``, else a number.
+
+    Returns
+    -------
+    dict of str to Dataset
+        At least one run.
+
+    Raises
+    ------
+    RequestError
+        If there is no run, or something is not a Dataset.
+    """
+    named: dict[str, xr.Dataset] = {}
+    if isinstance(runs, xr.Dataset):
+        named[run_name(runs, "run")] = runs
+    elif isinstance(runs, Mapping):
+        named.update(cast("Mapping[str, xr.Dataset]", runs))
+    else:
+        for number, run in enumerate(runs, start=1):
+            name = run_name(run, f"run {number}")
+            named[name if name not in named else f"{name} ({number})"] = run
+    if not named:
+        raise RequestError("no run was given. Pass one Dataset, a sequence or a mapping of them.")
+    for name, run in named.items():
+        check_run(run, name)
+    return named
+
+
+def run_name(run: object, fallback: str) -> str:
+    """Name that a run carries in its attributes, or `fallback`."""
+    return str(run.attrs.get("run", fallback)) if isinstance(run, xr.Dataset) else fallback
+
+
+def check_run(run: object, name: str) -> None:
+    """Refuse what is not a Dataset with a ``time`` coordinate."""
+    if not isinstance(run, xr.Dataset):
+        raise RequestError(
+            f"{name} is a {type(run).__name__}; a run is an xarray.Dataset with the dimension "
+            "'time' and one variable a channel. Build one, or read it with seakeep.read_campaign."
+        )
+    if "time" not in run.dims or "time" not in run.coords:
+        raise RequestError(
+            f"{name} has no coordinate 'time' (dimensions: {', '.join(map(str, run.dims))}). "
+            "Give every channel the dimension 'time' and the instants in seconds."
+        )
+
+
+def run_step(run: xr.Dataset, name: str) -> float:
+    """Time step of a run, s; its times must be uniform.
+
+    Raises
+    ------
+    DataError
+        If the times are unsorted, repeated or not uniform.
+    """
+    time = run["time"].values
+    if not np.issubdtype(time.dtype, np.number):
+        raise DataError(
+            f"the times of {name} are of type {time.dtype}; seconds as numbers are expected. "
+            "Subtract the first instant and divide by one second."
+        )
+    return uniform_step(time, name)
+
+
+def check_step(run: xr.Dataset, name: str, expected: float) -> None:
+    """Refuse a run whose step is not `expected` (s).
+
+    A step read from rounded times is known to about the rounding divided by the number of
+    samples; one part in ten thousand is beyond that and far below a wrong sampling rate.
+    """
+    step = run_step(run, name)
+    if abs(step - expected) > 1e-4 * expected:
+        raise DataError(
+            f"{name} has a time step of {step:.6g} s and the model one of {expected:.6g} s. "
+            "Resample the run (seakeep.signals.resample, or the campaign's [preparation])."
+        )
+
+
+def channel_matrix(
+    run: xr.Dataset, names: Sequence[str], name: str, samples: slice = slice(None)
+) -> FloatArray:
+    """Channels of a run side by side.
+
+    Parameters
+    ----------
+    run : Dataset
+        The run.
+    names : sequence of str
+        Channels, in the order wanted.
+    name : str
+        What messages call the run.
+    samples : slice, optional
+        Samples to take.
+
+    Returns
+    -------
+    ndarray, shape (samples, channels)
+        Double precision, whatever the run holds.
+
+    Raises
+    ------
+    RequestError
+        If a channel is missing.
+    DataError
+        If a channel has another dimension than ``time``, or is not numeric.
+    """
+    size = len(range(*samples.indices(run.sizes["time"])))
+    out = np.empty((size, len(names)))
+    for column, channel in enumerate(names):
+        if channel not in run.data_vars:
+            known = [str(variable) for variable in run.data_vars]
+            raise RequestError(
+                f"{name} has no channel '{channel}'.{did_you_mean(channel, known)} "
+                f"It has: {', '.join(known)}."
+            )
+        variable = run[channel].variable
+        if variable.dims != ("time",):
+            raise DataError(
+                f"channel '{channel}' of {name} has the dimensions {variable.dims} and shape "
+                f"{variable.shape}; ('time',) is expected. Give each channel its own variable."
+            )
+        if not (np.issubdtype(variable.dtype, np.number) or variable.dtype == bool):
+            raise DataError(
+                f"channel '{channel}' of {name} is of type {variable.dtype}, not a number. "
+                "Convert the column, or leave it out of the run."
+            )
+        out[:, column] = variable.values[samples]
+    return out
+
+
+def check_finite(
+    values: FloatArray, names: Sequence[str], name: str, first: int, time: FloatArray
+) -> None:
+    """Refuse gaps; `first` is the sample of the first row of `values` in the run."""
+    if np.all(np.isfinite(values)):
+        return
+    bad = ~np.isfinite(values)
+    row, column = (int(index) for index in np.argwhere(bad)[0])
+    raise DataError(
+        f"channel '{names[column]}' of {name} has {int(bad[:, column].sum())} missing or infinite "
+        f"value(s) in the samples needed, the first at t = {time[first + row]:g} s. Fill the gap, "
+        "or choose a window without it: nothing is filled in silence."
+    )
+
+
+def channel_labels(run: xr.Dataset, names: Sequence[str]) -> tuple[ChannelLabel, ...]:
+    """Labels of channels as the run states them."""
+    return tuple(
+        ChannelLabel(
+            channel,
+            str(run[channel].attrs.get("units", "")),
+            str(run[channel].attrs.get("long_name", channel.replace("_", " "))),
+        )
+        for channel in names
+    )
+
+
+def check_units(run: xr.Dataset, labels: Sequence[ChannelLabel], name: str) -> None:
+    """Refuse a run that states another unit for a channel than the model was trained in."""
+    for label in labels:
+        units = run[label.name].attrs.get("units") if label.name in run.data_vars else None
+        if units and label.units and str(units) != label.units:
+            raise DataError(
+                f"channel '{label.name}' of {name} is in '{units}' and the model expects "
+                f"'{label.units}'. Convert the channel and its units attribute."
+            )
+
+
+def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "start") -> int:
+    """Sample nearest to an instant.
+
+    Parameters
+    ----------
+    time : ndarray, shape (time,)
+        Uniform instants, s.
+    instant : float
+        Instant wanted, s.
+    name, what : str
+        What the message calls the run and the instant.
+
+    Returns
+    -------
+    int
+        Index of the nearest sample.
+
+    Raises
+    ------
+    RequestError
+        If the instant is more than half a step outside the run, or not a number.
+    """
+    step = (time[-1] - time[0]) / (time.size - 1)
+    if not time[0] - 0.5 * step <= instant <= time[-1] + 0.5 * step:
+        raise RequestError(
+            f"{what} = {instant:g} s is outside {name}, which runs from {time[0]:g} to "
+            f"{time[-1]:g} s. Choose an instant inside it."
+        )
+    return int(np.clip(np.rint((instant - time[0]) / step), 0, time.size - 1))

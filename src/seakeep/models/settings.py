@@ -1,0 +1,131 @@
+"""Settings of a model, their checks, and the conversion of periods to samples."""
+
+from __future__ import annotations
+
+import math
+import numbers
+import warnings
+from dataclasses import dataclass
+from typing import Literal
+
+from seakeep.core.embedding import History
+from seakeep.errors import RequestError, SeakeepWarning
+
+__all__ = [
+    "DelayRows",
+    "HankelSettings",
+    "History",
+    "RidgeScale",
+    "check_choice",
+    "check_integer",
+    "check_ridge",
+    "periods_to_samples",
+]
+
+DelayRows = Literal["ridge", "exact"]
+RidgeScale = Literal["absolute", "per_snapshot"]
+
+
+def periods_to_samples(periods: float, encounter_period: float, dt: float) -> int:
+    """Number of samples of a time in encounter periods, to the nearest integer.
+
+    Parameters
+    ----------
+    periods : float
+        Length in encounter periods.
+    encounter_period : float
+        Encounter period, s.
+    dt : float
+        Time step, s.
+
+    Returns
+    -------
+    int
+        Samples, halves rounded up (the paper's text; its box writes the floor).
+
+    Raises
+    ------
+    RequestError
+        If period or step are not positive.
+    """
+    for name, value in (("encounter_period", encounter_period), ("dt", dt)):
+        if not (math.isfinite(value) and value > 0):
+            raise RequestError(f"{name} must be a positive number of seconds; received {value!r}.")
+    return math.floor(periods * encounter_period / dt + 0.5)
+
+
+def check_integer(name: str, value: object, least: int, optional: bool = False) -> None:
+    """Refuse a setting that is not an integer of at least `least` (or None, if `optional`)."""
+    if optional and value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < least:
+        hint = " Round it to an integer." if isinstance(value, float) else ""
+        raise RequestError(
+            f"{name} must be an integer of at least {least}{' or None' if optional else ''}; "
+            f"received {value!r}.{hint}"
+        )
+
+
+def check_ridge(value: object) -> None:
+    """Refuse a λ that is not a number, zero or positive."""
+    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    if not real or not math.isfinite(value) or value < 0:  # type: ignore[arg-type,operator]
+        raise RequestError(
+            f"ridge must be a number, zero or positive; received {value!r}. "
+            "The paper uses 100; 0 asks for the solution of least norm."
+        )
+
+
+def check_choice(name: str, value: object, choices: tuple[str, str]) -> None:
+    """Refuse a setting that is none of two words."""
+    if value not in choices:
+        raise RequestError(f"{name} must be '{choices[0]}' or '{choices[1]}'; received {value!r}.")
+
+
+@dataclass(frozen=True)
+class HankelSettings:
+    """What a model was asked to be; see :class:`seakeep.HankelDMDc` for the meaning of each.
+
+    Raises
+    ------
+    RequestError
+        If a setting is out of range.
+    """
+
+    state_delays: int
+    input_delays: int
+    ridge: float
+    window: int | None = None
+    history: History = "before"
+    delay_rows: DelayRows = "ridge"
+    ridge_scale: RidgeScale = "absolute"
+    rank: int | None = None
+    standardize: bool = True
+    alignment: None = None
+
+    def __post_init__(self) -> None:
+        check_integer("state_delays", self.state_delays, 0)
+        check_integer("input_delays", self.input_delays, 0)
+        check_integer("window", self.window, 2, optional=True)
+        check_integer("rank", self.rank, 1, optional=True)
+        check_ridge(self.ridge)
+        check_choice("history", self.history, ("before", "inside"))
+        check_choice("delay_rows", self.delay_rows, ("ridge", "exact"))
+        check_choice("ridge_scale", self.ridge_scale, ("absolute", "per_snapshot"))
+        if self.alignment is not None:
+            raise RequestError(
+                f"alignment is not available in this version; received {self.alignment!r}. "
+                "Leave it None, or align the elevation channels before fitting."
+            )
+        if self.rank is not None and self.ridge > 0:
+            warnings.warn(
+                f"rank = {self.rank} truncates singular values instead of regularising, so "
+                f"ridge = {self.ridge:g} is not used. Set ridge=0 to say so.",
+                SeakeepWarning,
+                stacklevel=4,
+            )
+
+    @property
+    def history_samples(self) -> int:
+        """Samples up to and including the start that a forecast needs: max(s, z) + 1."""
+        return max(self.state_delays, self.input_delays) + 1
