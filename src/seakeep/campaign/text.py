@@ -255,7 +255,7 @@ def _numbers(
         out = np.full(len(cells), np.nan)
         for row, cell in enumerate(cells):
             try:
-                out[row] = np.nan if cell is None else float(cell.replace(layout.decimal, "."))
+                out[row] = np.nan if cell is None else _number(cell, layout.decimal)
             except ValueError:
                 faults[names[i]] = (
                     f"{path}, line {layout.body[row][0]}, column '{names[i]}': {cell!r} is not a "
@@ -266,3 +266,10 @@ def _numbers(
         else:
             values[names[i]] = out
     return values, faults
+
+
+def _number(cell: str, decimal: str) -> float:
+    if decimal == ",":
+        # A point would divide thousands, or the file mixes both marks: neither is guessed at.
+        cell = cell.replace(".", "?").replace(",", ".")
+    return float(cell)
