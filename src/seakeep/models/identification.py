@@ -132,9 +132,12 @@ def gather(
         reach = place.first_column - max(state_delays, input_delays)
         samples = slice(min(place.first, reach), last + 1)
         arrays = []
-        for channels in (states, inputs):
+        for channels, delays in ((states, state_delays), (inputs, input_delays)):
             values = labelled.channel_matrix(run, channels, name, samples)
-            labelled.check_finite(values, channels, name, samples.start, time)
+            # Each group reaches back by its own delays, and the moments over the window.
+            needed = min(place.first, place.first_column - delays)
+            unread = needed - samples.start
+            labelled.check_finite(values[unread:], channels, name, needed, time)
             arrays.append(values)
         labels = labels or tuple(labelled.channel_labels(run, names) for names in (states, inputs))
         for group in labels:
@@ -198,7 +201,7 @@ def _stops(stop: Stop, names: list[str]) -> dict[str, float | None]:
                 f"({', '.join(names)}).{did_you_mean(unknown[0], names)}"
             )
         return {name: stop.get(name) for name in names}
-    if not np.isscalar(stop):
+    if np.ndim(stop) > 0:  # a scalar array, such as an instant of a run, is one for all
         values = [float(value) for value in np.asarray(stop, dtype=float)]
         if len(values) != len(names):
             raise RequestError(
