@@ -159,7 +159,8 @@ def cut_divergence(values: FloatArray, scale: Scale) -> FloatArray:
     """NaN from the instant on at which a state is lost; values are (…, time, channel)."""
     spread = np.where(scale.spread > 0, scale.spread, np.inf)
     centre = scale.mean
-    lost = ~np.all(np.abs(values - centre) <= DIVERGED * spread, axis=-1)
+    kept = np.isfinite(values) & (np.abs(values - centre) <= DIVERGED * spread)
+    lost = ~np.all(kept, axis=-1)
     if np.any(lost):
         values[np.logical_or.accumulate(lost, axis=-1)] = np.nan
     return values

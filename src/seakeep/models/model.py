@@ -267,7 +267,9 @@ class HankelDMDcModel:
             self.input_scale.deviations(u)[None],
             n_states=len(self.state_labels),
         )[0]
-        return forecasting.cut_divergence(self.state_scale.physical(deviations), self.state_scale)
+        with np.errstate(over="ignore"):  # a run that is lost is cut just below
+            values = self.state_scale.physical(deviations)
+        return forecasting.cut_divergence(values, self.state_scale)
 
     def to_state_space(self) -> signal.StateSpace:
         """Discrete state-space system in physical deviations from the means.
