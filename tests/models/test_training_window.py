@@ -220,7 +220,9 @@ def test_fitting_leaves_the_settings_and_the_run_as_they_were(run, channels):
         model.dt = 1.0
 
 
-@pytest.mark.parametrize("name", ["A", "B", "state_mean", "state_std", "input_mean", "input_std"])
+@pytest.mark.parametrize(
+    "name", ["A", "B", "eigenvalues", "state_mean", "state_std", "input_mean", "input_std"]
+)
 @pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
 def test_the_arrays_of_a_model_cannot_be_written(run, channels, name, delay_rows):
     model = HankelDMDc(3, 8, 1.0, delay_rows=delay_rows).fit(run, **channels)
