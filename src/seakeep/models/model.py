@@ -400,6 +400,12 @@ class HankelDMDcModel:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeakeepWarning)  # given when the model was made
             settings = HankelSettings(**parts.settings)
+        states, inputs = (len(parts.labels[group]) for group in ("state", "input"))
+        extended = states * (settings.state_delays + 1)
+        rows = extended if settings.delay_rows == "ridge" else states
+        shape = (rows, extended + inputs * (settings.input_delays + 1))
+        if parts.coefficients.shape != shape:
+            raise ValueError(f"coefficients have shape {parts.coefficients.shape}, not {shape}")
         return cls(
             settings=settings,
             coefficients=parts.coefficients,
