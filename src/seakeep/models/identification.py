@@ -250,10 +250,11 @@ def _moments(
         [values[window.samples] for values, window in zip(series, windows, strict=True)]
     )
     mean, spread = pooled.mean(axis=0), pooled.std(axis=0, ddof=1)
-    if not standardize:
-        return Scale(np.zeros(mean.size), np.ones(mean.size), spread)
     # A constant that is not a binary fraction has a spread of rounding, not of zero.
     constant = spread <= 1e-12 * np.abs(pooled).max(axis=0, initial=0.0)
+    spread = np.where(constant, 0.0, spread)
+    if not standardize:
+        return Scale(np.zeros(mean.size), np.ones(mean.size), spread)
     if np.any(constant):
         column = int(np.flatnonzero(constant)[0])
         raise DataError(
