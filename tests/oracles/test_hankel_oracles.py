@@ -1,11 +1,13 @@
 """The model against outside packages: pykoop, scikit-learn, python-control, scipy, plain numpy."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 import xarray as xr
 from scipy import signal
 
-from seakeep import HankelDMDc
+from seakeep import HankelDMDc, HankelDMDcModel
 
 pytestmark = pytest.mark.oracle
 
@@ -122,37 +124,91 @@ def test_the_first_rows_equal_scikit_learn(make_run, delay_rows, samples, ridge)
     np.testing.assert_allclose(ours, oracle.coef_, rtol=0, atol=SAME_MATRICES)
 
 
-@pytest.mark.parametrize("standardize", [False, True])
-@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
-@pytest.mark.parametrize(("s", "z"), [(4, 7), (6, 3), (5, 0), (3, 1)])
-def test_the_exported_system_forecasts_the_same(make_run, s, z, delay_rows, standardize):
+@dataclass(frozen=True)
+class Exported:
+    """A model, what drives its exported system, and the forecast to compare with."""
+
+    model: HankelDMDcModel
+    deviations: np.ndarray
+    initial_state: np.ndarray
+    measured: np.ndarray
+    forecast: np.ndarray
+
+
+@pytest.fixture(params=[(4, 7), (6, 3), (5, 0), (3, 1)], ids=lambda delays: f"s, z = {delays}")
+def delays(request):
+    return request.param
+
+
+@pytest.fixture(params=["ridge", "exact"])
+def exported(request, make_run, delays):
     run = make_run(samples=300)
-    model = fit(run, s, z, ridge=2.0, delay_rows=delay_rows, standardize=standardize)
+    # Ridge enough for a stable model: an unstable one would compare rounding of large numbers.
+    model = fit(run, *delays, ridge=2.0, delay_rows=request.param, standardize=True)
     assert model.spectral_radius < 1
     start, steps = 100, 150
-    instants = run.time.values[start : start + steps + 1]
-    deviations = matrix(run, INPUTS)[start : start + steps + 1] - model.input_mean
-    state = model.initial_state(run, start=float(instants[0]))
-    ours = matrix(model.forecast(run, start=float(instants[0]), steps=steps), STATES)
+    instant = float(run.time[start])
+    return Exported(
+        model,
+        matrix(run, INPUTS)[start : start + steps + 1] - model.input_mean,
+        model.initial_state(run, start=instant),
+        matrix(run, STATES)[start],
+        matrix(model.forecast(run, start=instant, steps=steps), STATES),
+    )
 
-    system = model.to_state_space()
-    assert system.dt == model.dt
+
+def test_scipy_simulates_the_exported_system_like_our_forecast(exported, delays):
+    s, z = delays
+    system = exported.model.to_state_space()
+    assert isinstance(system, signal.StateSpace)
+    assert system.dt == exported.model.dt
     assert not np.any(system.D)
     assert system.A.shape == (N * (s + 1) + Q * z,) * 2
-    _, output, _ = signal.dlsim(system, deviations, x0=state)
-    # The first output is the measured state at the start; SI values are of order one.
-    np.testing.assert_allclose(
-        output[0] + model.state_mean, matrix(run, STATES)[start], rtol=0, atol=1e-12
-    )
-    np.testing.assert_allclose(output[1:] + model.state_mean, ours, rtol=0, atol=1e-10)
+    _, output, _ = signal.dlsim(system, exported.deviations, x0=exported.initial_state)
+    physical = output + exported.model.state_mean
+    # The first output is the measured state at the start; values are of order one.
+    np.testing.assert_allclose(physical[0], exported.measured, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(physical[1:], exported.forecast, rtol=0, atol=1e-10)
 
+
+def test_python_control_simulates_the_exported_system_like_our_forecast(exported):
     control = pytest.importorskip("control")
-    named = model.to_control()
-    assert (named.input_labels, named.output_labels) == (INPUTS, STATES)
+    system = exported.model.to_control()
+    assert (system.input_labels, system.output_labels) == (INPUTS, STATES)
+    assert system.dt == exported.model.dt
     response = control.forced_response(
-        named, model.dt * np.arange(steps + 1), deviations.T, initial_state=state
+        system,
+        exported.model.dt * np.arange(len(exported.deviations)),
+        exported.deviations.T,
+        initial_state=exported.initial_state,
     )
-    np.testing.assert_allclose(response.outputs.T[1:] + model.state_mean, ours, rtol=0, atol=1e-10)
+    physical = response.outputs.T + exported.model.state_mean
+    np.testing.assert_allclose(physical[1:], exported.forecast, rtol=0, atol=1e-10)
+
+
+def test_the_exported_system_without_standardisation_holds_the_matrices_themselves(make_run):
+    model = fit(make_run(), 2, 0)
+    system = model.to_state_space()
+    np.testing.assert_array_equal(system.A, model.A)
+    np.testing.assert_array_equal(system.B, model.B)
+
+
+@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
+@pytest.mark.parametrize("rank", [4, 12])
+def test_a_rank_equals_truncated_singular_values_in_plain_numpy(make_run, rank, delay_rows):
+    s, z = 3, 8
+    run = make_run(samples=200)
+    model = fit(run, s, z, ridge=0.0, rank=rank, delay_rows=delay_rows)
+    x, u = matrix(run, STATES), matrix(run, INPUTS)
+    columns = np.arange(z, 199)
+    y = np.vstack(
+        [x[columns - lag].T for lag in range(s + 1)] + [u[columns - lag].T for lag in range(z + 1)]
+    )
+    left, values, right = np.linalg.svd(y, full_matrices=False)
+    g = x[columns + 1].T @ right[:rank].T / values[:rank] @ left[:, :rank].T
+    ours = np.concatenate([model.A[:N], model.B[:N]], axis=1)
+    # Singular values kept are above 1e-2 of the largest, so the pseudo-inverse keeps 1e-13.
+    np.testing.assert_allclose(ours, g, rtol=0, atol=SAME_MATRICES)
 
 
 def test_the_papers_formula_in_plain_numpy_at_the_papers_size():
