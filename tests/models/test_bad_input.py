@@ -39,7 +39,11 @@ def broken_times():
             repeated, r"times of .* repeat: 2\.45 s stands at samples 49 and 50", id="repeated"
         ),
         pytest.param(unsorted, r"times of .* are not sorted: .* Sort the rows", id="unsorted"),
-        pytest.param(gap, r"times of .* are not uniform: steps run from 0\.05 to 0\.4 s", id="gap"),
+        pytest.param(
+            gap,
+            r"have 1 gap\(s\): after t = 2\.45 s, 7 sample\(s\) of 0\.05 s are missing",
+            id="gap",
+        ),
         pytest.param(missing, r"a value that is not finite at sample 50", id="missing"),
     ]
 
