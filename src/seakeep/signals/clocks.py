@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy import special
 
 from seakeep.errors import DataError
 from seakeep.signals.filters import as_series, odd_extension, positive
@@ -210,12 +211,15 @@ def resample(
     out = np.empty((wanted.size, flat.shape[1]))
     rows_at_once = max(1, 2_000_000 // offsets.size)
     for first in range(0, wanted.size, rows_at_once):
-        rows = slice(first, first + rows_at_once)
-        lag = position[rows, None] - (base[rows, None] + offsets)
-        window = np.i0(beta * np.sqrt(np.clip(1.0 - (lag / half) ** 2, 0.0, None)))
-        kernel = np.sinc(2 * cut * lag) * window
+        rows = range(first, min(first + rows_at_once, wanted.size))
+        lag = position[rows.start : rows.stop, None] - (
+            base[rows.start : rows.stop, None] + offsets
+        )
+        kernel = special.i0(beta * np.sqrt(np.clip(1.0 - (lag / half) ** 2, 0.0, None)))
+        kernel *= np.sinc(2 * cut * lag)
         kernel /= kernel.sum(axis=1, keepdims=True)
-        indices = np.clip(base[rows, None] + offsets + half, 0, flat.shape[0] - 1)
-        out[rows] = np.einsum("rk,rkc->rc", kernel, flat[indices])
+        for row, weights in zip(rows, kernel, strict=True):
+            begin = base[row] + 1
+            out[row] = weights @ flat[begin : begin + 2 * half]
     result: FloatArray = out.reshape((wanted.size, *array.shape[1:]))
     return result
