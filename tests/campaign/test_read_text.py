@@ -201,7 +201,23 @@ def test_round_trip(tmp_path, values, delimiter, comma, units, compressed, newli
             "t,heave\n0,1\n1\n2,3\n3\n4,5\n",
             DataError,
             r"line 3: 1 cells where the header has 2 \(2 such line\(s\), columns divided by ','\)\."
-            " Mend the lines, or state",
+            r" Mend the lines, or state in \[files\]: delimiter, decimal, or skip_rows where words",
+        ),
+        (
+            "Basin 2\nBy: us\ntime,heave\n0,1\n1,2\n",
+            DataError,
+            r"line 3: 1 cells where the header has 2 .* skip_rows where words stand above the head",
+        ),
+        (
+            "time,0,0.1,0.2\nheave,1,2,3\n",
+            DataError,
+            r"the first line is 'time' and 3 numbers, which looks transposed \(2 rows, 4 columns\);"
+            " expected a header, then one row an instant and one column a channel",
+        ),
+        (
+            "time,heave\n2024-05-01 12:00:00.1,1\n2024-05-01 12:00:00.2,2\n",
+            DataError,
+            "line 2, column 'time': '2024-05-01 12:00:00.1' is not a number. Write dates and clock",
         ),
         (
             "t,heave,pitch\n0,1,2\n1,2,3\n2,",
