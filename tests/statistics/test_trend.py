@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 from scipy.stats import kendalltau, linregress
 
 from seakeep.errors import DataError, RequestError
-from seakeep.statistics import trend_test
+from seakeep.statistics import moving_block_bootstrap, trend_test
 
 
 def dependent(phi, samples, seed):
@@ -21,6 +21,21 @@ def test_slope_and_tau_are_scipys():
     assert found.slope == pytest.approx(linregress(t, x).slope, rel=1e-10)
     assert found.kendall_tau == pytest.approx(kendalltau(t, x).statistic, rel=1e-12)
     assert found.change == pytest.approx(found.slope * t[-1], rel=1e-12)
+
+
+def test_p_value_and_interval_are_those_of_the_redrawn_residuals():
+    x, t = dependent(0.8, 120, 3), np.arange(120.0)
+    found = trend_test(x, rng=np.random.default_rng(4), block_length=7, n_series=40)
+    line = linregress(t, x)
+    residuals = x - line.intercept - line.slope * t
+    drawn = moving_block_bootstrap(residuals, 40, 7, np.random.default_rng(4))
+    slopes = np.array([linregress(t, row).slope for row in drawn])
+    tau = np.array([kendalltau(t, row).statistic for row in drawn])
+    low, high = np.quantile(slopes, [0.025, 0.975])
+    # The same sums in another order; the slopes are of order 1e-3.
+    assert found.lower == pytest.approx(line.slope - high, abs=1e-12)
+    assert found.upper == pytest.approx(line.slope - low, abs=1e-12)
+    assert found.p_value == (1 + np.sum(np.abs(tau) >= abs(found.kendall_tau))) / 41
 
 
 @pytest.mark.parametrize(("phi", "most"), [(0.0, 0.13), (0.8, 0.17)])
