@@ -79,11 +79,11 @@ def gram_trace(pieces: Sequence[Piece], state_delays: int, input_delays: int) ->
     total = 0.0
     for piece in pieces:
         for series, delays in ((piece.states, state_delays), (piece.inputs, input_delays)):
-            energy = np.zeros(len(series) + 1)
-            np.cumsum(np.einsum("tc,tc->t", series, series), out=energy[1:])
-            low, high = piece.first - delays, piece.first + piece.count - delays
-            span = delays + 1
-            total += float(np.sum(energy[high : high + span]) - np.sum(energy[low : low + span]))
+            # Only what the snapshots reach: what stands before may be a gap.
+            reached = series[piece.first - delays : piece.first + piece.count]
+            energy = np.zeros(len(reached) + 1)
+            np.cumsum(np.einsum("tc,tc->t", reached, reached), out=energy[1:])
+            total += float(np.sum(energy[piece.count :]) - np.sum(energy[: delays + 1]))
     return total
 
 

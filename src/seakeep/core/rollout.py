@@ -97,7 +97,7 @@ def rollout(
     with np.errstate(over="ignore", invalid="ignore"):
         symmetric, propagator = _prepare(a, b, count, channels, len(start), steps)
         out = _run(propagator, symmetric, start, driving, steps, count)
-        lost = ~(np.abs(out) <= limit).all(axis=2)
+        lost = ~(np.abs(out) <= min(limit, np.finfo(float).max)).all(axis=2)
     if lost.any():
         out[np.logical_or.accumulate(lost, axis=1)] = np.nan
     return out
