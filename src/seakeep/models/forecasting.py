@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,27 @@ FloatArray = npt.NDArray[np.float64]
 
 DIVERGED = 1e6
 """A free run is given up where a state is this many training SDs from its mean."""
+
+
+class Reader(Protocol):
+    """What a forecast must know of a model, or of an ensemble, to read a run."""
+
+    @property
+    def dt(self) -> float: ...
+    @property
+    def state_labels(self) -> tuple[labelled.ChannelLabel, ...]: ...
+    @property
+    def input_labels(self) -> tuple[labelled.ChannelLabel, ...]: ...
+    @property
+    def states(self) -> list[str]: ...
+    @property
+    def inputs(self) -> list[str]: ...
+    @property
+    def state_delays(self) -> int: ...
+    @property
+    def input_delays(self) -> int: ...
+    @property
+    def history_samples(self) -> int: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +74,7 @@ class ForecastWindow:
     time: xr.Variable
 
 
-def read_window(
-    model: HankelDMDcModel, run: xr.Dataset, start: float, steps: int | None
-) -> ForecastWindow:
+def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None) -> ForecastWindow:
     """Cut what a forecast needs out of a run; arguments and errors as ``forecast``."""
     name = labelled.run_name(run, "the run")
     labelled.check_run(run, name)
