@@ -25,15 +25,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from seakeep.core.lagged import lagged_response, lagged_sums, recent
+from seakeep.core.scratch import Scratch
 
 __all__ = ["Piece", "gram_trace", "primal_system", "snapshot_gram"]
 
 FloatArray = npt.NDArray[np.float64]
+
+PANELS = 4
+"""Pieces in which the upper triangle of a product is made."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +93,7 @@ def gram_trace(pieces: Sequence[Piece], state_delays: int, input_delays: int) ->
 
 
 def primal_system(
-    pieces: Sequence[Piece], state_delays: int, input_delays: int
+    pieces: Sequence[Piece], state_delays: int, input_delays: int, scratch: Scratch
 ) -> tuple[FloatArray, FloatArray]:
     r"""Gram matrix :math:`\hat Y \hat Y^T` and right-hand side :math:`X' \hat Y^T`.
 
@@ -100,6 +105,8 @@ def primal_system(
         Runs.
     state_delays, input_delays : int
         s and z.
+    scratch : Scratch
+        Memory; the Gram matrix is part of it.
 
     Returns
     -------
@@ -121,8 +128,8 @@ def primal_system(
         # One more lag and one column less than the heads need: the sums of the next states are
         # the same sums one lag later, up to one product at either end.
         newest = np.concatenate([u[start + 1 : end + 1], x[start + 1 : end + 1]], axis=1)
-        sums_u = lagged_sums(newest, u, start + 1, z + 2)
-        sums_x = lagged_sums(newest, x, start + 1, s + 2)
+        sums_u = lagged_sums(newest, u, start + 1, z + 2, scratch)
+        sums_x = lagged_sums(newest, x, start + 1, s + 2, scratch)
         snapshot = np.concatenate([recent(u, start, z + 1), recent(x, start, s + 1)])
         heads += np.concatenate([u[start], x[start]])[:, None] * snapshot
         heads[:, :inputs] += sums_u[:, : Q * (z + 1)]
@@ -136,7 +143,8 @@ def primal_system(
             row[inputs + N :] = recent(x, at, s)
     signed = edges.copy()
     signed[1::2] *= -1.0
-    gram = edges.T @ signed
+    gram = scratch.take((size, size))
+    _upper_product(edges.T, signed, gram)
     _fill_primal(gram, heads, N, Q, inputs)
     return gram, right
 
@@ -156,7 +164,9 @@ def _fill_primal(gram: FloatArray, heads: FloatArray, N: int, Q: int, inputs: in
         gram[at : at + N, at:] += gram[at - N : at, at - N : size - N]
 
 
-def snapshot_gram(pieces: Sequence[Piece], state_delays: int, input_delays: int) -> FloatArray:
+def snapshot_gram(
+    pieces: Sequence[Piece], state_delays: int, input_delays: int, scratch: Scratch
+) -> FloatArray:
     r"""Gram matrix :math:`\hat Y^T \hat Y` of the snapshots of all runs.
 
     Parameters
@@ -165,6 +175,8 @@ def snapshot_gram(pieces: Sequence[Piece], state_delays: int, input_delays: int)
         Runs.
     state_delays, input_delays : int
         s and z.
+    scratch : Scratch
+        Memory; the result is part of it.
 
     Returns
     -------
@@ -184,7 +196,8 @@ def snapshot_gram(pieces: Sequence[Piece], state_delays: int, input_delays: int)
         rows[1:, 2 * N + Q :] = piece.inputs[first - z : first - z + count - 1]
     signed = steps.copy()
     signed[:, N + Q :] *= -1.0
-    gram = steps @ signed.T
+    gram = scratch.take((len(steps), len(steps)))
+    _upper_product(steps, signed.T, gram)
     for i, piece in enumerate(pieces):
         own_x = recent(piece.states, piece.first, s + 1)
         own_u = recent(piece.inputs, piece.first, z + 1)
@@ -197,8 +210,16 @@ def snapshot_gram(pieces: Sequence[Piece], state_delays: int, input_delays: int)
                 gram[ends[j] : ends[j + 1], ends[i]] = head
     for i in range(len(pieces)):
         for at in range(ends[i] + 1, ends[i + 1]):
-            gram[at, at : ends[i + 1]] += gram[at - 1, at - 1 : ends[i + 1] - 1]
+            row = gram[at, at : ends[i + 1]]
+            row += gram[at - 1, at - 1 : ends[i + 1] - 1]
             for j in range(i + 1, len(pieces)):
-                block = slice(ends[j] + 1, ends[j + 1])
-                gram[at, block] += gram[at - 1, ends[j] : ends[j + 1] - 1]
+                row = gram[at, ends[j] + 1 : ends[j + 1]]
+                row += gram[at - 1, ends[j] : ends[j + 1] - 1]
     return gram
+
+
+def _upper_product(left: FloatArray, right: FloatArray, out: FloatArray) -> None:
+    # In panels of rows, each from its diagonal on: a little more than half of the product.
+    edges = [len(out) * panel // PANELS for panel in range(PANELS + 1)]
+    for begin, stop in pairwise(edges):
+        np.matmul(left[begin:stop], right[:, begin:], out=out[begin:stop, begin:])

@@ -26,6 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.core.scratch import Scratch
+
 __all__ = ["Propagator", "doublings", "mirrored", "shifting_propagator", "square_propagator"]
 
 FloatArray = npt.NDArray[np.float64]
@@ -136,7 +138,9 @@ def doublings(size: int, inputs: int, windows: int, steps: int) -> tuple[int, fl
     return best, least
 
 
-def mirrored(a: FloatArray, inputs: int, count: int, steps: int) -> FloatArray | None:
+def mirrored(
+    a: FloatArray, inputs: int, count: int, steps: int, scratch: Scratch
+) -> FloatArray | None:
     """Rows of Â for the delayed states as the upper triangle of a symmetric matrix.
 
     Parameters
@@ -145,6 +149,8 @@ def mirrored(a: FloatArray, inputs: int, count: int, steps: int) -> FloatArray |
         Â.
     inputs, count, steps : int
         Columns of B̂, N, and the steps of the one window.
+    scratch : Scratch
+        Memory; the result is part of it.
 
     Returns
     -------
@@ -161,13 +167,14 @@ def mirrored(a: FloatArray, inputs: int, count: int, steps: int) -> FloatArray |
     # A corner tells most other matrices apart before all of it is read.
     if not np.array_equal(block[:8, :8], block[:8, :8].T) or not np.array_equal(block, block.T):
         return None
-    out = np.zeros((size, size))
+    out = scratch.take((size, size))
     out[:kept] = a[count:]
+    out[kept:] = 0.0
     return out
 
 
 def square_propagator(
-    a: FloatArray, b: FloatArray, count: int, channels: int, times: int
+    a: FloatArray, b: FloatArray, count: int, channels: int, times: int, scratch: Scratch
 ) -> Propagator:
     """Propagator of a model with a full Â, of two to the power of `times` steps.
 
@@ -179,6 +186,8 @@ def square_propagator(
         N and Q.
     times : int
         Number of doublings.
+    scratch : Scratch
+        Memory; the result is part of it.
 
     Returns
     -------
@@ -197,8 +206,10 @@ def square_propagator(
         wider_output[half:, pad:] = output_input
         output_state = np.concatenate([output_state @ a, output_state])
         output_input = wider_output
-        wider = np.zeros((len(b), width + pad))
+        wider, squared = scratch.take((len(b), width + pad)), scratch.take(a.shape)
+        wider[:, :pad] = 0.0
         np.matmul(a, b, out=wider[:, pad:])
         wider[:, :width] += b
-        a, b, K = a @ a, wider, 2 * K
+        np.matmul(a, a, out=squared)
+        a, b, K = squared, wider, 2 * K
     return Propagator(K, output_state, output_input, a, b)

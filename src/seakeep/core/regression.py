@@ -23,6 +23,7 @@ from scipy.linalg import blas, lapack
 from seakeep.core.embedding import TrainingWindow, snapshot_matrices
 from seakeep.core.gram import Piece, gram_trace, primal_system, snapshot_gram
 from seakeep.core.lagged import lagged_sums
+from seakeep.core.scratch import Scratch
 
 __all__ = ["Method", "Solution", "identify", "solve"]
 
@@ -33,6 +34,9 @@ GRAM_LIMIT = 1e-6
 """Least effective λ, as a part of the largest squared singular value, for a Gram matrix.
 
 Its condition number is then below 1e6, and ten digits are left of sixteen."""
+
+MIRROR_ROWS = 48
+"""Rows that are turned at a time."""
 
 
 @dataclass(frozen=True)
@@ -162,11 +166,19 @@ def _apply(factor: FloatArray, right: FloatArray) -> FloatArray:
     return np.asarray(solved).T
 
 
-def _symmetric_inverse(factor: FloatArray) -> FloatArray:
+def _symmetric_inverse(factor: FloatArray, scratch: Scratch) -> FloatArray:
     """Inverse of L L^T, both triangles of it; the factor, in Fortran order, is overwritten."""
-    lower, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
-    lower = np.tril(lower)
-    return np.asarray(lower + np.tril(lower, -1).T)
+    upper = np.asarray(lapack.dpotri(factor, lower=1, overwrite_c=1)[0]).T
+    size = len(upper)
+    out = scratch.take((size, size))
+    # By blocks of rows: what stands right of a block's diagonal is turned into the place below it.
+    for begin in range(0, size, MIRROR_ROWS):
+        stop = min(begin + MIRROR_ROWS, size)
+        out[begin:stop, stop:] = upper[begin:stop, stop:]
+        out[stop:, begin:stop] = upper[begin:stop, stop:].T
+        corner = np.triu(upper[begin:stop, begin:stop])
+        out[begin:stop, begin:stop] = corner + np.triu(corner, 1).T
+    return out
 
 
 def _by_singular_values(
@@ -196,6 +208,7 @@ def identify(
     rank: int | None = None,
     all_rows: bool = True,
     method: Method | None = None,
+    scratch: Scratch | None = None,
 ) -> Solution:
     r"""Identify :math:`[\hat A\; \hat B]` from one or several runs.
 
@@ -222,6 +235,8 @@ def identify(
         alone.
     method : {"primal", "dual", "svd"}, optional
         As in :func:`solve`.
+    scratch : Scratch, optional
+        Memory of an earlier call to use again.
 
     Returns
     -------
@@ -234,7 +249,7 @@ def identify(
     ]
     columns = sum(piece.count for piece in pieces)
     effective = ridge * columns if per_snapshot else ridge
-    problem = _Delayed(pieces, state_delays, input_delays, all_rows)
+    problem = _Delayed(pieces, state_delays, input_delays, all_rows, scratch or Scratch())
     chosen = "svd" if rank is not None else method or problem.choose(effective)
     full_rank = min(problem.rows, columns)
     if chosen == "primal":
@@ -255,6 +270,12 @@ class _Delayed:
     state_delays: int
     input_delays: int
     all_rows: bool
+    scratch: Scratch
+
+    @property
+    def shape(self) -> tuple[Sequence[Piece], int, int]:
+        """Pieces and delays."""
+        return self.pieces, self.state_delays, self.input_delays
 
     @property
     def states(self) -> int:
@@ -292,8 +313,8 @@ class _Delayed:
     def gram(self) -> FloatArray:
         """The smaller Gram matrix, its upper triangle."""
         if self.rows <= self.columns:
-            return primal_system(self.pieces, self.state_delays, self.input_delays)[0]
-        return snapshot_gram(self.pieces, self.state_delays, self.input_delays)
+            return primal_system(*self.shape, self.scratch)[0]
+        return snapshot_gram(*self.shape, self.scratch)
 
     def matrices(self) -> tuple[FloatArray, FloatArray]:
         """Hankel matrices of regressors and targets, built."""
@@ -324,7 +345,7 @@ class _Delayed:
 
         .. math:: [-H T \;\; H], \quad H = (L_{22} L_{22}^T)^{-1}, \; T = L_{21} L_{11}^{-1}.
         """
-        gram, right = primal_system(self.pieces, self.state_delays, self.input_delays)
+        gram, right = primal_system(*self.shape, self.scratch)
         factor = _factor(gram, ridge)
         top = _apply(factor, right)
         inputs, N = self.rows - self.states, len(top)
@@ -336,17 +357,22 @@ class _Delayed:
         shifted = self.states - N
         if shifted == 0:
             return out
-        inverse = _symmetric_inverse(np.asfortranarray(factor[inputs:, inputs:]))[:shifted]
+        inverse = _symmetric_inverse(self._copied(factor[inputs:, inputs:]), self.scratch)[:shifted]
         inverse *= ridge
         np.negative(inverse, out=out[N:, : self.states])
         out[N:].reshape(-1)[: shifted * self.rows : self.rows + 1] += 1.0
         if inputs:
-            # f2py copies a block of a matrix element by element; asfortranarray does it by rows.
-            corner = np.asfortranarray(factor[:inputs, :inputs])
-            below = np.asfortranarray(factor[inputs:, :inputs])
+            corner = self._copied(factor[:inputs, :inputs])
+            below = self._copied(factor[inputs:, :inputs])
             ratio = blas.dtrsm(1.0, corner, below, side=1, lower=1, overwrite_b=1)
             np.matmul(inverse, ratio, out=out[N:, self.states :])
         return out
+
+    def _copied(self, block: FloatArray) -> FloatArray:
+        # In Fortran order: f2py would copy a block of a matrix element by element.
+        out = self.scratch.take(block.T.shape)
+        out[:] = block.T
+        return out.T
 
     def dual(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`K = \hat Y^T \hat Y`.
@@ -355,7 +381,7 @@ class _Delayed:
         summed against the lagged series; all rows are :math:`\hat X' L^{-T} Z` with
         :math:`Z = L^{-1} \hat Y^T`, and those of the delayed states are :math:`P Z^T Z`.
         """
-        factor = _factor(snapshot_gram(self.pieces, self.state_delays, self.input_delays), ridge)
+        factor = _factor(snapshot_gram(*self.shape, self.scratch), ridge)
         targets = np.concatenate([piece.targets for piece in self.pieces])
         if not self.all_rows:
             weights = _apply(factor, targets.T.copy()).T
@@ -363,8 +389,8 @@ class _Delayed:
             for piece in self.pieces:
                 own = weights[at : at + piece.count]
                 at += piece.count
-                x = lagged_sums(own, piece.states, piece.first, self.state_delays + 1)
-                u = lagged_sums(own, piece.inputs, piece.first, self.input_delays + 1)
+                x = lagged_sums(own, piece.states, piece.first, self.state_delays + 1, self.scratch)
+                u = lagged_sums(own, piece.inputs, piece.first, self.input_delays + 1, self.scratch)
                 top[:, : self.states] += x
                 top[:, self.states :] += u
             return top
