@@ -64,7 +64,8 @@ def test_the_displaced_gram_is_the_gram(problem):
     N, extended = states[0].shape[1], states[0].shape[1] * (s + 1)
     # Inputs stand first.
     turned = np.concatenate([regressors[extended:], regressors[:extended]])
-    gram, right = primal_system(pieces_of(problem), s, z, Scratch())
+    system = primal_system(pieces_of(problem), s, z, Scratch())
+    gram, right = system.gram, system.right
     np.testing.assert_allclose(np.triu(gram), np.triu(turned @ turned.T), atol=TIGHT, rtol=TIGHT)
     np.testing.assert_allclose(right, targets[:N] @ turned.T, atol=TIGHT, rtol=TIGHT)
 

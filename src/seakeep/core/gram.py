@@ -33,7 +33,7 @@ import numpy.typing as npt
 from seakeep.core.lagged import lagged_response, lagged_sums, recent
 from seakeep.core.scratch import Scratch
 
-__all__ = ["Piece", "gram_trace", "primal_system", "snapshot_gram"]
+__all__ = ["Piece", "PrimalSystem", "gram_trace", "primal_system", "snapshot_gram"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -66,6 +66,34 @@ class Piece:
         return self.states[self.first + 1 : self.first + 1 + self.count]
 
 
+@dataclass(frozen=True, eq=False)
+class PrimalSystem:
+    """Normal equations of delayed series; inputs stand before states, newest lags first.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (p, p)
+        Upper triangle of C, p = Q(z+1) + N(s+1).
+    right : ndarray, shape (N, p)
+        Products of the next states (the newest block alone) with the regressors.
+    heads : ndarray, shape (Q + N, p)
+        Rows of C of the newest inputs and states.
+    edges : ndarray, shape (2 runs, p)
+        What enters at the begin (even rows) and leaves at the end (odd rows) of a run where a
+        block moves by a lag.
+    states, channels, inputs : int
+        N, Q and Q(z+1).
+    """
+
+    gram: FloatArray
+    right: FloatArray
+    heads: FloatArray
+    edges: FloatArray
+    states: int
+    channels: int
+    inputs: int
+
+
 def gram_trace(pieces: Sequence[Piece], state_delays: int, input_delays: int) -> float:
     """Sum of squares of the Hankel matrix: the trace of its Gram matrix.
 
@@ -94,10 +122,8 @@ def gram_trace(pieces: Sequence[Piece], state_delays: int, input_delays: int) ->
 
 def primal_system(
     pieces: Sequence[Piece], state_delays: int, input_delays: int, scratch: Scratch
-) -> tuple[FloatArray, FloatArray]:
+) -> PrimalSystem:
     r"""Gram matrix :math:`\hat Y \hat Y^T` and right-hand side :math:`X' \hat Y^T`.
-
-    Rows and columns stand in the order extended inputs, extended states.
 
     Parameters
     ----------
@@ -106,14 +132,12 @@ def primal_system(
     state_delays, input_delays : int
         s and z.
     scratch : Scratch
-        Memory; the Gram matrix is part of it.
+        Memory.
 
     Returns
     -------
-    gram : ndarray, shape (p, p)
-        Its upper triangle, p = Q(z+1) + N(s+1).
-    right : ndarray, shape (N, p)
-        Products of the next states (the newest block alone) with the regressors.
+    PrimalSystem
+        Its Gram matrix is part of `scratch`.
     """
     s, z = state_delays, input_delays
     N, Q = pieces[0].states.shape[1], pieces[0].inputs.shape[1]
@@ -146,7 +170,7 @@ def primal_system(
     gram = scratch.take((size, size))
     _upper_product(edges.T, signed, gram)
     _fill_primal(gram, heads, N, Q, inputs)
-    return gram, right
+    return PrimalSystem(gram, right, heads, edges, N, Q, inputs)
 
 
 def _fill_primal(gram: FloatArray, heads: FloatArray, N: int, Q: int, inputs: int) -> None:

@@ -22,6 +22,7 @@ from scipy.linalg import blas, lapack
 
 from seakeep.core.embedding import TrainingWindow, snapshot_matrices
 from seakeep.core.gram import Piece, gram_trace, primal_system, snapshot_gram
+from seakeep.core.inverse import ridge_rows
 from seakeep.core.lagged import lagged_sums
 from seakeep.core.scratch import Scratch
 
@@ -34,9 +35,6 @@ GRAM_LIMIT = 1e-6
 """Least effective λ, as a part of the largest squared singular value, for a Gram matrix.
 
 Its condition number is then below 1e6, and ten digits are left of sixteen."""
-
-MIRROR_ROWS = 48
-"""Rows that are turned at a time."""
 
 
 @dataclass(frozen=True)
@@ -166,21 +164,6 @@ def _apply(factor: FloatArray, right: FloatArray) -> FloatArray:
     return np.asarray(solved).T
 
 
-def _symmetric_inverse(factor: FloatArray, scratch: Scratch) -> FloatArray:
-    """Inverse of L L^T, both triangles of it; the factor, in Fortran order, is overwritten."""
-    upper = np.asarray(lapack.dpotri(factor, lower=1, overwrite_c=1)[0]).T
-    size = len(upper)
-    out = scratch.take((size, size))
-    # By blocks of rows: what stands right of a block's diagonal is turned into the place below it.
-    for begin in range(0, size, MIRROR_ROWS):
-        stop = min(begin + MIRROR_ROWS, size)
-        out[begin:stop, stop:] = upper[begin:stop, stop:]
-        out[stop:, begin:stop] = upper[begin:stop, stop:].T
-        corner = np.triu(upper[begin:stop, begin:stop])
-        out[begin:stop, begin:stop] = corner + np.triu(corner, 1).T
-    return out
-
-
 def _by_singular_values(
     regressors: FloatArray, targets: FloatArray, ridge: float, rank: int | None
 ) -> Solution:
@@ -298,7 +281,9 @@ class _Delayed:
         if not self.all_rows:
             return "primal" if p <= n else "dual"
         b = p - a
-        primal = p**3 / 3 + 2 * a**3 / 3 + a * b * b + 2 * a * a * b
+        first = self.pieces[0]
+        rank = 2 * (first.states.shape[1] + first.inputs.shape[1] + len(self.pieces))
+        primal = p**3 / 3 + 2 * rank * p * (p + a)
         dual = n**3 / 3 + n * n * p + n * a * (a + 2 * b)
         return "primal" if primal <= dual else "dual"
 
@@ -313,7 +298,7 @@ class _Delayed:
     def gram(self) -> FloatArray:
         """The smaller Gram matrix, its upper triangle."""
         if self.rows <= self.columns:
-            return primal_system(*self.shape, self.scratch)[0]
+            return primal_system(*self.shape, self.scratch).gram
         return snapshot_gram(*self.shape, self.scratch)
 
     def matrices(self) -> tuple[FloatArray, FloatArray]:
@@ -335,44 +320,13 @@ class _Delayed:
         return np.concatenate(regressors, axis=1), np.concatenate(targets, axis=1)
 
     def primal(self, ridge: float) -> FloatArray:
-        r"""Coefficients from :math:`C = \hat Y \hat Y^T`.
-
-        The rows that shift the delayed states need no right-hand side. With P the rows of
-        the identity that select the lags 0 … s−1 of the states, their targets are
-        :math:`P \hat Y`, and :math:`P C (C + \lambda I)^{-1} = P - \lambda P (C+\lambda I)^{-1}`:
-        a block of rows of the inverse. With the inputs first and the states last in
-        :math:`C + \lambda I = L L^T`, it is
-
-        .. math:: [-H T \;\; H], \quad H = (L_{22} L_{22}^T)^{-1}, \; T = L_{21} L_{11}^{-1}.
-        """
-        gram, right = primal_system(*self.shape, self.scratch)
-        factor = _factor(gram, ridge)
-        top = _apply(factor, right)
-        inputs, N = self.rows - self.states, len(top)
-        if not self.all_rows:
-            return np.concatenate([top[:, inputs:], top[:, :inputs]], axis=1)
-        out = np.empty((self.states, self.rows))
-        out[:N, : self.states] = top[:, inputs:]
-        out[:N, self.states :] = top[:, :inputs]
-        shifted = self.states - N
-        if shifted == 0:
-            return out
-        inverse = _symmetric_inverse(self._copied(factor[inputs:, inputs:]), self.scratch)[:shifted]
-        inverse *= ridge
-        np.negative(inverse, out=out[N:, : self.states])
-        out[N:].reshape(-1)[: shifted * self.rows : self.rows + 1] += 1.0
-        if inputs:
-            corner = self._copied(factor[:inputs, :inputs])
-            below = self._copied(factor[inputs:, :inputs])
-            ratio = blas.dtrsm(1.0, corner, below, side=1, lower=1, overwrite_b=1)
-            np.matmul(inverse, ratio, out=out[N:, self.states :])
-        return out
-
-    def _copied(self, block: FloatArray) -> FloatArray:
-        # In Fortran order: f2py would copy a block of a matrix element by element.
-        out = self.scratch.take(block.T.shape)
-        out[:] = block.T
-        return out.T
+        r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
+        system = primal_system(*self.shape, self.scratch)
+        factor = _factor(system.gram, ridge)
+        if self.all_rows:
+            return ridge_rows(system, factor, ridge, self.scratch)
+        top = _apply(factor, system.right)
+        return np.concatenate([top[:, system.inputs :], top[:, : system.inputs]], axis=1)
 
     def dual(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`K = \hat Y^T \hat Y`.
