@@ -156,7 +156,10 @@ def _count_states(a: FloatArray, b: FloatArray, start: FloatArray, given: int | 
 
 def _shifts_exactly(a: FloatArray, b: FloatArray, count: int) -> bool:
     kept = a.shape[1] - count
-    lower = a[count:]
+    lower, moved = a[count:], np.eye(min(kept, 1), kept)
+    # The first of these rows tells most other matrices apart.
+    if kept and (np.any(b[count]) or not np.array_equal(lower[:1, :kept], moved)):
+        return False
     return (
         not np.any(b[count:])
         and not np.any(lower[:, kept:])
