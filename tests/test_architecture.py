@@ -10,6 +10,7 @@ SOURCE = Path(__file__).parents[1] / "src" / "seakeep"
 
 FLOORS = {
     "errors": 0,
+    "files": 1,
     "waves": 1,
     "conventions": 2,
     "signals": 2,
@@ -22,8 +23,8 @@ FLOORS = {
     "study": 4,
     "report": 5,
     "cli": 6,
-    "__main__": 6,
-    "__init__": 6,
+    "__main__": 7,
+    "__init__": 7,
 }
 # Rooms on one floor that may look into another one beside them.
 NEIGHBOURS = {("signals", "conventions")}

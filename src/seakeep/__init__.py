@@ -3,12 +3,14 @@
 from importlib import metadata
 
 from seakeep import core, metrics, signals
+from seakeep.campaign import Campaign, read_campaign
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
 from seakeep.models import HankelDMDc, HankelDMDcModel, load_model
 
 __version__ = metadata.version("seakeep")
 
 __all__ = [
+    "Campaign",
     "DataError",
     "HankelDMDc",
     "HankelDMDcModel",
@@ -18,5 +20,6 @@ __all__ = [
     "core",
     "load_model",
     "metrics",
+    "read_campaign",
     "signals",
 ]

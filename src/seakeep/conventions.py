@@ -123,6 +123,7 @@ def canonical_channel(name: str) -> Channel | None:
 
 # The angle is a dimension of its own, so that degrees cannot pass for metres per metre.
 _UNITS = """
+hecto- = 1e2 = h-
 centi- = 1e-2 = c-
 milli- = 1e-3 = m-
 micro- = 1e-6 = µ- = u-
@@ -145,6 +146,7 @@ newton = kilogram * metre / second ** 2 = N = newtons
 pascal = newton / metre ** 2 = Pa
 bar = 1e5 * pascal = bar
 joule = newton * metre = J
+newton_metre = newton * metre = Nm
 watt = joule / second = W
 hertz = 1 / second = Hz
 tonne = 1e3 * kilogram = t = tonnes
@@ -169,10 +171,10 @@ _SPELLINGS = (
     (re.compile(r"[·⋅×]"), "*"),
     (re.compile(r"µ|μ"), "µ"),
     (re.compile(r"%"), "percent"),
-    (re.compile("²"), "^2"),
-    (re.compile("³"), "^3"),
     (re.compile("⁻¹"), "^-1"),
     (re.compile("⁻²"), "^-2"),
+    (re.compile("²"), "^2"),
+    (re.compile("³"), "^3"),
     (re.compile(r"(?<=[A-Za-z°])(-?[1-9])"), r"^\1"),
     (re.compile(r"\^"), "**"),
     (re.compile(r"(?<=[A-Za-z°0-9])[ .](?=[A-Za-z°])"), "*"),

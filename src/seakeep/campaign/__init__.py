@@ -1,1 +1,18 @@
-"""Placeholder."""
+"""The campaign room: a TOML file and raw recordings in, analysis-ready runs out."""
+
+from seakeep.campaign.drafts import draft_campaign
+from seakeep.campaign.prepare import Campaign, read_campaign
+from seakeep.campaign.readers import read_table
+from seakeep.campaign.settings import ModelSettings, PriorSettings
+from seakeep.campaign.store import load_prepared, write_prepared
+
+__all__ = [
+    "Campaign",
+    "ModelSettings",
+    "PriorSettings",
+    "draft_campaign",
+    "load_prepared",
+    "read_campaign",
+    "read_table",
+    "write_prepared",
+]

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.errors import RequestError
-from seakeep.models.store import replacing
+from seakeep.files import replacing
 
 if TYPE_CHECKING:
     import control

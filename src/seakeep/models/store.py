@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, is_dataclass
 from importlib import metadata
 from pathlib import Path
@@ -17,46 +14,17 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.errors import DataError, RequestError
+from seakeep.files import replacing
 from seakeep.models.identification import Scale
 from seakeep.models.labelled import ChannelLabel
 
-__all__ = ["FORMAT_VERSION", "HANKEL_DMDC", "pack", "read", "replacing", "unpack", "write"]
+__all__ = ["FORMAT_VERSION", "HANKEL_DMDC", "pack", "read", "unpack", "write"]
 
 FloatArray = npt.NDArray[np.float64]
 
 HANKEL_DMDC = "hankel_dmdc"
 FORMAT_VERSION = 1
 """Version of the layout; raised when an older seakeep could not read a new file rightly."""
-
-
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary name beside `path`, renamed onto it when all went well.
-
-    Raises
-    ------
-    RequestError
-        If the folder does not exist or cannot be written, or the disk is full.
-    """
-    if not path.parent.is_dir():
-        raise RequestError(
-            f"cannot write {path}: the folder {path.parent} does not exist. Create it first."
-        )
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
-        os.close(handle)
-        temporary = Path(name)
-        try:
-            yield temporary
-            temporary.chmod(0o644)
-            temporary.replace(path)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise RequestError(
-            f"cannot write {path}: {error.strerror or error}. The file that was there before, if "
-            "any, is untouched. Free space on the disk or choose another place."
-        ) from error
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,1 +1,1 @@
-"""Placeholder."""
+"""Figures and tables; the only rooms that know matplotlib."""

@@ -80,8 +80,8 @@ def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
     Raises
     ------
     DataError
-        If the times are unsorted, repeated, or further than a hundredth of a step from a
-        uniform grid.
+        If the times are unsorted, repeated, or further from a uniform grid than a hundredth of a
+        step and than the decimals explain with which they were written.
 
     Examples
     --------
@@ -91,18 +91,43 @@ def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
     t = check_order(time, name)
     step = float((t[-1] - t[0]) / (t.size - 1))
     off = np.abs(t - (t[0] + step * np.arange(t.size)))
-    if np.max(off) > STEP_TOLERANCE * step:
-        steps = np.diff(t)
-        at = int(np.argmax(np.abs(steps - np.median(steps))))
-        raise DataError(
-            f"the times of {name} are not uniform: steps run from {steps.min():g} to "
-            f"{steps.max():g} s (median {np.median(steps):g} s), the oddest after t = {t[at]:g} s. "
-            "Fill the gap or resample onto a uniform step (seakeep.signals.resample, or a campaign "
-            "with [preparation])."
-        )
+    if np.max(off) > max(STEP_TOLERANCE * step, _printed_tolerance(t, step)):
+        raise DataError(_irregularity(t, name))
     # A decimal step such as 0.04 that was summed or printed comes back as what was meant.
     rounded = float(f"{step:.10g}")
     return rounded if abs(rounded - step) * t.size < 1e-6 * step else step
+
+
+def _printed_tolerance(t: FloatArray, step: float) -> float:
+    """How far rounding to the decimals that the times were written with may move an instant."""
+    for decimals in range(7):
+        unit = 10.0**-decimals
+        if unit <= 0.1 * step:
+            scaled = t / unit
+            if np.max(np.abs(scaled - np.rint(scaled))) < 1e-3:
+                return 1.001 * unit  # half a unit at the instant, half at the ends of the grid
+    return 0.0
+
+
+def _irregularity(t: FloatArray, name: str) -> str:
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    counts = steps / usual
+    gaps = np.flatnonzero(counts > 1.5)
+    if gaps.size and np.max(np.abs(counts - np.rint(counts))) < 0.1:
+        longest = gaps[np.argmax(steps[gaps])]
+        return (
+            f"the times of {name} have {gaps.size} gap(s): after t = {t[gaps[0]]:g} s, "
+            f"{int(np.rint(counts[gaps[0]])) - 1} sample(s) of {usual:g} s are missing; the "
+            f"longest gap, after t = {t[longest]:g} s, lasts {steps[longest]:g} s. Fill the gap, "
+            "or use the record before or after it."
+        )
+    at = int(np.argmax(np.abs(steps - usual)))
+    return (
+        f"the times of {name} are not uniform: steps run from {steps.min():g} to {steps.max():g} s "
+        f"(median {usual:g} s), the oddest after t = {t[at]:g} s. Interpolate the series onto a "
+        "uniform step before reading it, or split it where the clock changed."
+    )
 
 
 def resample(
@@ -127,7 +152,7 @@ def resample(
     new_time : array_like, shape (new_time,)
         The instants wanted, s, uniform and inside the span of `time`.
     attenuation : float, optional
-        Attenuation above the new Nyquist frequency, dB.
+        Attenuation above the new Nyquist frequency, dB; less than 50 is taken as 50.
     passband : float, optional
         Edge of the pass band as a part of the lower Nyquist frequency.
 
@@ -175,7 +200,8 @@ def resample(
     nyquist = 0.5 * min(1.0, dt / new_dt)  # the lower one, in cycles an old sample
     width = (1.0 - passband) * nyquist
     cut = 0.5 * (1.0 + passband) * nyquist
-    beta = 0.1102 * (max(positive("the attenuation", attenuation, "dB"), 50.0) - 8.7)
+    attenuation = max(positive("the attenuation", attenuation, "dB"), 50.0)
+    beta = 0.1102 * (attenuation - 8.7)
     half = int(np.ceil((attenuation - 7.95) / (4.57 * np.pi * width) + 1))  # Kaiser's formula
     extended = odd_extension(array, half)
     base = np.floor(position).astype(int)

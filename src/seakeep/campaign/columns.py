@@ -1,0 +1,106 @@
+"""What a reader hands on: named columns of numbers, with the units the file states."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.conventions import si_unit
+from seakeep.errors import RequestError
+
+__all__ = ["Columns", "split_unit"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_BRACKETS = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*\Z")
+_PARENTHESES = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\s*\Z")
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns of a file.
+
+    Parameters
+    ----------
+    values : dict of str to ndarray, shape (row,)
+        Numbers by column name, without the unit.
+    units : dict of str to str
+        Units that the file states, by column name.
+    faults : dict of str to str
+        Columns that are there but cannot be used, and why: raised when one is asked for.
+    headers : dict of str to str
+        The full header of a column where it differs from its name.
+    sampling_rate : float or None
+        Samples a second, where the file holds it apart from a time column.
+    """
+
+    values: dict[str, FloatArray]
+    units: dict[str, str] = field(default_factory=dict)
+    faults: dict[str, str] = field(default_factory=dict)
+    headers: dict[str, str] = field(default_factory=dict)
+    sampling_rate: float | None = None
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all columns, usable or not, in the file's order."""
+        return list(dict.fromkeys([*self.headers, *self.values, *self.faults]))
+
+    def find(self, wanted: str) -> str | None:
+        """Name of a column, given by name or by full header; None if there is none."""
+        if wanted in self.values or wanted in self.faults:
+            return wanted
+        by_header = {header: name for name, header in self.headers.items()}
+        return by_header.get(wanted.strip())
+
+
+def is_unit(text: str) -> bool:
+    """Whether `text` is a unit that we understand."""
+    try:
+        si_unit(text)
+    except RequestError:
+        return False
+    return True
+
+
+def split_unit(header: str) -> tuple[str, str | None]:
+    """Split a header into a name and a unit.
+
+    Parameters
+    ----------
+    header : str
+        Such as ``"Heave [mm]"``.
+
+    Returns
+    -------
+    (str, str or None)
+        Name and unit. What stands in square brackets is a unit; what stands in parentheses is
+        one if it is a unit we understand.
+
+    Examples
+    --------
+    >>> split_unit("Heave [mm]"), split_unit("Pitch (deg)"), split_unit("Heave (bow)")
+    (('Heave', 'mm'), ('Pitch', 'deg'), ('Heave (bow)', None))
+    """
+    header = header.strip()
+    if match := _BRACKETS.match(header):
+        return match["name"].strip(), match["unit"].strip()
+    match = _PARENTHESES.match(header)
+    if match and match["unit"].strip() and is_unit(match["unit"]):
+        return match["name"].strip(), match["unit"].strip()
+    return header, None
+
+
+def unique_names(headers: Iterable[str]) -> tuple[list[str], list[str | None]]:
+    """Names and units of headers; the unit stays in a name that would not be unique without it."""
+    full = [header.strip() for header in headers]
+    pairs = [split_unit(header) for header in full]
+    bare = [name for name, _ in pairs]
+    names = [
+        name if bare.count(name) == 1 or not name else header
+        for name, header in zip(bare, full, strict=True)
+    ]
+    return names, [unit for _, unit in pairs]

@@ -1,0 +1,214 @@
+"""One function that reads a run's file, whatever it is: :func:`read_table`."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.campaign.binary import read_matlab, read_netcdf
+from seakeep.campaign.columns import Columns
+from seakeep.campaign.settings import FileSettings
+from seakeep.campaign.text import read_text
+from seakeep.conventions import conversion
+from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.signals.clocks import check_order
+
+__all__ = ["expand", "read_columns", "read_table"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_TIMES = {"time", "t", "times", "tid", "tempo", "zeit", "temps", "tiempo", "time_s", "t_s",
+          "sec", "seconds", "elapsed", "elapsed time", "time elapsed", "timestamp"}  # fmt: skip
+_VARIABLE = re.compile(r"\$\{([^}]*)\}")
+
+
+def expand(file: str, folder: Path) -> Path:
+    """Path of a file as a campaign writes it.
+
+    Parameters
+    ----------
+    file : str
+        The file; ``${NAME}`` stands for an environment variable, ``~`` for the home folder.
+    folder : Path
+        Folder to which a relative path is relative.
+
+    Returns
+    -------
+    Path
+        The path.
+
+    Raises
+    ------
+    RequestError
+        If an environment variable is not set.
+    """
+
+    def value(match: re.Match[str]) -> str:
+        if not (found := os.environ.get(match[1])):
+            raise RequestError(
+                f"the file {file!r} needs the environment variable {match[1]}, which is not set. "
+                f"Set it to the folder of the data: export {match[1]}=/path/to/data"
+            )
+        return found
+
+    return folder / Path(_VARIABLE.sub(value, file)).expanduser()
+
+
+def checksum(path: Path) -> str:
+    """SHA-256 of a file."""
+    _check_there(path)
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _check_there(path: Path) -> None:
+    if path.is_dir():
+        raise RequestError(f"{path} is a folder; give the file in it.")
+    if path.exists():
+        return
+    if not path.parent.is_dir():
+        raise RequestError(
+            f"{path} does not exist: there is no folder {path.parent}. Paths are relative to the "
+            "campaign file; ${NAME} stands for an environment variable."
+        )
+    beside = sorted(p.name for p in path.parent.iterdir())
+    near = did_you_mean(path.name, beside)
+    shown = ", ".join(beside[:8]) + (" …" if len(beside) > 8 else "")
+    raise RequestError(
+        f"{path} does not exist.{near} Its folder holds {shown or 'nothing'}. Correct the name."
+    )
+
+
+def read_columns(path: Path, options: FileSettings | None = None) -> Columns:
+    """Read the columns of a file, without a look at its time axis.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its kind is recognised by its first bytes, then by its suffix.
+    options : FileSettings, optional
+        What is known about the file.
+
+    Returns
+    -------
+    Columns
+        Its columns.
+
+    Raises
+    ------
+    RequestError
+        If the file does not exist.
+    DataError
+        If it is empty, damaged or of no kind that we read.
+    """
+    options = options or FileSettings()
+    _check_there(path)
+    with path.open("rb") as file:
+        head = file.read(600)
+    if not head:
+        raise DataError(f"{path} is empty (0 bytes). Export the run again.")
+    suffix = path.suffix.lower()
+    if head.startswith(b"MATLAB") or suffix == ".mat":
+        return read_matlab(path, options)
+    if head.startswith((b"\x89HDF", b"CDF")) or suffix in (".nc", ".nc4", ".h5", ".hdf5", ".hdf"):
+        return read_netcdf(path, options)
+    return read_text(path, options)
+
+
+def read_table(
+    path: Path | str, options: FileSettings | None = None, columns: Iterable[str] | None = None
+) -> xr.Dataset:
+    """Read a run's file as it is: no channel is renamed, no value converted.
+
+    Parameters
+    ----------
+    path : Path or str
+        CSV or text (plain or gzip), MATLAB .mat of version 5 to 7.2, NetCDF or HDF5.
+    options : FileSettings, optional
+        What is known about the file: time column, delimiter, decimal mark and so on; what is left
+        out is recognised.
+    columns : iterable of str, optional
+        The columns wanted, by name or full header; the default is all of them. A fault in a
+        column that nobody wants is none.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimension ``time`` (s, increasing, not necessarily uniform); one variable a column, its
+        attribute ``units`` what the file says, if it says something, and ``long_name`` its full
+        header.
+
+    Raises
+    ------
+    RequestError
+        If the file, the time column or a wanted column does not exist.
+    DataError
+        If the file is damaged, a cell is no number, or times are missing, repeated or unsorted.
+    """
+    path, options = Path(path), options or FileSettings()
+    table = read_columns(path, options)
+    time_name, time = _time(path, table, options)
+    wanted = [name for name in table.names if name != time_name] if columns is None else columns
+    variables = {}
+    for each in wanted:
+        name = find_column(path, table, each)
+        attributes = {"long_name": table.headers.get(name, name)}
+        if name in table.units:
+            attributes["units"] = table.units[name]
+        variables[name] = ("time", table.values[name], attributes)
+    if not variables:
+        raise DataError(f"{path} holds times and no channel. Export the run again.")
+    coordinates = {"time": ("time", time, {"units": "s", "long_name": "time"})}
+    return xr.Dataset(variables, coordinates)
+
+
+def find_column(path: Path, table: Columns, wanted: str) -> str:
+    """Name of a wanted column; refuse one that is missing or at fault."""
+    name = table.find(wanted)
+    if name is None:
+        raise RequestError(
+            f"{path} has no column '{wanted}'.{did_you_mean(wanted, table.names)} "
+            f"Its columns: {', '.join(table.names)}."
+        )
+    if name in table.faults:
+        raise DataError(table.faults[name])
+    return name
+
+
+def time_column(table: Columns, stated: str | None = None) -> str | None:
+    """Name of the time column: the one stated, or the one that is called as times are."""
+    if stated is not None:
+        return table.find(stated)
+    for name in table.names:
+        if name.strip().lower() in _TIMES:
+            return name
+    return None
+
+
+def _time(path: Path, table: Columns, options: FileSettings) -> tuple[str | None, FloatArray]:
+    name = time_column(table, options.time)
+    rate = options.sampling_rate or table.sampling_rate
+    if name is None and options.time is not None:
+        raise RequestError(
+            f"{path} has no time column '{options.time}'.{did_you_mean(options.time, table.names)} "
+            f"Its columns: {', '.join(table.names)}."
+        )
+    if name is None and rate is None:
+        raise RequestError(
+            f"{path} has no column that is called as a time is. State time = 'NAME' or "
+            f"sampling_rate (Hz) in [files]. Its columns: {', '.join(table.names)}."
+        )
+    if name is None or (options.sampling_rate and options.time is None):
+        count = next((values.size for values in table.values.values()), 0)
+        return name, check_order(np.arange(count) / float(rate or 1.0), str(path))
+    if name in table.faults:
+        raise DataError(table.faults[name])
+    unit = (options.time_unit or table.units.get(name, "s")).split(" since ")[0]
+    factor = conversion(unit, "s", f"the time column '{name}' of {path}")
+    return name, check_order(table.values[name] * factor, str(path))

@@ -1,0 +1,386 @@
+"""What a campaign file may say: one frozen table a section, validated by pydantic.
+
+Nothing is read from disk here; :mod:`seakeep.campaign.validation` fills these tables from TOML and
+turns what does not fit into messages. A field's description is the mend that a message proposes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
+
+from seakeep.conventions import canonical_channel
+
+__all__ = [
+    "CampaignSettings",
+    "ChannelSettings",
+    "DerivedSettings",
+    "FileSettings",
+    "GeneralSettings",
+    "ModelSettings",
+    "PreparationSettings",
+    "PriorSettings",
+    "RigSettings",
+    "RunSettings",
+]
+
+
+def _rising(span: tuple[float, float]) -> tuple[float, float]:
+    if math.isnan(span[0]) or math.isnan(span[1]) or not span[0] < span[1]:
+        raise ValueError(
+            "a span is [begin, end] in seconds of the file's clock, begin before end; "
+            "'inf' stands for the end of the record"
+        )
+    return span
+
+
+Span = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_rising)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+RunName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$")]
+Names = Annotated[tuple[str, ...], Field(strict=False)]
+
+
+class Table(BaseModel):
+    """A frozen table that refuses keys it does not know."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, populate_by_name=True)
+
+
+class GeneralSettings(Table):
+    """``[campaign]``: what the campaign is called, its scale and its encounter period."""
+
+    name: str = Field(default="", description="a name for titles and tables")
+    description: str = Field(default="", description="free text")
+    scale_factor: Positive = Field(
+        default=1.0, description="full-scale length over model length, such as 30.0"
+    )
+    encounter_period: Positive | None = Field(
+        default=None, description="mean encounter period in seconds; left out, it is measured"
+    )
+    period_channel: str | None = Field(
+        default=None,
+        description="the wave channel whose zero-up-crossings define the encounter period",
+    )
+
+
+class RigSettings(Table):
+    """``[rig]``: the basin and where things stand in it."""
+
+    water_depth: Annotated[float, Field(gt=0)] | None = Field(
+        default=None, description="water depth in metres; 'inf' for deep water"
+    )
+    wave_direction: Finite | None = Field(
+        default=None, description="direction in which the waves run, degrees from the x axis"
+    )
+    frame: str | None = Field(default=None, description="words that describe the frame")
+    positions: dict[str, Finite] = Field(
+        default_factory=dict, description="channel = x position in metres, along the waves"
+    )
+
+
+class FileSettings(Table):
+    """``[files]``: how the files of the runs are to be read; all of it is optional."""
+
+    time: str | None = Field(default=None, description="the name of the time column")
+    time_unit: str | None = Field(default=None, description="unit of the time column, such as 'ms'")
+    sampling_rate: Positive | None = Field(
+        default=None, description="samples a second, for files that have no time column"
+    )
+    delimiter: Literal[",", ";", "\t", " "] | None = Field(
+        default=None, description="',' or ';' or '\\t', or ' ' for any number of blanks"
+    )
+    decimal: Literal[".", ","] | None = Field(default=None, description="'.' or ','")
+    comment: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None, description="the mark that begins a comment line; '#' and '%' are known"
+    )
+    skip_rows: Annotated[int, Field(ge=0)] = Field(
+        default=0, description="lines to leave out at the head of the file"
+    )
+    encoding: str | None = Field(default=None, description="such as 'utf-8' or 'latin-1'")
+    group: str | None = Field(default=None, description="group of an HDF5 file")
+
+
+class ChannelSettings(Table):
+    """``[channels.NAME]``: where a channel comes from.
+
+    The channel is ``sign * (reading + offset)``, converted from `unit` to SI: the offset is added
+    to the reading, in the file's unit, before the sign.
+    """
+
+    column: str | None = Field(
+        default=None, description="the column in the file; left out, the channel's own name"
+    )
+    unit: str | None = Field(
+        default=None, description="unit of the column, such as 'mm'; left out, the file's header"
+    )
+    sign: Literal[1, -1] = Field(default=1, description="1 or -1")
+    offset: Finite = Field(
+        default=0.0, description="added to the reading, in the file's unit, before the sign"
+    )
+    long_name: str | None = Field(default=None, description="name for labels")
+
+
+_STEP_KEYS = {
+    "band_pass": {"band"},
+    "integrate": {"times", "band"},
+    "differentiate": set(),
+    "low_pass": {"passband", "stopband"},
+    "envelope_squared": set(),
+}
+
+
+class DerivedSettings(Table):
+    """``[derived.NAME]``: a channel made from others, by an expression or by a named step."""
+
+    expression: str | None = Field(
+        default=None, description="such as '0.5*(acc_sb + acc_ps)', on SI values"
+    )
+    source: str | None = Field(
+        default=None, alias="from", description="the channel that the step works on"
+    )
+    step: (
+        Literal["integrate", "differentiate", "band_pass", "low_pass", "envelope_squared"] | None
+    ) = Field(default=None, description="what to do with the channel named by 'from'")
+    times: Literal[1, 2] | None = Field(default=None, description="integrate once or twice")
+    band: Span | None = Field(
+        default=None, description="[low, high] in Hz, kept by 'integrate' and 'band_pass'"
+    )
+    passband: Positive | None = Field(default=None, description="edge of the pass band, Hz")
+    stopband: Positive | None = Field(default=None, description="edge of the stop band, Hz")
+    unit: str | None = Field(
+        default=None, description="unit of the result; needed by expressions for free names"
+    )
+    long_name: str | None = Field(default=None, description="name for labels")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> DerivedSettings:
+        if (self.expression is None) == (self.step is None):
+            raise ValueError("a derived channel needs either 'expression', or 'from' and 'step'")
+        given = {key for key in ("times", "band", "passband", "stopband") if getattr(self, key)}
+        if self.step is None:
+            if self.source is not None or given:
+                raise ValueError("'from' and the keys of steps do not go with 'expression'")
+            return self
+        if self.source is None:
+            raise ValueError(f"step '{self.step}' needs 'from', the channel it works on")
+        if extra := given - _STEP_KEYS[self.step]:
+            raise ValueError(f"step '{self.step}' has no key {sorted(extra)[0]!r}; remove it")
+        for key, step in (
+            ("band", "integrate"),
+            ("band", "band_pass"),
+            ("passband", "low_pass"),
+        ):
+            if self.step == step and getattr(self, key) is None:
+                raise ValueError(
+                    f"step '{step}' needs '{key}' (Hz)"
+                    + (", such as band = [0.3, 5.0]" if key == "band" else "")
+                )
+        return self
+
+
+class RunSettings(Table):
+    """``[runs.NAME]``: one run, its file, and what it serves for.
+
+    Either `role` (with an optional `span`, the part that is used), or `train` and `test`, spans of
+    one run that is used for both. `record` cuts the file before anything else is done with it.
+    """
+
+    file: str = Field(description="the file, relative to the campaign file")
+    sea_state: str = Field(default="", description="a name for the sea state")
+    waves: Literal["regular", "irregular"] | None = Field(
+        default=None, description="'regular' or 'irregular'"
+    )
+    role: Literal["train", "test", "unused"] | None = Field(
+        default=None, description="'train', 'test' or 'unused'"
+    )
+    span: Span | None = Field(default=None, description="[begin, end] in s: the part used")
+    train: Span | None = Field(default=None, description="[begin, end] in s, used for training")
+    test: Span | None = Field(default=None, description="[begin, end] in s, used for testing")
+    record: Span | None = Field(default=None, description="[begin, end] in s: the part read")
+    channels: dict[str, ChannelSettings] = Field(
+        default_factory=dict, description="keys of [channels.NAME] that differ in this run"
+    )
+
+    @model_validator(mode="after")
+    def _one_use(self) -> RunSettings:
+        if self.role is not None and (self.train or self.test):
+            raise ValueError(
+                "'role' does not go with 'train' and 'test'; state the role and 'span', or the "
+                "two spans"
+            )
+        return self
+
+
+class PreparationSettings(Table):
+    """``[preparation]``: the common time step and how it is reached."""
+
+    sampling_rate: Positive | None = Field(default=None, description="samples a second, Hz")
+    dt: Positive | None = Field(default=None, description="time step in seconds")
+    steps_per_period: Annotated[int, Field(ge=4)] | None = Field(
+        default=None, description="samples a mean encounter period; 32 is the paper's"
+    )
+    attenuation: Annotated[float, Field(ge=50, le=200)] = Field(
+        default=60.0, description="attenuation above the new Nyquist frequency, dB, at least 50"
+    )
+    gaps: Literal["refuse"] = Field(
+        default="refuse", description="'refuse': a run with gaps is an error"
+    )
+
+    @model_validator(mode="after")
+    def _one_rate(self) -> PreparationSettings:
+        given = [k for k in ("sampling_rate", "dt", "steps_per_period") if getattr(self, k)]
+        if len(given) > 1:
+            raise ValueError(f"state only one of {', '.join(given)}")
+        return self
+
+
+class PriorSettings(Table):
+    """A prior of the ensemble, such as ``{ uniform = [10, 30] }``."""
+
+    uniform: Span | None = Field(default=None, description="[low, high]")
+    log_uniform: Span | None = Field(default=None, description="[low, high], both positive")
+    fixed: Finite | None = Field(default=None, description="a number")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> PriorSettings:
+        if sum(getattr(self, k) is not None for k in ("uniform", "log_uniform", "fixed")) != 1:
+            raise ValueError("a prior is one of { uniform = [a, b] }, { log_uniform = [a, b] }, "
+                             "{ fixed = value }")  # fmt: skip
+        return self
+
+
+def _branch(value: object) -> str:
+    return "<prior>" if isinstance(value, dict | PriorSettings) else "<number>"
+
+
+NumberOrPrior = Annotated[
+    Annotated[float, Field(ge=0, allow_inf_nan=False), Tag("<number>")]
+    | Annotated[PriorSettings, Tag("<prior>")],
+    Discriminator(_branch),
+]
+Delays = Annotated[int, Field(ge=0)]
+_ONE_MODEL = ("state_delays", "input_delays", "window")
+_ENSEMBLE = ("train_length", "state_delay", "input_delay", "n_members", "seed")
+
+
+class ModelSettings(Table):
+    """``[model]`` and ``[models.NAME]``: states, inputs, and the constructor's own keys.
+
+    Keys that are left out are None: the preset, or the constructor, decides about them.
+    """
+
+    kind: Literal["hankel_dmdc", "bayesian_hankel_dmdc"] = Field(
+        default="hankel_dmdc", description="'hankel_dmdc' or 'bayesian_hankel_dmdc'"
+    )
+    preset: Literal["paper", "recommended"] | None = Field(
+        default=None, description="'paper' or 'recommended'"
+    )
+    states: Annotated[tuple[str, ...], Field(strict=False, min_length=1)] = Field(
+        description="list of channels that the model forecasts"
+    )
+    inputs: Names = Field(default=(), description="list of channels that drive the model")
+    state_delays: Delays | None = Field(default=None, description="samples")
+    input_delays: Delays | None = Field(default=None, description="samples")
+    ridge: NumberOrPrior | None = Field(
+        default=None, description="a number, 0 or more; a prior for an ensemble"
+    )
+    window: Annotated[int, Field(ge=2)] | None = Field(
+        default=None, description="training snapshots a run"
+    )
+    history: Literal["before", "inside"] | None = Field(default=None, description="")
+    delay_rows: Literal["ridge", "exact"] | None = Field(default=None, description="")
+    ridge_scale: Literal["absolute", "per_snapshot"] | None = Field(default=None, description="")
+    rank: Annotated[int, Field(ge=1)] | None = Field(default=None, description="a positive integer")
+    standardize: bool | None = Field(default=None, description="true or false")
+    stop: Finite | None = Field(default=None, description="end of the training window, s")
+    train_length: PriorSettings | None = Field(default=None, description="a prior, in periods")
+    state_delay: PriorSettings | None = Field(default=None, description="a prior, in periods")
+    input_delay: PriorSettings | None = Field(default=None, description="a prior, in periods")
+    n_members: Annotated[int, Field(ge=1)] | None = Field(default=None, description="members")
+    seed: Annotated[int, Field(ge=0)] | None = Field(default=None, description="an integer")
+
+    @model_validator(mode="after")
+    def _keys_fit_kind(self) -> ModelSettings:
+        foreign: tuple[str, ...] = _ENSEMBLE
+        meant = "bayesian_hankel_dmdc"
+        if self.kind == "bayesian_hankel_dmdc":
+            foreign, meant = _ONE_MODEL, "hankel_dmdc"
+        if given := [key for key in foreign if getattr(self, key) is not None]:
+            raise ValueError(
+                f"'{given[0]}' belongs to kind = '{meant}', not to '{self.kind}'; remove it or "
+                "change the kind"
+            )
+        if self.kind == "hankel_dmdc" and isinstance(self.ridge, PriorSettings):
+            raise ValueError("'ridge' of kind = 'hankel_dmdc' is a number, not a prior")
+        for key in ("states", "inputs"):
+            names = getattr(self, key)
+            if len(set(names)) < len(names):
+                raise ValueError(f"'{key}' names a channel twice; remove the repetition")
+        if both := set(self.states) & set(self.inputs):
+            raise ValueError(f"{sorted(both)[0]!r} is among the states and the inputs; choose one")
+        return self
+
+    def arguments(self) -> dict[str, Any]:
+        """Keys of the constructor and of ``fit`` that the file states, without the channels.
+
+        Returns
+        -------
+        dict
+            Key → value; `kind`, `preset`, `states` and `inputs` are left out.
+
+        Examples
+        --------
+        >>> ModelSettings(states=("heave",), ridge=100.0).arguments()
+        {'ridge': 100.0}
+        """
+        apart = {"kind", "preset", "states", "inputs"}
+        return {
+            key: getattr(self, key)
+            for key in type(self).model_fields
+            if key not in apart and getattr(self, key) is not None
+        }
+
+
+class CampaignSettings(Table):
+    """A whole campaign file."""
+
+    campaign: GeneralSettings = GeneralSettings()
+    rig: RigSettings = RigSettings()
+    files: FileSettings = FileSettings()
+    channels: dict[str, ChannelSettings] = Field(
+        min_length=1, description="at least one table [channels.NAME]"
+    )
+    derived: dict[str, DerivedSettings] = Field(default_factory=dict)
+    runs: dict[RunName, RunSettings] = Field(
+        min_length=1, description="at least one table [runs.NAME] with a file"
+    )
+    preparation: PreparationSettings = PreparationSettings()
+    model: ModelSettings | None = None
+    models: dict[str, ModelSettings] = Field(default_factory=dict)
+
+    @property
+    def channel_names(self) -> tuple[str, ...]:
+        """Names of the mapped and the derived channels, in the file's order."""
+        return (*self.channels, *self.derived)
+
+    def all_models(self) -> dict[str, ModelSettings]:
+        """Models by the key of their table: ``model`` and ``models.NAME``."""
+        unnamed = {} if self.model is None else {"model": self.model}
+        return {**unnamed, **{f"models.{name}": each for name, each in self.models.items()}}
+
+
+def long_name_of(name: str, stated: str | None) -> str:
+    """Label of a channel: the one stated, the canonical one, or the name with spaces."""
+    canonical = canonical_channel(name)
+    return stated or (canonical.long_name if canonical else name.replace("_", " "))

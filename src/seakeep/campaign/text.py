@@ -1,0 +1,275 @@
+"""Tables in text files: CSV and its relatives, as loggers and spreadsheets write them."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import gzip
+import io
+import re
+import warnings
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from seakeep.campaign.columns import Columns, is_unit, unique_names
+from seakeep.campaign.settings import FileSettings
+from seakeep.errors import DataError, SeakeepWarning
+
+__all__ = ["read_text"]
+
+_COMMENTS = ("#", "%")
+_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?\Z")
+_MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf", "+inf"}
+
+
+@dataclass(frozen=True)
+class _Layout:
+    delimiter: str
+    decimal: str
+    headers: list[str]
+    units: list[str] | None
+    body: list[tuple[int, str]]  # line numbers count from one
+
+
+def read_text(path: Path, options: FileSettings) -> Columns:
+    """Read a table from a text file, compressed by gzip or not.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    options : FileSettings
+        What is known about it; the rest is recognised.
+
+    Returns
+    -------
+    Columns
+        Its columns. Empty cells and ``nan`` are NaN.
+
+    Raises
+    ------
+    DataError
+        If the file is empty, damaged, or its rows differ in length.
+    """
+    layout = _layout(path, _lines(path, options), options)
+    _check_widths(path, layout)
+    names, units = unique_names(layout.headers)
+    if layout.units is not None:
+        units = [row or unit for row, unit in zip(layout.units, units, strict=True)]
+    keep = [i for i, name in enumerate(names) if name and names.count(name) == 1]
+    numbers, faults = _numbers(path, layout, names, keep)
+    for name in names:
+        if name and names.count(name) > 1:
+            faults[name] = (
+                f"{path}: {names.count(name)} columns are called '{name}'. Rename them in the "
+                "file's header, so that it is plain which one is meant."
+            )
+    return Columns(
+        values=numbers,
+        units={names[i]: str(units[i]) for i in keep if units[i] is not None},
+        faults=faults,
+        headers={name: full for name, full in zip(names, layout.headers, strict=True) if name},
+    )
+
+
+def _lines(path: Path, options: FileSettings) -> list[str]:
+    raw = path.read_bytes()
+    if raw[:2] == b"\x1f\x8b":
+        try:
+            raw = gzip.decompress(raw)
+        except (EOFError, OSError, zlib.error) as error:
+            raise DataError(
+                f"{path} is cut off or damaged (gzip: {error}). Copy or download it again."
+            ) from None
+    if not raw.strip():
+        raise DataError(f"{path} is empty. Export the run again.")
+    if b"\x00" in raw[:4096] and not raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise DataError(
+            f"{path} holds binary data that are no text table. Readable are CSV and text tables "
+            "(plain or gzip), MATLAB .mat (version 5 to 7.2), NetCDF and HDF5; export to one of "
+            "these."
+        )
+    return _decode(path, raw, options.encoding).splitlines()
+
+
+def _decode(path: Path, raw: bytes, encoding: str | None) -> str:
+    if encoding is None and raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        encoding = "utf-16"
+    try:
+        return raw.decode(encoding or "utf-8-sig").removeprefix("\ufeff")
+    except LookupError:
+        raise DataError(
+            f"{path}: the encoding {encoding!r} is not known. Write 'utf-8', 'latin-1' or 'cp1252'."
+        ) from None
+    except UnicodeDecodeError as error:
+        if encoding is not None:
+            raise DataError(
+                f"{path} is not {encoding}: byte {error.start} does not fit. Correct 'encoding' in "
+                "[files], or leave it out."
+            ) from None
+    warnings.warn(
+        f"{path} is not UTF-8 and was read as Latin-1; check the letters of its header, or state "
+        "encoding in [files].",
+        SeakeepWarning,
+        stacklevel=2,
+    )
+    return raw.decode("latin-1")
+
+
+def _layout(path: Path, lines: list[str], options: FileSettings) -> _Layout:
+    marks = (options.comment,) if options.comment else _COMMENTS
+    rows: list[tuple[int, str]] = []
+    remark: tuple[str, int] | None = None  # the last comment line and how many rows precede it
+    for number, line in enumerate(lines[options.skip_rows :], options.skip_rows + 1):
+        if line.lstrip().startswith(marks):
+            if not rows:
+                remark = line.lstrip().lstrip("".join(marks)).strip(), number
+        elif line.strip(" \t,;"):
+            rows.append((number, line))
+    if not rows:
+        raise DataError(
+            f"{path} holds no rows, only comments and blank lines. Export the run again."
+        )
+    delimiter = options.delimiter or _delimiter([line for _, line in rows[:20]])
+    head = _cells(rows[0][1], delimiter)
+    if _numeric(head):
+        named = [] if remark is None else _cells(remark[0], delimiter)
+        headers = named if len(named) == len(head) and not _numeric(named) else []
+        headers = headers or [str(i + 1) for i in range(len(head))]
+        body = rows
+    else:
+        headers, body = head, rows[1:]
+    units = None
+    if body and body is not rows and (second := _units(_cells(body[0][1], delimiter), headers)):
+        units, body = second, body[1:]
+    if not body:
+        raise DataError(f"{path} has a header and no rows of numbers. Export the run again.")
+    decimal = options.decimal
+    if decimal is None:
+        decimal = "," if delimiter != "," and any("," in line for _, line in body) else "."
+    return _Layout(delimiter, decimal, headers, units, body)
+
+
+def _delimiter(lines: list[str]) -> str:
+    for candidate in ("\t", ";"):
+        if candidate in lines[0]:
+            return candidate
+    # With a decimal comma, lines of numbers hold commas and the header does not.
+    if "," in lines[0] and not (_numeric(_cells(lines[0], " ")) and " " in lines[0].strip()):
+        return ","
+    return " "
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    if delimiter == " ":
+        joined: list[str] = []
+        for token in next(csv.reader([line.strip()], delimiter=" ", skipinitialspace=True)):
+            # "Heave [m]": a unit that stands behind a blank belongs to the name before it.
+            opened = joined and joined[-1].count("[") > joined[-1].count("]")
+            if joined and (token.startswith(("[", "(")) or opened):
+                joined[-1] += f" {token}"
+            elif token:
+                joined.append(token)
+        return joined
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+
+
+def _numeric(cells: list[str]) -> bool:
+    """Whether these are the cells of a row of data: numbers, or nothing where one is missing."""
+    numbers = [bool(_NUMBER.match(cell)) for cell in cells]
+    known = [
+        number or cell.lower() in _MISSING for number, cell in zip(numbers, cells, strict=True)
+    ]
+    return any(numbers) and all(known)
+
+
+def _units(cells: list[str], headers: list[str]) -> list[str] | None:
+    """Units of a row below the header, if it is one: texts, most of which are known units."""
+    stripped = [cell.strip("[]() ") for cell in cells]
+    if len(cells) != len(headers) or any(_NUMBER.match(cell) for cell in cells):
+        return None
+    named = [text for text in stripped if text]
+    if not named or 2 * sum(is_unit(text) for text in named) < len(named):
+        return None
+    return stripped
+
+
+def _check_widths(path: Path, layout: _Layout) -> None:
+    wanted, mark = len(layout.headers), layout.delimiter
+    if mark == " ":
+        counts = [len(line.split()) for _, line in layout.body]
+    else:
+        counts = [
+            line.count(mark) + 1 if '"' not in line else len(_cells(line, mark))
+            for _, line in layout.body
+        ]
+    wrong = [i for i, count in enumerate(counts) if count != wanted]
+    if not wrong:
+        return
+    first = wrong[0]
+    shown = {" ": "blanks", "\t": "tabs"}.get(mark, f"'{mark}'")
+    last = len(wrong) == 1 and first == len(counts) - 1
+    raise DataError(
+        f"{path}, line {layout.body[first][0]}: {counts[first]} cells where the header has "
+        f"{wanted} ({len(wrong)} such line(s), columns divided by {shown}). "
+        + (
+            "It is the last line: the file was cut off. Export it again, or remove the line."
+            if last
+            else "Mend the lines, or state delimiter and decimal in [files]."
+        )
+    )
+
+
+def _numbers(
+    path: Path, layout: _Layout, names: list[str], keep: list[int]
+) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    text = "\n".join(line for _, line in layout.body)
+    form = {
+        "sep": r"\s+" if layout.delimiter == " " else layout.delimiter,
+        "header": None,
+        "names": list(range(len(names))),
+        "index_col": False,
+        "skip_blank_lines": False,
+        "usecols": keep,
+        "skipinitialspace": True,
+    }
+    try:
+        frame = pd.read_csv(
+            io.StringIO(text),
+            dtype=float,
+            decimal=layout.decimal,
+            float_precision="round_trip",
+            **form,  # type: ignore[call-overload]
+        )
+        return {names[i]: frame[i].to_numpy(dtype=float) for i in keep}, {}
+    except ValueError:
+        # Some cell is no number: read as text, column by column, to say which.
+        frame = pd.read_csv(io.StringIO(text), dtype=str, **form)  # type: ignore[call-overload]
+    values, faults = {}, {}
+    for i in keep:
+        cells = [None if pd.isna(cell) else str(cell).strip() for cell in frame[i]]
+        out = np.full(len(cells), np.nan)
+        for row, cell in enumerate(cells):
+            try:
+                out[row] = np.nan if cell is None else _number(cell, layout.decimal)
+            except ValueError:
+                faults[names[i]] = (
+                    f"{path}, line {layout.body[row][0]}, column '{names[i]}': {cell!r} is not a "
+                    "number. Correct the cell, leave it empty where the value is missing, or state "
+                    "decimal and delimiter in [files]."
+                )
+                break
+        else:
+            values[names[i]] = out
+    return values, faults
+
+
+def _number(cell: str, decimal: str) -> float:
+    if decimal == ",":
+        # A point would divide thousands, or the file mixes both marks: neither is guessed at.
+        cell = cell.replace(".", "?").replace(",", ".")
+    return float(cell)

@@ -1,0 +1,302 @@
+"""From a TOML file to settings, with one message that names every mistake in it."""
+
+from __future__ import annotations
+
+import tomllib
+import typing
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from seakeep.campaign.settings import CampaignSettings, ChannelSettings, DerivedSettings
+from seakeep.conventions import canonical_channel, conversion, si_unit
+from seakeep.errors import RequestError, did_you_mean
+from seakeep.signals.expressions import parse
+
+__all__ = ["derivation_order", "read_settings", "validate"]
+
+
+def read_settings(path: Path) -> CampaignSettings:
+    """Read and validate a campaign file.
+
+    Parameters
+    ----------
+    path : Path
+        The TOML file.
+
+    Returns
+    -------
+    CampaignSettings
+        Its contents.
+
+    Raises
+    ------
+    RequestError
+        If the file is missing, is no TOML, or says something that a campaign cannot say.
+    """
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        beside = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+        raise RequestError(
+            f"the campaign file {path} does not exist.{did_you_mean(path.name, beside)} "
+            "Draft one with 'seakeep init FILE…'."
+        ) from None
+    except IsADirectoryError:
+        raise RequestError(f"{path} is a folder; give the campaign's TOML file in it.") from None
+    except UnicodeDecodeError as error:
+        line = path.read_bytes()[: error.start].count(b"\n") + 1
+        raise RequestError(
+            f"{path}, line {line}: not UTF-8, which TOML asks for. Save the file as UTF-8."
+        ) from None
+    try:
+        received = tomllib.loads(text.replace("\r\n", "\n"))
+    except tomllib.TOMLDecodeError as error:
+        raise RequestError(
+            f"{path} is not valid TOML: {error}. Write texts in quotes, lists in [ ], "
+            "one 'key = value' a line, and each table and key once."
+        ) from None
+    return validate(received, str(path))
+
+
+def validate(received: Mapping[str, Any], name: str) -> CampaignSettings:
+    """Validate the contents of a campaign file.
+
+    Parameters
+    ----------
+    received : mapping
+        What the TOML says.
+    name : str
+        What the message calls the file.
+
+    Returns
+    -------
+    CampaignSettings
+        The same, checked.
+
+    Raises
+    ------
+    RequestError
+        With one line a mistake: key, value, mend.
+    """
+    try:
+        settings = CampaignSettings.model_validate(received)
+    except ValidationError as error:
+        mistakes = _lines(error)
+    else:
+        mistakes = list(_cross_checks(settings))
+    if mistakes:
+        heading = "1 mistake" if len(mistakes) == 1 else f"{len(mistakes)} mistakes"
+        raise RequestError(
+            f"{name}: {heading} in the campaign file\n" + "\n".join(f"  {m}" for m in mistakes)
+        )
+    return settings
+
+
+def _lines(error: ValidationError) -> list[str]:
+    lines: dict[str, None] = {}
+    for item in error.errors(include_url=False):
+        # Pydantic's own words in a place: '[key]' of a table, '<number>' for a branch of a union.
+        place = [str(part) for part in item["loc"] if not str(part).startswith("<")]
+        table, description, depth = _place(place)
+        key = ".".join(p for p in place[:depth] if p != "[key]") or "the file"
+        lines[f"{key}: {_reason(item, place, table, description)}"] = None
+    return list(lines)
+
+
+def _reason(item: Any, place: list[str], table: type[BaseModel] | None, description: str) -> str:
+    kind, value = item["type"], item["input"]
+    if kind == "extra_forbidden" and table is not None:
+        known = [field.alias or name for name, field in table.model_fields.items()]
+        near = did_you_mean(place[-1], known)
+        return f"unknown key, received {_shown(value)}.{near} Keys here: {', '.join(known)}."
+    if kind == "missing":
+        return f"missing. Add it: {description}." if description else "missing. Add it."
+    if kind == "value_error":
+        return f"{item['ctx']['error']}; received {_shown(value)}."
+    if kind == "string_pattern_mismatch":
+        return (
+            f"received the run name {value!r}; a name is made of letters, digits and '_', '-', "
+            "'.', '+', and begins with a letter or digit, because files are named after it."
+        )
+    message = str(item["msg"]).removeprefix("Input ").replace("valid ", "")
+    message = message.replace("a integer", "an integer")
+    mend = f" Give {description}." if description else ""
+    return f"received {_shown(value)}, which {message}.{mend}"
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, str):
+        return repr(value)
+    if isinstance(value, dict):
+        return "a table with " + (", ".join(map(str, value)) or "no keys")
+    if isinstance(value, bool):
+        return str(value).lower()
+    return str(value)
+
+
+def _place(loc: list[str]) -> tuple[type[BaseModel] | None, str, int]:
+    """Table in which the last key stands, that key's description, and how many keys count."""
+    table: type[BaseModel] | None = CampaignSettings
+    owner, description, annotation = table, "", None
+    for depth, key in enumerate(loc):
+        if table is not None:
+            owner = table
+            fields = {field.alias or name: field for name, field in table.model_fields.items()}
+            if key not in fields:
+                return owner, "", depth + 1
+            annotation, description = fields[key].annotation, fields[key].description or ""
+        elif typing.get_origin(annotation) is dict:
+            annotation = typing.get_args(annotation)[1]
+        else:
+            return owner, description, depth
+        table = _table_of(annotation)
+    return owner, description, len(loc)
+
+
+def _table_of(annotation: Any) -> type[BaseModel] | None:
+    """Return the table that an annotation allows, behind unions and annotations."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    if typing.get_origin(annotation) is dict:
+        return None
+    found = (_table_of(each) for each in typing.get_args(annotation))
+    return next((table for table in found if table is not None), None)
+
+
+def derivation_order(derived: Mapping[str, DerivedSettings]) -> list[str]:
+    """Order derived channels so that each finds what it needs.
+
+    Parameters
+    ----------
+    derived : mapping of str to DerivedSettings
+        The tables ``[derived.NAME]``.
+
+    Returns
+    -------
+    list of str
+        Their names, sources first.
+
+    Raises
+    ------
+    RequestError
+        If they need one another in a circle; the message prints it.
+    """
+    order: list[str] = []
+
+    def visit(name: str, trail: tuple[str, ...]) -> None:
+        if name in trail:
+            circle = " -> ".join((*trail[trail.index(name) :], name))
+            raise RequestError(
+                f"derived channels need one another in a circle: {circle}. Make one of them from "
+                "measured channels."
+            )
+        if name in order or name not in derived:
+            return
+        for source in _sources(derived[name]):
+            visit(source, (*trail, name))
+        order.append(name)
+
+    for name in derived:
+        visit(name, ())
+    return order
+
+
+def _sources(settings: DerivedSettings) -> tuple[str, ...]:
+    if settings.expression is not None:
+        return parse(settings.expression).channels
+    return (str(settings.source),)
+
+
+def _cross_checks(settings: CampaignSettings) -> Iterable[str]:
+    yield from _channel_mistakes(settings)
+    yield from _derived_mistakes(settings)
+    names = settings.channel_names
+    listed = f"Channels: {', '.join(names)}."
+    for name in settings.rig.positions:
+        if name not in names:
+            yield f"rig.positions.{name}: no such channel.{did_you_mean(name, names)} {listed}"
+    wave = settings.campaign.period_channel
+    if wave is not None and wave not in names:
+        yield f"campaign.period_channel: received {wave!r}, no such channel." + (
+            f"{did_you_mean(wave, names)} {listed}"
+        )
+    yield from _model_mistakes(settings)
+    for run, each in settings.runs.items():
+        for name in each.channels:
+            if name not in settings.channels:
+                near = did_you_mean(name, settings.channels)
+                yield (
+                    f"runs.{run}.channels.{name}: no table [channels.{name}] to change.{near} "
+                    "Add it there first."
+                )
+
+
+def _model_mistakes(settings: CampaignSettings) -> Iterable[str]:
+    names = settings.channel_names
+    listed = f"Channels: {', '.join(names)}."
+    for table, model in settings.all_models().items():
+        for key in ("states", "inputs"):
+            for name in getattr(model, key):
+                if name not in names:
+                    near = did_you_mean(name, names)
+                    yield f"{table}.{key}: received {name!r}, no such channel.{near} {listed}"
+
+
+def _channel_mistakes(settings: CampaignSettings) -> Iterable[str]:
+    tables = [(f"channels.{name}", name, each) for name, each in settings.channels.items()]
+    for run, settings_of_run in settings.runs.items():
+        tables += [
+            (f"runs.{run}.channels.{name}", name, each)
+            for name, each in settings_of_run.channels.items()
+        ]
+    for key, name, each in tables:
+        try:
+            _check_unit(name, each)
+        except RequestError as error:
+            yield f"{key}.unit: {error}"
+
+
+def _check_unit(name: str, settings: ChannelSettings | DerivedSettings) -> None:
+    if settings.unit is None:
+        return
+    canonical = canonical_channel(name)
+    conversion(settings.unit, canonical.units if canonical else si_unit(settings.unit), name)
+
+
+def _derived_mistakes(settings: CampaignSettings) -> Iterable[str]:
+    names = settings.channel_names
+    sound = True
+    for name, each in settings.derived.items():
+        if name in settings.channels:
+            yield f"derived.{name}: [channels.{name}] exists too. Rename one of them."
+        try:
+            _check_unit(name, each)
+        except RequestError as error:
+            yield f"derived.{name}.unit: {error}"
+        try:
+            sources = _sources(each)
+        except RequestError as error:
+            sound = False
+            yield f"derived.{name}.expression: {error}"
+            continue
+        key = "expression" if each.expression is not None else "from"
+        for source in sources:
+            if source not in names:
+                near = did_you_mean(source, names)
+                yield (
+                    f"derived.{name}.{key}: the channel '{source}' does not exist.{near} "
+                    f"Channels: {', '.join(names)}."
+                )
+        if each.expression is not None and each.unit is None and canonical_channel(name) is None:
+            yield (
+                f"derived.{name}.unit: missing. '{name}' is a free name; state the unit of the "
+                "expression, such as unit = 'm' ('-' for none)."
+            )
+    if sound:
+        try:
+            derivation_order(settings.derived)
+        except RequestError as error:
+            yield f"derived: {error}"

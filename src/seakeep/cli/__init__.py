@@ -1,0 +1,101 @@
+"""The command ``seakeep``."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from importlib import metadata
+from typing import Annotated
+
+import typer
+
+from seakeep.cli import campaigns, information, modelling
+from seakeep.cli.console import messages, tell_warnings
+from seakeep.errors import SeakeepError
+
+__all__ = ["app", "main"]
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells count it."""
+
+app = typer.Typer(
+    name="seakeep",
+    help=(
+        "Data-driven models of vessels in waves: from measured runs to judged forecasts.\n\n"
+        "Example: seakeep fit campaign.toml -o model.nc && seakeep compare model.nc campaign.toml"
+    ),
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"seakeep {metadata.version('seakeep')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Read the options that stand before the verb; ``main`` looks for --debug itself."""
+
+
+app.command("init")(campaigns.init)
+app.command("prepare")(campaigns.prepare)
+app.command("fit")(modelling.fit)
+app.command("forecast")(modelling.forecast)
+app.command("compare")(modelling.compare)
+app.add_typer(campaigns.datasets, name="datasets")
+app.command("info")(information.info)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a command; the entry point of ``seakeep``.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        What stands after ``seakeep``; by default the program's own arguments.
+
+    Returns
+    -------
+    int
+        0 done, 1 the run failed, 2 the request is wrong, 130 interrupted.
+    """
+    received = sys.argv[1:] if arguments is None else list(arguments)
+    debug = "--debug" in received
+    received = [each for each in received if each != "--debug"]
+    command = typer.main.get_command(app)
+    try:
+        with tell_warnings():
+            command.main(args=received, prog_name="seakeep")
+    except SystemExit as leaving:
+        status = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
+        if status == INTERRUPTED:
+            messages().print("Interrupted. Files that were finished are kept.", style="red")
+        return status
+    except SeakeepError as error:
+        if debug:
+            traceback.print_exc()
+        messages().print(f"Error: {error}", style="red")
+        return error.exit_status
+    except BrokenPipeError:
+        return 1
+    except Exception as error:
+        if debug:
+            traceback.print_exc()
+        messages().print(
+            f"Error: {type(error).__name__}: {error}. This is a fault of seakeep; run the command "
+            "again with --debug and report what it prints together with `seakeep info`.",
+            style="red",
+        )
+        return 1
+    return 0

@@ -1,0 +1,122 @@
+"""``seakeep init``, ``prepare`` and ``datasets``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.markup import escape
+from rich.table import Table
+
+from seakeep.campaign import draft_campaign, read_campaign, write_prepared
+from seakeep.campaign.datasets import DATASETS, data_folder, fetch, find_dataset, state_of
+from seakeep.cli.console import messages, progress_bar, results
+from seakeep.errors import RequestError
+from seakeep.files import replacing
+
+__all__ = ["datasets", "init", "prepare"]
+
+
+def init(
+    files: Annotated[list[Path], typer.Argument(help="Files of measured runs.", metavar="FILE…")],
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="File to write; by default standard output."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+) -> None:
+    """Draft a campaign file from the headers of measured files.
+
+    Columns, units and canonical names are guessed: read the draft before you use it.
+
+    Example: seakeep init run1.csv run2.csv run3.csv -o campaign.toml
+    """
+    folder = Path() if out is None else out.parent
+    text = draft_campaign(files, folder)
+    if out is None:
+        typer.echo(text, nl=False)
+        return
+    if out.exists() and not force:
+        raise RequestError(f"{out} exists already. Give another name, or --force to overwrite it.")
+    with replacing(out) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    messages().print(f"Wrote {out}. Read it, then: seakeep fit {out} -o model.nc")
+
+
+def prepare(
+    campaign: Annotated[Path, typer.Argument(help="Campaign file.", metavar="CAMPAIGN.toml")],
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="Folder; by default 'prepared' beside the campaign."),
+    ] = None,
+) -> None:
+    """Turn raw files into analysis-ready runs, one NetCDF file each.
+
+    fit, forecast and compare use these files while they are fresh (same settings, same raw
+    files), and prepare in memory what is missing.
+
+    Example: seakeep prepare docs/tutorial/campaign.toml
+    """
+    with progress_bar("Preparing") as progress:
+        files = write_prepared(read_campaign(campaign), out, progress=progress)
+    for path in files.values():
+        typer.echo(str(path))
+
+
+datasets = typer.Typer(
+    help=("List the public data sets of the examples, or fetch one.\n\nExample: seakeep datasets"),
+    invoke_without_command=True,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+
+
+@datasets.callback()
+def _list(context: typer.Context) -> None:
+    if context.invoked_subcommand is not None:
+        return
+    folder = data_folder()
+    table = Table(box=box.SIMPLE_HEAD, show_header=False)
+    table.add_column("key", style="bold")
+    table.add_column("value", overflow="fold")
+    for each in DATASETS:
+        table.add_row("name", each.name, style="bold")
+        table.add_row("what", each.title)
+        table.add_row("origin", each.origin)
+        table.add_row("licence", each.licence)
+        table.add_row("cite", each.reference)
+        table.add_row("here", state_of(each, folder))
+        if each.note:
+            table.add_row("note", escape(each.note))
+        table.add_row("files", "with their SHA-256")
+        for name, checksum in each.files:
+            table.add_row("", escape(f"{name}  {checksum}"))
+        table.add_section()
+    results().print(table)
+
+
+@datasets.command("fetch")
+def _fetch(
+    name: Annotated[str, typer.Argument(help="Name of the data set.")],
+    to: Annotated[
+        Path | None,
+        typer.Option("--to", help="Data folder; by default SEAKEEP_DATA_DIR."),
+    ] = None,
+) -> None:
+    """Fetch a data set from its origin and check it; the one command that uses the network.
+
+    Example: seakeep datasets fetch ntnu_ship_section --to data
+    """
+    dataset = find_dataset(name)
+    folder = to or data_folder()
+    if folder is None:
+        raise RequestError(
+            "no data folder is known. Give --to DIR, or set the environment variable "
+            "SEAKEEP_DATA_DIR."
+        )
+    with progress_bar("Fetching") as progress:
+        place = fetch(dataset, folder, progress)
+    typer.echo(str(place))
+    messages().print(f"Set SEAKEEP_DATA_DIR={folder.resolve()} so that the examples find it.")

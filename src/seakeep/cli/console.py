@@ -1,0 +1,82 @@
+"""What all commands share: streams, progress, and how mistakes are told."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from seakeep.campaign.prepare import Progress as Report
+from seakeep.errors import SeakeepWarning
+
+__all__ = ["messages", "progress_bar", "results", "tell_warnings"]
+
+PIPE_WIDTH = 140
+"""Columns of a table that goes to a file or a pipe, where nobody can widen the window."""
+
+
+def results() -> Console:
+    """Console of results, on standard output."""
+    width = None if sys.stdout.isatty() else PIPE_WIDTH
+    return Console(file=sys.stdout, width=width, highlight=False, markup=False)
+
+
+def messages() -> Console:
+    """Console of messages, on standard error; long lines are left to the terminal."""
+    return Console(file=sys.stderr, highlight=False, soft_wrap=True, markup=False)
+
+
+@contextmanager
+def progress_bar(what: str) -> Iterator[Report]:
+    """Show progress: a bar on a terminal, a line a step elsewhere, on standard error."""
+    console = messages()
+    if not console.is_terminal:
+
+        def line(done: int, total: int, name: str) -> None:
+            console.print(f"{what} {done}/{total}: {name}")
+
+        yield line
+        return
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task(what, total=None)
+
+        def advance(done: int, total: int, name: str) -> None:
+            bar.update(task, total=total, completed=done, description=f"{what}: {name}")
+
+        yield advance
+
+
+@contextmanager
+def tell_warnings() -> Iterator[None]:
+    """Print warnings of seakeep as one line each, and leave the others to Python."""
+    told = warnings.showwarning
+
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: object = None,
+        line: str | None = None,
+    ) -> None:
+        if issubclass(category, SeakeepWarning):
+            messages().print(f"Note: {message}", style="yellow")
+        else:
+            told(message, category, filename, lineno, None, line)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", SeakeepWarning)
+        warnings.showwarning = show
+        yield

@@ -1,0 +1,160 @@
+"""``seakeep fit``, ``forecast`` and ``compare``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import xarray as xr
+
+from seakeep.campaign import Campaign, load_prepared, read_campaign
+from seakeep.cli.console import messages, progress_bar, results
+from seakeep.errors import RequestError, did_you_mean
+from seakeep.files import replacing
+from seakeep.models import load_model
+from seakeep.report.overlay import overlay_figure
+from seakeep.report.style import save_figure
+from seakeep.report.tables import rich_comparison, write_csv
+from seakeep.study import compare as compare_runs
+from seakeep.study import comparison_table, fit_campaign, in_degrees
+
+__all__ = ["compare", "fit", "forecast"]
+
+CampaignFile = Annotated[Path, typer.Argument(help="Campaign file.", metavar="CAMPAIGN.toml")]
+ModelFile = Annotated[
+    Path, typer.Argument(help="Model file written by seakeep fit.", metavar="MODEL.nc")
+]
+
+
+def fit(
+    campaign: CampaignFile,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Model file to write (NetCDF).")],
+    model: Annotated[
+        str | None,
+        typer.Option("--model", help="Key in [models.NAME]; by default the table [model]."),
+    ] = None,
+) -> None:
+    """Identify a model from the training runs of a campaign.
+
+    Example: seakeep fit docs/tutorial/campaign.toml -o model.nc
+    """
+    if not out.parent.is_dir():
+        raise RequestError(f"the folder {out.parent} does not exist. Create it first.")
+    with progress_bar("Preparing") as progress:
+        identified = fit_campaign(read_campaign(campaign), model, progress)
+    typer.echo(identified.summary())
+    identified.save(out)
+    messages().print(f"Wrote {out}. Judge it with: seakeep compare {out} {campaign}")
+
+
+def forecast(
+    model: ModelFile,
+    campaign: CampaignFile,
+    run: Annotated[str, typer.Option("--run", help="Name of the run.")],
+    start: Annotated[float, typer.Option("--start", help="Instant of the last measured state, s.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Result: .nc or .csv.")],
+    steps: Annotated[
+        int | None, typer.Option("--steps", help="Number of instants; by default to the end.")
+    ] = None,
+) -> None:
+    """Forecast a run: the model runs freely after START, driven by the measured waves.
+
+    Example: seakeep forecast model.nc docs/tutorial/campaign.toml --run unseen --start 20
+    --steps 400 -o forecast.csv
+    """
+    if out.suffix not in (".nc", ".csv"):
+        raise RequestError(f"{out} ends in '{out.suffix}'; a forecast is written as .nc or .csv.")
+    identified = load_model(model)
+    prepared = _prepared(read_campaign(campaign), run)
+    result = identified.forecast(prepared, start=start, steps=steps)
+    with replacing(out) as temporary:
+        if out.suffix == ".nc":
+            result.to_netcdf(temporary, engine="h5netcdf")
+        else:
+            _with_units(result).to_dataframe().to_csv(temporary)
+    status = result.attrs["status"]
+    messages().print(
+        f"Wrote {out}: {result.sizes['time']} instants after t = {result.attrs['start']:g} s, "
+        f"status {status}."
+    )
+    if status != "ok":
+        raise typer.Exit(1)
+
+
+def compare(
+    model: ModelFile,
+    campaign: CampaignFile,
+    run: Annotated[
+        list[str] | None,
+        typer.Option("--run", help="Name of a run (repeatable); by default the test runs."),
+    ] = None,
+    start: Annotated[
+        float | None,
+        typer.Option(
+            "--start",
+            help="Instant of the last measured state, s; by default the first possible one.",
+        ),
+    ] = None,
+    steps: Annotated[
+        int | None, typer.Option("--steps", help="Number of instants; by default to the end.")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Folder for the table and the figures.")
+    ] = Path("comparison"),
+    format_: Annotated[
+        str, typer.Option("--format", help="Format of the figures: png, svg or pdf.")
+    ] = "png",
+    radians: Annotated[
+        bool, typer.Option("--radians", help="Show angles in radians instead of degrees.")
+    ] = False,
+) -> None:
+    """Forecast test runs and judge the forecasts against the measurement.
+
+    Prints a table a channel and writes it as CSV, with an overlay figure a run.
+
+    Example: seakeep compare model.nc docs/tutorial/campaign.toml -o comparison
+    """
+    if format_ not in ("png", "svg", "pdf"):
+        raise RequestError(f"--format must be png, svg or pdf; received '{format_}'.")
+    identified = load_model(model)
+    with progress_bar("Preparing") as progress:
+        comparisons = compare_runs(
+            identified, read_campaign(campaign), run or (), start, steps, progress
+        )
+    if not radians:
+        comparisons = [in_degrees(each) for each in comparisons]
+    table = comparison_table(comparisons)
+    results().print(rich_comparison(table))
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RequestError(
+            f"cannot make the folder {out}: {error.strerror or error}. Choose another with -o."
+        ) from error
+    written = [write_csv(table, out / "comparison.csv")]
+    for comparison in comparisons:
+        path = out / f"{comparison.run}.{format_}"
+        written.append(save_figure(overlay_figure(comparison), path))
+    messages().print("Wrote " + ", ".join(map(str, written)))
+    if any(comparison.status != "ok" for comparison in comparisons):
+        raise typer.Exit(1)
+
+
+def _prepared(campaign: Campaign, run: str) -> xr.Dataset:
+    if run not in campaign.runs:
+        raise RequestError(
+            f"the campaign has no run '{run}'.{did_you_mean(run, campaign.runs)} "
+            f"Runs: {', '.join(campaign.runs)}."
+        )
+    return load_prepared(campaign, names=[run])[run]
+
+
+def _with_units(result: xr.Dataset) -> xr.Dataset:
+    names = {
+        str(name): f"{name} [{variable.attrs.get('units', '')}]"
+        for name, variable in result.data_vars.items()
+    }
+    # Instants are multiples of a step; nine decimals hide the rounding of the product.
+    timed = result.assign_coords(time=result["time"].round(9))
+    return timed.rename({**names, "time": "time [s]"})

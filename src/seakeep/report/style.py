@@ -1,0 +1,108 @@
+"""One look for all figures: colours that survive grey print and colour-blind readers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from seakeep.conventions import canonical_channel
+from seakeep.errors import RequestError
+from seakeep.files import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["COLOURS", "LINES", "axis_label", "figure_style", "new_figure", "save_figure"]
+
+COLOURS = {
+    "measured": "#000000",
+    "forecast": "#D55E00",
+    "ensemble": "#0072B2",
+    "input": "#56606B",
+    "start": "#009E73",
+}
+"""From the palette of Okabe and Ito; their greys differ too."""
+
+LINES: dict[str, dict[str, Any]] = {
+    "measured": {"color": COLOURS["measured"], "linewidth": 1.6, "linestyle": "-"},
+    "forecast": {"color": COLOURS["forecast"], "linewidth": 1.2, "linestyle": (0, (4, 1.5))},
+    "ensemble": {"color": COLOURS["ensemble"], "linewidth": 1.2, "linestyle": "-."},
+    "input": {"color": COLOURS["input"], "linewidth": 0.9, "linestyle": "-"},
+}
+"""Lines differ in dash and width as well as in colour."""
+
+_RC: Any = {
+    "font.size": 9,
+    "axes.titlesize": 10,
+    "axes.labelsize": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#D9D9D9",
+    "grid.linewidth": 0.5,
+    "legend.frameon": False,
+    "savefig.dpi": 110,
+    "svg.fonttype": "none",
+}
+
+
+@contextmanager
+def figure_style() -> Iterator[None]:
+    """Draw in our style, without touching anybody's global settings.
+
+    Raises
+    ------
+    RequestError
+        If matplotlib is not installed.
+    """
+    try:
+        import matplotlib as mpl
+    except ImportError as error:
+        raise RequestError(
+            "figures need matplotlib, which is not installed. "
+            "Install it with: pip install 'seakeep[figures]'"
+        ) from error
+    with mpl.rc_context(_RC):
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure, in inches; draw on it inside :func:`figure_style`."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write a figure to a temporary name and rename it; the suffix decides the format.
+
+    Raises
+    ------
+    RequestError
+        If the file cannot be written.
+    """
+    with figure_style(), replacing(path) as temporary:
+        kind = path.suffix.removeprefix(".")
+        if kind == "png":
+            figure.savefig(temporary, format=kind, pil_kwargs={"optimize": True})
+        else:
+            figure.savefig(temporary, format=kind)
+    return path
+
+
+def axis_label(name: str, units: str) -> str:
+    r"""Label of a channel for an axis: words, symbol where it has one, and unit.
+
+    Examples
+    --------
+    >>> axis_label("pitch_rate", "rad/s")
+    'pitch rate\n$\\dot{\\theta}$ [rad/s]'
+    >>> axis_label("propeller_torque", "N m")
+    'propeller torque\n[N m]'
+    """
+    channel = canonical_channel(name)
+    words = channel.long_name if channel else name.replace("_", " ")
+    symbol = f"${channel.symbol}$ " if channel else ""
+    return f"{words}\n{symbol}[{units or '?'}]"

@@ -1,0 +1,110 @@
+"""Tables for the terminal and for files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from rich import box
+from rich.table import Table
+
+from seakeep.files import replacing
+
+__all__ = ["comparison_columns", "rich_comparison", "write_csv"]
+
+_HEADINGS = {
+    "nrmse": ("NRMSE", "{:.3f}"),
+    "fit": ("fit %", "{:.1f}"),
+    "nammae": ("NAMMAE", "{:.3f}"),
+    "sd_ratio": ("SD ratio", "{:.3f}"),
+    "measured_min": ("min meas.", "{:.4g}"),
+    "predicted_min": ("min pred.", "{:.4g}"),
+    "measured_max": ("max meas.", "{:.4g}"),
+    "predicted_max": ("max pred.", "{:.4g}"),
+}
+
+
+def comparison_columns() -> list[str]:
+    """Variables of a comparison table in the order they are shown."""
+    return list(_HEADINGS)
+
+
+def rich_comparison(table: xr.Dataset) -> Table:
+    """Comparison of forecasts with measurements as a table for the terminal.
+
+    Parameters
+    ----------
+    table : Dataset
+        From :func:`seakeep.study.comparison_table`.
+
+    Returns
+    -------
+    rich.table.Table
+        A row a run and channel, and the averages below each run.
+    """
+    out = Table(box=box.SIMPLE_HEAD, title="Forecast against measurement", title_justify="left")
+    out.add_column("run", no_wrap=True)
+    out.add_column("channel", no_wrap=True)
+    out.add_column("unit", no_wrap=True)
+    for heading, _ in _HEADINGS.values():
+        out.add_column(heading, justify="right", no_wrap=True)
+    for run in table["run"].values:
+        rows = table.sel(run=run)
+        for channel in table["channel"].values:
+            at = rows.sel(channel=channel)
+            out.add_row(
+                str(run),
+                str(channel),
+                str(at["channel_units"].values),
+                *(_shown(float(at[name]), form) for name, (_, form) in _HEADINGS.items()),
+            )
+        status = str(rows["status"].values)
+        mean = [
+            _shown(float(rows["anrmse"]), "{:.3f}"),
+            "",
+            _shown(float(rows["mean_nammae"]), "{:.3f}"),
+        ]
+        out.add_row(
+            str(run),
+            "average" + ("" if status == "ok" else f" ({status})"),
+            "",
+            *mean,
+            style="bold",
+        )
+        out.add_section()
+    return out
+
+
+def _shown(value: float, form: str) -> str:
+    return form.format(value) if np.isfinite(value) else "–"
+
+
+def write_csv(table: xr.Dataset, path: Path) -> Path:
+    """Write a comparison table as CSV, a row a run and channel, full precision.
+
+    Parameters
+    ----------
+    table : Dataset
+        From :func:`seakeep.study.comparison_table`.
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    RequestError
+        If the file cannot be written.
+    """
+    frame = table[list(_HEADINGS)].to_dataframe().reset_index()
+    for name in ("start", "status", "anrmse"):
+        frame[name] = frame["run"].map(table[name].to_series())
+    front = ["run", "channel", "channel_units"]
+    frame = frame[front + [name for name in frame.columns if name not in front]]
+    with replacing(path) as temporary:
+        frame.to_csv(temporary, index=False)
+    return path

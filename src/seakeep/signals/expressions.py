@@ -1,0 +1,238 @@
+"""Arithmetic of channels, written as text and parsed, never evaluated as Python.
+
+An expression knows numbers, channel names, ``+ - * / **``, parentheses, and the functions
+``square``, ``abs``, ``sqrt``, ``sin``, ``cos`` and ``mean``. ``mean(a, b)`` is the average of
+several values instant by instant; ``mean(a)`` of one is its mean over time, so that
+``a - mean(a)`` is the deviation. A name that is no identifier stands between backticks.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.errors import DataError, RequestError, did_you_mean
+
+__all__ = ["Expression", "parse"]
+
+FloatArray = npt.NDArray[np.float64]
+
+LONGEST = 1000
+"""Characters an expression may have: more is a program, and Python's parser recurses."""
+
+_OPERATORS: dict[type[ast.operator], Callable[[FloatArray, FloatArray], FloatArray]] = {
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+    ast.Div: np.divide,
+    ast.Pow: np.power,
+}
+_FUNCTIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "square": np.square,
+    "abs": np.abs,
+    "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
+}
+_ALLOWED = (
+    "numbers, channel names, + - * / **, parentheses, and the functions "
+    "square, abs, mean, sqrt, sin, cos"
+)
+_QUOTED = re.compile(r"`([^`]*)`")
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A parsed expression; made by :func:`parse`.
+
+    Parameters
+    ----------
+    text : str
+        What was parsed.
+    channels : tuple of str
+        Names of the channels it uses, in the order in which they appear.
+    """
+
+    text: str
+    channels: tuple[str, ...]
+    _tree: ast.expr = field(repr=False, compare=False)
+    _quoted: Mapping[str, str] = field(repr=False, compare=False)
+
+    def evaluate(self, values: Mapping[str, npt.ArrayLike]) -> FloatArray:
+        """Value of the expression.
+
+        Parameters
+        ----------
+        values : mapping of str to array_like, shape (time,)
+            The channels by name, all of one length.
+
+        Returns
+        -------
+        ndarray, shape (time,)
+            The value at each instant.
+
+        Raises
+        ------
+        RequestError
+            If a channel that the expression uses is not among `values`.
+        DataError
+            If the value is not finite somewhere (a division by zero, the root of a negative).
+
+        Examples
+        --------
+        >>> parse("2 * a - mean(a)").evaluate({"a": [1.0, 2.0, 3.0]})
+        array([0., 2., 4.])
+        """
+        for name in self.channels:
+            if name not in values:
+                raise RequestError(
+                    f"the expression {self.text!r} uses the channel '{name}', which does not "
+                    f"exist.{did_you_mean(name, values)} Channels: {', '.join(values)}."
+                )
+        arrays = {name: np.asarray(values[name], dtype=float) for name in self.channels}
+        with np.errstate(all="ignore"):
+            out = self._value(self._tree, arrays)
+        shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
+        result: FloatArray = np.array(np.broadcast_to(out, shape))
+        if not np.all(np.isfinite(result)):
+            bad = np.flatnonzero(~np.isfinite(result))
+            raise DataError(
+                f"the expression {self.text!r} gives {bad.size} value(s) that are not finite, the "
+                f"first at sample {bad[0]}. Look for a division by zero, the root of a negative "
+                "number, or gaps in its channels."
+            )
+        return result
+
+    def _value(self, node: ast.expr, values: Mapping[str, FloatArray]) -> FloatArray:
+        if isinstance(node, ast.Constant):
+            return np.asarray(node.value, dtype=float)
+        if isinstance(node, ast.Name):
+            return values[self._quoted.get(node.id, node.id)]
+        if isinstance(node, ast.BinOp):
+            operate = _OPERATORS[type(node.op)]
+            return operate(self._value(node.left, values), self._value(node.right, values))
+        if isinstance(node, ast.UnaryOp):
+            operand = self._value(node.operand, values)
+            return -operand if isinstance(node.op, ast.USub) else operand
+        assert isinstance(node, ast.Call)
+        assert isinstance(node.func, ast.Name)
+        arguments = [self._value(argument, values) for argument in node.args]
+        if node.func.id == "mean":
+            if len(arguments) == 1:
+                return np.asarray(np.mean(arguments[0]))
+            total = arguments[0]
+            for argument in arguments[1:]:
+                total = total + argument
+            return total / len(arguments)
+        return _FUNCTIONS[node.func.id](arguments[0])
+
+
+def parse(text: str) -> Expression:
+    """Parse an expression of channels.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``"0.5*(acc_sb + acc_ps)"``.
+
+    Returns
+    -------
+    Expression
+        Its parsed form, with the names of the channels that it uses.
+
+    Raises
+    ------
+    RequestError
+        If the text is no expression, names no channel, or uses what is not allowed; the message
+        says what and where.
+
+    Examples
+    --------
+    >>> parse("square(`wave probe 1`) / 2 + heave").channels
+    ('wave probe 1', 'heave')
+    """
+    if not text.strip() or len(text) > LONGEST:
+        raise RequestError(
+            f"an expression has between 1 and {LONGEST} characters; received {len(text)}. "
+            "Split it into several derived channels."
+            if text.strip()
+            else f"the expression {text!r} is empty. Write one of {_ALLOWED}."
+        )
+    text = " ".join(text.strip().splitlines())
+    plain, quoted = _unquoted(text)
+    try:
+        tree = ast.parse(plain, mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        at = error.offset or 1 if isinstance(error, SyntaxError) else 1
+        raise _refusal(text, at, "this is not an arithmetic expression") from None
+    channels: dict[str, None] = {}
+    _check(tree, text, plain, quoted, channels)
+    if not channels:
+        raise RequestError(
+            f"the expression {text!r} names no channel, so it would be a constant. "
+            "Write the name of a channel in it."
+        )
+    return Expression(text, tuple(channels), tree, quoted)
+
+
+def _unquoted(text: str) -> tuple[str, dict[str, str]]:
+    """Put identifiers of the same length in the place of names between backticks."""
+    quoted: dict[str, str] = {}
+
+    def stand_in(match: re.Match[str]) -> str:
+        # A click letter, which may be part of an identifier and which nobody calls a channel.
+        name = f"\u01c3{len(quoted)}".ljust(len(match[0]), "_")
+        quoted[name] = match[1]
+        return name
+
+    return _QUOTED.sub(stand_in, text), quoted
+
+
+def _refusal(text: str, position: int, reason: str) -> RequestError:
+    return RequestError(
+        f"the expression {text!r} is not allowed: at character {position}, {reason}. "
+        f"Allowed are {_ALLOWED}; write names with blanks or signs between backticks."
+    )
+
+
+def _check(
+    node: ast.expr, text: str, plain: str, quoted: Mapping[str, str], channels: dict[str, None]
+) -> None:
+    """Refuse every node that is not on the list; collect the channels."""
+    position = len(plain.encode()[: node.col_offset].decode()) + 1
+
+    def inner(*nodes: ast.expr) -> None:
+        for each in nodes:
+            _check(each, text, plain, quoted, channels)
+
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        return
+    if isinstance(node, ast.Name):
+        channels[quoted.get(node.id, node.id)] = None
+    elif isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+        inner(node.left, node.right)
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
+        inner(node.operand)
+    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
+        _check_call(node.func.id, len(node.args), text, position)
+        inner(*node.args)
+    else:
+        source = ast.get_source_segment(plain, node) or plain
+        for stand_in, name in quoted.items():
+            source = source.replace(stand_in, f"`{name}`")
+        raise _refusal(text, position, f"{source!r} is none of the allowed forms")
+
+
+def _check_call(name: str, count: int, text: str, position: int) -> None:
+    known = [*_FUNCTIONS, "mean"]
+    if name not in known:
+        near = did_you_mean(name, known)
+        raise _refusal(text, position, f"'{name}' is no function known here.{near}".rstrip("."))
+    if count == 0 or (count > 1 and name != "mean"):
+        wanted = "one or more" if name == "mean" else "one"
+        raise _refusal(text, position, f"'{name}' takes {wanted} argument(s), not {count}")

@@ -1,0 +1,242 @@
+"""A model against the measurement: forecasts of test runs, and the table that judges them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xarray as xr
+
+from seakeep import metrics
+from seakeep.campaign import Campaign, load_prepared
+from seakeep.campaign.prepare import Progress
+from seakeep.conventions import conversion
+from seakeep.errors import RequestError, did_you_mean
+from seakeep.models import HankelDMDcModel
+
+__all__ = ["Comparison", "compare", "comparison_table", "in_degrees"]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Forecast and measurement of one run.
+
+    Parameters
+    ----------
+    run : str
+        Name of the run.
+    sea_state : str
+        As the campaign states it.
+    forecast : Dataset
+        As :meth:`seakeep.HankelDMDcModel.forecast` gives it.
+    measured : Dataset
+        The states at the same instants.
+    inputs : Dataset
+        The inputs over the forecast, to be drawn beside it.
+    """
+
+    run: str
+    sea_state: str
+    forecast: xr.Dataset
+    measured: xr.Dataset
+    inputs: xr.Dataset
+
+    @property
+    def start(self) -> float:
+        """Instant of the last measured state, s."""
+        return float(self.forecast.attrs["start"])
+
+    @property
+    def status(self) -> str:
+        """Whether the forecast went well ("ok"), or from when on it diverged."""
+        return str(self.forecast.attrs["status"])
+
+    @property
+    def anrmse(self) -> float:
+        """Average of the channels' NRMSE."""
+        return float(metrics.anrmse(predicted=self.forecast, measured=self.measured))
+
+
+def in_degrees(comparison: Comparison) -> Comparison:
+    """Turn the angles of a comparison into degrees, for tables and figures that people read.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        In SI units.
+
+    Returns
+    -------
+    Comparison
+        Radians, and their rates, turned into degrees; error measures do not change by it.
+    """
+    return replace(
+        comparison,
+        forecast=_degrees(comparison.forecast),
+        measured=_degrees(comparison.measured),
+        inputs=_degrees(comparison.inputs),
+    )
+
+
+def _degrees(run: xr.Dataset) -> xr.Dataset:
+    out = run.copy()
+    for name, variable in run.data_vars.items():
+        units = str(variable.attrs.get("units", ""))
+        if units.split("/")[0] != "rad":
+            continue
+        target = units.replace("rad", "deg")
+        factor = conversion(units, target)
+        out[name] = variable * factor
+        out[name].attrs = {**variable.attrs, "units": target}
+        if "training_std" in variable.attrs:
+            out[name].attrs["training_std"] = factor * float(variable.attrs["training_std"])
+    return out
+
+
+def compare(
+    model: HankelDMDcModel,
+    campaign: Campaign,
+    runs: Sequence[str] = (),
+    start: float | None = None,
+    steps: int | None = None,
+    progress: Progress | None = None,
+) -> list[Comparison]:
+    """Forecast runs of a campaign and put the measurement beside.
+
+    Parameters
+    ----------
+    model : HankelDMDcModel
+        The model.
+    campaign : Campaign
+        The campaign.
+    runs : sequence of str, optional
+        Runs; by default those that test.
+    start : float, optional
+        Instant of the last measured state, s; by default the first possible one of the run's
+        test span, its delay history read from before the span where the run has it.
+    steps : int, optional
+        Number of instants; by default to the end of the test span.
+    progress : callable, optional
+        Called as ``progress(done, total, run)`` while runs are prepared.
+
+    Returns
+    -------
+    list of Comparison
+        One a run.
+
+    Raises
+    ------
+    RequestError
+        If a run is unknown or none tests, or `start` and `steps` do not fit.
+    DataError
+        If a run cannot be read or used.
+    """
+    wanted = list(runs) or campaign.test_runs
+    unknown = [name for name in wanted if name not in campaign.runs]
+    if unknown:
+        raise RequestError(
+            f"the campaign has no run '{unknown[0]}'.{did_you_mean(unknown[0], campaign.runs)} "
+            f"Runs: {', '.join(campaign.runs)}."
+        )
+    if not wanted:
+        raise RequestError(
+            "no run of the campaign tests a model. Name one with --run, or give one "
+            "role = 'test' or a span test = [begin, end]."
+        )
+    prepared = load_prepared(campaign, names=wanted, progress=progress)
+    return [_compare_run(model, run, name, start, steps) for name, run in prepared.items()]
+
+
+def _compare_run(
+    model: HankelDMDcModel, run: xr.Dataset, name: str, start: float | None, steps: int | None
+) -> Comparison:
+    time = run["time"].values
+    begin, end = run.attrs.get("test_span", (time[0], time[-1]))
+    if start is None:
+        first = min(model.history_samples - 1, time.size - 1)
+        start = max(float(begin), float(time[first]))
+    if steps is None:
+        last = int(np.searchsorted(time, float(end) + 0.5 * model.dt)) - 1
+        at = int(np.argmin(np.abs(time - start)))
+        steps = max(last - at, 1)
+    forecast = model.forecast(run, start=start, steps=steps)
+    inside = forecast.sel(time=slice(None, time[-1]))
+    if inside.sizes["time"] < forecast.sizes["time"]:
+        inside.attrs = forecast.attrs
+    instants = {"time": inside["time"]}
+    return Comparison(
+        run=name,
+        sea_state=str(run.attrs.get("sea_state", "")),
+        forecast=inside,
+        measured=run[model.states].sel(instants),
+        inputs=run[model.inputs].sel(instants),
+    )
+
+
+def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
+    """Judge forecasts channel by channel.
+
+    Parameters
+    ----------
+    comparisons : sequence of Comparison
+        From :func:`compare`.
+
+    Returns
+    -------
+    Dataset
+        Over ``run`` and ``channel``: ``nrmse``, ``fit`` (%), ``nammae``, ``sd_ratio`` (predicted
+        over measured), ``measured_min``, ``measured_max``, ``predicted_min``, ``predicted_max``
+        (in ``channel_units``); over ``run``: ``anrmse``, ``mean_nammae``, ``status``, ``start``.
+    """
+    rows = [_row(comparison) for comparison in comparisons]
+    table = xr.concat(rows, dim="run")
+    for name, (units, label) in _COLUMNS.items():
+        table[name].attrs = {"units": units, "long_name": label}
+    return table
+
+
+_COLUMNS = {
+    "nrmse": ("1", "RMS error in measured standard deviations"),
+    "fit": ("%", "fit as MATLAB's compare states it"),
+    "nammae": ("1", "error of minimum and maximum in measured standard deviations"),
+    "sd_ratio": ("1", "standard deviation, predicted over measured"),
+    "measured_min": ("channel's", "measured minimum"),
+    "measured_max": ("channel's", "measured maximum"),
+    "predicted_min": ("channel's", "predicted minimum"),
+    "predicted_max": ("channel's", "predicted maximum"),
+}
+
+
+def _row(comparison: Comparison) -> xr.Dataset:
+    p, m = comparison.forecast, comparison.measured
+    names = [str(name) for name in p.data_vars]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sd_ratio = p.std("time", ddof=1, skipna=False) / m.std("time", ddof=1)
+    each = {
+        "nrmse": metrics.nrmse(predicted=p, measured=m),
+        "fit": metrics.fit_percent(predicted=p, measured=m),
+        "nammae": metrics.normalised_extremes_error(predicted=p, measured=m),
+        "sd_ratio": sd_ratio,
+        "measured_min": m.min("time"),
+        "measured_max": m.max("time"),
+        "predicted_min": p.min("time", skipna=False),
+        "predicted_max": p.max("time", skipna=False),
+    }
+    return xr.Dataset(
+        {
+            name: ("channel", np.array([float(values[channel]) for channel in names]))
+            for name, values in each.items()
+        }
+        | {
+            "anrmse": comparison.anrmse,
+            "mean_nammae": float(metrics.nammae(predicted=p, measured=m)),
+            "status": comparison.status,
+            "start": comparison.start,
+        },
+        coords={
+            "run": comparison.run,
+            "channel": names,
+            "channel_units": ("channel", [str(p[name].attrs.get("units", "")) for name in names]),
+        },
+    )

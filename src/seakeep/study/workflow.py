@@ -1,0 +1,134 @@
+"""A campaign's settings become a model: the one place where both rooms meet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import xarray as xr
+
+from seakeep.campaign import Campaign, ModelSettings, load_prepared
+from seakeep.campaign.prepare import Progress
+from seakeep.errors import RequestError
+from seakeep.models import HankelDMDc, HankelDMDcModel
+
+__all__ = ["build_spec", "fit_campaign", "training_runs"]
+
+
+def build_spec(settings: ModelSettings, encounter_period: float | None, dt: float) -> HankelDMDc:
+    """Turn the ``[model]`` table of a campaign into the settings of a model.
+
+    Parameters
+    ----------
+    settings : ModelSettings
+        The table: a preset, keys of the constructor, or a preset with keys that override it.
+    encounter_period : float or None
+        Mean encounter period, s; a preset needs it.
+    dt : float
+        Time step of the prepared runs, s.
+
+    Returns
+    -------
+    HankelDMDc
+        The settings.
+
+    Raises
+    ------
+    RequestError
+        If the kind of model is not known, a preset has no encounter period, or a key that has no
+        default is missing.
+    """
+    if settings.kind != "hankel_dmdc":
+        raise RequestError(
+            f"kind = '{settings.kind}' is not available in this version. Use kind = 'hankel_dmdc'."
+        )
+    stated = settings.arguments()
+    stated.pop("stop", None)
+    if settings.preset is not None:
+        if encounter_period is None:
+            raise RequestError(
+                f"preset = '{settings.preset}' counts in encounter periods, and the campaign has "
+                "none. State encounter_period (s) in [campaign]."
+            )
+        preset = HankelDMDc.paper if settings.preset == "paper" else HankelDMDc.recommended
+        base = preset(encounter_period, dt)
+        names = base.__dataclass_fields__
+        return HankelDMDc(**{**{name: getattr(base, name) for name in names}, **stated})
+    missing = [key for key in ("state_delays", "input_delays", "ridge") if key not in stated]
+    if missing:
+        raise RequestError(
+            f"the [model] table states no {missing[0]}. Add {', '.join(missing)}, or a preset: "
+            "preset = 'recommended' or 'paper'."
+        )
+    return HankelDMDc(**stated)
+
+
+def training_runs(prepared: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """Parts of prepared runs that train.
+
+    Parameters
+    ----------
+    prepared : mapping of str to Dataset
+        Runs of a campaign, as ``campaign.prepare()`` gives them.
+
+    Returns
+    -------
+    dict of str to Dataset
+        Each cut to its ``train_span``.
+
+    Raises
+    ------
+    RequestError
+        If no run trains.
+    """
+    runs = {
+        name: between(run, run.attrs["train_span"])
+        for name, run in prepared.items()
+        if "train_span" in run.attrs
+    }
+    if not runs:
+        raise RequestError(
+            "no run of the campaign trains a model. Give one role = 'train', or a span "
+            "train = [begin, end]."
+        )
+    return runs
+
+
+def between(run: xr.Dataset, span: tuple[float, float]) -> xr.Dataset:
+    """Part of a run between two of its own instants, both included."""
+    slack = 1e-6 * float(run.attrs.get("dt", 1.0))
+    return run.sel(time=slice(float(span[0]) - slack, float(span[1]) + slack))
+
+
+def fit_campaign(
+    campaign: Campaign, model: str | None = None, progress: Progress | None = None
+) -> HankelDMDcModel:
+    """Identify the model that a campaign describes from its training runs.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The campaign.
+    model : str, optional
+        Key in ``[models.NAME]``; by default the table ``[model]``.
+    progress : callable, optional
+        Called as ``progress(done, total, run)`` while runs are prepared.
+
+    Returns
+    -------
+    HankelDMDcModel
+        The model.
+
+    Raises
+    ------
+    RequestError
+        If the campaign describes no such model, or no run trains.
+    DataError
+        If a run cannot be read or used.
+    """
+    settings = campaign.model(model)
+    prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
+    runs = training_runs(prepared)
+    dt = float(next(iter(runs.values())).attrs["dt"])
+    period = campaign.encounter_period() if settings.preset is not None else None
+    spec = build_spec(settings, period, dt)
+    return spec.fit(runs, list(settings.states), list(settings.inputs), stop=settings.stop)
