@@ -31,6 +31,9 @@ def broken_times():
     def gap(t):
         return np.where(np.arange(t.size) < 50, t, t + 7 * DT)
 
+    def stretched(t):
+        return np.where(np.arange(t.size) < 200, t, t[200] + 1.2 * (t - t[200]))
+
     def missing(t):
         return np.where(np.arange(t.size) == 50, np.nan, t)
 
@@ -39,7 +42,12 @@ def broken_times():
             repeated, r"times of .* repeat: 2\.45 s stands at samples 49 and 50", id="repeated"
         ),
         pytest.param(unsorted, r"times of .* are not sorted: .* Sort the rows", id="unsorted"),
-        pytest.param(gap, r"times of .* are not uniform: steps run from 0\.05 to 0\.4 s", id="gap"),
+        pytest.param(
+            gap, r"1 gap\(s\): after t = 2\.45 s, 7 sample\(s\) of 0\.05 s are missing", id="gap"
+        ),
+        pytest.param(
+            stretched, r"are not uniform: steps run from 0\.05 to 0\.06 s", id="stretched"
+        ),
         pytest.param(missing, r"a value that is not finite at sample 50", id="missing"),
     ]
 
