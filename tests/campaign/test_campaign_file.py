@@ -164,7 +164,7 @@ MISTAKES = [
         'step = "differentiate"',
         'step = "derive"',
         "derived.pitch_rate.step: received 'derive', which should be 'integrate', "
-        "'differentiate', 'low_pass' or 'envelope_squared'.",
+        "'differentiate', 'band_pass', 'low_pass' or 'envelope_squared'.",
     ),
     (
         'step = "differentiate"',

@@ -10,7 +10,14 @@ from small_tank import DT, tank_columns, write_csv
 
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
 from seakeep.errors import DataError, RequestError, SeakeepWarning
-from seakeep.signals import differentiate, envelope_squared, integrate, low_pass, resample
+from seakeep.signals import (
+    band_pass,
+    differentiate,
+    envelope_squared,
+    integrate,
+    low_pass,
+    resample,
+)
 
 
 @pytest.fixture
@@ -110,6 +117,7 @@ def test_derived_at_the_files_own_rate(edited):
             'unit = "mm"\nlong_name = "way of the bow"\n'
             '[derived.smooth]\nfrom = "twice"\nstep = "low_pass"\npassband = 1\n'
             '[derived.twice]\nexpression = "2 * eta_fwd"\nunit = "m"\n'
+            '[derived.waves]\nfrom = "pitch"\nstep = "band_pass"\nband = [0.3, 5]\n'
             '[derived.group]\nfrom = "eta_fwd"\nstep = "envelope_squared"\n'
             '[derived.sway]\nexpression = "1000 * heave"\nunit = "mm"\n[runs.first]',
         )
@@ -120,6 +128,8 @@ def test_derived_at_the_files_own_rate(edited):
     np.testing.assert_array_equal(run["way"], integrate(acc, DT, (0.3, 5.0), 2))
     np.testing.assert_array_equal(run["twice"], 2 * eta)
     np.testing.assert_array_equal(run["smooth"], low_pass(2 * eta, DT, 1.0))
+    np.testing.assert_array_equal(run["waves"], band_pass(run["pitch"], DT, (0.3, 5.0)))
+    assert run["waves"].attrs["units"] == "rad"
     np.testing.assert_array_equal(run["group"], envelope_squared(eta, DT))
     np.testing.assert_array_equal(run["pitch_rate"], differentiate(run["pitch"], DT))
     # 'unit' is that of the expression's value: millimetres, kept as metres.
@@ -142,7 +152,7 @@ def test_a_step_whose_unit_does_not_fit(edited):
 def test_a_band_above_the_files_nyquist_frequency(edited):
     path = edited(('step = "differentiate"', 'step = "integrate"\nband = [0.3, 50]'))
     with pytest.raises(
-        RequestError, match=r"channel 'pitch_rate': an integration band needs 0 < l"
+        RequestError, match=r"channel 'pitch_rate': a band needs 0 < low < high, and high at"
     ):
         read_campaign(path).read_run("first")
 

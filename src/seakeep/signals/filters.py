@@ -99,7 +99,7 @@ def _kaiser_taps(edges: tuple[float, float], attenuation: float) -> FloatArray:
 
 def _deviation(taps: FloatArray, edges: tuple[float, float]) -> float:
     """Largest distance of the gain from one in the pass band and from zero in the stop band."""
-    points = 16 * taps.size
+    points = 64 * taps.size
     gain, frequency = np.abs(np.fft.rfft(taps, points)), np.fft.rfftfreq(points)
     at_edges = np.abs(np.exp(-2j * np.pi * np.outer(edges, np.arange(taps.size))) @ taps)
     passing = np.append(gain[frequency <= edges[0]], at_edges[0])
