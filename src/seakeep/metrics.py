@@ -19,6 +19,7 @@ import xarray as xr
 
 from seakeep.core import metrics as core
 from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.signals.clocks import check_order
 
 __all__ = [
     "anrmse",
@@ -51,6 +52,13 @@ def _pair(
                 f"channel '{name}' is in '{units[0]}' in predicted and in '{units[1]}' in "
                 "measured. Convert one of them and its units attribute."
             )
+    for side, data in (("predicted", predicted), ("measured", measured)):
+        if "time" not in data.coords:
+            raise DataError(
+                f"{side} has no coordinate 'time' (dimensions: {', '.join(map(str, data.dims))}). "
+                "Give every channel the dimension 'time' and the instants in seconds."
+            )
+        check_order(data["time"].values, side)
     time = predicted["time"].values
     step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
     try:

@@ -91,6 +91,15 @@ def test_saving_over_a_model_replaces_it(saved, run, channels):
     assert [path.name for path in saved.parent.iterdir()] == ["rom.nc"]
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="open files cannot be replaced there")
+def test_a_reader_that_has_the_old_file_open_keeps_it_whole(saved, run, channels):
+    before = saved.read_bytes()
+    with saved.open("rb") as reader:
+        HankelDMDc(4, 2, 1.0).fit(run, **channels).save(saved)
+        assert reader.read() == before
+    assert saved.read_bytes() != before
+
+
 def test_a_missing_file_is_told_how_to_be_made(tmp_path):
     with pytest.raises(RequestError, match=r"there is no model file .*rom\.nc\. Make one with"):
         load_model(tmp_path / "rom.nc")
