@@ -5,7 +5,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -165,7 +164,7 @@ def test_a_folder_that_cannot_be_written_is_named(model, tmp_path, monkeypatch):
     def refuse(*args, **kwargs):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
-    monkeypatch.setattr(tempfile, "mkstemp", refuse)
+    monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(RequestError, match=r"cannot write .*rom\.nc: Permission denied"):
         model.save(tmp_path / "rom.nc")
 

@@ -198,7 +198,9 @@ def modes(eigenvalues: npt.NDArray[np.complex128], dt: float) -> xr.Dataset:
         poles = np.log(kept.astype(complex)) / dt
         natural = np.abs(poles)
         frequency = np.abs(poles.imag) / (2 * np.pi)
-        damping = np.where(natural > 0, -poles.real / natural, 1.0)
+        # An eigenvalue of zero is gone after a step: overdamped, not undefined.
+        oscillating = (natural > 0) & np.isfinite(natural)
+        damping = np.where(oscillating, -poles.real / natural, 1.0)
         decay = np.where(poles.real < 0, -1.0 / poles.real, np.inf)
         period = np.where(frequency > 0, 1.0 / frequency, np.inf)
     table = {

@@ -238,10 +238,11 @@ def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "sta
     Raises
     ------
     RequestError
-        If the instant is more than half a step outside the run, or not a number.
+        If the instant is outside the run by more than rounding, or not a number.
     """
     step = (time[-1] - time[0]) / (time.size - 1)
-    if not time[0] - 0.5 * step <= instant <= time[-1] + 0.5 * step:
+    rounding = 1e-3 * step
+    if not time[0] - rounding <= instant <= time[-1] + rounding:
         raise RequestError(
             f"{what} = {instant:.10g} s is outside {name}, which runs from {time[0]:.10g} to "
             f"{time[-1]:.10g} s. Choose an instant inside it."
