@@ -161,8 +161,12 @@ def test_a_folder_that_does_not_exist_is_named(model, tmp_path):
 
 def test_a_folder_that_cannot_be_written_is_named(model, tmp_path, monkeypatch):
     # A mode without write permission does not stop an administrator, and tests may run as one.
-    def refuse(*args, **kwargs):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    usual = Path.open
+
+    def refuse(self, *args, **kwargs):
+        if self.parent == tmp_path:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        return usual(self, *args, **kwargs)
 
     monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(RequestError, match=r"cannot write .*rom\.nc: Permission denied"):
