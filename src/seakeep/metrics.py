@@ -44,6 +44,13 @@ def _pair(
             f"measured has no channel '{missing[0]}'.{did_you_mean(missing[0], known)} "
             f"It has: {', '.join(known)}. Select the channels to judge: predicted[['heave']]."
         )
+    for name in names:
+        units = [side[name].attrs.get("units") for side in (predicted, measured)]
+        if all(units) and units[0] != units[1]:
+            raise DataError(
+                f"channel '{name}' is in '{units[0]}' in predicted and in '{units[1]}' in "
+                "measured. Convert one of them and its units attribute."
+            )
     time = predicted["time"].values
     step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
     try:
@@ -122,7 +129,7 @@ def nrmse(
     RequestError
         If shapes or channels do not fit.
     DataError
-        If the instants of two Datasets differ.
+        If the instants or units of two Datasets differ.
 
     Examples
     --------
@@ -160,7 +167,7 @@ def normalised_extremes_error(
     RequestError
         If shapes or channels do not fit.
     DataError
-        If the instants of two Datasets differ.
+        If the instants or units of two Datasets differ.
     """
     return _per_channel(
         core.normalised_extremes_error, predicted, measured, training_std, "1", "NAMMAE"
@@ -192,7 +199,7 @@ def fit_percent(
     RequestError
         If shapes or channels do not fit.
     DataError
-        If the instants of two Datasets differ.
+        If the instants or units of two Datasets differ.
     """
     return _per_channel(core.fit_percent, predicted, measured, training_std, "%", "fit")
 
@@ -221,7 +228,7 @@ def anrmse(
     RequestError
         If shapes or channels do not fit.
     DataError
-        If the instants of two Datasets differ.
+        If the instants or units of two Datasets differ.
     """
     values, _, lead = _apply(core.anrmse, predicted, measured, training_std)
     if values.ndim == 0:
@@ -253,7 +260,7 @@ def nammae(
     RequestError
         If shapes or channels do not fit.
     DataError
-        If the instants of two Datasets differ.
+        If the instants or units of two Datasets differ.
     """
     values, _, lead = _apply(core.nammae, predicted, measured, training_std)
     if values.ndim == 0:
@@ -286,7 +293,7 @@ def error_over_time(
     RequestError
         If shapes or channels do not fit.
     DataError
-        If the instants of two Datasets differ.
+        If the instants or units of two Datasets differ.
     """
     values, names, lead = _apply(core.error_over_time, predicted, measured, training_std)
     if not names or not isinstance(predicted, xr.Dataset):

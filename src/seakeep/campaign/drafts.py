@@ -17,7 +17,7 @@ from seakeep.campaign.readers import read_columns, time_column
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import RequestError
 
-__all__ = ["draft_campaign"]
+__all__ = ["draft_campaign", "suggest_channel"]
 
 # What a column may be called, in the words of tanks in several countries: whole words, lower case.
 _WORDS = {
@@ -125,7 +125,7 @@ def _guesses(paths: list[Path], tables: list[Columns], time: str | None) -> list
             why = f"has gaps in {', '.join(gapped[:3])}"
         if unit is not None and not is_unit(unit):
             why = why or f"its unit '{unit}' is not known; state unit = '…'"
-        channel = None if why else _channel(column, unit)
+        channel = None if why else suggest_channel(column, unit)
         if channel is not None:
             stem, count = channel, 2
             while channel in taken:
@@ -143,7 +143,7 @@ def _words(column: str) -> list[str]:
     return [word for word in re.split(r"[^A-Za-z0-9]+", spaced.lower()) if word]
 
 
-def _channel(column: str, unit: str | None) -> str:
+def suggest_channel(column: str, unit: str | None) -> str:
     """Name for a column: a canonical one if words and unit speak for it, else the column's own."""
     words = _words(column)
     dimension = None if unit is None else si_unit(unit)
@@ -172,7 +172,7 @@ def _channel(column: str, unit: str | None) -> str:
     if _LOAD & set(words):
         ends = ["bow"] * bool(_BOW & set(words)) + ["stern"] * bool(_STERN & set(words))
         ends = ends or sides or numbers
-        if ends and not known_motion(words) and fits(name := "mooring_" + "_".join(ends)):
+        if ends and not _names_motion(words) and fits(name := "mooring_" + "_".join(ends)):
             return name
     free = "_".join(words) or "channel"
     free = free if not free[0].isdigit() else f"column_{free}"
@@ -180,7 +180,7 @@ def _channel(column: str, unit: str | None) -> str:
     return f"{free}_signal" if canonical and not fits(free) else free
 
 
-def known_motion(words: Iterable[str]) -> bool:
+def _names_motion(words: Iterable[str]) -> bool:
     """Whether one of the words names a motion, as in "sway force"."""
     return any(known & set(words) for known in _WORDS.values())
 

@@ -9,7 +9,15 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
 
 from seakeep.conventions import canonical_channel
 
@@ -252,6 +260,15 @@ class PriorSettings(Table):
         return self
 
 
+def _branch(value: object) -> str:
+    return "<prior>" if isinstance(value, dict | PriorSettings) else "<number>"
+
+
+NumberOrPrior = Annotated[
+    Annotated[float, Field(ge=0, allow_inf_nan=False), Tag("<number>")]
+    | Annotated[PriorSettings, Tag("<prior>")],
+    Discriminator(_branch),
+]
 Delays = Annotated[int, Field(ge=0)]
 _ONE_MODEL = ("state_delays", "input_delays", "window")
 _ENSEMBLE = ("train_length", "state_delay", "input_delay", "n_members", "seed")
@@ -275,7 +292,7 @@ class ModelSettings(Table):
     inputs: Names = Field(default=(), description="list of channels that drive the model")
     state_delays: Delays | None = Field(default=None, description="samples")
     input_delays: Delays | None = Field(default=None, description="samples")
-    ridge: Annotated[float, Field(ge=0, allow_inf_nan=False)] | PriorSettings | None = Field(
+    ridge: NumberOrPrior | None = Field(
         default=None, description="a number, 0 or more; a prior for an ensemble"
     )
     window: Annotated[int, Field(ge=2)] | None = Field(

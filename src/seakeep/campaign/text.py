@@ -142,6 +142,7 @@ def _layout(path: Path, lines: list[str], options: FileSettings) -> _Layout:
         headers = headers or [str(i + 1) for i in range(len(head))]
         body = rows
     else:
+        _refuse_transposed(path, head, len(rows))
         headers, body = head, rows[1:]
     units = None
     if body and body is not rows and (second := _units(_cells(body[0][1], delimiter), headers)):
@@ -152,6 +153,15 @@ def _layout(path: Path, lines: list[str], options: FileSettings) -> _Layout:
     if decimal is None:
         decimal = "," if delimiter != "," and any("," in line for _, line in body) else "."
     return _Layout(delimiter, decimal, headers, units, body)
+
+
+def _refuse_transposed(path: Path, head: list[str], rows: int) -> None:
+    if len(head) > 2 and not _NUMBER.match(head[0]) and _numeric(head[1:]):
+        raise DataError(
+            f"{path}: the first line is '{head[0]}' and {len(head) - 1} numbers, which looks "
+            f"transposed ({rows} rows, {len(head)} columns); expected a header, then one row an "
+            "instant and one column a channel. Save it transposed: nothing is turned silently."
+        )
 
 
 def _delimiter(lines: list[str]) -> str:
@@ -219,7 +229,8 @@ def _check_widths(path: Path, layout: _Layout) -> None:
         + (
             "It is the last line: the file was cut off. Export it again, or remove the line."
             if last
-            else "Mend the lines, or state delimiter and decimal in [files]."
+            else "Mend the lines, or state in [files]: delimiter, decimal, or skip_rows where "
+            "words stand above the header."
         )
     )
 
@@ -255,14 +266,29 @@ def _numbers(
         out = np.full(len(cells), np.nan)
         for row, cell in enumerate(cells):
             try:
-                out[row] = np.nan if cell is None else float(cell.replace(layout.decimal, "."))
+                out[row] = np.nan if cell is None else _number(cell, layout.decimal)
             except ValueError:
                 faults[names[i]] = (
                     f"{path}, line {layout.body[row][0]}, column '{names[i]}': {cell!r} is not a "
-                    "number. Correct the cell, leave it empty where the value is missing, or state "
-                    "decimal and delimiter in [files]."
+                    f"number. {_mend(str(cell))}"
                 )
                 break
         else:
             values[names[i]] = out
     return values, faults
+
+
+def _number(cell: str, decimal: str) -> float:
+    if decimal == ",":
+        # A point would divide thousands, or the file mixes both marks: neither is guessed at.
+        cell = cell.replace(".", "?").replace(",", ".")
+    return float(cell)
+
+
+def _mend(cell: str) -> str:
+    if re.search(r"\d[-/:]\d", cell):
+        return "Write dates and clock times as seconds from the start of the run."
+    return (
+        "Correct the cell, leave it empty where the value is missing, or state decimal and "
+        "delimiter in [files]."
+    )

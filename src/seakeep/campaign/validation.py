@@ -98,9 +98,9 @@ def validate(received: Mapping[str, Any], name: str) -> CampaignSettings:
 def _lines(error: ValidationError) -> list[str]:
     lines: dict[str, None] = {}
     for item in error.errors(include_url=False):
-        place = [str(part) for part in item["loc"]]
+        # Pydantic's own words in a place: '[key]' of a table, '<number>' for a branch of a union.
+        place = [str(part) for part in item["loc"] if not str(part).startswith("<")]
         table, description, depth = _place(place)
-        # Beyond the last key that the file can hold, pydantic names the branch of a union.
         key = ".".join(p for p in place[:depth] if p != "[key]") or "the file"
         lines[f"{key}: {_reason(item, place, table, description)}"] = None
     return list(lines)
@@ -122,6 +122,7 @@ def _reason(item: Any, place: list[str], table: type[BaseModel] | None, descript
             "'.', '+', and begins with a letter or digit, because files are named after it."
         )
     message = str(item["msg"]).removeprefix("Input ").replace("valid ", "")
+    message = message.replace("a integer", "an integer")
     mend = f" Give {description}." if description else ""
     return f"received {_shown(value)}, which {message}.{mend}"
 
@@ -156,10 +157,13 @@ def _place(loc: list[str]) -> tuple[type[BaseModel] | None, str, int]:
 
 
 def _table_of(annotation: Any) -> type[BaseModel] | None:
-    for each in (annotation, *typing.get_args(annotation)):
-        if isinstance(each, type) and issubclass(each, BaseModel):
-            return None if typing.get_origin(annotation) is dict else each
-    return None
+    """Return the table that an annotation allows, behind unions and annotations."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    if typing.get_origin(annotation) is dict:
+        return None
+    found = (_table_of(each) for each in typing.get_args(annotation))
+    return next((table for table in found if table is not None), None)
 
 
 def derivation_order(derived: Mapping[str, DerivedSettings]) -> list[str]:

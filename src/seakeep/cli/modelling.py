@@ -60,7 +60,7 @@ def forecast(
 ) -> None:
     """Forecast a run: the model runs freely after START, driven by the measured waves.
 
-    Example: seakeep forecast model.nc docs/tutorial/campaign.toml --run test --start 20
+    Example: seakeep forecast model.nc docs/tutorial/campaign.toml --run unseen --start 20
     --steps 400 -o forecast.csv
     """
     if out.suffix not in (".nc", ".csv"):

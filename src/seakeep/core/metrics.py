@@ -21,6 +21,7 @@ __all__ = [
 ]
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
 SLACK_PART = 0.01
 """A channel whose measured SD is below this part of its training SD is not judged."""
@@ -28,8 +29,12 @@ SLACK_PART = 0.01
 
 def paired(
     predicted: npt.ArrayLike, measured: npt.ArrayLike, training_std: npt.ArrayLike | None
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Check two histories and return them with the measured SD, NaN where a channel is slack."""
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Check two histories and return them with the measured SD and which channels are judged.
+
+    The SD is NaN where a channel is slack, and where the measurement has a gap; the first is not
+    judged, the second is (and found to be NaN).
+    """
     p, m = np.asarray(predicted, dtype=float), np.asarray(measured, dtype=float)
     if m.ndim == 1 and p.ndim >= 1 and p.shape[-1:] == m.shape:
         p, m = p[..., None], m[:, None]
@@ -48,9 +53,16 @@ def paired(
             f"a window of {m.shape[-2]} sample(s) has no standard deviation; judge at least two."
         )
     spread = m.std(axis=-2, ddof=1)
-    reference = 0.0 if training_std is None else np.asarray(training_std, dtype=float)
-    slack = (spread <= 0) | (spread < SLACK_PART * reference)
-    return p, m, np.where(slack, np.nan, spread)
+    reference = np.asarray(0.0 if training_std is None else training_std, dtype=float)
+    if reference.shape not in ((), m.shape[-1:]):
+        raise RequestError(
+            f"training_std has shape {reference.shape}; one value for each of the {m.shape[-1]} "
+            "channels is expected."
+        )
+    # A constant that is not a binary fraction has a spread of rounding, not of zero.
+    constant = spread <= 1e-12 * np.abs(m).max(axis=-2)
+    slack = constant | (spread < SLACK_PART * reference)
+    return p, m, np.where(slack, np.nan, spread), ~slack
 
 
 def nrmse(
@@ -79,7 +91,7 @@ def nrmse(
     RequestError
         If the shapes differ or the window has fewer than two samples.
     """
-    p, m, spread = paired(predicted, measured, training_std)
+    p, m, spread, _ = paired(predicted, measured, training_std)
     out: FloatArray = np.sqrt(np.mean((p - m) ** 2, axis=-2)) / spread
     return out
 
@@ -107,8 +119,8 @@ def anrmse(
     RequestError
         As :func:`nrmse`.
     """
-    p, m, spread = paired(predicted, measured, training_std)
-    return _over_channels(np.sqrt(np.mean((p - m) ** 2, axis=-2)) / spread, spread)
+    p, m, spread, judged = paired(predicted, measured, training_std)
+    return _over_channels(np.sqrt(np.mean((p - m) ** 2, axis=-2)) / spread, judged)
 
 
 def error_over_time(
@@ -134,8 +146,8 @@ def error_over_time(
     RequestError
         As :func:`nrmse`.
     """
-    p, m, spread = paired(predicted, measured, training_std)
-    return _over_channels(np.abs(p - m) / spread[..., None, :], spread[..., None, :])
+    p, m, spread, judged = paired(predicted, measured, training_std)
+    return _over_channels(np.abs(p - m) / spread[..., None, :], judged[..., None, :])
 
 
 def normalised_extremes_error(
@@ -161,7 +173,7 @@ def normalised_extremes_error(
     RequestError
         As :func:`nrmse`.
     """
-    p, m, spread = paired(predicted, measured, training_std)
+    p, m, spread, _ = paired(predicted, measured, training_std)
     low = np.abs(p.min(axis=-2) - m.min(axis=-2))
     high = np.abs(p.max(axis=-2) - m.max(axis=-2))
     out: FloatArray = 0.5 * (low + high) / spread
@@ -194,8 +206,8 @@ def nammae(
     each = normalised_extremes_error(
         predicted=predicted, measured=measured, training_std=training_std
     )
-    spread = paired(predicted, measured, training_std)[2]
-    return _over_channels(each, spread)
+    judged = paired(predicted, measured, training_std)[3]
+    return _over_channels(each, judged)
 
 
 def fit_percent(
@@ -222,16 +234,16 @@ def fit_percent(
     RequestError
         As :func:`nrmse`.
     """
-    p, m, spread = paired(predicted, measured, training_std)
+    p, m, spread, _ = paired(predicted, measured, training_std)
     samples = m.shape[-2]
     norm = np.sqrt(np.sum((p - m) ** 2, axis=-2))
     out: FloatArray = 100.0 * (1.0 - norm / (spread * np.sqrt(samples - 1)))
     return out
 
 
-def _over_channels(values: FloatArray, spread: FloatArray) -> FloatArray:
-    # A slack channel is left out; a diverged one (NaN with a sound spread) must not be.
-    judged = np.isfinite(np.broadcast_to(spread, values.shape))
+def _over_channels(values: FloatArray, judged: BoolArray) -> FloatArray:
+    # A slack channel is left out; a diverged one, or one with a gap, must not be.
+    judged = np.broadcast_to(judged, values.shape)
     count = judged.sum(axis=-1)
     total = np.where(judged, values, 0.0).sum(axis=-1)
     out: FloatArray = np.where(count > 0, total / np.maximum(count, 1), np.nan)

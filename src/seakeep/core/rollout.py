@@ -83,7 +83,7 @@ def rollout(
             out = _run_shifting(a, start, forcing)
         else:
             out = _run_square(a, start, forcing, count)
-        lost = ~np.all(np.abs(out) <= limit, axis=2)
+        lost = ~np.all((np.abs(out) <= limit) & np.isfinite(out), axis=2)
     out[np.logical_or.accumulate(lost, axis=1)] = np.nan
     return out
 

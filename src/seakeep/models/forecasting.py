@@ -92,8 +92,12 @@ def read_window(
     inputs = slice(first, max(at + count, at + 1))
     x = labelled.channel_matrix(run, model.states, name, history)
     u = labelled.channel_matrix(run, model.inputs, name, inputs)
-    labelled.check_finite(x, model.states, name, first, time)
-    labelled.check_finite(u, model.inputs, name, first, time)
+    for values, names, delays in (
+        (x, model.states, model.state_delays),
+        (u, model.inputs, model.input_delays),
+    ):
+        unread = needed - 1 - delays  # the other group reaches further back
+        labelled.check_finite(values[unread:], names, name, first + unread, time)
     instants = time[at + 1 : at + 1 + count]
     beyond = time[-1] + model.dt * np.arange(1, count - instants.size + 1)
     attrs = dict(run["time"].attrs) or {"units": "s", "long_name": "time"}
@@ -120,15 +124,15 @@ def check_arrays(
         raise RequestError(f"steps must be a positive integer; received {steps!r}.")
     states, inputs = len(model.states), len(model.inputs)
     s, z = model.state_delays, model.input_delays
-    x = _rows("x_history", x_history, s + 1, states, "s + 1")
+    x = _finite("x_history", _rows("x_history", x_history, s + 1, states, "s + 1")[-s - 1 :])
     if not inputs:
-        return x[-s - 1 :], np.zeros((int(steps), 0))
-    u = _rows("u_history", u_history, z + 1, inputs, "z + 1")
+        return x, np.zeros((int(steps), 0))
+    u = _finite("u_history", _rows("u_history", u_history, z + 1, inputs, "z + 1")[-z - 1 :])
     future = np.asarray(u_future, dtype=float)
     if future.size == 0:
         future = np.zeros((0, inputs))
     future = _rows("u_future", future, int(steps) - 1, inputs, "steps − 1")
-    return x[-s - 1 :], np.concatenate([u[-z - 1 :], future[: int(steps) - 1]])
+    return x, np.concatenate([u, _finite("u_future", future[: int(steps) - 1])])
 
 
 def _rows(name: str, value: npt.ArrayLike, least: int, channels: int, meaning: str) -> FloatArray:
@@ -139,19 +143,24 @@ def _rows(name: str, value: npt.ArrayLike, least: int, channels: int, meaning: s
             f"{name} has shape {array.shape}; expected (time, channel) with at least {least} rows "
             f"({meaning}) and {channels} columns.{' It looks transposed.' if turned else ''}"
         )
-    if not np.all(np.isfinite(array)):
-        raise RequestError(
-            f"{name} holds {int(np.sum(~np.isfinite(array)))} values that are not finite. "
-            "Fill the gap first."
-        )
     return array
+
+
+def _finite(name: str, needed: FloatArray) -> FloatArray:
+    if not np.all(np.isfinite(needed)):
+        raise RequestError(
+            f"{name} holds {int(np.sum(~np.isfinite(needed)))} values that are not finite in the "
+            f"{len(needed)} rows needed. Fill the gap first."
+        )
+    return needed
 
 
 def cut_divergence(values: FloatArray, scale: Scale) -> FloatArray:
     """NaN from the instant on at which a state is lost; values are (…, time, channel)."""
     spread = np.where(scale.spread > 0, scale.spread, np.inf)
     centre = scale.mean
-    lost = ~np.all(np.abs(values - centre) <= DIVERGED * spread, axis=-1)
+    kept = np.isfinite(values) & (np.abs(values - centre) <= DIVERGED * spread)
+    lost = ~np.all(kept, axis=-1)
     if np.any(lost):
         values[np.logical_or.accumulate(lost, axis=-1)] = np.nan
     return values

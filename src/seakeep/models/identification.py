@@ -132,9 +132,12 @@ def gather(
         reach = place.first_column - max(state_delays, input_delays)
         samples = slice(min(place.first, reach), last + 1)
         arrays = []
-        for channels in (states, inputs):
+        for channels, delays in ((states, state_delays), (inputs, input_delays)):
             values = labelled.channel_matrix(run, channels, name, samples)
-            labelled.check_finite(values, channels, name, samples.start, time)
+            # Each group reaches back by its own delays, and the moments over the window.
+            needed = min(place.first, place.first_column - delays)
+            unread = needed - samples.start
+            labelled.check_finite(values[unread:], channels, name, needed, time)
             arrays.append(values)
         labels = labels or tuple(labelled.channel_labels(run, names) for names in (states, inputs))
         for group in labels:
@@ -198,7 +201,7 @@ def _stops(stop: Stop, names: list[str]) -> dict[str, float | None]:
                 f"({', '.join(names)}).{did_you_mean(unknown[0], names)}"
             )
         return {name: stop.get(name) for name in names}
-    if not np.isscalar(stop):
+    if np.ndim(stop) > 0:  # a scalar array, such as an instant of a run, is one for all
         values = [float(value) for value in np.asarray(stop, dtype=float)]
         if len(values) != len(names):
             raise RequestError(
@@ -247,10 +250,11 @@ def _moments(
         [values[window.samples] for values, window in zip(series, windows, strict=True)]
     )
     mean, spread = pooled.mean(axis=0), pooled.std(axis=0, ddof=1)
-    if not standardize:
-        return Scale(np.zeros(mean.size), np.ones(mean.size), spread)
     # A constant that is not a binary fraction has a spread of rounding, not of zero.
     constant = spread <= 1e-12 * np.abs(pooled).max(axis=0, initial=0.0)
+    spread = np.where(constant, 0.0, spread)
+    if not standardize:
+        return Scale(np.zeros(mean.size), np.ones(mean.size), spread)
     if np.any(constant):
         column = int(np.flatnonzero(constant)[0])
         raise DataError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -57,6 +57,8 @@ def as_runs(runs: Runs) -> dict[str, xr.Dataset]:
         named[run_name(runs, "run")] = runs
     elif isinstance(runs, Mapping):
         named.update(cast("Mapping[str, xr.Dataset]", runs))
+    elif not isinstance(cast("object", runs), Iterable):
+        check_run(runs, "runs")
     else:
         for number, run in enumerate(runs, start=1):
             name = run_name(run, f"run {number}")
@@ -96,7 +98,7 @@ def run_step(run: xr.Dataset, name: str) -> float:
         If the times are unsorted, repeated or not uniform.
     """
     time = run["time"].values
-    if not np.issubdtype(time.dtype, np.number):
+    if time.dtype.kind not in "iuf":
         raise DataError(
             f"the times of {name} are of type {time.dtype}; seconds as numbers are expected. "
             "Subtract the first instant and divide by one second."
@@ -161,9 +163,9 @@ def channel_matrix(
                 f"channel '{channel}' of {name} has the dimensions {variable.dims} and shape "
                 f"{variable.shape}; ('time',) is expected. Give each channel its own variable."
             )
-        if not (np.issubdtype(variable.dtype, np.number) or variable.dtype == bool):
+        if variable.dtype.kind not in "iufb":
             raise DataError(
-                f"channel '{channel}' of {name} is of type {variable.dtype}, not a number. "
+                f"channel '{channel}' of {name} is of type {variable.dtype}, not a real number. "
                 "Convert the column, or leave it out of the run."
             )
         out[:, column] = variable.values[samples]

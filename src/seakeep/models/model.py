@@ -87,6 +87,11 @@ class HankelDMDcModel:
     input_scale: Scale = field(repr=False)
     training: Training
 
+    def __post_init__(self) -> None:
+        scales = (self.state_scale, self.input_scale)
+        for array in (self.coefficients, *(a for s in scales for a in (s.mean, s.std, s.spread))):
+            array.flags.writeable = False
+
     @property
     def states(self) -> list[str]:
         """Names of the states, in the order of the model."""
@@ -145,14 +150,14 @@ class HankelDMDcModel:
         size, count = a.shape[1], len(self.state_labels)
         if a.shape[0] == size:
             return a
-        return np.concatenate([a, np.eye(size - count, size)])
+        return _read_only(np.concatenate([a, np.eye(size - count, size)]))
 
     @cached_property
     def B(self) -> FloatArray:
         """B̂, shape (N(s+1), Q(z+1)), on standardised deviations, newest block first."""
         b = self.top[1]
         missing = self.A.shape[0] - b.shape[0]
-        return np.concatenate([b, np.zeros((missing, b.shape[1]))])
+        return _read_only(np.concatenate([b, np.zeros((missing, b.shape[1]))]))
 
     @cached_property
     def eigenvalues(self) -> npt.NDArray[np.complex128]:
@@ -165,6 +170,7 @@ class HankelDMDcModel:
         """
         values = np.linalg.eigvals(self.A).astype(np.complex128)
         values = values[np.argsort(-np.abs(values), kind="stable")]
+        values.flags.writeable = False
         if abs(values[0]) >= 1.0:
             warnings.warn(
                 f"the spectral radius of the model is {abs(values[0]):.6f}: a free run grows by "
@@ -267,7 +273,9 @@ class HankelDMDcModel:
             self.input_scale.deviations(u)[None],
             n_states=len(self.state_labels),
         )[0]
-        return forecasting.cut_divergence(self.state_scale.physical(deviations), self.state_scale)
+        with np.errstate(over="ignore"):  # a run that is lost is cut just below
+            values = self.state_scale.physical(deviations)
+        return forecasting.cut_divergence(values, self.state_scale)
 
     def to_state_space(self) -> signal.StateSpace:
         """Discrete state-space system in physical deviations from the means.
@@ -392,6 +400,12 @@ class HankelDMDcModel:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeakeepWarning)  # given when the model was made
             settings = HankelSettings(**parts.settings)
+        states, inputs = (len(parts.labels[group]) for group in ("state", "input"))
+        extended = states * (settings.state_delays + 1)
+        rows = extended if settings.delay_rows == "ridge" else states
+        shape = (rows, extended + inputs * (settings.input_delays + 1))
+        if parts.coefficients.shape != shape:
+            raise ValueError(f"coefficients have shape {parts.coefficients.shape}, not {shape}")
         return cls(
             settings=settings,
             coefficients=parts.coefficients,
@@ -402,3 +416,8 @@ class HankelDMDcModel:
             input_scale=parts.scales["input"],
             training=Training(**parts.training),
         )
+
+
+def _read_only(array: FloatArray) -> FloatArray:
+    array.flags.writeable = False
+    return array

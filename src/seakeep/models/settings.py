@@ -8,6 +8,8 @@ import warnings
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from seakeep.core.embedding import History
 from seakeep.errors import RequestError, SeakeepWarning
 
@@ -112,6 +114,8 @@ class HankelSettings:
         check_choice("history", self.history, ("before", "inside"))
         check_choice("delay_rows", self.delay_rows, ("ridge", "exact"))
         check_choice("ridge_scale", self.ridge_scale, ("absolute", "per_snapshot"))
+        if not isinstance(self.standardize, bool | np.bool_):
+            raise RequestError(f"standardize must be True or False; received {self.standardize!r}.")
         if self.alignment is not None:
             raise RequestError(
                 f"alignment is not available in this version; received {self.alignment!r}. "

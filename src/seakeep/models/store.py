@@ -137,7 +137,10 @@ def write(dataset: xr.Dataset, path: str | Path, kind: str) -> Path:
         seakeep_version=metadata.version("seakeep"),
     )
     with replacing(target) as temporary:
-        labelled.to_netcdf(temporary, engine="h5netcdf")
+        try:
+            labelled.to_netcdf(temporary, engine="h5netcdf")
+        except RuntimeError as error:  # what HDF5 makes of a full disk when it closes the file
+            raise OSError("the file could not be written to its end") from error
     return target
 
 

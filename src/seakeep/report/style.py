@@ -85,8 +85,10 @@ def save_figure(figure: Figure, path: Path) -> Path:
     """
     with figure_style(), replacing(path) as temporary:
         kind = path.suffix.removeprefix(".")
-        options = {"pil_kwargs": {"optimize": True}} if kind == "png" else {}
-        figure.savefig(temporary, format=kind, **options)
+        if kind == "png":
+            figure.savefig(temporary, format=kind, pil_kwargs={"optimize": True})
+        else:
+            figure.savefig(temporary, format=kind)
     return path
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy import special
 
 from seakeep.errors import DataError
 from seakeep.signals.filters import as_series, odd_extension, positive
@@ -198,24 +199,34 @@ def resample(
         return same
 
     nyquist = 0.5 * min(1.0, dt / new_dt)  # the lower one, in cycles an old sample
-    width = (1.0 - passband) * nyquist
-    cut = 0.5 * (1.0 + passband) * nyquist
+    return _sinc_sums(array, position, (passband * nyquist, nyquist), attenuation)
+
+
+def _sinc_sums(
+    array: FloatArray, position: FloatArray, edges: tuple[float, float], attenuation: float
+) -> FloatArray:
+    """Low-passed values of a series between its samples.
+
+    `position` counts in old samples; `edges`, of the pass and stop bands, are cycles a sample.
+    """
     attenuation = max(positive("the attenuation", attenuation, "dB"), 50.0)
     beta = 0.1102 * (attenuation - 8.7)
+    width = edges[1] - edges[0]
     half = int(np.ceil((attenuation - 7.95) / (4.57 * np.pi * width) + 1))  # Kaiser's formula
-    extended = odd_extension(array, half)
     base = np.floor(position).astype(int)
     offsets = np.arange(-half + 1, half + 1)
+    extended = odd_extension(array, half)
     flat = extended.reshape(extended.shape[0], -1)
-    out = np.empty((wanted.size, flat.shape[1]))
+    out = np.empty((position.size, flat.shape[1]))
     rows_at_once = max(1, 2_000_000 // offsets.size)
-    for first in range(0, wanted.size, rows_at_once):
+    for first in range(0, position.size, rows_at_once):
         rows = slice(first, first + rows_at_once)
         lag = position[rows, None] - (base[rows, None] + offsets)
-        window = np.i0(beta * np.sqrt(np.clip(1.0 - (lag / half) ** 2, 0.0, None)))
-        kernel = np.sinc(2 * cut * lag) * window
+        kernel = special.i0(beta * np.sqrt(np.clip(1.0 - (lag / half) ** 2, 0.0, None)))
+        kernel *= np.sinc(sum(edges) * lag)
         kernel /= kernel.sum(axis=1, keepdims=True)
-        indices = np.clip(base[rows, None] + offsets + half, 0, flat.shape[0] - 1)
-        out[rows] = np.einsum("rk,rkc->rc", kernel, flat[indices])
-    result: FloatArray = out.reshape((wanted.size, *array.shape[1:]))
+        for row, weights in enumerate(kernel, first):
+            begin = base[row] + 1
+            out[row] = weights @ flat[begin : begin + 2 * half]
+    result: FloatArray = out.reshape((position.size, *array.shape[1:]))
     return result

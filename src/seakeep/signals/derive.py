@@ -55,7 +55,8 @@ def linear_prediction(series: FloatArray, order: int) -> FloatArray:
     """
     forward, backward = series[1:].copy(), series[:-1].copy()
     polynomial = np.array([1.0])
-    floor = np.finfo(float).eps ** 2 * float(series @ series)
+    # Below this the errors are rounding: a pure tone needs two coefficients and gets no more.
+    floor = np.finfo(float).eps * float(series @ series)
     for _ in range(order):
         power = float(forward @ forward + backward @ backward)
         if power <= floor:
@@ -102,7 +103,7 @@ def predicted_extension(
     order = max(1, min(order, fitted // 3))
     window = 0.5 * (1 + np.cos(np.pi * np.arange(1, count + 1) / (count + 1))) if fade else 1.0
     out = np.empty((flat.shape[0] + 2 * count, flat.shape[1]))
-    for column, values in enumerate(flat.T):
+    for column, values in enumerate(np.ascontiguousarray(flat.T)):
         ends = []
         for inward in (values[::-1], values):
             past = inward[-fitted:]
@@ -130,7 +131,9 @@ def _integrated(
 ) -> FloatArray:
     array = as_series(series, minimum=4)
     low, _ = edges = _checked_band(band, dt)
-    array = array - array.mean(axis=0)
+    # Averaged column by column, so that a channel has the same bits alone and beside others.
+    columns = np.ascontiguousarray(array.reshape(array.shape[0], -1).T)
+    array = (columns - columns.mean(axis=1, keepdims=True)).T.reshape(array.shape)
     # Eight periods of the lower edge outlast the ringing of its flank; a prediction needs to
     # look back one and a half of them to tell the slowest wave from a trend.
     padding = int(np.ceil(8.0 / (low * dt)))

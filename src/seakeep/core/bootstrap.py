@@ -1,0 +1,410 @@
+r"""Block lengths and the moving-block bootstrap (paper, section Performance metrics).
+
+A series of :math:`\mathcal T` samples is redrawn from its overlapping blocks of :math:`r`
+samples, which keeps its dependence within a block (Künsch 1989).
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.core.samples import FloatArray, IntArray, as_segments, as_series, whole_number
+from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+
+__all__ = [
+    "BlockChoice",
+    "BlockRule",
+    "block_length",
+    "bootstrap_indices",
+    "choose_block_length",
+    "lag_one_correlation",
+    "moving_block_bootstrap",
+    "resolve_block_length",
+]
+
+BlockRule = Literal["carlstein", "politis_white", "encounter_periods"]
+
+RULES = ("carlstein", "politis_white", "encounter_periods")
+QUIET_LAGS = 5
+"""K of Politis & White: max(5, √log₁₀ T), which is five below 10²⁵ samples."""
+FEWEST_SAMPLES = 8
+"""A shorter series has no block length: its quarter holds one sample."""
+
+
+@dataclass(frozen=True)
+class BlockChoice:
+    """A block length and how it came about.
+
+    Attributes
+    ----------
+    samples : int
+        Length to use, between 1 and `cap`.
+    optimum : float
+        Length that the rule asks for, samples; infinite where the lag-one correlation is 1.
+    cap : int
+        Longest length allowed: a quarter of the series, or its shortest segment.
+    rule : str
+        Rule that was asked.
+    """
+
+    samples: int
+    optimum: float
+    cap: int
+    rule: BlockRule
+
+    @property
+    def capped(self) -> bool:
+        """Whether the rule asked for longer blocks than the series allows."""
+        return round(min(self.optimum, 1e18)) > self.cap
+
+
+def _varying(series: npt.ArrayLike) -> FloatArray:
+    x = as_series("the series", series, FEWEST_SAMPLES)
+    if x.min() == x.max():
+        raise DataError(
+            f"the series is constant ({x[0]:g}); it has no correlation, block length or density. "
+            "Leave the channel out."
+        )
+    return x
+
+
+def _autocovariance(x: FloatArray, lags: int, segments: IntArray) -> FloatArray:
+    # Zeros between the pieces keep every product inside one of them.
+    centred = x - x.mean()
+    pieces = np.split(centred, np.cumsum(segments)[:-1])
+    apart = np.concatenate([np.concatenate([piece, np.zeros(lags)]) for piece in pieces])
+    return np.array([apart[: apart.size - k] @ apart[k:] for k in range(lags + 1)]) / x.size
+
+
+def lag_one_correlation(series: npt.ArrayLike, segments: Sequence[int] | None = None) -> float:
+    r"""Lag-one correlation :math:`\varphi` of the paper, its denominator squared.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Uniform samples.
+    segments : sequence of int, optional
+        Lengths of the joined pieces; products across a join are left out.
+
+    Returns
+    -------
+    float
+        :math:`\frac{\mathcal T \sum_{i=1}^{\mathcal T - 1} (\xi_{i+1} - EV)(\xi_i - EV)}
+        {(\mathcal T - 1) \sum_{i=1}^{\mathcal T} (\xi_i - EV)^2}`. The printed denominator lacks
+        the square and is zero. The factor can carry a very slow series beyond 1.
+
+    Raises
+    ------
+    DataError
+        If the series is constant, has gaps, or has fewer than eight samples.
+    """
+    x = _varying(series)
+    pieces = as_segments(segments, x.size)
+    zero, one = _autocovariance(x, 1, pieces)
+    return float(x.size * one / ((x.size - pieces.size) * zero))
+
+
+def _carlstein(x: FloatArray, segments: IntArray) -> float:
+    phi = abs(lag_one_correlation(x, [int(item) for item in segments]))
+    if phi >= 1.0:
+        return math.inf
+    return float((2.0 * phi / ((1.0 - phi) * (1.0 + phi))) ** (2.0 / 3.0) * np.cbrt(x.size))
+
+
+def _politis_white(x: FloatArray, kind: str, segments: IntArray) -> float:
+    n = x.size
+    longest = min(math.ceil(math.sqrt(n)) + QUIET_LAGS, n - 1)
+    covariance = _autocovariance(x, longest, segments)
+    small = np.abs(covariance[1:] / covariance[0]) < 2.0 * math.sqrt(math.log10(n) / n)
+    # m: the first of K insignificant correlations in a row, counted as R's np and arch do.
+    quiet = np.lib.stride_tricks.sliding_window_view(small, QUIET_LAGS).all(axis=-1)
+    last = int(np.argmax(quiet)) if quiet.any() else int(np.flatnonzero(~small)[-1])
+    last += 1
+    bandwidth = min(2 * last, longest)
+    lags = np.arange(1, bandwidth + 1)
+    window = np.clip(2.0 * (1.0 - lags / bandwidth), 0.0, 1.0)
+    weighted = window * covariance[1 : bandwidth + 1]
+    slope = 2.0 * float(np.sum(lags * weighted))
+    at_zero = float(covariance[0] + 2.0 * np.sum(weighted))
+    variance = (4.0 / 3.0 if kind == "circular" else 2.0) * at_zero**2
+    if variance <= 0.0:
+        return 1.0
+    return float(np.cbrt(2.0 * slope**2 / variance * n))
+
+
+def choose_block_length(
+    series: npt.ArrayLike,
+    rule: BlockRule = "carlstein",
+    *,
+    kind: Literal["circular", "stationary"] = "circular",
+    periods: float | None = None,
+    samples_per_period: float = 32.0,
+    segments: Sequence[int] | None = None,
+) -> BlockChoice:
+    r"""Block length of a series with what the rule asked for; warns of nothing.
+
+    Parameters
+    ----------
+    series, rule, kind, periods, samples_per_period, segments
+        As for :func:`block_length`.
+
+    Returns
+    -------
+    BlockChoice
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`block_length`.
+    """
+    if rule not in RULES:
+        raise RequestError(
+            f"unknown rule '{rule}' of the block length.{did_you_mean(str(rule), RULES)} "
+            f"There are: {', '.join(RULES)}."
+        )
+    if kind not in ("circular", "stationary"):
+        raise RequestError(f"kind must be 'circular' or 'stationary'; received '{kind}'.")
+    x = _varying(series)
+    pieces = as_segments(segments, x.size)
+    cap = min(x.size // 4, int(pieces.min()))
+    if rule == "carlstein":
+        optimum = _carlstein(x, pieces)
+    elif rule == "politis_white":
+        optimum = _politis_white(x, kind, pieces)
+        cap = min(cap, math.ceil(min(3.0 * math.sqrt(x.size), x.size / 3.0)))
+    else:
+        if periods is None or not periods > 0 or not samples_per_period > 0:
+            raise RequestError(
+                "rule 'encounter_periods' needs how many of them make a block, and the samples of "
+                f"one; received periods={periods} and samples_per_period={samples_per_period}."
+            )
+        optimum = float(periods * samples_per_period)
+    samples = int(np.clip(round(min(optimum, 1e18)), 1, cap))
+    return BlockChoice(samples=samples, optimum=optimum, cap=cap, rule=rule)
+
+
+def block_length(
+    series: npt.ArrayLike,
+    rule: BlockRule = "carlstein",
+    *,
+    kind: Literal["circular", "stationary"] = "circular",
+    periods: float | None = None,
+    samples_per_period: float = 32.0,
+    segments: Sequence[int] | None = None,
+) -> int:
+    r"""Length of the blocks of a bootstrap.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Uniform samples without gaps, at least eight.
+    rule : {"carlstein", "politis_white", "encounter_periods"}
+        ``"carlstein"`` is the paper's
+        :math:`r = (2\varphi/a)^{2/3} \mathcal T^{1/3}`, :math:`a = (1-\varphi)(1+\varphi)`, with
+        :func:`lag_one_correlation` by size, the optimum of an AR(1) (Carlstein 1986).
+        ``"politis_white"`` takes the correlations up to the lag where they die out (Politis &
+        White 2004, corrected by Patton, Politis & White 2009), no longer than
+        :math:`\min(3\sqrt{\mathcal T}, \mathcal T/3)`. ``"encounter_periods"`` is a fixed number.
+    kind : {"circular", "stationary"}
+        Bootstrap for which Politis–White is optimal; the circular one shares its optimum with the
+        moving-block bootstrap and is meant here.
+    periods : float, optional
+        Mean encounter periods in a block, for ``"encounter_periods"``.
+    samples_per_period : float
+        Samples of one mean encounter period; 32 after preparation.
+    segments : sequence of int, optional
+        Lengths of the joined pieces; no product and no block then crosses a join.
+
+    Returns
+    -------
+    int
+        Samples, rounded to the nearest, at least 1 and at most a quarter of the series and its
+        shortest segment.
+
+    Raises
+    ------
+    RequestError
+        If a setting is unknown or out of range.
+    DataError
+        If the series is constant, has gaps, or has fewer than eight samples.
+
+    Warns
+    -----
+    SeakeepWarning
+        If the rule asked for longer blocks than that; an interval from so few blocks is too
+        narrow.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> x = np.sin(np.arange(480) * 2 * np.pi / 32)
+    >>> block_length(x, "encounter_periods", periods=2.5)
+    80
+    """
+    choice = choose_block_length(
+        series,
+        rule,
+        kind=kind,
+        periods=periods,
+        samples_per_period=samples_per_period,
+        segments=segments,
+    )
+    if choice.capped:
+        warnings.warn(
+            f"the rule '{rule}' asks for blocks of {choice.optimum:.0f} samples; cut to "
+            f"{choice.cap}, the longest that a series of {np.size(series)} samples allows. So few "
+            "blocks make an interval too narrow: take a longer series.",
+            SeakeepWarning,
+            stacklevel=2,
+        )
+    return choice.samples
+
+
+def resolve_block_length(
+    series: npt.ArrayLike, block: int | BlockRule, segments: Sequence[int] | None = None
+) -> int:
+    """Return a block length as it is, or by the rule that it names.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        The series to which a rule is applied.
+    block : int, "carlstein" or "politis_white"
+        Samples, or a rule.
+    segments : sequence of int, optional
+        Lengths of the joined pieces.
+
+    Returns
+    -------
+    int
+        Samples.
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`block_length`.
+    """
+    if isinstance(block, str):
+        return block_length(series, block, segments=segments)
+    return whole_number("block_length", block)
+
+
+def bootstrap_indices(
+    n_samples: int,
+    n_series: int,
+    block_length: int,
+    rng: np.random.Generator,
+    segments: Sequence[int] | None = None,
+) -> IntArray:
+    """Positions that redraw a series; the same for every series that must keep step with it.
+
+    Parameters
+    ----------
+    n_samples : int
+        Length of the series.
+    n_series : int
+        Number of redrawn series.
+    block_length : int
+        Samples of a block.
+    rng : numpy.random.Generator
+        Source of the block starts.
+    segments : sequence of int, optional
+        Lengths of the joined pieces; by default blocks may cross a join, as in the paper.
+
+    Returns
+    -------
+    ndarray of int, shape (n_series, n_samples)
+        ceil(n_samples / block_length) blocks in the order drawn, cut to the length.
+
+    Raises
+    ------
+    RequestError
+        If a number is out of range, or a block is longer than the shortest segment.
+    """
+    whole_number("n_samples", n_samples)
+    whole_number("n_series", n_series)
+    whole_number("block_length", block_length)
+    if not isinstance(rng, np.random.Generator):
+        raise RequestError(
+            f"rng must be a numpy.random.Generator; received {type(rng).__name__}. Make one with "
+            "numpy.random.default_rng(seed)."
+        )
+    lengths = as_segments(segments, n_samples)
+    shortest = int(lengths.min())
+    if block_length > shortest:
+        what = "the series" if segments is None else "the shortest segment"
+        raise RequestError(
+            f"block_length of {block_length} samples does not fit into {what} of {shortest}. "
+            f"Choose 1 to {shortest}; block_length(series) proposes one."
+        )
+    first = np.concatenate([[0], np.cumsum(lengths)[:-1]])
+    allowed = np.concatenate(
+        [np.arange(a, a + n - block_length + 1) for a, n in zip(first, lengths, strict=True)]
+    )
+    blocks = -(-n_samples // block_length)
+    starts = allowed[rng.integers(0, allowed.size, size=(n_series, blocks))]
+    positions = starts[:, :, None] + np.arange(block_length)
+    return positions.reshape(n_series, -1)[:, :n_samples].astype(np.intp, copy=False)
+
+
+def moving_block_bootstrap(
+    series: npt.ArrayLike,
+    n_series: int,
+    block_length: int,
+    rng: np.random.Generator,
+    *,
+    segments: Sequence[int] | None = None,
+) -> FloatArray:
+    r"""Redraw a series from its overlapping blocks.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,) or (time, channel)
+        Uniform samples without gaps; the channels are redrawn together, from the same blocks.
+    n_series : int
+        Number of redrawn series (100 in the paper).
+    block_length : int
+        Samples of a block.
+    rng : numpy.random.Generator
+        Source of the block starts.
+    segments : sequence of int, optional
+        Lengths of the joined pieces. No block then crosses a join; by default it may, as in the
+        paper.
+
+    Returns
+    -------
+    ndarray, shape (n_series, time) or (n_series, time, channel)
+
+    Raises
+    ------
+    RequestError
+        If the block does not fit, or a setting is out of range.
+    DataError
+        If a value is not finite.
+
+    Notes
+    -----
+    The paper draws :math:`C' = \mathcal T / r` of the :math:`\mathcal T - r + 1` blocks, which is
+    no whole number; its ceiling is drawn and the last block cut. Samples within a block of either
+    end lie in fewer blocks than the others and are drawn less often.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> moving_block_bootstrap(np.arange(6.0), 2, 3, np.random.default_rng(1))
+    array([[1., 2., 3., 2., 3., 4.],
+           [3., 4., 5., 3., 4., 5.]])
+    """
+    x = np.asarray(series, dtype=float)
+    if x.ndim not in (1, 2):
+        raise RequestError(f"series has shape {x.shape}; (time,) or (time, channel) is needed.")
+    if not np.all(np.isfinite(x)):
+        as_series("series", x.ravel(), 1)
+    return x[bootstrap_indices(x.shape[0], n_series, block_length, rng, segments)]

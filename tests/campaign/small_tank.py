@@ -1,0 +1,80 @@
+"""A small tank: two runs as a logger writes them, and a campaign file that reads them."""
+
+from pathlib import Path
+
+import numpy as np
+
+DT = 0.02
+
+
+def tank_columns(seed: int = 0, seconds: float = 20.0) -> dict[str, np.ndarray]:
+    """Time (s), wave (mm), heave (mm), pitch (deg), acceleration (m/s²) of a made-up run."""
+    t = DT * np.arange(int(seconds / DT) + 1)
+    phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, 5)
+    omega = 2 * np.pi * np.array([0.5, 0.6, 0.7, 0.8, 0.9])
+    waves = np.cos(omega * t[:, None] + phase)
+    return {
+        "Time [s]": t,
+        "WP fwd [mm]": 20 * waves.sum(axis=1),
+        "Heave [mm]": 15 * (waves * [1.0, 0.9, 0.7, 0.5, 0.3]).sum(axis=1),
+        "Pitch (deg)": 2 * np.sin(omega * t[:, None] + phase).sum(axis=1),
+        "acc [g]": 0.05 * waves[:, 0],
+    }
+
+
+def write_csv(path: Path, columns: dict[str, np.ndarray], delimiter: str = ",") -> Path:
+    rows = np.column_stack(list(columns.values()))
+    lines = [delimiter.join(columns), *(delimiter.join(map(repr, map(float, r))) for r in rows)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+CAMPAIGN = """
+[campaign]
+name = "Small tank"
+scale_factor = 30.0
+
+[rig]
+water_depth = 3.6
+
+[rig.positions]
+eta_fwd = -2.5
+
+[channels.eta_fwd]
+column = "WP fwd"
+
+[channels.heave]
+column = "Heave"
+
+[channels.pitch]
+column = "Pitch"
+
+[channels.acc]
+column = "acc [g]"
+long_name = "acceleration of the bow"
+
+[derived.pitch_rate]
+from = "pitch"
+step = "differentiate"
+
+[runs.first]
+file = "first.csv"
+sea_state = "moderate"
+train = [0, 10]
+test = [10, inf]
+
+[runs.second]
+file = "second.csv"
+role = "test"
+span = [2, 18]
+
+[preparation]
+sampling_rate = 10
+
+[model]
+states = ["heave", "pitch"]
+inputs = ["eta_fwd"]
+state_delays = 4
+input_delays = 8
+ridge = 1
+"""

@@ -1,0 +1,336 @@
+"""What a campaign file may say, and the words of the messages where it says something else."""
+
+import pytest
+
+from seakeep.campaign import read_campaign
+from seakeep.campaign.settings import ModelSettings, PriorSettings
+from seakeep.errors import RequestError
+
+
+def refusal(path) -> str:
+    with pytest.raises(RequestError) as caught:
+        read_campaign(path)
+    return str(caught.value)
+
+
+def test_reads(tank):
+    campaign = read_campaign(tank / "campaign.toml")
+    assert campaign.name == "Small tank"
+    assert campaign.runs == ["first", "second"]
+    assert campaign.training_runs == ["first"]
+    assert campaign.test_runs == ["first", "second"]
+    model = campaign.model()
+    assert model.kind == "hankel_dmdc"
+    assert model.states == ("heave", "pitch")
+    assert model.arguments() == {"state_delays": 4, "input_delays": 8, "ridge": 1.0}
+    assert hash(campaign.path)
+    with pytest.raises(AttributeError):
+        campaign.path = tank
+
+
+def test_byte_order_mark_and_crlf(tank):
+    path = tank / "campaign.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
+    assert read_campaign(path).name == "Small tank"
+
+
+# One mistake each: (old text, new text, the line of the message about it).
+MISTAKES = [
+    (
+        'column = "Heave"',
+        'colum = "Heave"',
+        "channels.heave.colum: unknown key, received 'Heave'. Did you mean 'column'? "
+        "Keys here: column, unit, sign, offset, long_name.",
+    ),
+    (
+        "[preparation]",
+        "[preperation]",
+        "preperation: unknown key, received a table with sampling_rate. Did you mean "
+        "'preparation'? Keys here: campaign, rig, files, channels, derived, runs, preparation, "
+        "model, models.",
+    ),
+    (
+        'role = "test"',
+        'role = "tset"',
+        "runs.second.role: received 'tset', which should be 'train', 'test' or 'unused'. "
+        "Give 'train', 'test' or 'unused'.",
+    ),
+    (
+        'file = "second.csv"\n',
+        "",
+        "runs.second.file: missing. Add it: the file, relative to the campaign file.",
+    ),
+    (
+        "sampling_rate = 10",
+        "sampling_rate = -10",
+        "preparation.sampling_rate: received -10, which should be greater than 0. "
+        "Give samples a second, Hz.",
+    ),
+    (
+        "sampling_rate = 10",
+        'sampling_rate = "10 Hz"',
+        "preparation.sampling_rate: received '10 Hz', which should be a number. Give samples",
+    ),
+    (
+        "sampling_rate = 10",
+        "sampling_rate = 10\ndt = 0.1",
+        "preparation: state only one of sampling_rate, dt; received a table with",
+    ),
+    (
+        "span = [2, 18]",
+        "span = [18, 2]",
+        "runs.second.span: a span is [begin, end] in seconds of the file's clock, begin before "
+        "end; 'inf' stands for the end of the record; received [18, 2].",
+    ),
+    (
+        "span = [2, 18]",
+        "train = [2, 18]",
+        "runs.second: 'role' does not go with 'train' and 'test'; state the role and 'span'",
+    ),
+    (
+        "[runs.second]",
+        '[runs."second/run"]',
+        "runs.second/run: received the run name 'second/run'; a name is made of letters",
+    ),
+    (
+        'column = "Heave"',
+        'column = "Heave"\nunit = "deg"',
+        "channels.heave.unit: the unit 'deg' does not fit heave, which is measured in 'm'. "
+        "Correct the unit, or map the column to another channel.",
+    ),
+    (
+        'column = "Heave"',
+        'column = "Heave"\nunit = "milimetre"',
+        "channels.heave.unit: the unit 'milimetre' is not known.",
+    ),
+    (
+        'column = "Heave"',
+        'column = "Heave"\nsign = 2',
+        "channels.heave.sign: received 2, which should be 1 or -1. Give 1 or -1.",
+    ),
+    (
+        'states = ["heave", "pitch"]',
+        'states = ["heave", "ptich"]',
+        "model.states: received 'ptich', no such channel. Did you mean 'pitch'? Channels: "
+        "eta_fwd, heave, pitch, acc, pitch_rate.",
+    ),
+    (
+        'states = ["heave", "pitch"]\n',
+        "",
+        "model.states: missing. Add it: list of channels that the model forecasts.",
+    ),
+    (
+        'inputs = ["eta_fwd"]',
+        'inputs = ["heave"]',
+        "model: 'heave' is among the states and the inputs; choose one",
+    ),
+    (
+        "ridge = 1",
+        "ridge = { uniform = [1, 2] }",
+        "model: 'ridge' of kind = 'hankel_dmdc' is a number, not a prior",
+    ),
+    (
+        "ridge = 1",
+        "n_members = 100",
+        "model: 'n_members' belongs to kind = 'bayesian_hankel_dmdc', not to 'hankel_dmdc'",
+    ),
+    (
+        "ridge = 1",
+        "ridge = { unifrom = [1, 2] }",
+        "model.ridge.unifrom: unknown key, received [1, 2]. Did you mean 'uniform'?",
+    ),
+    ("ridge = 1", "ridge = -1", "model.ridge: received -1, which should be greater than or"),
+    (
+        "state_delays = 4",
+        "state_delays = 4.5",
+        "model.state_delays: received 4.5, which should be an integer. Give samples.",
+    ),
+    (
+        "eta_fwd = -2.5",
+        "eta_fdw = -2.5",
+        "rig.positions.eta_fdw: no such channel. Did you mean 'eta_fwd'?",
+    ),
+    (
+        "scale_factor = 30.0",
+        'period_channel = "eta_cog"',
+        "campaign.period_channel: received 'eta_cog', no such channel.",
+    ),
+    (
+        'from = "pitch"',
+        'from = "picth"',
+        "derived.pitch_rate.from: the channel 'picth' does not exist. Did you mean 'pitch'?",
+    ),
+    (
+        'step = "differentiate"',
+        'step = "derive"',
+        "derived.pitch_rate.step: received 'derive', which should be 'integrate', "
+        "'differentiate', 'band_pass', 'low_pass' or 'envelope_squared'.",
+    ),
+    (
+        'step = "differentiate"',
+        'step = "integrate"',
+        "derived.pitch_rate: step 'integrate' needs 'band' (Hz), such as band = [0.3, 5.0]",
+    ),
+    (
+        'step = "differentiate"',
+        'step = "differentiate"\nband = [1, 2]',
+        "derived.pitch_rate: step 'differentiate' has no key 'band'; remove it",
+    ),
+    (
+        'from = "pitch"\nstep = "differentiate"',
+        'expression = "2 * ptch"',
+        "derived.pitch_rate.expression: the channel 'ptch' does not exist. Did you mean 'pitch'?",
+    ),
+    (
+        'from = "pitch"\nstep = "differentiate"',
+        'expression = "pitch.real"',
+        "derived.pitch_rate.expression: the expression 'pitch.real' is not allowed: at character 1",
+    ),
+    (
+        'from = "pitch"',
+        'expression = "pitch"',
+        "derived.pitch_rate: a derived channel needs either 'expression', or 'from' and 'step'",
+    ),
+    (
+        "[derived.pitch_rate]",
+        "[derived.slope]",
+        None,
+    ),
+    (
+        '[derived.pitch_rate]\nfrom = "pitch"\nstep = "differentiate"',
+        '[derived.slope]\nexpression = "pitch / 2"',
+        "derived.slope.unit: missing. 'slope' is a free name; state the unit of the expression",
+    ),
+    (
+        "[derived.pitch_rate]",
+        "[derived.heave]",
+        "derived.heave: [channels.heave] exists too. Rename one of them.",
+    ),
+    (
+        "[preparation]",
+        "[runs.second.channels.heeve]\nsign = -1\n[preparation]",
+        "runs.second.channels.heeve: no table [channels.heeve] to change. Did you mean 'heave'?",
+    ),
+    (
+        "[preparation]",
+        '[runs.second.channels.heave]\nunit = "rad"\n[preparation]',
+        "runs.second.channels.heave.unit: the unit 'rad' does not fit heave",
+    ),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "line"), MISTAKES, ids=lambda x: repr(x)[:40])
+def test_mistake(edited, old, new, line):
+    path = edited((old, new))
+    if line is None:  # a free name with a step knows its unit
+        assert read_campaign(path)
+        return
+    message = refusal(path)
+    assert message.startswith(f"{path}: 1 mistake in the campaign file\n  ")
+    assert line in message.splitlines()[1]
+
+
+def test_every_mistake_is_named_at_once(edited):
+    message = refusal(
+        edited(
+            ('column = "Heave"', 'colum = "Heave"'),
+            ('role = "test"', 'role = "tset"'),
+            ("ridge = 1", 'ridge = "much"'),
+        )
+    )
+    assert "3 mistakes in the campaign file" in message
+    for key in ("channels.heave.colum: ", "runs.second.role: ", "model.ridge: "):
+        assert key in message
+
+
+def test_circle(edited):
+    path = edited(
+        (
+            "[runs.first]",
+            '[derived.a]\nexpression = "b + 1"\nunit = "m"\n'
+            '[derived.b]\nfrom = "c"\nstep = "low_pass"\npassband = 1\n'
+            '[derived.c]\nexpression = "a * heave"\nunit = "m"\n[runs.first]',
+        )
+    )
+    assert (
+        "derived: derived channels need one another in a circle: a -> b -> c -> a. Make one of "
+        "them from measured channels." in refusal(path)
+    )
+
+
+def test_no_runs_no_channels(tmp_path):
+    path = tmp_path / "campaign.toml"
+    path.write_text("")
+    assert "channels: missing. Add it: at least one table [channels.NAME]." in refusal(path)
+    assert "runs: missing. Add it: at least one table [runs.NAME] with a file." in refusal(path)
+
+
+def test_toml_that_is_none(tank):
+    path = tank / "campaign.toml"
+    path.write_text("[campaign]\nname = Small tank\n")
+    message = refusal(path)
+    assert message.startswith(f"{path} is not valid TOML: ")
+    assert "line 2" in message
+    assert "Write texts in quotes" in message
+    path.write_bytes(b"[campaign]\nname = '\xff'\n")
+    assert refusal(path) == (
+        f"{path}, line 2: not UTF-8, which TOML asks for. Save the file as UTF-8."
+    )
+
+
+def test_file_that_is_not_there(tank):
+    message = refusal(tank / "campain.toml")
+    assert "campain.toml does not exist. Did you mean 'campaign.toml'? Draft one with" in message
+    assert "is a folder; give the campaign's TOML file in it" in refusal(tank)
+    assert "does not exist" in refusal(tank / "no" / "campaign.toml")
+
+
+class TestModels:
+    def test_named_models(self, edited):
+        path = edited(
+            ("[model]", "[models.small]"),
+            (
+                "ridge = 1",
+                'ridge = 1\n[models.band]\nkind = "bayesian_hankel_dmdc"\npreset = "recommended"\n'
+                'states = ["heave"]\nn_members = 10\nridge = { log_uniform = [0.1, 1] }',
+            ),
+        )
+        campaign = read_campaign(path)
+        assert campaign.models == ["small", "band"]
+        band = campaign.model("band")
+        assert band.inputs == ()
+        assert band.arguments() == {
+            "ridge": PriorSettings(log_uniform=(0.1, 1.0)),
+            "n_members": 10,
+        }
+        with pytest.raises(
+            RequestError, match=r"no table \[models\.bnad\]\. Did you mean 'band'\? Named models: s"
+        ):
+            campaign.model("bnad")
+        with pytest.raises(RequestError, match=r"no table \[model\]\. Name one of small, band\."):
+            campaign.model()
+
+    def test_the_only_one_needs_no_name(self, edited):
+        assert read_campaign(edited(("[model]", "[models.small]"))).model().ridge == 1.0
+
+    def test_none(self, edited):
+        text = edited().read_text()
+        path = edited()
+        path.write_text(text[: text.index("[model]")])
+        with pytest.raises(RequestError, match=r"no table \[model\]\. Add \[model\] with 'states'"):
+            read_campaign(path).model()
+
+    def test_frozen(self):
+        model = ModelSettings(states=("heave",))
+        with pytest.raises(ValueError, match="frozen"):
+            model.ridge = 3.0
+
+    def test_a_prior_is_one_thing(self, edited):
+        message = refusal(
+            edited(
+                ("[model]", '[model]\nkind = "bayesian_hankel_dmdc"'),
+                ("state_delays = 4\ninput_delays = 8\n", ""),
+                ("ridge = 1", "state_delay = { uniform = [1, 2], fixed = 3 }"),
+            )
+        )
+        assert "model.state_delay: a prior is one of { uniform = [a, b] }" in message

@@ -1,0 +1,196 @@
+"""Drafts of campaign files: they must be read and prepared as they are."""
+
+import re
+import tomllib
+
+import numpy as np
+import pytest
+from scipy import io
+from small_tank import tank_columns, write_csv
+
+from seakeep.campaign import read_campaign
+from seakeep.campaign.drafts import draft_campaign, suggest_channel
+from seakeep.errors import DataError, RequestError
+
+
+def drafted(folder, files):
+    text = draft_campaign(files, folder)
+    path = folder / "campaign.toml"
+    path.write_text(text, encoding="utf-8")
+    return text, read_campaign(path)
+
+
+@pytest.mark.parametrize(
+    ("column", "unit", "channel"),
+    [
+        ("Heave", "m", "heave"),
+        ("HEAVE_CoG", "mm", "heave"),
+        ("z", "m", "heave"),
+        ("Sussulto", "mm", "heave"),
+        ("Pitch", "deg", "pitch"),
+        ("theta", "rad", "pitch"),
+        ("beccheggio", "deg", "pitch"),
+        ("Pitch", "deg/s", "pitch_rate"),
+        ("GyroPitch", "deg/s", "pitch_rate"),
+        ("rollRate", "deg/s", "roll_rate"),
+        ("rollio", "deg", "roll"),
+        ("x", "m", "surge"),
+        ("acc_z", "g", "heave_acceleration"),
+        ("ACC_SWAY", "m/s2", "sway_acceleration"),
+        ("ACC_Heave_SB", "m/s2", "acc_heave_sb"),
+        ("Heave", "deg", "heave_signal"),
+        ("WP_1", "m", "eta_1"),
+        ("WP12", "mm", "eta_12"),
+        ("Wave fwd", "mm", "eta_fwd"),
+        ("eta cog", None, "eta_cog"),
+        ("Sonda 3", "mm", "eta_3"),
+        ("probe", "cm", "eta_1"),
+        ("probe", "V", "probe"),
+        ("Tension_SB", "N", "mooring_starboard"),
+        ("Mooring bow", "kN", "mooring_bow"),
+        ("Tiro poppa", "N", "mooring_stern"),
+        ("Line 3 load", "N", "mooring_3"),
+        ("Force_Sway", "N", "force_sway"),
+        ("3rd thing", None, "column_3_rd_thing"),
+        ("Ærlig", None, "rlig"),
+        ("°", None, "channel"),
+    ],
+)
+def test_guesses(column, unit, channel):
+    assert suggest_channel(column, unit) == channel
+
+
+def test_draft_of_a_tank(tmp_path):
+    files = [write_csv(tmp_path / f"run{i}.csv", tank_columns(i)) for i in range(3)]
+    text, campaign = drafted(tmp_path, files)
+    assert campaign.training_runs == ["run0", "run1"]
+    assert campaign.test_runs == ["run2"]
+    assert campaign.model().states == ("heave", "pitch")
+    assert campaign.model().inputs == ("eta_fwd",)
+    assert campaign.model().preset == "recommended"
+    assert 'file = "run0.csv"' in text
+    assert "guessed" in text
+    runs = campaign.prepare()
+    raw = tank_columns(2)
+    prepared = runs["run2"]
+    # The step is a whole number of the files' own, 32 samples a wave of the spectral peak or more.
+    assert 24 <= campaign.encounter_period() / prepared.attrs["dt"] <= 100
+    # Perhaps on a coarser step, so compared by size: the waves lie far below its edge.
+    assert float(prepared["heave"].std()) == pytest.approx(raw["Heave [mm]"].std() / 1e3, rel=0.02)
+
+
+def test_fast_files_get_a_coarser_step(tmp_path):
+    columns = tank_columns(seconds=40.0)
+    columns = {name: np.repeat(each, 8) for name, each in columns.items()}  # 400 Hz
+    columns["Time [s]"] = np.arange(columns["Time [s]"].size) * 0.02 / 8
+    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
+    rate = campaign.settings.preparation.sampling_rate
+    assert 400 / rate == pytest.approx(round(400 / rate), rel=1e-5)  # written with six digits
+    assert 24 <= campaign.encounter_period() * rate <= 80
+    assert "# Hz; guessed: about 32 samples a wave of" in text
+
+
+def test_one_file_trains(tmp_path):
+    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", tank_columns())])
+    assert campaign.training_runs == ["run"]
+    assert "# train = [0.0, 60.0]" in text
+
+
+def test_columns_that_do_not_serve_are_listed(tmp_path):
+    for name, last in (("a", "3"), ("b", "4")):
+        (tmp_path / f"{name}.csv").write_text(
+            "t;heave;state;odd [furlong];gaps;twice;twice\n"
+            f"0;1,5;ok;1;1;1;1\n0,1;2,5;ok;1;;1;1\n0,2;{last},5;ok;1;1;1;1\n"
+        )
+    text, campaign = drafted(tmp_path, [tmp_path / "a.csv", tmp_path / "b.csv"])
+    assert list(campaign.settings.channels) == ["heave"]
+    for line in (
+        "# column 'state' left out: not all of it are numbers, or its name is there twice",
+        "# column 'odd [furlong]' left out: its unit 'furlong' is not known; state unit = '…'",
+        "# column 'gaps' left out: has gaps in a.csv, b.csv",
+        "# column 'twice' left out: not all of it are numbers, or its name is there twice",
+        'unit = "m" # ASSUMED: the file states none. Correct it',
+    ):
+        assert line in text.splitlines()
+    np.testing.assert_allclose(campaign.prepare()["b"]["heave"], [1.5, 2.5, 4.5], rtol=1e-15)
+
+
+def test_a_column_that_is_missing_elsewhere(tmp_path):
+    write_csv(tmp_path / "a.csv", tank_columns())
+    fewer = tank_columns()
+    del fewer["acc [g]"]
+    write_csv(tmp_path / "b.csv", fewer)
+    text, campaign = drafted(tmp_path, [tmp_path / "a.csv", tmp_path / "b.csv"])
+    assert "# column 'acc [g]' left out: missing or unusable in b.csv" in text
+    assert campaign.prepare()
+
+
+def test_files_without_time_or_with_odd_names(tmp_path):
+    for name in ("1.run of today.csv", "1.other.csv"):
+        (tmp_path / name).write_text("heave [m],heave,`x`\n1,2,3\n2,3,4\n3,4,6\n")
+    text, campaign = drafted(tmp_path, sorted(tmp_path.glob("*.csv")))
+    assert "sampling_rate = 100.0 # ASSUMED: the files have no time column. Correct it" in text
+    assert campaign.runs == ["1", "1_2"]
+    assert len(campaign.prepare()) == 2
+
+
+def test_matlab(tmp_path):
+    t = np.arange(300) * 0.1
+    content = {"time": t, "heave": np.sin(t), "WP1": np.cos(t), "units": {"heave": "m"}}
+    io.savemat(tmp_path / "run.mat", content)
+    _, campaign = drafted(tmp_path, [tmp_path / "run.mat"])
+    assert list(campaign.settings.channels) == ["heave", "eta_1"]
+    assert campaign.prepare()
+
+
+def test_files_in_the_data_folder_are_named_by_it(tmp_path, monkeypatch):
+    data = tmp_path / "data" / "set"
+    data.mkdir(parents=True)
+    write_csv(data / "run.csv", tank_columns())
+    monkeypatch.setenv("SEAKEEP_DATA_DIR", str(tmp_path / "data"))
+    text, campaign = drafted(tmp_path, [data / "run.csv"])
+    assert 'file = "${SEAKEEP_DATA_DIR}/set/run.csv"' in text
+    assert campaign.prepare()
+
+
+def test_relative_to_the_campaigns_folder(tmp_path):
+    (tmp_path / "runs").mkdir()
+    write_csv(tmp_path / "runs" / "run.csv", tank_columns())
+    (tmp_path / "settings").mkdir()
+    text, campaign = drafted(tmp_path / "settings", [tmp_path / "runs" / "run.csv"])
+    assert 'file = "../runs/run.csv"' in text
+    assert campaign.prepare()
+
+
+def test_what_is_left_out_stays_valid_toml(tmp_path):
+    """The commented proposals can be switched on."""
+    text, _ = drafted(tmp_path, [write_csv(tmp_path / "run.csv", tank_columns())])
+    switched = re.sub(
+        r"^# (state_delays|input_delays|ridge|ridge_scale|delay_rows|encounter_period) =",
+        r"\1 =",
+        text,
+        flags=re.M,
+    )
+    model = tomllib.loads(switched)["model"]
+    assert model["ridge"] == 100 / 640
+    (tmp_path / "campaign.toml").write_text(switched)
+    assert read_campaign(tmp_path / "campaign.toml").model().delay_rows == "exact"
+
+
+def test_nothing_to_draft_from(tmp_path):
+    with pytest.raises(
+        RequestError, match=r"no file was given\. Name the runs' files: seakeep init"
+    ):
+        draft_campaign([])
+    path = tmp_path / "words.csv"
+    path.write_text("t,a\n0,x\n1,y\n")
+    with pytest.raises(
+        RequestError,
+        match=r"no column has numbers that a channel could be made of \(columns: t, a\)",
+    ):
+        draft_campaign([path])
+    with pytest.raises(RequestError, match="does not exist"):
+        draft_campaign([tmp_path / "none.csv"])
+    path.write_text("")
+    with pytest.raises(DataError, match="is empty"):
+        draft_campaign([path])

@@ -1,0 +1,482 @@
+"""From files to analysis-ready runs."""
+
+import json
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+import xarray as xr
+from small_tank import DT, tank_columns, write_csv
+
+from seakeep.campaign import load_prepared, read_campaign, write_prepared
+from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.signals import (
+    band_pass,
+    differentiate,
+    envelope_squared,
+    integrate,
+    low_pass,
+    resample,
+)
+
+
+@pytest.fixture
+def campaign(tank):
+    return read_campaign(tank / "campaign.toml")
+
+
+def rewrite(tank, change, name="second.csv", seed=1):
+    columns = tank_columns(seed)
+    change(columns)
+    write_csv(tank / name, columns)
+    return read_campaign(tank / "campaign.toml")
+
+
+def test_raw_run_is_in_si_units(campaign):
+    run, raw = campaign.read_run("first"), tank_columns(0)
+    np.testing.assert_array_equal(run["time"], raw["Time [s]"])
+    # One product with a rounded factor.
+    np.testing.assert_allclose(run["heave"], 1e-3 * raw["Heave [mm]"], rtol=1e-15)
+    np.testing.assert_allclose(run["pitch"], np.deg2rad(raw["Pitch (deg)"]), rtol=1e-14)
+    np.testing.assert_allclose(run["acc"], 9.80665 * raw["acc [g]"], rtol=1e-15)
+    assert {str(n): each.attrs["units"] for n, each in run.items()} == {
+        "eta_fwd": "m", "heave": "m", "pitch": "rad", "acc": "m/s^2", "pitch_rate": "rad/s",
+    }  # fmt: skip
+    assert run["acc"].attrs["long_name"] == "acceleration of the bow"
+    assert run["eta_fwd"].attrs["long_name"] == "wave elevation fwd"
+    assert run["eta_fwd"].attrs["x_position"] == -2.5
+    assert "x_position" not in run["heave"].attrs
+    assert list(run.dims) == ["time"]
+    assert run.attrs["dt"] == DT
+
+
+def test_offset_is_added_in_the_files_unit_before_the_sign(edited):
+    path = edited(('column = "Heave"', 'column = "Heave"\nsign = -1\noffset = 250'))
+    run = read_campaign(path).read_run("first")
+    # heave = -(reading + 250 mm)
+    expected = -(tank_columns(0)["Heave [mm]"] + 250) * 1e-3
+    np.testing.assert_allclose(run["heave"], expected, rtol=1e-15)  # order of two products
+
+
+def test_a_run_may_differ(edited):
+    path = edited(
+        (
+            "[preparation]",
+            '[runs.second.channels.heave]\nsign = -1\ncolumn = "WP fwd"\n[preparation]',
+        )
+    )
+    campaign = read_campaign(path)
+    first, second = campaign.read_run("first"), campaign.read_run("second")
+    np.testing.assert_array_equal(second["heave"], -second["eta_fwd"])
+    assert abs(float(np.corrcoef(first["heave"], first["eta_fwd"])[0, 1])) < 0.999
+
+
+def test_prepared_runs(campaign):
+    calls = []
+    runs = campaign.prepare(progress=lambda *call: calls.append(call))
+    assert calls == [(1, 2, "first"), (2, 2, "second")]
+    first, second = runs["first"], runs["second"]
+    np.testing.assert_allclose(first["time"], np.arange(201) * 0.1, rtol=1e-15)
+    np.testing.assert_allclose(second["time"], 2 + np.arange(161) * 0.1, rtol=1e-15)
+    assert first.attrs["dt"] == second.attrs["dt"] == 0.1
+    expected = {
+        "run": "first",
+        "campaign": "Small tank",
+        "role": "train and test",
+        "sea_state": "moderate",
+        "water_depth": 3.6,
+        "scale_factor": 30.0,
+        "train_span": (0.0, 10.0),
+        "test_span": (10.0, 20.0),
+        "campaign_digest": campaign.digest,
+        "file": "first.csv",
+    }
+    assert {key: first.attrs[key] for key in expected} == expected
+    assert len(first.attrs["file_sha256"]) == 64
+    assert "encounter_period" not in first.attrs
+    assert second.attrs["role"] == "test"
+    assert second.attrs["test_span"] == (2.0, 18.0)
+    assert "train_span" not in second.attrs
+    assert first["pitch_rate"].attrs["derived_from"] == "pitch, differentiated"
+
+
+def test_the_whole_record_is_resampled_and_then_cut(campaign):
+    raw = campaign.read_run("second")
+    run = campaign.prepare(["second"])["second"]
+    whole = resample(raw["pitch_rate"], raw["time"], np.arange(201) * 0.1)
+    # Channels side by side are summed in another order.
+    np.testing.assert_allclose(run["pitch_rate"], whole[20:181], atol=1e-14)
+
+
+def test_derived_at_the_files_own_rate(edited):
+    path = edited(
+        (
+            "[runs.first]",
+            '[derived.speed]\nfrom = "acc"\nstep = "integrate"\nband = [0.3, 5]\n'
+            '[derived.way]\nfrom = "acc"\nstep = "integrate"\nband = [0.3, 5]\ntimes = 2\n'
+            'unit = "mm"\nlong_name = "way of the bow"\n'
+            '[derived.smooth]\nfrom = "twice"\nstep = "low_pass"\npassband = 1\n'
+            '[derived.twice]\nexpression = "2 * eta_fwd"\nunit = "m"\n'
+            '[derived.waves]\nfrom = "pitch"\nstep = "band_pass"\nband = [0.3, 5]\n'
+            '[derived.group]\nfrom = "eta_fwd"\nstep = "envelope_squared"\n'
+            '[derived.sway]\nexpression = "1000 * heave"\nunit = "mm"\n[runs.first]',
+        )
+    )
+    run = read_campaign(path).read_run("first")
+    acc, eta = run["acc"].to_numpy(), run["eta_fwd"].to_numpy()
+    np.testing.assert_array_equal(run["speed"], integrate(acc, DT, (0.3, 5.0)))
+    np.testing.assert_array_equal(run["way"], integrate(acc, DT, (0.3, 5.0), 2))
+    np.testing.assert_array_equal(run["twice"], 2 * eta)
+    np.testing.assert_array_equal(run["smooth"], low_pass(2 * eta, DT, 1.0))
+    np.testing.assert_array_equal(run["waves"], band_pass(run["pitch"], DT, (0.3, 5.0)))
+    assert run["waves"].attrs["units"] == "rad"
+    np.testing.assert_array_equal(run["group"], envelope_squared(eta, DT))
+    np.testing.assert_array_equal(run["pitch_rate"], differentiate(run["pitch"], DT))
+    # 'unit' is that of the expression's value: millimetres, kept as metres.
+    np.testing.assert_allclose(run["sway"], run["heave"], rtol=1e-15)
+    units = {n: run[n].attrs["units"] for n in ("speed", "way", "smooth", "group", "sway")}
+    assert units == {"speed": "m/s", "way": "m", "smooth": "m", "group": "m^2", "sway": "m"}
+    assert run["way"].attrs["long_name"] == "way of the bow"
+
+
+def test_a_step_whose_unit_does_not_fit(edited):
+    campaign = read_campaign(edited(("[derived.pitch_rate]", "[derived.heave_rate]")))
+    with pytest.raises(
+        RequestError,
+        match=r"run 'first', derived channel 'heave_rate': the unit 'rad/s' does not fit the "
+        r"derived channel 'heave_rate', which is measured in 'm/s'",
+    ):
+        campaign.read_run("first")
+
+
+def test_a_band_above_the_files_nyquist_frequency(edited):
+    path = edited(('step = "differentiate"', 'step = "integrate"\nband = [0.3, 50]'))
+    with pytest.raises(
+        RequestError, match=r"channel 'pitch_rate': a band needs 0 < low < high, and high at"
+    ):
+        read_campaign(path).read_run("first")
+
+
+class TestStep:
+    def test_dt(self, edited):
+        runs = read_campaign(edited(("sampling_rate = 10", "dt = 0.13"))).prepare()
+        for run in runs.values():
+            assert run.attrs["dt"] == 0.13
+            np.testing.assert_allclose(np.diff(run["time"]), 0.13, rtol=1e-12)
+
+    def test_the_files_own(self, edited):
+        campaign = read_campaign(edited(("sampling_rate = 10", "")))
+        run = campaign.prepare()["first"]
+        raw = campaign.read_run("first")
+        assert run.attrs["dt"] == DT
+        np.testing.assert_array_equal(run["heave"], raw["heave"])
+
+    def test_the_files_own_differ(self, edited, tank):
+        edited(("sampling_rate = 10", ""))
+        columns = {name: each[::2] for name, each in tank_columns(1).items()}
+        write_csv(tank / "second.csv", columns)
+        with pytest.raises(
+            RequestError,
+            match=r"the runs differ in rate: 'first' has a step of 0\.02 s and 'second' one of "
+            r"0\.04 s\. State sampling_rate",
+        ):
+            read_campaign(tank / "campaign.toml").prepare()
+
+    def test_steps_a_period(self, edited):
+        campaign = read_campaign(
+            edited(
+                ("sampling_rate = 10", "steps_per_period = 32"),
+                ("scale_factor = 30.0", "encounter_period = 1.6"),
+            )
+        )
+        run = campaign.prepare(["second"])["second"]
+        assert run.attrs["dt"] == 0.05
+        assert run.attrs["encounter_period"] == 1.6
+
+    def test_steps_a_measured_period(self, edited):
+        campaign = read_campaign(edited(("sampling_rate = 10", "steps_per_period = 16")))
+        runs = campaign.prepare()
+        period = campaign.encounter_period()
+        assert runs["first"].attrs["encounter_period"] == period
+        assert {run.attrs["dt"] for run in runs.values()} == {period / 16}
+
+    def test_step_longer_than_the_record(self, edited):
+        with pytest.raises(RequestError, match=r"of 20 s is shorter than two steps of 50 s"):
+            read_campaign(edited(("sampling_rate = 10", "dt = 50"))).prepare()
+
+
+class TestEncounterPeriod:
+    def test_measured_over_the_spans(self, campaign):
+        # Five waves of 0.5 to 0.9 Hz: the mean period lies among theirs.
+        assert 1 / 0.9 < campaign.encounter_period() < 1 / 0.5
+        assert campaign.period_channel() == "eta_fwd"
+
+    def test_mean_of_the_irregular_runs(self, edited):
+        of = lambda path: read_campaign(path).encounter_period()  # noqa: E731
+        both = of(edited())
+        first = of(edited(('sea_state = "moderate"', 'waves = "irregular"')))
+        second = of(
+            edited(
+                ('sea_state = "moderate"', 'waves = "regular"'),
+                ('role = "test"', 'role = "test"\nwaves = "irregular"'),
+            )
+        )
+        assert first != second
+        assert both == pytest.approx((first + second) / 2, rel=1e-15)  # rounding of a sum
+
+    def test_stated(self, edited):
+        path = edited(("scale_factor = 30.0", "encounter_period = 1.64"))
+        campaign = read_campaign(path)
+        assert campaign.encounter_period() == 1.64
+        assert campaign.prepare(["first"])["first"].attrs["encounter_period"] == 1.64
+
+    def test_channel_stated(self, edited):
+        path = edited(("scale_factor = 30.0", 'period_channel = "heave"'))
+        assert read_campaign(path).period_channel() == "heave"
+
+    def test_no_wave(self, edited):
+        path = edited(
+            ('inputs = ["eta_fwd"]', ""), ("[channels.eta_fwd]", '[channels.probe]'),
+            ("eta_fwd = -2.5", ""),
+        )  # fmt: skip
+        with pytest.raises(
+            RequestError,
+            match=r"no wave channel to take the encounter period from. State encounter",
+        ):
+            read_campaign(path).encounter_period()
+
+    def test_still_water(self, tank):
+        campaign = rewrite(tank, lambda c: c["WP fwd [mm]"].fill(0.0), "first.csv")
+        with pytest.raises(DataError, match="run 'first', channel 'eta_fwd': the record of 20"):
+            campaign.encounter_period()
+        # A constant channel is kept all the same: whether it serves is the model's business.
+        assert float(campaign.prepare()["first"]["eta_fwd"].std()) == 0.0
+
+
+class TestBadRuns:
+    def test_gap_of_values(self, tank):
+        def change(columns):
+            columns["Heave [mm]"][[100, 101, 102, 300]] = np.nan
+            columns["Pitch (deg)"][5] = np.nan
+
+        with pytest.raises(
+            DataError,
+            match=r"run 'second' .*: channel 'heave' has 4 missing values of 1001 in 2 gap\(s\), "
+            r"the first at t = 2 s \(3 samples, 0\.06 s\), the longest at t = 2 s \(3 samples, "
+            r"0\.06 s\) \(also in pitch\)\. Repair the file, leave the channel out, or cut the gap "
+            r"off with record = \[begin, end\] in \[runs\.second\]",
+        ):
+            rewrite(tank, change).prepare()
+
+    def test_gap_cut_off(self, tank):
+        rewrite(tank, lambda c: c["Heave [mm]"].__setitem__(slice(20, 30), np.nan))
+        path = tank / "campaign.toml"
+        path.write_text(path.read_text().replace("span = [2, 18]", "record = [1, inf]"))
+        run = read_campaign(path).prepare()["second"]
+        assert float(run["time"][0]) == 1.0
+
+    def test_gap_of_time(self, tank):
+        def change(columns):
+            for name, values in columns.items():
+                columns[name] = np.delete(values, slice(100, 125))
+
+        with pytest.raises(
+            DataError,
+            match=r"the times of run 'second' \(.*second\.csv\) have 1 gap\(s\): after t = 1\.98 s"
+            r", 25 sample\(s\) of 0\.02 s are missing; the longest gap, after t = 1\.98 s, lasts 0",
+        ):
+            rewrite(tank, change).prepare()
+
+    def test_times_not_uniform(self, tank):
+        def change(columns):
+            columns["Time [s]"] = columns["Time [s]"] ** 1.1
+
+        with pytest.raises(
+            DataError, match=r"the times of run 'second' .* are not uniform: steps r"
+        ):
+            rewrite(tank, change).prepare()
+
+    def test_missing_column(self, edited):
+        path = edited(('column = "Heave"', 'column = "Heaves"'))
+        with pytest.raises(
+            RequestError,
+            match=r"first\.csv has no column 'Heaves'\. Did you mean 'Heave'\? Its columns: Time",
+        ):
+            read_campaign(path).prepare()
+
+    def test_no_unit(self, tank):
+        campaign = rewrite(tank, lambda c: c.update({"Heave": c.pop("Heave [mm]")}))
+        with pytest.raises(
+            RequestError,
+            match=r"channels\.heave: the column 'Heave' of .*second\.csv states no unit\. Add unit",
+        ):
+            campaign.prepare()
+
+    def test_unit_of_the_header_does_not_fit(self, tank):
+        campaign = rewrite(tank, lambda c: c.update({"Heave [deg]": c.pop("Heave [mm]")}))
+        with pytest.raises(
+            RequestError,
+            match=r"the unit 'deg' does not fit channel 'heave' \(column 'Heave' of .*second\.csv\)"
+            ", which is measured in 'm'",
+        ):
+            campaign.prepare()
+
+    @pytest.mark.parametrize("span", ["[2, 30]", "[-3, 10]", "[30, 40]"])
+    def test_span_outside_the_record(self, edited, span):
+        path = edited(("span = [2, 18]", f"span = {span}"))
+        with pytest.raises(
+            RequestError,
+            match=r"runs\.second\.span: received \[.*\] s, and the record runs from 0 to 20 s\.",
+        ):
+            read_campaign(path).prepare()
+
+    def test_span_that_holds_nothing(self, edited):
+        path = edited(("span = [2, 18]", "span = [2.01, 2.05]"))
+        with pytest.raises(
+            RequestError, match=r"holds 0 sample\(s\) at a step of 0\.1 s\. Lengthen"
+        ):
+            read_campaign(path).prepare()
+        path = edited(("span = [2, 18]", "record = [90, 100]"))
+        with pytest.raises(
+            RequestError, match=r"runs\.second\.record: received \[90, 100\] s, and"
+        ):
+            read_campaign(path).prepare()
+
+    def test_missing_file(self, edited):
+        path = edited(('file = "second.csv"', 'file = "secnd.csv"'))
+        with pytest.raises(
+            RequestError, match=r"secnd\.csv does not exist\. Did you mean 'second\.c"
+        ):
+            read_campaign(path).prepare()
+
+    def test_unset_variable(self, edited, monkeypatch):
+        monkeypatch.delenv("TANK_FILES", raising=False)
+        path = edited(('file = "second.csv"', 'file = "${TANK_FILES}/second.csv"'))
+        with pytest.raises(
+            RequestError,
+            match=r"needs the environment variable TANK_FILES, which is not set\. Set it to the "
+            r"folder of the data: export TANK_FILES=",
+        ):
+            read_campaign(path).prepare(["second"])
+        monkeypatch.setenv("TANK_FILES", str(path.parent))
+        assert read_campaign(path).prepare(["second"])
+
+    def test_unknown_run(self, campaign):
+        with pytest.raises(
+            RequestError, match=r"has no run 'secnd'. Did you mean 'second'. Runs: fi"
+        ):
+            campaign.prepare(["secnd"])
+
+
+def test_unused_runs_are_left_alone(edited, tank):
+    campaign = read_campaign(edited(('role = "test"', 'role = "unused"')))
+    (tank / "second.csv").unlink()
+    assert list(campaign.prepare()) == ["first"]
+
+
+def test_home_folder(edited, monkeypatch):
+    path = edited(('file = "second.csv"', 'file = "~/second.csv"'))
+    monkeypatch.setenv("HOME", str(path.parent))
+    assert read_campaign(path).prepare(["second"])
+
+
+def test_integers_and_floats_agree(tank, campaign):
+    columns = {n: each if "[s]" in n else np.rint(each) for n, each in tank_columns().items()}
+    path = write_csv(tank / "first.csv", columns)
+    as_floats = campaign.read_run("first")
+    header, *rows = path.read_text().splitlines()
+    times, values = zip(*(row.split(",", 1) for row in rows), strict=True)
+    whole = [value.replace(".0", "") for value in values]
+    pairs = zip(times, whole, strict=True)
+    path.write_text("\n".join([header, *(",".join(pair) for pair in pairs)]))
+    xr.testing.assert_equal(campaign.read_run("first"), as_floats)
+
+
+class TestDigest:
+    def test_what_does_not_matter(self, edited):
+        digest = read_campaign(edited()).digest
+        for pair in (
+            ("ridge = 1", "ridge = 2"),
+            ('name = "Small tank"', 'name = "Other"\ndescription = "words"'),
+            ("[rig]", "# a remark\n[rig]"),
+        ):
+            assert read_campaign(edited(pair)).digest == digest
+        assert len(digest) == 64
+
+    def test_what_matters(self, edited):
+        digests = {
+            read_campaign(edited(pair)).digest
+            for pair in (
+                ("ridge = 1", "ridge = 1"),
+                ("sampling_rate = 10", "sampling_rate = 11"),
+                ("span = [2, 18]", "span = [2, 17]"),
+                ('column = "Heave"', 'column = "Heave"\nsign = -1'),
+                ("water_depth = 3.6", "water_depth = inf"),
+            )
+        }
+        assert len(digests) == 5
+
+
+class TestFiles:
+    def test_written_runs_come_back(self, campaign, tank, monkeypatch):
+        files = write_prepared(campaign, tank / "out")
+        assert files == {n: tank / "out" / f"{n}.nc" for n in ("first", "second")}
+        assert sorted(p.name for p in (tank / "out").iterdir()) == ["first.nc", "second.nc"]
+        expected = campaign.prepare()
+        monkeypatch.setattr(type(campaign), "prepare", None)  # nothing is prepared again
+        for name, run in load_prepared(campaign, tank / "out").items():
+            xr.testing.assert_identical(run, expected[name])
+            assert {k: type(v) for k, v in run.attrs.items()} == {
+                k: type(v) for k, v in expected[name].attrs.items()
+            }
+
+    def test_default_folder(self, campaign, tank):
+        assert write_prepared(campaign, names=["first"])["first"] == tank / "prepared" / "first.nc"
+        assert list(load_prepared(campaign)) == ["first", "second"]
+
+    def test_others_can_read_them(self, campaign):
+        path = write_prepared(campaign, names=["first"])["first"]
+        with xr.open_dataset(path) as run:
+            assert run.attrs["water_depth"] == 3.6
+            assert run["time"].dtype == float
+
+    @pytest.mark.parametrize("change", ["settings", "file", "version"])
+    def test_stale_files_are_not_used(self, campaign, tank, edited, change, monkeypatch):
+        path = write_prepared(campaign)["second"]
+        with xr.open_dataset(path) as opened:
+            run = opened.load()
+        run["heave"][:] = 0.0  # to be seen if it were used
+        run.to_netcdf(path, engine="h5netcdf")
+        assert float(load_prepared(campaign)["second"]["heave"].std()) == 0.0
+        if change == "settings":
+            campaign = read_campaign(edited(("sampling_rate = 10", "sampling_rate = 12")))
+        elif change == "file":
+            write_csv(tank / "second.csv", tank_columns(5))
+        else:
+            monkeypatch.setattr("seakeep.campaign.store.version", lambda: "99.0")
+        assert float(load_prepared(campaign)["second"]["heave"].std()) > 0.0
+
+    def test_damaged_files_are_prepared_anew(self, campaign):
+        path = write_prepared(campaign)["second"]
+        path.write_bytes(path.read_bytes()[:500])
+        with pytest.warns(
+            SeakeepWarning, match=r"second\.nc cannot be read; the run is prepared an"
+        ):
+            run = load_prepared(campaign)["second"]
+        xr.testing.assert_identical(run, campaign.prepare(["second"])["second"])
+
+    def test_nothing_is_left_behind_by_a_failure(self, campaign, tank, monkeypatch):
+        def fail(*_, **__):
+            (tank / "prepared" / "half").write_text("")
+            raise OSError("disk full")
+
+        monkeypatch.setattr(xr.Dataset, "to_netcdf", fail)
+        with pytest.raises(OSError, match="disk full"):
+            write_prepared(campaign)
+        assert [p.name for p in (tank / "prepared").iterdir()] == ["half"]
+
+
+def test_frozen(campaign):
+    with pytest.raises(FrozenInstanceError):
+        campaign.path = None
+    assert json.dumps({"digest": campaign.digest})

@@ -1,0 +1,193 @@
+"""MATLAB, NetCDF and HDF5."""
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import io
+
+from seakeep.campaign import read_table
+from seakeep.campaign.settings import FileSettings
+from seakeep.errors import DataError, RequestError
+
+T = np.arange(200) * 0.05
+HEAVE, WAVE = np.sin(T), np.cos(T)
+
+
+def check(run, unit="mm"):
+    np.testing.assert_array_equal(run["time"], T)
+    np.testing.assert_array_equal(run["heave"], HEAVE)
+    np.testing.assert_array_equal(run["wave"], WAVE)
+    assert run["heave"].attrs.get("units") == unit
+    assert set(run.data_vars) == {"heave", "wave"}
+
+
+NAMES = np.array(["time", "heave", "wave"], dtype=object)
+UNITS = np.array(["s", "mm", "m"], dtype=object)
+MATRIX = np.column_stack([T, HEAVE, WAVE])
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"time": T, "heave": HEAVE, "wave": WAVE, "units": {"heave": "mm", "wave": "m"}},
+        {"time": T[:, None], "heave": HEAVE[None, :], "wave": WAVE, "units": {"heave": "mm"}},
+        {"run": {"time": T, "heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}}},
+        {"data": MATRIX, "names": NAMES, "units": UNITS},
+        {"run": {"data": MATRIX, "channels": NAMES, "units": UNITS}},
+        {"time": T, "data": MATRIX[:, 1:], "names": NAMES[1:], "units": UNITS[1:]},
+        {"Fs": 20.0, "data": MATRIX[:, 1:], "names": NAMES[1:], "units": UNITS[1:]},
+        {"dt": 0.05, "heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}, "comment": "text"},
+    ],
+)
+@pytest.mark.parametrize("compressed", [False, True])
+def test_matlab(tmp_path, content, compressed):
+    path = tmp_path / "run.mat"
+    io.savemat(path, content, do_compression=compressed)
+    run = read_table(path)
+    # A step of 0.05 turned into a rate and back: rounding.
+    np.testing.assert_allclose(run["time"], T, rtol=1e-15)
+    check(run.assign_coords(time=T))
+
+
+def test_matlab_headers_with_units(tmp_path):
+    path = tmp_path / "run.mat"
+    names = np.array(["Time [s]", "heave [mm]", "wave (m)"], dtype=object)
+    io.savemat(path, {"data": MATRIX, "labels": names})
+    check(read_table(path))
+
+
+@pytest.mark.parametrize(
+    ("content", "error", "message"),
+    [
+        (
+            {"time": T, "heave": HEAVE[:-3]},
+            DataError,
+            r"the channels differ in length \(time 200, heave 197\)\. Save channels of one clock",
+        ),
+        (
+            {"data": MATRIX.T, "names": NAMES},
+            DataError,
+            r"'data' has shape \(3, 200\), which looks transposed; expected \(time, channel\) = "
+            r"\(200, 3\)\. Save it transposed: nothing is turned silently",
+        ),
+        ({"data": MATRIX.T}, DataError, r"'data' has shape \(3, 200\), which looks transposed"),
+        ({"data": MATRIX}, DataError, r"the matrix 'data' \(200, 3\) has no names for its columns"),
+        (
+            {"data": MATRIX, "names": NAMES[:2]},
+            DataError,
+            r"lists 2 channel names, and no matrix has as many columns \(matrices: data \(200, 3\)",
+        ),
+        ({"comment": "nothing"}, DataError, "holds no channels; found comment. Save one vector"),
+        ({"heave": HEAVE}, RequestError, "has no column that is called as a time is"),
+    ],
+)
+def test_what_is_no_matlab_run(tmp_path, content, error, message):
+    io.savemat(tmp_path / "run.mat", content)
+    with pytest.raises(error, match=message):
+        read_table(tmp_path / "run.mat")
+
+
+@pytest.mark.parametrize("part", [20, 127, 128, 200, 1500])
+@pytest.mark.parametrize("compressed", [False, True])
+def test_matlab_cut_off(tmp_path, part, compressed):
+    path = tmp_path / "run.mat"
+    io.savemat(path, {"time": T, "heave": HEAVE}, do_compression=compressed)
+    path.write_bytes(path.read_bytes()[:part])
+    with pytest.raises(DataError, match=r"cut off or damaged|holds no channels"):
+        read_table(path)
+
+
+def test_matlab_73(tmp_path):
+    path = tmp_path / "run.mat"
+    path.write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512) + b"\x89HDF\r\n\x1a\n")
+    with pytest.raises(
+        DataError, match=r"of version 7\.3, which is not read yet\. In MATLAB, write it with save"
+    ):
+        read_table(path)
+
+
+def dataset():
+    return xr.Dataset(
+        {"heave": ("time", HEAVE, {"units": "mm"}), "wave": ("time", WAVE), "depth": ((), 3.6)},
+        {"time": ("time", T, {"units": "s"})},
+    )
+
+
+@pytest.mark.parametrize("engine", ["h5netcdf", "scipy"])
+def test_netcdf(tmp_path, engine):
+    dataset().to_netcdf(tmp_path / "run.nc", engine=engine)
+    check(read_table(tmp_path / "run.nc"))
+
+
+def test_netcdf_with_times_since(tmp_path):
+    run = dataset()
+    run["time"].attrs["units"] = "seconds since 2024-05-01"
+    run.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
+    check(read_table(tmp_path / "run.nc"))
+
+
+def test_netcdf_table_with_names(tmp_path):
+    table = xr.DataArray(
+        MATRIX[:, 1:], dims=("time", "channel"), coords={"time": T, "channel": ["heave", "wave"]}
+    )
+    table.to_dataset(name="data").to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
+    check(read_table(tmp_path / "run.nc"), unit=None)
+
+
+def test_netcdf_transposed(tmp_path):
+    table = xr.DataArray(MATRIX.T, dims=("channel", "time"), coords={"time": T})
+    table.to_dataset(name="data").to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
+    with pytest.raises(
+        DataError,
+        match=r"'data' has dimensions \(channel: 3, time: 200\), which looks transposed; expected "
+        r"time first, \(time, channel\)",
+    ):
+        read_table(tmp_path / "run.nc")
+
+
+def write_hdf5(path, group=""):
+    with h5py.File(path, "w") as file:
+        place = file.create_group(group) if group else file
+        place["time"], place["heave"], place["wave"] = T, HEAVE, WAVE
+        place["heave"].attrs["units"] = "mm"
+
+
+def test_hdf5(tmp_path):
+    write_hdf5(tmp_path / "run.h5")
+    check(read_table(tmp_path / "run.h5"))
+
+
+def test_hdf5_group(tmp_path):
+    write_hdf5(tmp_path / "run.h5", "basin/run7")
+    check(read_table(tmp_path / "run.h5", FileSettings(group="basin/run7")))
+    with pytest.raises(DataError, match=r"holds no channels.*state 'group'"):
+        read_table(tmp_path / "run.h5")
+    with pytest.raises(DataError, match=r"has no group 'basin/run8'. Correct 'group'"):
+        read_table(tmp_path / "run.h5", FileSettings(group="basin/run8"))
+
+
+def test_hdf5_integers_and_float32(tmp_path):
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["time"] = np.arange(5)
+        file["heave"] = np.arange(5, dtype=np.float32)
+    run = read_table(tmp_path / "run.h5")
+    assert run["heave"].dtype == run["time"].dtype == np.float64
+
+
+@pytest.mark.parametrize("engine", ["h5netcdf", "scipy"])
+@pytest.mark.parametrize("part", [0.1, 0.5, 0.9])
+def test_netcdf_cut_off(tmp_path, engine, part):
+    path = tmp_path / "run.nc"
+    dataset().to_netcdf(path, engine=engine)
+    raw = path.read_bytes()
+    path.write_bytes(raw[: int(part * len(raw))])
+    with pytest.raises(DataError, match="cannot be read as NetCDF or HDF5: cut off, damaged or of"):
+        read_table(path)
+
+
+def test_netcdf_that_is_none(tmp_path):
+    path = tmp_path / "run.nc"
+    path.write_text("not a NetCDF file")
+    with pytest.raises(DataError, match="cannot be read as NetCDF or HDF5"):
+        read_table(path)

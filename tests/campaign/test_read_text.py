@@ -1,0 +1,306 @@
+"""Text tables: the dialects we read, and what is wrong with the others."""
+
+import gzip
+import io
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from seakeep.campaign import read_table
+from seakeep.campaign.settings import FileSettings
+from seakeep.errors import DataError, RequestError, SeakeepWarning
+
+PLAIN = "Time [s],Heave [mm],Pitch (deg),WP 1\n0,1.5,2,3\n0.1,-1.5,2e-3,4\n0.2,.5,+2,5\n"
+
+
+def write(folder, text, name="run.csv", encoding="utf-8"):
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode(encoding))
+    return path
+
+
+def check_plain(run):
+    assert list(run.data_vars) == ["Heave", "Pitch", "WP 1"]
+    assert run["Heave"].dims == ("time",)
+    np.testing.assert_array_equal(run["time"], [0.0, 0.1, 0.2])
+    np.testing.assert_array_equal(run["Heave"], [1.5, -1.5, 0.5])
+    np.testing.assert_array_equal(run["Pitch"], [2, 2e-3, 2])
+    np.testing.assert_array_equal(run["WP 1"], [3, 4, 5])
+    units = {str(name): each.attrs.get("units") for name, each in run.items()}
+    assert units == {"Heave": "mm", "Pitch": "deg", "WP 1": None}
+
+
+def with_comma(text):
+    return text.replace(",", ";").replace(".", ",")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PLAIN,
+        PLAIN.rstrip(),
+        PLAIN.replace("\n", "\r\n"),
+        "\ufeff" + PLAIN,
+        PLAIN.replace(",", ";"),
+        PLAIN.replace(",", "\t"),
+        PLAIN.replace(",", " , "),
+        with_comma(PLAIN),
+        "# a remark\n# another, with a comma\n" + PLAIN,
+        "% MATLAB's mark\n\n" + PLAIN + "\n\n",
+        PLAIN.replace("\n", ",\n"),
+        '"Time [s]","Heave [mm]","Pitch (deg)","WP 1"\n' + PLAIN.split("\n", 1)[1],
+        "Time,Heave,Pitch,WP 1\ns,mm,deg,\n" + PLAIN.split("\n", 1)[1],
+        "Time,Heave,Pitch,WP 1\n[s],[mm],[deg],\n" + PLAIN.split("\n", 1)[1],
+        "Time;Heave;Pitch;WP 1\ns;mm;deg;\n" + with_comma(PLAIN).split("\n", 1)[1],
+    ],
+)
+def test_dialects(tmp_path, text):
+    check_plain(read_table(write(tmp_path, text)))
+
+
+def test_gzip(tmp_path):
+    check_plain(read_table(write(tmp_path, gzip.compress(PLAIN.encode(), mtime=0), "run.csv.gz")))
+
+
+def test_utf16(tmp_path):
+    check_plain(read_table(write(tmp_path, PLAIN, encoding="utf-16")))
+
+
+def test_blanks(tmp_path):
+    text = "  Time [s]   Heave [mm]  Pitch\n  0.0   1.5  -2\n 0.1  1  2\n"
+    run = read_table(write(tmp_path, text, "run.txt"))
+    assert list(run.data_vars) == ["Heave", "Pitch"]
+    assert run["Heave"].attrs["units"] == "mm"
+    np.testing.assert_array_equal(run["Pitch"], [-2, 2])
+
+
+def test_blanks_and_decimal_comma(tmp_path):
+    run = read_table(write(tmp_path, "t heave\n0,0 1,5\n0,5 -2,25\n"))
+    np.testing.assert_array_equal(run["heave"], [1.5, -2.25])
+
+
+def test_header_in_a_comment(tmp_path):
+    buffer = io.StringIO()
+    np.savetxt(buffer, [[0, 1], [0.1, 2]], header="time heave")
+    run = read_table(write(tmp_path, buffer.getvalue()))
+    np.testing.assert_array_equal(run["heave"], [1, 2])
+
+
+def test_no_header(tmp_path):
+    run = read_table(write(tmp_path, "0,5\n0.1,6\n"), FileSettings(time="1"))
+    np.testing.assert_array_equal(run["2"], [5, 6])
+
+
+def test_options(tmp_path):
+    text = "made by a logger\nRecord 7\n! remark\nclock|heave\n".replace("|", ";") + "0;1\n50;2\n"
+    options = FileSettings(skip_rows=2, comment="!", time="clock", time_unit="ms", delimiter=";")
+    run = read_table(write(tmp_path, text), options)
+    np.testing.assert_allclose(run["time"], [0, 0.05], rtol=1e-15)
+
+
+def test_time_in_the_unit_of_its_header(tmp_path):
+    run = read_table(write(tmp_path, "time (ms),heave\n0,1\n20,2\n"))
+    np.testing.assert_allclose(run["time"], [0, 0.02], rtol=1e-15)
+
+
+def test_no_time_column_but_a_rate(tmp_path):
+    run = read_table(write(tmp_path, "heave,pitch\n1,1\n2,2\n"), FileSettings(sampling_rate=50))
+    np.testing.assert_array_equal(run["time"], [0, 0.02])
+    assert set(run.data_vars) == {"heave", "pitch"}
+
+
+def test_latin_1_is_read_and_said(tmp_path):
+    path = write(tmp_path, "tid [s],vinkel [°]\n0,1\n1,2\n", encoding="latin-1")
+    with pytest.warns(SeakeepWarning, match="is not UTF-8 and was read as Latin-1; check"):
+        run = read_table(path)
+    assert run["vinkel"].attrs["units"] == "°"
+    assert read_table(path, FileSettings(encoding="latin-1")).identical(run)
+
+
+def test_missing_values_are_nan(tmp_path):
+    run = read_table(write(tmp_path, "t,a,b\n0,,nan\n1,NaN,1\n2,3,\n"))
+    np.testing.assert_array_equal(run["a"], [np.nan, np.nan, 3])
+    np.testing.assert_array_equal(run["b"], [np.nan, 1, np.nan])
+
+
+def test_a_column_by_its_full_header(tmp_path):
+    run = read_table(write(tmp_path, "t,WP [m],WP [mm]\n0,1,2\n1,1,2\n"), columns=["WP [mm]"])
+    assert list(run.data_vars) == ["WP [mm]"]
+    assert run["WP [mm]"].attrs == {"long_name": "WP [mm]", "units": "mm"}
+
+
+def test_a_fault_in_a_column_that_nobody_wants(tmp_path):
+    path = write(tmp_path, "t,a,state,b,b\n0,1,ok,1,2\n1,2,ok,1,2\n")
+    assert list(read_table(path, columns=["a"]).data_vars) == ["a"]
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    values=st.lists(
+        st.lists(
+            st.floats(allow_nan=False, allow_infinity=False, width=64), min_size=3, max_size=3
+        ),
+        min_size=2,
+        max_size=8,
+    ),
+    delimiter=st.sampled_from([",", ";", "\t", " "]),
+    comma=st.booleans(),
+    units=st.sampled_from(["brackets", "row", "none"]),
+    compressed=st.booleans(),
+    newline=st.sampled_from(["\n", "\r\n"]),
+)
+def test_round_trip(tmp_path, values, delimiter, comma, units, compressed, newline):
+    """Whatever the dialect, the same bits come back."""
+    if units == "brackets":
+        head = ["time [s]", "heave [mm]", "a b [m/s2]", "c [-]"]
+    else:
+        head = ["time", "heave", "a b" if delimiter != " " else "ab", "c"]
+    lines = [head] + ([["s", "mm", "m/s2", "-"]] if units == "row" else [])
+    text = newline.join(delimiter.join(line) for line in lines) + newline
+    for i, row in enumerate(values):
+        cells = [repr(float(x)) for x in (i, *row)]
+        if comma and delimiter != ",":
+            cells = [cell.replace(".", ",") for cell in cells]
+        text += delimiter.join(cells) + newline
+    raw = text.encode()
+    path = write(tmp_path, gzip.compress(raw, mtime=0) if compressed else raw)
+    if units == "brackets" and delimiter == " ":
+        path.write_bytes(raw.replace(b"a b", b"ab"))
+    run = read_table(path)
+    np.testing.assert_array_equal(np.column_stack([each for _, each in run.items()]), values)
+    expected = [None] * 3 if units == "none" else ["mm", "m/s2", "-"]
+    assert [each.attrs.get("units") for _, each in run.items()] == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "message"),
+    [
+        (b"", DataError, r"is empty \(0 bytes\)\. Export the run again"),
+        (b" \n\n", DataError, r"is empty\. Export the run again"),
+        (b"# only\n# remarks\n", DataError, "holds no rows, only comments and blank lines"),
+        (b"t,heave\n", DataError, "has a header and no rows of numbers"),
+        (b"t,heave\ns,m\n", DataError, "has a header and no rows of numbers"),
+        (b"t\n0\n1\n", DataError, "holds times and no channel"),
+        (b"\x93\x00\x01PNG" * 9, DataError, "holds binary data that are no text table. Readable"),
+        (gzip.compress(PLAIN.encode(), mtime=0)[:-12], DataError, r"cut off or damaged \(gzip: "),
+        (
+            "t,heave\n0,1\n1,x7\n2,3\n",
+            DataError,
+            r"line 3, column 'heave': 'x7' is not a number\. Correct the cell, leave it empty",
+        ),
+        (
+            "t;heave\n0;1,5\n1;1.5\n",
+            DataError,
+            r"line 3, column 'heave': '1\.5' is not a number\. Correct .* state decimal and del",
+        ),
+        (
+            "t,heave\n0,1\n1\n2,3\n3\n4,5\n",
+            DataError,
+            r"line 3: 1 cells where the header has 2 \(2 such line\(s\), columns divided by ','\)\."
+            r" Mend the lines, or state in \[files\]: delimiter, decimal, or skip_rows where words",
+        ),
+        (
+            "Basin 2\nBy: us\ntime,heave\n0,1\n1,2\n",
+            DataError,
+            r"line 3: 1 cells where the header has 2 .* skip_rows where words stand above the head",
+        ),
+        (
+            "time,0,0.1,0.2\nheave,1,2,3\n",
+            DataError,
+            r"the first line is 'time' and 3 numbers, which looks transposed \(2 rows, 4 columns\);"
+            " expected a header, then one row an instant and one column a channel",
+        ),
+        (
+            "time,heave\n2024-05-01 12:00:00.1,1\n2024-05-01 12:00:00.2,2\n",
+            DataError,
+            "line 2, column 'time': '2024-05-01 12:00:00.1' is not a number. Write dates and clock",
+        ),
+        (
+            "t,heave,pitch\n0,1,2\n1,2,3\n2,",
+            DataError,
+            r"line 4: 2 cells where the header has 3 .*It is the last line: the file was cut off",
+        ),
+        (
+            "t,heave,heave\n0,1,2\n1,2,3\n",
+            DataError,
+            "2 columns are called 'heave'. Rename them in the file's header",
+        ),
+        (
+            "clock,heave\n0,1\n1,2\n",
+            RequestError,
+            r"has no column that is called as a time is\. State time = 'NAME' or sampling_rate "
+            r"\(Hz\) in \[files\]\. Its columns: clock, heave",
+        ),
+        (
+            "t,heave\n0,1\n0,2\n",
+            DataError,
+            "the times of .*run.csv repeat: 0 s stands at samples 0",
+        ),
+        ("t,heave\n1,1\n0,2\n", DataError, "are not sorted: 0 s follows 1 s at sample 1"),
+        ("t,heave\n0,1\n,2\n", DataError, "hold a value that is not finite at sample 1"),
+        ("t,heave\n0,1\n", DataError, r"has 1 instant\(s\); a time axis needs at least two"),
+        ("t [m],heave\n0,1\n1,2\n", RequestError, "the unit 'm' does not fit the time column 't'"),
+        ("t,t,heave\n0,0,1\n1,1,2\n", DataError, "2 columns are called 't'"),
+    ],
+)
+def test_what_is_no_table(tmp_path, text, error, message):
+    path = write(tmp_path, text)
+    with pytest.raises(error, match=message):
+        read_table(path)
+
+
+@pytest.mark.parametrize(
+    ("options", "columns", "error", "message"),
+    [
+        (
+            FileSettings(),
+            ["Haeve"],
+            RequestError,
+            "has no column 'Haeve'. Did you mean 'Heave'. Its columns: Time, Heave, Pitch, WP 1",
+        ),
+        (
+            FileSettings(time="Tme"),
+            None,
+            RequestError,
+            "has no time column 'Tme'. Did you mean 'Time'. Its columns: Time",
+        ),
+        (
+            FileSettings(encoding="utf-9"),
+            None,
+            DataError,
+            "the encoding 'utf-9' is not known. Write 'utf-8'",
+        ),
+        (
+            FileSettings(delimiter=";"),
+            None,
+            RequestError,
+            "has no column that is called as a time is",
+        ),
+    ],
+)
+def test_options_that_do_not_fit(tmp_path, options, columns, error, message):
+    with pytest.raises(error, match=message):
+        read_table(write(tmp_path, PLAIN), options, columns)
+
+
+def test_stated_encoding_that_does_not_fit(tmp_path):
+    path = write(tmp_path, "t,°\n0,1\n1,2\n", encoding="latin-1")
+    with pytest.raises(DataError, match=r"is not utf-8: byte 2 does not fit. Correct 'encoding'"):
+        read_table(path, FileSettings(encoding="utf-8"))
+
+
+def test_file_that_is_not_there(tmp_path):
+    write(tmp_path, PLAIN, "run_1.csv")
+    with pytest.raises(
+        RequestError,
+        match=r"run1\.csv does not exist\. Did you mean 'run_1\.csv'\? Its folder holds run_1\.csv",
+    ):
+        read_table(tmp_path / "run1.csv")
+    with pytest.raises(RequestError, match=r"there is no folder .*nowhere. Paths are relative to"):
+        read_table(tmp_path / "nowhere" / "run1.csv")
+    with pytest.raises(RequestError, match="is a folder; give the file in it"):
+        read_table(tmp_path)

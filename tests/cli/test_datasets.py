@@ -1,0 +1,90 @@
+"""Fetching a public data set, against a server on this machine."""
+
+import functools
+import hashlib
+import http.server
+import threading
+from dataclasses import replace
+
+import pytest
+
+from seakeep.campaign import datasets
+from seakeep.errors import DataError, RequestError
+
+
+@pytest.fixture
+def upstream(tmp_path):
+    folder = tmp_path / "upstream"
+    folder.mkdir()
+    (folder / "a.csv").write_bytes(b"Time [s],x [m]\n0,1\n")
+    (folder / "b.csv").write_bytes(b"Time [s],x [m]\n0,2\n")
+
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *_):
+            pass
+
+    handler = functools.partial(Quiet, directory=str(folder))
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    files = tuple(
+        (path.name, hashlib.sha256(path.read_bytes()).hexdigest())
+        for path in sorted(folder.iterdir())
+    )
+    address = f"http://127.0.0.1:{server.server_port}"
+    yield (
+        folder,
+        replace(
+            datasets.DATASETS[0], name="toy", files=files, sources=(f"{address}/gone", address)
+        ),
+    )
+    server.shutdown()
+    server.server_close()
+    thread.join()
+
+
+def test_fetch_takes_the_first_address_that_has_the_file_and_checks_it(upstream, tmp_path):
+    _, dataset = upstream
+    told = []
+    place = datasets.fetch(dataset, tmp_path / "data", lambda *step: told.append(step))
+    assert place == tmp_path / "data" / "toy"
+    assert told == [(1, 2, "a.csv"), (2, 2, "b.csv")]
+    assert datasets.state_of(dataset, tmp_path / "data") == "complete"
+
+
+def test_fetch_resumes_and_repairs(upstream, tmp_path):
+    folder, dataset = upstream
+    datasets.fetch(dataset, tmp_path)
+    kept = (tmp_path / "toy/a.csv").stat().st_mtime_ns
+    (tmp_path / "toy/b.csv").write_bytes(b"Time")
+    assert "1 altered" in datasets.state_of(dataset, tmp_path)
+    datasets.fetch(dataset, tmp_path)
+    assert (tmp_path / "toy/a.csv").stat().st_mtime_ns == kept
+    assert (tmp_path / "toy/b.csv").read_bytes() == (folder / "b.csv").read_bytes()
+
+
+def test_an_altered_file_upstream_is_refused_and_nothing_is_written(upstream, tmp_path):
+    folder, dataset = upstream
+    (folder / "a.csv").write_bytes(b"something else")
+    with pytest.raises(DataError, match=r"a\.csv was received with SHA-256 .* upstream changed it"):
+        datasets.fetch(dataset, tmp_path)
+    assert list((tmp_path / "toy").iterdir()) == []
+
+
+def test_no_network_names_the_addresses_tried(upstream, tmp_path):
+    _, dataset = upstream
+    with pytest.raises(
+        RequestError, match=r"could not be fetched\. Tried: http.*Check the network"
+    ):
+        datasets.fetch(dataset, tmp_path, sources=["http://127.0.0.1:9/nothing"])
+
+
+def test_pickles_are_never_fetched(tmp_path):
+    with pytest.raises(RequestError, match="the originals are pickles"):
+        datasets.fetch(datasets.find_dataset("sjtu_semisub"), tmp_path)
+
+
+def test_absent_and_unknown_are_told_apart(upstream, tmp_path):
+    _, dataset = upstream
+    assert datasets.state_of(dataset, tmp_path) == "absent"
+    assert datasets.state_of(dataset, None).startswith("unknown")

@@ -1,0 +1,67 @@
+"""Delay embedding: its order, its inverse, and which samples a window uses."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from seakeep.core import embed, snapshot_matrices, training_window, unembed
+
+
+def test_blocks_are_lag_major_the_newest_first():
+    series = np.array([[0.0, 10], [1, 11], [2, 12], [3, 13]])
+    column = embed(series, delays=2, first=3, count=1)[:, 0]
+    np.testing.assert_array_equal(column, [3, 13, 2, 12, 1, 11])
+
+
+@given(samples=st.integers(1, 30), channels=st.integers(1, 4), delays=st.integers(0, 10))
+def test_unembed_undoes_embed(samples, channels, delays):
+    series = np.arange(float((samples + delays) * channels)).reshape(-1, channels)
+    columns = embed(series, delays, first=delays, count=samples)
+    assert columns.shape == (channels * (delays + 1), samples)
+    np.testing.assert_array_equal(unembed(columns, channels), series)
+
+
+def test_targets_are_the_regressors_one_sample_later():
+    x, u = np.arange(20.0)[:, None], 100 + np.arange(20.0)[:, None]
+    place = training_window(19, None, 2, 3, "before")
+    y, target = snapshot_matrices(x, u, place, 2, 3, all_rows=True)
+    np.testing.assert_array_equal(y[:, 0], [3, 2, 1, 103, 102, 101, 100])
+    np.testing.assert_array_equal(target[:, 0], [4, 3, 2])
+    np.testing.assert_array_equal(y[:, -1], [18, 17, 16, 118, 117, 116, 115])
+    np.testing.assert_array_equal(target[:, -1], [19, 18, 17])
+    _, top = snapshot_matrices(x, u, place, 2, 3, all_rows=False)
+    np.testing.assert_array_equal(top, target[:1])
+
+
+@pytest.mark.parametrize(
+    ("last", "window", "history", "first", "first_column", "columns"),
+    [
+        (799, 640, "before", 160, 160, 639),  # all m − 1 pairs: the history lies before
+        (999, 640, "before", 360, 360, 639),
+        (700, 640, "before", 61, 160, 540),  # the run starts 99 samples too late for that
+        (639, 640, "before", 0, 160, 479),  # nothing lies before
+        (799, 640, "inside", 160, 320, 479),
+        (799, None, "before", 0, 160, 639),
+        (799, None, "inside", 0, 160, 639),
+    ],
+)
+def test_windows_at_the_papers_delays(last, window, history, first, first_column, columns):
+    place = training_window(last, window, 32, 160, history)
+    assert (place.first, place.first_column, place.columns) == (first, first_column, columns)
+    assert place.samples == slice(first, last + 1)
+
+
+@given(
+    last=st.integers(0, 300),
+    window=st.none() | st.integers(2, 300),
+    s=st.integers(0, 40),
+    z=st.integers(0, 40),
+    history=st.sampled_from(["before", "inside"]),
+)
+def test_no_column_reads_before_the_run_and_none_ends_after_the_window(last, window, s, z, history):
+    assume(window is None or window <= last + 1)
+    place = training_window(last, window, s, z, history)
+    assert place.first_column - max(s, z) >= 0
+    assert place.first_column + place.columns == last
+    assert place.first_column >= place.first

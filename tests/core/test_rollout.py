@@ -1,0 +1,138 @@
+"""Free runs: the recursion, its forms, and what becomes of one that grows without bound."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seakeep.core import embed, rollout
+from seakeep.errors import RequestError
+
+
+def problem(n=2, q=2, s=3, z=4, windows=3, steps=12, seed=0):
+    """Top rows of a contracting model, histories and inputs as samples, oldest first."""
+    rng = np.random.default_rng(seed)
+    a = rng.standard_normal((n, n * (s + 1)))
+    a *= 0.9 / np.abs(a).sum(axis=1, keepdims=True)
+    b = rng.standard_normal((n, q * (z + 1)))
+    return (
+        a,
+        b,
+        rng.standard_normal((windows, s + 1, n)),
+        rng.standard_normal((windows, z + steps, q)),
+    )
+
+
+def by_hand(a, b, x_history, u):
+    """The recursion, sample by sample; one window."""
+    n, q = x_history.shape[1], u.shape[1]
+    s, z = a.shape[1] // n - 1, b.shape[1] // q - 1
+    x = list(x_history)
+    for k in range(len(u) - z):
+        states = np.concatenate([x[-1 - lag] for lag in range(s + 1)])
+        inputs = np.concatenate([u[k + z - lag] for lag in range(z + 1)])
+        x.append(a @ states + b @ inputs)
+    return np.array(x[s + 1 :])
+
+
+def shifted(a, n):
+    size = a.shape[1]
+    return np.vstack([a, np.eye(size - n, size)])
+
+
+def extended(histories, inputs, s, z):
+    """Both in the embedded form, newest block first."""
+    x = np.stack([embed(one, s, s, 1)[:, 0] for one in histories])
+    u = np.stack([embed(one, z, z, len(one) - z).T for one in inputs])
+    return x, u
+
+
+@pytest.mark.parametrize(("s", "z"), [(3, 4), (0, 4), (3, 0), (0, 0), (5, 2)])
+def test_a_free_run_is_the_recursion(s, z):
+    a, b, histories, inputs = problem(s=s, z=z)
+    expected = np.stack([by_hand(a, b, x, u) for x, u in zip(histories, inputs, strict=True)])
+    # Twelve sums of a dozen products of order one.
+    np.testing.assert_allclose(rollout(a, b, histories, inputs), expected, rtol=0, atol=1e-12)
+
+
+def test_a_regressed_square_matrix_drives_its_own_delayed_states():
+    a, b, histories, inputs = problem()
+    rng = np.random.default_rng(1)
+    square = np.vstack([a, 0.9 * np.eye(6, 8)])
+    full = np.vstack([b, 0.1 * rng.standard_normal((6, b.shape[1]))])
+    x, u = extended(histories, inputs, 3, 4)
+    expected = np.empty((3, 12, 2))
+    for k in range(12):
+        x = x @ square.T + u[:, k] @ full.T
+        expected[:, k] = x[:, :2]
+    out = rollout(square, full, histories, inputs)
+    np.testing.assert_allclose(out, expected, rtol=0, atol=1e-12)  # as above
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    n=st.integers(1, 3),
+    q=st.integers(1, 3),
+    s=st.integers(0, 5),
+    z=st.integers(0, 5),
+    windows=st.integers(1, 6),
+    seed=st.integers(0, 99),
+)
+def test_every_form_of_the_same_run_agrees(n, q, s, z, windows, seed):
+    a, b, histories, inputs = problem(n, q, s, z, windows, 8, seed)
+    x, u = extended(histories, inputs, s, z)
+    square, full = shifted(a, n), np.vstack([b, np.zeros((n * s, b.shape[1]))])
+    expected = rollout(a, b, histories, inputs)
+    assert expected.shape == (windows, 8, n)
+    for form in (
+        rollout(a, b, x, u),
+        rollout(a, b, x, inputs),
+        rollout(a, b, histories, u),
+        rollout(square, full, histories, inputs),
+        rollout(square, full, x, u, n_states=n),
+    ):
+        np.testing.assert_allclose(form, expected, rtol=0, atol=1e-11)  # rounding of eight steps
+
+
+def test_windows_side_by_side_equal_windows_one_by_one():
+    a, b, histories, inputs = problem(windows=7)
+    together = rollout(a, b, histories, inputs)
+    for one in range(7):
+        alone = rollout(a, b, histories[one : one + 1], inputs[one : one + 1])[0]
+        # Products of matrices of other widths sum in another order.
+        np.testing.assert_allclose(together[one], alone, rtol=0, atol=1e-12)
+
+
+def test_a_model_without_input_runs_on_its_own():
+    out = rollout([[0.5]], np.zeros((1, 0)), [[8.0]], np.zeros((1, 3, 0)))
+    np.testing.assert_array_equal(out[0, :, 0], [4, 2, 1])
+
+
+def test_a_window_that_diverges_is_nan_from_there_on_and_the_others_go_on():
+    # 1e200 squared overflows at the second step; the neighbour is at rest.
+    out = rollout([[1e200]], [[0.0]], [[1.0], [0.0]], np.zeros((2, 5, 1)))
+    np.testing.assert_array_equal(out[0, :, 0], [1e200, *[np.nan] * 4])
+    np.testing.assert_array_equal(out[1, :, 0], 0.0)
+
+
+def test_a_limit_gives_a_window_up_earlier():
+    out = rollout([[2.0]], [[0.0]], [[1.0]], np.zeros((1, 5, 1)), limit=8.0)
+    np.testing.assert_array_equal(out[0, :, 0], [2, 4, 8, np.nan, np.nan])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"inputs": np.zeros((3, 12))}, r"rollout needs A .* received .*\(3, 12\)"),
+        ({"histories": np.zeros((3, 7))}, r"histories \(3, 7\) .* a history has 8 values"),
+        ({"histories": np.zeros((2, 4, 2))}, r"both have one row a window"),
+        ({"inputs": np.zeros((3, 16, 3))}, r"inputs with 3 channels do not fit B of shape"),
+        ({"inputs": np.zeros((3, 4, 2))}, r"inputs of 4 samples do not reach one step: 4 delays"),
+        ({"n_states": 3}, r"A of shape \(2, 8\) does not belong to 3 states"),
+    ],
+)
+def test_shapes_that_do_not_fit_are_named(change, message):
+    a, b, histories, inputs = problem()
+    arguments = {"A": a, "B": b, "histories": histories, "inputs": inputs, **change}
+    with pytest.raises(RequestError, match=message):
+        rollout(**arguments)

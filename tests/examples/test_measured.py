@@ -1,0 +1,122 @@
+"""The examples on measured data hold what their pages say (needs SEAKEEP_DATA_DIR)."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import seakeep
+from seakeep.campaign.datasets import data_folder, find_dataset, state_of
+from seakeep.study import compare, comparison_table, fit_campaign
+
+pytestmark = [
+    pytest.mark.data,
+    pytest.mark.skipif(
+        not os.environ.get("SEAKEEP_DATA_DIR"),
+        reason="SEAKEEP_DATA_DIR is not set: it names the folder of the measured data",
+    ),
+]
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture(scope="module")
+def section():
+    return seakeep.read_campaign(EXAMPLES / "ntnu_ship_section" / "campaign.toml")
+
+
+@pytest.fixture(scope="module")
+def section_runs(section):
+    return section.prepare()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _prepared_once(section, section_runs):
+    """Let the commands find the runs prepared instead of preparing them in each test."""
+    patch = pytest.MonkeyPatch()
+    for module in ("workflow", "comparison"):
+        target = f"seakeep.study.{module}.load_prepared"
+
+        def taken(campaign, names, progress=None):
+            runs = section_runs if campaign is section else campaign.prepare(names)
+            return {name: runs[name] for name in names}
+
+        patch.setattr(target, taken)
+    yield
+    patch.undo()
+
+
+@pytest.mark.parametrize("name", ["ntnu_ship_section", "sjtu_semisub"])
+def test_the_files_are_the_published_ones(name):
+    assert state_of(find_dataset(name), data_folder()) == "complete"
+
+
+def test_motions_of_unseen_runs_are_forecast_to_the_end_of_the_record(section, section_runs):
+    model = fit_campaign(section)
+    assert len(model.training.runs) == 10
+    assert model.input_delays * model.dt >= 2.4
+    assert model.spectral_radius < 1
+    judged = compare(model, section)
+    assert [each.run for each in judged] == ["3041_2", "3061_2", "3102_3"]
+    for each in judged:
+        end = float(section_runs[each.run]["time"][-1])
+        assert float(each.forecast["time"][-1]) == end
+        assert each.start == pytest.approx((model.history_samples - 1) * model.dt)
+    table = comparison_table(judged)
+    # Asked for: 0.16. Found: at most 0.071; half as much again leaves room for other libraries'
+    # rounding and none for a wrong sign or lag.
+    assert float(table["nrmse"].max()) <= 0.11
+
+
+def test_sway_needs_the_tilt_and_the_arm_with_their_signs(section_runs):
+    for name in ("3102_1", "3102_2", "3102_3", "3102_4"):
+        run = section_runs[name]
+        springs = run["spring_offset_in_band"].std()
+        ratio = float(run["sway"].std() / springs)
+        assert 0.8 <= ratio <= 1.2
+        wrong = run["acc_sway"] + 9.81 * run["roll"] - 0.0502 * run["roll_acceleration"]
+        integrated = seakeep.signals.integrate(wrong, run.attrs["dt"], (0.4, 5.0), times=2)
+        assert float(integrated.std() / springs) > 2.0
+
+
+def test_sway_is_forecast_where_its_target_is_sound(section):
+    model = fit_campaign(section, "sway")
+    table = comparison_table(compare(model, section))
+    # Asked for: 0.17 for 3102_3 (found 0.049). The other two stand near the resonance of roll,
+    # where the tilt's part is ten times the sway; they are reported, not judged.
+    assert float(table["nrmse"].sel(run="3102_3", channel="sway")) <= 0.08
+    assert np.all(np.isfinite(table["nrmse"]))
+
+
+def test_tensions_are_reported_and_known_to_be_poor(section):
+    table = comparison_table(compare(fit_campaign(section, "tensions"), section))
+    # Slow second-order drift carries half of their variance and no linear model makes it.
+    assert 0.5 < float(table["nrmse"].mean()) < 1.2
+
+
+def test_integrals_hold_to_the_end_of_a_record_that_stops_in_mid_wave(section_runs):
+    """Cut a record early and compare with the uncut one over the last 5 s before the cut."""
+    worst = []
+    for name, run in section_runs.items():
+        if name == "3012_1":  # the one record that ends in calm water
+            continue
+        dt = run.attrs["dt"]
+        acceleration = run["heave_acceleration"].values
+        for cut in (10.0, 13.7, 17.3):
+            kept = acceleration.size - int(cut / dt)
+            short = seakeep.signals.integrate(acceleration[:kept], dt, (0.4, 5.0), times=2)
+            whole = seakeep.signals.integrate(acceleration, dt, (0.4, 5.0), times=2)[:kept]
+            last = slice(-int(5 / dt), None)
+            worst.append(np.sqrt(np.mean((short - whole)[last] ** 2)) / whole[last].std())
+    # Zero padding gives 0.16 and a point reflection 0.56 here; linear prediction gave 0.004.
+    assert np.median(worst) < 0.03
+
+
+def test_semisubmersible_heave_runs_freely_over_the_last_30_percent():
+    campaign = seakeep.read_campaign(EXAMPLES / "sjtu_semisub" / "campaign.toml")
+    model = fit_campaign(campaign)
+    (judged,) = compare(model, campaign)
+    share = model.training.stop[0] / float(judged.forecast["time"][-1])
+    assert share == pytest.approx(0.7, abs=0.001)
+    assert judged.anrmse <= 0.38  # found: 0.350; coherence allows about 0.31

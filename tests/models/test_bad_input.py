@@ -1,0 +1,336 @@
+"""Wrong data and wrong requests: each has its own message, and the message says the mend."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import DataError, HankelDMDc, RequestError
+
+DT = 0.05
+SPEC = HankelDMDc(3, 8, 1.0)
+
+
+@pytest.fixture
+def model(run, channels):
+    return SPEC.fit(run, **channels)
+
+
+def with_times(run, time):
+    return run.assign_coords(time=("time", np.asarray(time, dtype=float)))
+
+
+def broken_times():
+    """(what, times from good ones, message) of the ways a time axis is wrong."""
+
+    def repeated(t):
+        return np.concatenate([t[:50], [t[49]], t[50:-1]])
+
+    def unsorted(t):
+        return np.concatenate([t[:50], t[50:60][::-1], t[60:]])
+
+    def gap(t):
+        return np.where(np.arange(t.size) < 50, t, t + 7 * DT)
+
+    def missing(t):
+        return np.where(np.arange(t.size) == 50, np.nan, t)
+
+    return [
+        pytest.param(
+            repeated, r"times of .* repeat: 2\.45 s stands at samples 49 and 50", id="repeated"
+        ),
+        pytest.param(unsorted, r"times of .* are not sorted: .* Sort the rows", id="unsorted"),
+        pytest.param(
+            gap,
+            r"have 1 gap\(s\): after t = 2\.45 s, 7 sample\(s\) of 0\.05 s are missing",
+            id="gap",
+        ),
+        pytest.param(missing, r"a value that is not finite at sample 50", id="missing"),
+    ]
+
+
+@pytest.mark.parametrize(("spoil", "message"), broken_times())
+def test_wrong_times_are_refused_in_training_and_in_forecasts(model, run, channels, spoil, message):
+    bad = with_times(run, spoil(run.time.values))
+    with pytest.raises(DataError, match=message):
+        SPEC.fit(bad, **channels)
+    with pytest.raises(DataError, match=message):
+        model.forecast(bad, start=5.0, steps=5)
+
+
+@pytest.mark.parametrize("kind", ["datetime64[ns]", "timedelta64[ns]"])
+def test_times_that_are_not_seconds_are_refused(run, channels, kind):
+    stamps = (1e9 * run.time.values).astype("int64").astype(kind)
+    with pytest.raises(DataError, match=r"times of run are of type .*seconds as numbers"):
+        SPEC.fit(run.assign_coords(time=stamps), **channels)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("name", ["heave", "eta_cog"])
+def test_gaps_in_the_window_are_refused(run, channels, name, value):
+    run[name][250:253] = value
+    message = rf"channel '{name}' of run has 3 missing or infinite value\(s\) .* t = 12\.5 s"
+    with pytest.raises(DataError, match=message):
+        SPEC.fit(run, **channels)
+
+
+def test_gaps_outside_of_the_window_are_no_matter(run, channels):
+    spec = HankelDMDc(3, 8, 1.0, window=100)
+    expected = spec.fit(run, stop=10.0, **channels)
+    run.heave[:50] = np.nan
+    run.eta_cog[300:] = np.nan
+    np.testing.assert_array_equal(spec.fit(run, stop=10.0, **channels).A, expected.A)
+
+
+def test_gaps_in_what_a_forecast_reads_are_refused(model, run):
+    run.heave[98] = np.nan
+    with pytest.raises(DataError, match=r"'heave' .* 1 missing .* the first at t = 4\.9 s"):
+        model.forecast(run, start=5.0, steps=20)
+    run.eta_fwd[150] = np.nan
+    with pytest.raises(DataError, match=r"'eta_fwd' .* the first at t = 7\.5 s"):
+        model.forecast(run, start=6.0, steps=40)
+
+
+def test_a_variable_with_two_dimensions_is_refused(run, channels, model):
+    both = run.assign(heave=(("time", "sensor"), np.zeros((400, 2))))
+    message = r"'heave' of run has the dimensions \('time', 'sensor'\) and shape \(400, 2\)"
+    with pytest.raises(DataError, match=message):
+        SPEC.fit(both, **channels)
+    with pytest.raises(DataError, match=r"has the dimensions .* \('time',\) is expected"):
+        model.forecast(both, start=5.0, steps=5)
+
+
+@pytest.mark.parametrize(
+    ("values", "kind"),
+    [
+        (np.full(400, "1.0"), "<U3"),
+        (np.full(400, 1j), "complex128"),
+        (np.arange(400).astype("timedelta64[ns]"), "timedelta64"),
+    ],
+)
+def test_a_channel_that_is_not_a_number_is_refused(run, channels, values, kind):
+    bad = run.assign(heave=("time", values))
+    with pytest.raises(DataError, match=f"'heave' of run is of type {kind}.*, not a real number"):
+        SPEC.fit(bad, **channels)
+
+
+ARRAYS = {"x_history": (9, 2), "u_history": (9, 2), "u_future": (19, 2)}
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "message"),
+    [
+        ("x_history", (2, 9), r"\(2, 9\); .* 4 rows \(s \+ 1\) and 2 col.* looks transposed"),
+        ("u_history", (2, 9), r"\(2, 9\); .* 9 rows \(z \+ 1\) and 2 col.* looks transposed"),
+        ("u_future", (2, 19), r"\(2, 19\); .* 19 rows \(steps − 1\) .* looks transposed"),
+        ("x_history", (3, 2), r"\(3, 2\); .*at least 4 rows"),
+        ("u_history", (8, 2), r"\(8, 2\); .*at least 9 rows"),
+        ("u_future", (18, 2), r"\(18, 2\); .*at least 19 rows"),
+        ("u_history", (9, 3), r"\(9, 3\); .*and 2 columns"),
+        ("x_history", (9,), r"\(9,\); expected \(time, channel\)"),
+    ],
+)
+def test_arrays_of_another_shape_are_refused_and_never_turned(model, name, shape, message):
+    arrays = {key: np.zeros(size) for key, size in (ARRAYS | {name: shape}).items()}
+    with pytest.raises(RequestError, match=f"{name} has shape {message}"):
+        model.forecast_arrays(**arrays, steps=20)
+
+
+@pytest.mark.parametrize("name", list(ARRAYS))
+def test_gaps_in_arrays_are_refused(model, name):
+    arrays = {key: np.zeros(size) for key, size in ARRAYS.items()}
+    arrays[name][-1] = np.nan
+    with pytest.raises(RequestError, match=rf"{name} holds 2 values that are not finite"):
+        model.forecast_arrays(**arrays, steps=20)
+
+
+@pytest.mark.parametrize("steps", [0, -1, 2.0, True, "5"])
+def test_steps_must_be_a_positive_integer(model, run, steps):
+    with pytest.raises(RequestError, match=r"steps must be a positive integer; received"):
+        model.forecast(run, start=5.0, steps=steps)
+    with pytest.raises(RequestError, match=r"steps must be a positive integer; received"):
+        model.forecast_arrays(**{key: np.zeros(size) for key, size in ARRAYS.items()}, steps=steps)
+
+
+@pytest.mark.parametrize(
+    ("settings", "samples", "missing"),
+    [
+        ({}, 9, "10 samples are needed .*, 9 were received, 1 are missing"),
+        ({}, 4, "10 samples are needed .*, 4 were received, 6 are missing"),
+        ({"window": 4}, 8, "10 samples are needed .*, 8 were received, 2 are missing"),
+        (
+            {"window": 7, "history": "inside"},
+            100,
+            "10 samples are needed .*, 7 were received, 3 are missing.* longer window",
+        ),
+        ({"window": 120}, 100, "has 100 samples up to .* asks for 120: 20 are missing"),
+        ({"window": 120, "history": "inside"}, 100, "asks for 120: 20 are missing"),
+    ],
+)
+def test_a_run_that_is_too_short_is_told_how_many_samples_are_missing(
+    run, channels, settings, samples, missing
+):
+    short = run.isel(time=slice(0, samples))
+    with pytest.raises(DataError, match=missing):
+        HankelDMDc(3, 8, 1.0, **settings).fit(short, **channels)
+
+
+def test_the_shortest_run_that_is_long_enough_trains(run, channels):
+    assert SPEC.fit(run.isel(time=slice(0, 10)), **channels).training.columns == (1,)
+
+
+def test_the_short_one_of_several_runs_is_named(run, channels):
+    with pytest.raises(DataError, match=r"^b is too short for its delays"):
+        SPEC.fit({"a": run, "b": run.isel(time=slice(0, 9))}, **channels)
+
+
+def test_runs_of_another_step_are_refused(model, run, channels):
+    coarse = run.isel(time=slice(None, None, 2))
+    message = r"time step of 0\.1 s and the model one of 0\.05 s\. Resample"
+    with pytest.raises(DataError, match=message):
+        SPEC.fit([run, coarse], **channels)
+    with pytest.raises(DataError, match=message):
+        model.forecast(coarse, start=5.0, steps=5)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.1, 1e5 / 3])
+@pytest.mark.parametrize("name", ["pitch", "eta_fwd"])
+def test_a_constant_channel_cannot_be_standardised(run, channels, name, value):
+    run[name][:] = value
+    message = rf"channel '{name}' is constant \(.*\) over the training window"
+    with pytest.raises(DataError, match=message):
+        SPEC.fit(run, **channels)
+    model = HankelDMDc(3, 8, 1.0, standardize=False).fit(run, **channels)
+    assert np.all(np.isfinite(model.forecast(run, start=5.0, steps=20).heave))
+
+
+def test_a_channel_constant_in_one_run_alone_is_standardised_over_all(make_run, channels):
+    slack = make_run(seed=1)
+    slack.pitch[:] = 0.1
+    assert np.all(SPEC.fit([make_run(), slack], **channels).state_std > 0)
+
+
+def test_a_start_before_the_history_is_full_says_how_many_samples_are_missing(model, run):
+    message = (
+        r"start = 0\.25 s leaves 6 samples of history .* needs 9 .*: 3 are missing\. "
+        r"Start at 0\.4 s"
+    )
+    with pytest.raises(RequestError, match=message):
+        model.forecast(run, start=0.25, steps=5)
+    assert model.forecast(run, start=0.4, steps=5).sizes["time"] == 5
+
+
+@pytest.mark.parametrize("start", [-1.0, 25.0, np.nan, np.inf])
+def test_a_start_outside_the_run_is_refused(model, run, start):
+    with pytest.raises(
+        RequestError, match=r"start = .* s is outside the run, which runs from 0 to"
+    ):
+        model.forecast(run, start=start, steps=5)
+
+
+def test_a_forecast_beyond_the_input_is_told_what_is_possible(model, run):
+    message = r"201 steps from 10 s need the input up to 20 s .* ends at 19\.95 s\. At most 200"
+    with pytest.raises(RequestError, match=message):
+        model.forecast(run, start=10.0, steps=201)
+
+
+def test_another_unit_than_trained_is_refused(model, run, channels):
+    degrees = run.copy()
+    degrees["pitch"] = np.degrees(run.pitch).assign_attrs(units="deg")
+    message = r"channel 'pitch' of .* is in 'deg' and the model expects 'rad'\. Convert"
+    with pytest.raises(DataError, match=message):
+        model.forecast(degrees, start=5.0, steps=5)
+    with pytest.raises(DataError, match=message):
+        SPEC.fit([run, degrees], **channels)
+
+
+def test_an_unknown_channel_gets_a_suggestion(run, model):
+    message = r"run has no channel 'heeve'\. Did you mean 'heave'\? It has: heave, pitch"
+    with pytest.raises(RequestError, match=message):
+        SPEC.fit(run, states=["heeve"], inputs=["eta_fwd"])
+    with pytest.raises(RequestError, match=r"no channel 'eta_cog'\. Did you mean 'eta_cg'\?"):
+        model.forecast(run.rename(eta_cog="eta_cg"), start=5.0, steps=5)
+
+
+@pytest.mark.parametrize(
+    ("states", "inputs", "message"),
+    [
+        (["heave", "heave"], ["eta_fwd"], "states names heave more than once"),
+        (["heave"], ["eta_fwd", "eta_fwd"], "inputs names eta_fwd more than once"),
+        (["heave", "eta_fwd"], ["eta_fwd"], "eta_fwd is both a state and an input"),
+        ("heave", ["eta_fwd"], r"states must be a list .* the string 'heave'\. Write states="),
+        (["heave"], "eta_fwd", r"inputs must be a list .* Write inputs=\['eta_fwd'\]"),
+        ([], ["eta_fwd"], "states is empty: name at least one channel"),
+    ],
+)
+def test_wrong_lists_of_channels_are_refused(run, states, inputs, message):
+    with pytest.raises(RequestError, match=message):
+        SPEC.fit(run, states=states, inputs=inputs)
+
+
+@pytest.mark.parametrize(
+    ("stop", "message"),
+    [
+        (25.0, r"stop = 25 s is outside run, which runs from 0 to 19\.95 s"),
+        (-1.0, r"stop = -1 s is outside run"),
+        (np.nan, r"stop = nan s is outside run"),
+        ([5.0, 6.0], "stop has 2 instants for 1 runs"),
+        ({"rum": 5.0}, r"stop names the run 'rum', which is not among .*Did you mean 'run'\?"),
+    ],
+)
+def test_a_wrong_stop_is_refused(run, channels, stop, message):
+    with pytest.raises(RequestError, match=message):
+        SPEC.fit(run, stop=stop, **channels)
+
+
+@pytest.mark.parametrize(
+    ("runs", "message"),
+    [
+        ([], "no run was given"),
+        ({}, "no run was given"),
+        (np.zeros((3, 4)), r"is a ndarray; a run is an xarray\.Dataset"),
+        ({"a": None}, r"a is a NoneType; a run is an xarray\.Dataset"),
+        (None, r"NoneType; a run is an xarray\.Dataset"),
+        (xr.Dataset({"heave": ("sample", np.zeros(9))}), r"has no coordinate 'time' .*sample"),
+        (xr.Dataset({"heave": ("time", np.zeros(9))}), "has no coordinate 'time'"),
+    ],
+)
+def test_what_is_not_a_run_is_refused(channels, runs, message):
+    with pytest.raises(RequestError, match=message):
+        SPEC.fit(runs, **channels)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"state_delays": -1}, "state_delays must be an integer of at least 0; received -1"),
+        ({"state_delays": 3.0}, r"state_delays must be an integer .* 3\.0\. Round it"),
+        ({"input_delays": True}, "input_delays must be an integer .* received True"),
+        ({"input_delays": None}, "input_delays must be an integer .* received None"),
+        ({"window": 1}, "window must be an integer of at least 2 or None; received 1"),
+        ({"window": 20.5}, r"window must be an integer .* Round it"),
+        ({"rank": 0, "ridge": 0}, "rank must be an integer of at least 1 or None"),
+        ({"ridge": -1.0}, r"ridge must be a number, zero or positive; received -1\.0"),
+        ({"ridge": np.nan}, "ridge must be a number, zero or positive; received nan"),
+        ({"ridge": "100"}, "ridge must be a number, zero or positive; received '100'"),
+        ({"history": "outside"}, "history must be 'before' or 'inside'; received 'outside'"),
+        ({"delay_rows": "shift"}, "delay_rows must be 'ridge' or 'exact'; received 'shift'"),
+        ({"ridge_scale": "x"}, "ridge_scale must be 'absolute' or 'per_snapshot'; received 'x'"),
+        ({"standardize": "no"}, "standardize must be True or False; received 'no'"),
+        ({"alignment": "effective"}, "alignment is not available in this version"),
+    ],
+)
+def test_wrong_settings_are_refused(settings, message):
+    with pytest.raises(RequestError, match=message):
+        HankelDMDc(**{"state_delays": 3, "input_delays": 8, "ridge": 1.0, **settings})
+
+
+@pytest.mark.parametrize("preset", [HankelDMDc.paper, HankelDMDc.recommended])
+@pytest.mark.parametrize(("period", "dt", "name"), [(0, 0.05, "encounter_period"), (1.6, -1, "dt")])
+def test_presets_ask_for_a_positive_period_and_step(preset, period, dt, name):
+    with pytest.raises(RequestError, match=f"{name} must be a positive number of seconds"):
+        preset(encounter_period=period, dt=dt)
+
+
+def test_no_setting_hides_in_the_constructor():
+    with pytest.raises(TypeError, match="missing 3 required positional arguments"):
+        HankelDMDc()

@@ -1,0 +1,105 @@
+"""A system that is in the model class is found exactly; the first step of the truth ladder."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import HankelDMDc
+
+FORCED = {"states": ["heave"], "inputs": ["eta_fwd"]}
+# The channels are not standardised here: a constant offset (the mean of a finite window is not a
+# fixed point of the system) is not in the model class, the raw recursion is.
+EXACT = 1e-9  # what the method promises; rounding times the condition number (1e2) is 1e-13
+
+
+def top_row(model):
+    return np.concatenate([model.A[0], model.B[0]])
+
+
+def smallest_squared_singular_value(run):
+    y, u = run.heave.values, run.eta_fwd.values
+    regressors = np.stack([y[1:-1], y[:-2], u[1:-1], u[:-2]])
+    return np.linalg.svd(regressors, compute_uv=False)[-1] ** 2
+
+
+@pytest.mark.parametrize("part", [0.0, 1e-12, 1e-10])
+@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
+def test_a_position_only_oscillator_gives_its_arx_coefficients(oscillator, part, delay_rows):
+    run = oscillator.run()
+    # The bias of ridge is at most λ/σ²_min of a coefficient of order one.
+    ridge = part * smallest_squared_singular_value(run)
+    spec = HankelDMDc(1, 1, ridge, standardize=False, delay_rows=delay_rows)
+    model = spec.fit(run, **FORCED)
+    np.testing.assert_allclose(top_row(model), oscillator.arx, rtol=0, atol=EXACT)
+    np.testing.assert_allclose(model.A[1], [1, 0], rtol=0, atol=EXACT)
+    np.testing.assert_allclose(model.B[1], [0, 0], rtol=0, atol=EXACT)
+
+
+def test_a_free_oscillator_is_recovered_without_input(oscillator):
+    run = oscillator.run(samples=60, forced=False)
+    model = HankelDMDc(1, 0, 0.0, standardize=False).fit(run, states=["heave"], inputs=[])
+    np.testing.assert_allclose(model.A[0], oscillator.arx[:2], rtol=0, atol=EXACT)
+    assert model.B.shape == (2, 0)
+    forecast = model.forecast(run, start=float(run.time[1]), steps=50)
+    np.testing.assert_allclose(forecast.heave, run.heave[2:52], rtol=0, atol=EXACT)
+
+
+def test_a_model_without_input_may_forecast_past_the_end_of_the_run(oscillator):
+    run = oscillator.run(samples=80, forced=False)
+    model = HankelDMDc(1, 0, 0.0, standardize=False).fit(run, states=["heave"], inputs=[])
+    whole = model.forecast(run, start=float(run.time[9]), steps=60)
+    cut = model.forecast(run.isel(time=slice(0, 10)), start=float(run.time[9]), steps=60)
+    np.testing.assert_array_equal(cut.heave, whole.heave)
+    np.testing.assert_allclose(cut.time, run.time[10:70], rtol=0, atol=1e-12)  # rounding of k·dt
+
+
+@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
+@pytest.mark.parametrize(("s", "z"), [(3, 2), (2, 5), (6, 6)])
+def test_with_redundant_delays_forecasts_are_right_and_coefficients_are_not(
+    oscillator, s, z, delay_rows
+):
+    # More delays than the system has make the regressors linearly dependent: infinitely many
+    # coefficients continue the data exactly, and least norm takes another one than (arx, 0, …).
+    # All of them agree on histories that obey the system, so that forecasts must be right.
+    run = oscillator.run()
+    model = HankelDMDc(s, z, 0.0, standardize=False, delay_rows=delay_rows).fit(run, **FORCED)
+    padded = np.zeros(s + z + 2)
+    padded[[0, 1, s + 1, s + 2]] = oscillator.arx
+    assert np.max(np.abs(top_row(model) - padded)) > 0.01
+    other = oscillator.run(seed=1)
+    forecast = model.forecast(other, start=float(other.time[10]), steps=150)
+    np.testing.assert_allclose(forecast.heave, other.heave[11:161], rtol=0, atol=EXACT)
+
+
+def test_no_snapshot_pair_crosses_a_joint(oscillator):
+    first, second = oscillator.run(samples=40, seed=2), oscillator.run(samples=40, seed=3)
+    spec = HankelDMDc(1, 1, 0.0, standardize=False)
+    pooled = spec.fit([first, second], **FORCED)
+    np.testing.assert_allclose(top_row(pooled), oscillator.arx, rtol=0, atol=EXACT)
+    assert pooled.training.columns == (38, 38)
+
+    joined = xr.concat(
+        [first, second.assign_coords(time=second.time + 40 * oscillator.dt)], dim="time"
+    )
+    spoilt = spec.fit(joined, **FORCED)
+    assert np.max(np.abs(top_row(spoilt) - oscillator.arx)) > 1e-3
+
+
+def test_pooled_runs_identify_what_none_of_them_can_alone(oscillator):
+    # Two columns a run and four unknowns: one run leaves the system open, three close it.
+    runs = [oscillator.run(samples=4, seed=seed) for seed in (4, 5, 6)]
+    spec = HankelDMDc(1, 1, 0.0, standardize=False)
+    assert np.max(np.abs(top_row(spec.fit(runs[0], **FORCED)) - oscillator.arx)) > 1e-3
+    pooled = spec.fit({"a": runs[0], "b": runs[1], "c": runs[2]}, **FORCED)
+    # Six columns of random data: the condition number may reach 1e4, so 1e-12 and a margin.
+    np.testing.assert_allclose(top_row(pooled), oscillator.arx, rtol=0, atol=EXACT)
+    assert pooled.training.runs == ("a", "b", "c")
+
+
+def test_exact_input_to_output_recovery_survives_the_choice_of_units(oscillator, make_dataset):
+    # Least squares without ridge does not depend on the scale of the channels.
+    run = oscillator.run()
+    scaled = make_dataset(run.time.values, heave=1e3 * run.heave.values, eta_fwd=run.eta_fwd.values)
+    model = HankelDMDc(1, 1, 0.0, standardize=False).fit(scaled, **FORCED)
+    a0, a1, b0, b1 = oscillator.arx
+    np.testing.assert_allclose(top_row(model), [a0, a1, 1e3 * b0, 1e3 * b1], rtol=1e-9)

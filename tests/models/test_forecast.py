@@ -1,0 +1,174 @@
+"""What a forecast reads, when it starts, and what it says."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import HankelDMDc
+from seakeep.core import embed
+
+DT = 0.05
+S, Z = 3, 8
+
+
+@pytest.fixture(params=["ridge", "exact"])
+def model(request, make_run, channels):
+    return HankelDMDc(S, Z, 1.0, delay_rows=request.param).fit(make_run(), **channels)
+
+
+@pytest.fixture
+def test_run(make_run):
+    return make_run(samples=300, seed=5)
+
+
+def values(dataset, names):
+    return np.stack([dataset[name].values for name in names], axis=1)
+
+
+def test_the_state_at_the_next_instant_comes_from_states_and_inputs_up_to_this_one(model, test_run):
+    k = 50
+    x = (values(test_run, model.states) - model.state_mean) / model.state_std
+    u = (values(test_run, model.inputs) - model.input_mean) / model.input_std
+    state = embed(x, S, k, 1)[:, 0]
+    expected = []
+    for step in range(40):
+        state = model.A @ state + model.B @ embed(u, Z, k + step, 1)[:, 0]
+        expected.append(state[:2] * model.state_std + model.state_mean)
+    forecast = model.forecast(test_run, start=k * DT, steps=40)
+    # The same recursion with sums in another order.
+    np.testing.assert_allclose(values(forecast, model.states), expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(forecast.time, test_run.time[k + 1 : k + 41], rtol=0, atol=0)
+
+
+def test_no_state_after_the_start_is_read(model, test_run):
+    expected = model.forecast(test_run, start=5.0, steps=100)
+    scrambled = test_run.copy(deep=True)
+    for name in model.states:
+        scrambled[name][101:] = np.nan
+    xr.testing.assert_identical(model.forecast(scrambled, start=5.0, steps=100), expected)
+    scrambled.heave[100] += 1.0
+    assert not model.forecast(scrambled, start=5.0, steps=100).equals(expected)
+
+
+def test_no_input_after_the_last_but_one_instant_is_read(model, test_run):
+    expected = model.forecast(test_run, start=5.0, steps=100)
+    scrambled = test_run.copy(deep=True)
+    for name in model.inputs:
+        scrambled[name][200:] = np.nan  # the last instant forecast is sample 200
+    xr.testing.assert_identical(model.forecast(scrambled, start=5.0, steps=100), expected)
+    scrambled.eta_cog[199] += 1.0
+    other = model.forecast(scrambled, start=5.0, steps=100)
+    assert not other.isel(time=-1).equals(expected.isel(time=-1))
+    xr.testing.assert_equal(other.isel(time=slice(0, -1)), expected.isel(time=slice(0, -1)))
+
+
+@pytest.mark.parametrize(("s", "z"), [(3, 8), (8, 3)])
+def test_nothing_before_the_delays_of_each_group_is_read(make_run, channels, test_run, s, z):
+    model = HankelDMDc(s, z, 1.0).fit(make_run(), **channels)
+    expected = model.forecast(test_run, start=5.0, steps=50)
+    scrambled = test_run.copy(deep=True)
+    scrambled.heave[: 100 - s] = np.nan
+    scrambled.eta_fwd[: 100 - z] = np.nan
+    xr.testing.assert_identical(model.forecast(scrambled, start=5.0, steps=50), expected)
+
+
+@pytest.mark.parametrize("offset", [-0.4, 0.4])
+def test_the_start_is_the_nearest_sample_and_the_result_says_which(model, test_run, offset):
+    expected = model.forecast(test_run, start=5.0, steps=10)
+    snapped = model.forecast(test_run, start=5.0 + offset * DT, steps=10)
+    xr.testing.assert_identical(snapped, expected)
+    assert snapped.attrs["start"] == float(test_run.time[100])
+    assert float(snapped.time[0]) == float(test_run.time[101])
+
+
+def test_channels_time_and_units_are_kept(model, test_run):
+    forecast = model.forecast(test_run.assign_attrs(run="3041_2"), start=5.0, steps=10)
+    assert list(forecast.data_vars) == ["heave", "pitch"]
+    assert (forecast.heave.attrs["units"], forecast.pitch.attrs["units"]) == ("m", "rad")
+    assert forecast.heave.attrs["long_name"] == "Heave"
+    assert forecast.heave.attrs["training_std"] == model.state_std[0]
+    assert forecast.time.attrs == {"units": "s", "long_name": "time"}
+    assert (forecast.attrs["run"], forecast.attrs["status"]) == ("3041_2", "ok")
+
+
+def test_without_steps_the_forecast_goes_to_the_end_of_the_run(model, test_run):
+    forecast = model.forecast(test_run, start=5.0)
+    assert forecast.sizes["time"] == 199
+    assert float(forecast.time[-1]) == float(test_run.time[-1])
+
+
+def test_one_step_past_the_end_of_the_run_is_within_reach_of_its_inputs(model, test_run):
+    within = model.forecast(test_run, start=5.0, steps=199)
+    past = model.forecast(test_run, start=5.0, steps=200)
+    xr.testing.assert_equal(past.isel(time=slice(0, 199)), within)
+    assert float(past.time[-1]) == pytest.approx(300 * DT)
+    assert np.isfinite(past.heave[-1])
+    last = model.forecast(test_run, start=float(test_run.time[-1]), steps=1)
+    assert float(last.time[0]) == pytest.approx(300 * DT)
+
+
+def test_the_first_possible_start_is_the_sample_that_fills_the_history(model, test_run):
+    assert model.history_samples == max(S, Z) + 1
+    first = test_run.time.values[model.history_samples - 1]
+    assert model.forecast(test_run, start=first, steps=5).attrs["start"] == first
+
+
+@pytest.mark.parametrize(("s", "z", "needed"), [(3, 8, 9), (8, 3, 9), (0, 0, 1)])
+def test_history_samples_are_the_longer_delay_and_the_start(s, z, needed):
+    assert HankelDMDc(s, z, 1.0).history_samples == needed
+
+
+def test_arrays_give_the_same_bits_as_a_run(model, test_run):
+    x, u = values(test_run, model.states), values(test_run, model.inputs)
+    forecast = model.forecast(test_run, start=5.0, steps=60)
+    arrays = model.forecast_arrays(x[:101], u[:101], u[101:160], steps=60)
+    np.testing.assert_array_equal(arrays, values(forecast, model.states))
+    shortest = model.forecast_arrays(x[100 - S : 101], u[100 - Z : 101], u[101:160], steps=60)
+    np.testing.assert_array_equal(shortest, arrays)
+
+
+def test_rows_of_arrays_that_are_not_needed_are_not_looked_at(model, test_run):
+    x, u = values(test_run, model.states), values(test_run, model.inputs)
+    expected = model.forecast_arrays(x[:101], u[:101], u[101:160], steps=60)
+    x[: 100 - S], u[: 100 - Z], u[160:] = np.nan, np.nan, np.nan
+    again = model.forecast_arrays(x[:101], u[:101], u[101:], steps=60)
+    np.testing.assert_array_equal(again, expected)
+
+
+def test_forecasting_leaves_the_arrays_it_gets_alone(model, test_run):
+    x, u = values(test_run, model.states), values(test_run, model.inputs)
+    before = x.copy(), u.copy()
+    model.forecast_arrays(x[:101], u[:101], u[101:160], steps=60)
+    np.testing.assert_array_equal(x, before[0])
+    np.testing.assert_array_equal(u, before[1])
+
+
+def test_a_model_without_input_takes_empty_arrays(make_run):
+    run = make_run()
+    model = HankelDMDc(5, 0, 1.0).fit(run, states=["heave", "pitch"], inputs=[])
+    x = values(run, model.states)
+    empty = np.zeros((0, 0))
+    arrays = model.forecast_arrays(x[:50], empty, empty, steps=30)
+    forecast = model.forecast(run, start=float(run.time[49]), steps=30)
+    np.testing.assert_array_equal(arrays, values(forecast, model.states))
+
+
+def test_shifting_a_run_in_time_shifts_its_forecast(model, test_run):
+    expected = model.forecast(test_run, start=5.0, steps=50)
+    later = test_run.assign_coords(time=test_run.time + 100.0)
+    forecast = model.forecast(later, start=105.0, steps=50)
+    np.testing.assert_array_equal(forecast.heave.values, expected.heave.values)
+    np.testing.assert_allclose(forecast.time, expected.time + 100.0, rtol=0, atol=1e-12)
+
+
+def test_a_forecast_in_other_consistent_units_is_the_same_forecast(make_run, channels):
+    # Standardisation makes the regression blind to units; a power of two changes no bit.
+    def scaled(run):
+        return run.assign(heave=4.0 * run.heave, eta_fwd=0.5 * run.eta_fwd)
+
+    spec = HankelDMDc(S, Z, 1.0)
+    train, test = make_run(), make_run(seed=5)
+    expected = spec.fit(train, **channels).forecast(test, start=5.0, steps=60)
+    forecast = spec.fit(scaled(train), **channels).forecast(scaled(test), start=5.0, steps=60)
+    np.testing.assert_array_equal(forecast.heave.values, 4.0 * expected.heave.values)
+    np.testing.assert_array_equal(forecast.pitch.values, expected.pitch.values)

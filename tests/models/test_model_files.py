@@ -1,0 +1,240 @@
+"""Models on disk: the same bits in another process, and what a wrong file is told."""
+
+import errno
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import io
+
+from seakeep import DataError, HankelDMDc, RequestError, load_model
+
+FORECAST_ELSEWHERE = """
+import sys
+import numpy as np, xarray as xr
+import seakeep
+model = seakeep.load_model(sys.argv[1])
+run = xr.load_dataset(sys.argv[2], engine="h5netcdf")
+forecast = model.forecast(run, start=5.0, steps=120)
+np.save(sys.argv[3], np.stack([forecast[name].values for name in model.states], axis=1))
+"""
+
+
+@pytest.fixture(params=["ridge", "exact"])
+def model(request, make_run, channels):
+    spec = HankelDMDc(3, 8, 1.0, window=np.int64(200), delay_rows=request.param)
+    return spec.fit({"a": make_run(), "b": make_run(seed=1)}, **channels)
+
+
+@pytest.fixture
+def saved(make_run, channels, tmp_path):
+    return HankelDMDc(3, 8, 1.0).fit(make_run(), **channels).save(tmp_path / "rom.nc")
+
+
+def edited(path, **attrs):
+    """The file at `path` with other attributes."""
+    dataset = xr.load_dataset(path, engine="h5netcdf").assign_attrs(attrs)
+    dataset.to_netcdf(path, engine="h5netcdf")
+    return path
+
+
+def test_a_new_process_forecasts_the_same_bits(model, make_run, tmp_path):
+    run = make_run(samples=300, seed=5)
+    model.save(tmp_path / "rom.nc")
+    run.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
+    paths = [str(tmp_path / name) for name in ("rom.nc", "run.nc", "out.npy")]
+    subprocess.run([sys.executable, "-c", FORECAST_ELSEWHERE, *paths], check=True)
+    here = model.forecast(run, start=5.0, steps=120)
+    there = np.load(tmp_path / "out.npy")
+    np.testing.assert_array_equal(there, np.stack([here.heave, here.pitch], axis=1))
+
+
+def test_everything_a_model_is_comes_back(model, make_run, tmp_path):
+    loaded = load_model(model.save(tmp_path / "rom.nc"))
+    for name in ("A", "B", "eigenvalues", "state_mean", "state_std", "input_mean", "input_std"):
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(model, name))
+    assert (loaded.dt, loaded.states, loaded.inputs) == (model.dt, model.states, model.inputs)
+    assert loaded.state_labels == model.state_labels
+    assert loaded.training == model.training
+    assert loaded.summary() == model.summary()
+    run = make_run(seed=5)
+    xr.testing.assert_identical(
+        loaded.forecast(run, start=5.0, steps=20), model.forecast(run, start=5.0, steps=20)
+    )
+
+
+def test_a_model_without_input_comes_back(run, tmp_path):
+    model = HankelDMDc(5, 0, 1.0).fit(run, states=["heave"], inputs=[])
+    loaded = load_model(model.save(tmp_path / "rom.nc"))
+    assert loaded.inputs == []
+    np.testing.assert_array_equal(loaded.A, model.A)
+    assert loaded.B.shape == (6, 0)
+
+
+def test_a_file_holds_no_pickle_and_says_what_it_is(saved):
+    dataset = xr.load_dataset(saved, engine="h5netcdf")
+    assert dataset.attrs["seakeep_kind"] == "hankel_dmdc"
+    assert int(dataset.attrs["seakeep_format"]) == 1
+    assert json.loads(dataset.attrs["settings"])["state_delays"] == 3
+    assert all(variable.dtype == np.float64 for variable in dataset.variables.values())
+
+
+def test_saving_over_a_model_replaces_it(saved, run, channels):
+    HankelDMDc(4, 2, 1.0).fit(run, **channels).save(saved)
+    assert load_model(saved).state_delays == 4
+    assert [path.name for path in saved.parent.iterdir()] == ["rom.nc"]
+
+
+def test_a_missing_file_is_told_how_to_be_made(tmp_path):
+    with pytest.raises(RequestError, match=r"there is no model file .*rom\.nc\. Make one with"):
+        load_model(tmp_path / "rom.nc")
+
+
+@pytest.mark.parametrize("part", [0.0, 0.3, 0.95])
+def test_a_truncated_file_is_refused(saved, part):
+    content = saved.read_bytes()
+    saved.write_bytes(content[: int(part * len(content))])
+    with pytest.raises(DataError, match=r"cannot be read as NetCDF \(\d+ bytes\): it is truncated"):
+        load_model(saved)
+
+
+def test_a_text_file_is_refused(tmp_path):
+    path = tmp_path / "rom.nc"
+    path.write_text("time,heave\n0.0,1.0\n", encoding="utf-8")
+    with pytest.raises(DataError, match=r"cannot be read as NetCDF \(19 bytes\)"):
+        load_model(path)
+
+
+def test_a_foreign_netcdf_is_named_by_its_variables(run, tmp_path):
+    path = tmp_path / "run.nc"
+    run.to_netcdf(path, engine="h5netcdf")
+    with pytest.raises(DataError, match=r"is a NetCDF file and not a seakeep model \(var.*heave"):
+        load_model(path)
+
+
+def test_a_newer_layout_asks_for_an_update(saved):
+    edited(saved, seakeep_format=2, seakeep_version="9.0")
+    with pytest.raises(DataError, match=r"has layout 2, written by seakeep 9\.0; .* up to 1"):
+        load_model(saved)
+
+
+def test_an_unknown_kind_asks_for_an_update(saved):
+    edited(saved, seakeep_kind="oracle")
+    with pytest.raises(DataError, match="holds a model of kind 'oracle', which this version does"):
+        load_model(saved)
+
+
+@pytest.mark.parametrize(
+    "attrs", [{"settings": "{"}, {"settings": '{"ridge": -1}'}, {"training": "{}"}]
+)
+def test_a_file_with_broken_contents_is_incomplete(saved, attrs):
+    edited(saved, **attrs)
+    with pytest.raises(DataError, match=r"rom\.nc is incomplete: .* Save the model again"):
+        load_model(saved)
+
+
+def test_a_file_whose_matrices_do_not_fit_its_delays_is_refused(saved):
+    dataset = xr.load_dataset(saved, engine="h5netcdf")
+    dataset.isel(regressor=slice(1, None)).to_netcdf(saved, engine="h5netcdf")
+    with pytest.raises(DataError, match=r"rom\.nc is incomplete: .*coefficients"):
+        load_model(saved)
+
+
+def test_a_folder_that_does_not_exist_is_named(model, tmp_path):
+    with pytest.raises(RequestError, match=r"cannot write .*: the folder .*nowhere does not exist"):
+        model.save(tmp_path / "nowhere" / "rom.nc")
+
+
+def test_a_folder_that_cannot_be_written_is_named(model, tmp_path, monkeypatch):
+    # A mode without write permission does not stop an administrator, and tests may run as one.
+    def refuse(*args, **kwargs):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(tempfile, "mkstemp", refuse)
+    with pytest.raises(RequestError, match=r"cannot write .*rom\.nc: Permission denied"):
+        model.save(tmp_path / "rom.nc")
+
+
+def test_an_interrupted_write_leaves_the_old_file(saved, model, monkeypatch):
+    before = saved.read_bytes()
+
+    def fill_the_disk(self, path, **kwargs):
+        Path(path).write_bytes(b"half a mod")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(xr.Dataset, "to_netcdf", fill_the_disk)
+    with pytest.raises(RequestError, match=r"cannot write .*: No space left .* is untouched"):
+        model.save(saved)
+    assert saved.read_bytes() == before
+    assert [path.name for path in saved.parent.iterdir()] == ["rom.nc"]
+
+
+FILE_TOO_LARGE = """
+import resource, signal, sys
+import seakeep
+model = seakeep.load_model(sys.argv[1])
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+try:
+    model.save(sys.argv[1])
+except seakeep.RequestError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of file size are POSIX")
+def test_a_real_failure_of_the_operating_system_leaves_the_old_file(saved):
+    before = saved.read_bytes()
+    done = subprocess.run(
+        [sys.executable, "-c", FILE_TOO_LARGE, str(saved)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "cannot write" in done.stdout, done.stderr
+    assert saved.read_bytes() == before
+    assert [path.name for path in saved.parent.iterdir()] == ["rom.nc"]
+
+
+def test_a_mat_file_reproduces_the_forecast(model, make_run, tmp_path):
+    run = make_run(seed=5)
+    content = io.loadmat(model.to_mat(tmp_path / "rom.mat"), squeeze_me=False)
+    steps, start = 100, 60
+    state = model.initial_state(run, start=float(run.time[start]))
+    u = np.stack([run.eta_fwd.values, run.eta_cog.values], axis=1)[start : start + steps + 1]
+    outputs = []
+    for row in u:
+        deviation = row - content["InputOffset"][:, 0]
+        outputs.append(
+            content["C"] @ state + content["D"] @ deviation + content["OutputOffset"][:, 0]
+        )
+        state = content["A"] @ state + content["B"] @ deviation
+    forecast = model.forecast(run, start=float(run.time[start]), steps=steps)
+    expected = np.stack([forecast.heave, forecast.pitch], axis=1)
+    # The same recursion in physical units; values of order one, a hundred steps.
+    np.testing.assert_allclose(outputs[1:], expected, rtol=0, atol=1e-10)
+
+
+def test_a_mat_file_carries_what_idss_asks_for(model, tmp_path):
+    content = io.loadmat(model.to_mat(tmp_path / "rom.mat"))
+    names = {key: [str(cell[0]) for cell in content[key][:, 0]] for key in content if "Name" in key}
+    assert names == {"InputName": ["eta_fwd", "eta_cog"], "OutputName": ["heave", "pitch"]}
+    assert [str(cell[0]) for cell in content["OutputUnit"][:, 0]] == ["m", "rad"]
+    assert float(content["Ts"][0, 0]) == model.dt
+    assert content["A"].shape == (2 * 4 + 2 * 8,) * 2
+    assert content["D"].shape == (2, 2)
+
+
+def test_export_of_a_model_without_input_is_refused(run, tmp_path):
+    model = HankelDMDc(5, 0, 1.0).fit(run, states=["heave"], inputs=[])
+    with pytest.raises(RequestError, match=r"the model has no input.*Use model\.A"):
+        model.to_state_space()
+    with pytest.raises(RequestError, match="the model has no input"):
+        model.to_mat(tmp_path / "rom.mat")
+    assert not (tmp_path / "rom.mat").exists()

@@ -1,0 +1,123 @@
+"""Modes of a known oscillator, the warning of an unstable model, and how its forecast ends."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from seakeep import HankelDMDc, SeakeepWarning
+
+
+@pytest.fixture
+def identified(oscillator):
+    run = oscillator.run()
+    return HankelDMDc(1, 1, 0.0, standardize=False).fit(run, states=["heave"], inputs=["eta_fwd"])
+
+
+def growing(make_dataset, factor=1.5, samples=60, scale=1.0):
+    """A run of a system that grows by `factor` a step unless its input holds it."""
+    rng = np.random.default_rng(0)
+    heave, eta = np.zeros(samples), np.zeros(samples)
+    for k in range(samples - 1):
+        eta[k] = -factor * heave[k] + rng.standard_normal()
+        heave[k + 1] = factor * heave[k] + eta[k]
+    return make_dataset(0.1 * np.arange(samples), heave=scale * heave, eta_fwd=eta)
+
+
+def fit_growing(make_dataset, **settings):
+    run = growing(make_dataset, **settings)
+    spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact")
+    return spec.fit(run, states=["heave"], inputs=["eta_fwd"]), run
+
+
+def test_eigenvalues_are_those_of_the_oscillator(oscillator, identified):
+    pole = (
+        2
+        * np.pi
+        * oscillator.natural_frequency
+        * (-oscillator.damping_ratio + 1j * np.sqrt(1 - oscillator.damping_ratio**2))
+    )
+    expected = np.exp(pole * oscillator.dt)
+    found = identified.eigenvalues
+    assert found.shape == (2,)
+    # Coefficients are exact to 1e-13 and the eigenvalues lie far apart.
+    np.testing.assert_allclose(sorted(found, key=np.imag), [expected.conj(), expected], atol=1e-10)
+    assert identified.spectral_radius == pytest.approx(abs(expected), abs=1e-10)
+
+
+def test_modes_are_natural_frequency_and_damping_of_the_oscillator(oscillator, identified):
+    mode = identified.modes().isel(mode=0)
+    damped = oscillator.natural_frequency * np.sqrt(1 - oscillator.damping_ratio**2)
+    decay = 1 / (2 * np.pi * oscillator.natural_frequency * oscillator.damping_ratio)
+    # As above; the logarithm adds nothing.
+    assert identified.modes().sizes["mode"] == 1
+    assert float(mode.natural_frequency) == pytest.approx(oscillator.natural_frequency, rel=1e-9)
+    assert float(mode.damping_ratio) == pytest.approx(oscillator.damping_ratio, rel=1e-9)
+    assert float(mode.frequency) == pytest.approx(damped, rel=1e-9)
+    assert float(mode.period) == pytest.approx(1 / damped, rel=1e-9)
+    assert float(mode.decay_time) == pytest.approx(decay, rel=1e-9)
+    assert mode.natural_frequency.attrs["units"] == "Hz"
+
+
+def test_eigenvalues_come_largest_first(run, channels):
+    moduli = np.abs(HankelDMDc(5, 8, 1.0).fit(run, **channels).eigenvalues)
+    assert len(moduli) == 12
+    assert np.all(np.diff(moduli) <= 0)
+
+
+def test_modes_do_not_depend_on_standardisation_of_an_unforced_mean(oscillator):
+    # z-scoring is a similarity of Â; with N = 1 it leaves Â alone, the offset of means apart.
+    run = oscillator.run(samples=4000)
+    model = HankelDMDc(1, 1, 0.0).fit(run, states=["heave"], inputs=["eta_fwd"])
+    mode = model.modes().isel(mode=0)
+    # The offset of the sample means acts as a small error of 1/√4000 of the input.
+    assert float(mode.natural_frequency) == pytest.approx(oscillator.natural_frequency, rel=1e-3)
+
+
+def test_a_stable_model_warns_of_nothing_and_says_so(identified):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert identified.spectral_radius < 1
+    assert "(stable)" in identified.summary()
+    assert "damping ratio" in identified.summary()
+
+
+def test_an_unstable_model_warns_and_says_what_to_do(make_dataset):
+    model, _ = fit_growing(make_dataset)
+    message = (
+        r"the spectral radius of the model is 1\.4979\d*: a free run grows by 50 % a step .* "
+        r"Raise ridge, train on more data, use fewer state delays"
+    )
+    with pytest.warns(SeakeepWarning, match=message):
+        # Sample means of 60 samples are not a fixed point of the system: an error of that kind.
+        assert model.spectral_radius == pytest.approx(1.5, rel=1e-2)
+    assert "UNSTABLE" in model.summary()
+
+
+@pytest.mark.parametrize(("factor", "scale"), [(1.5, 1.0), (1e4, 1.0), (1e200, 1.0), (10.0, 1e8)])
+def test_a_forecast_that_diverges_ends_in_nan_with_its_status(make_dataset, factor, scale):
+    # The growth of the model is set by hand: what is tested is the end of the run, whatever the
+    # speed it comes at and the unit it comes in. Warnings are errors in this suite.
+    model, run = fit_growing(make_dataset, scale=scale)
+    object.__setattr__(model, "coefficients", np.array([[factor, 0.0]]))
+    long = run.pad(time=(0, 1000), mode="wrap").assign_coords(time=0.1 * np.arange(1060))
+    forecast = model.forecast(long, start=1.0)
+    lost = np.isnan(forecast.heave.values)
+    at = int(np.argmax(lost))
+    assert lost.any()
+    assert np.all(lost[at:])
+    assert np.all(np.abs(forecast.heave[:at] - model.state_mean) <= 1e6 * model.state_std)
+    assert forecast.attrs["status"] == f"diverged at t = {float(forecast.time[at]):g} s"
+
+
+@pytest.mark.parametrize("standardize", [False, True])
+def test_divergence_of_one_state_ends_all_of_them(make_dataset, standardize):
+    run = growing(make_dataset)
+    run["pitch"] = run.heave + np.random.default_rng(1).standard_normal(run.heave.size)
+    spec = HankelDMDc(0, 0, 1e-9, standardize=standardize)
+    model = spec.fit(run, states=["heave", "pitch"], inputs=["eta_fwd"])
+    x, u = np.array([[1.0, 1.0]]), np.zeros((1, 1))
+    out = model.forecast_arrays(x, u, np.zeros((199, 1)), steps=200)
+    np.testing.assert_array_equal(np.isnan(out[:, 0]), np.isnan(out[:, 1]))
+    assert np.isnan(out[-1, 0])
+    assert np.isfinite(out[0, 0])

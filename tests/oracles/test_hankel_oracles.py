@@ -1,0 +1,243 @@
+"""The model against outside packages: pykoop, scikit-learn, python-control, scipy, plain numpy."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import signal
+
+from seakeep import HankelDMDc, HankelDMDcModel
+
+pytestmark = pytest.mark.oracle
+
+STATES, INPUTS = ["heave", "pitch"], ["eta_fwd", "eta_cog"]
+N, Q = 2, 2
+DELAYS = [(4, 7), (6, 3), (3, 3), (0, 0)]
+# Gram matrices of these runs at λ = 0.5 have condition numbers near 1e4: rounding leaves 1e-12.
+SAME_MATRICES = 1e-10
+# Hundreds of steps of a free run add their rounding up.
+SAME_FORECAST = 1e-9
+
+
+def matrix(run, names=(*STATES, *INPUTS)):
+    return np.stack([run[name].values for name in names], axis=1)
+
+
+def fit(runs, s, z, ridge=0.5, **settings):
+    settings = {"standardize": False, "history": "inside", **settings}
+    return HankelDMDc(s, z, ridge, **settings).fit(runs, states=STATES, inputs=INPUTS)
+
+
+def koopman_pipeline(runs, s, z, ridge=0.5):
+    pykoop = pytest.importorskip("pykoop")
+    pipeline = pykoop.KoopmanPipeline(
+        lifting_functions=[("delay", pykoop.DelayLiftingFn(n_delays_state=s, n_delays_input=z))],
+        regressor=pykoop.Edmd(alpha=ridge),
+    )
+    data = pykoop.combine_episodes(
+        [(number, matrix(run)) for number, run in enumerate(runs)], episode_feature=True
+    )
+    pipeline.fit(data, n_inputs=Q, episode_feature=True)
+    return pipeline
+
+
+def oracle_matrices(pipeline):
+    coefficients = pipeline.regressor_.coef_.T
+    return coefficients[:, : coefficients.shape[0]], coefficients[:, coefficients.shape[0] :]
+
+
+@pytest.mark.parametrize(("s", "z"), DELAYS)
+@pytest.mark.parametrize("count", [1, 2])
+def test_matrices_equal_pykoop(make_run, s, z, count):
+    runs = [make_run(samples=200 + 30 * seed, seed=seed) for seed in range(count)]
+    model = fit(runs, s, z)
+    a, b = oracle_matrices(koopman_pipeline(runs, s, z))
+    np.testing.assert_allclose(model.A, a, rtol=0, atol=SAME_MATRICES)
+    np.testing.assert_allclose(model.B, b, rtol=0, atol=SAME_MATRICES)
+
+
+def test_a_window_with_history_inside_equals_pykoop_on_these_samples_alone(make_run):
+    run = make_run(samples=300)
+    model = fit(run, 4, 7, window=120)
+    a, b = oracle_matrices(koopman_pipeline([run.isel(time=slice(180, 300))], 4, 7))
+    np.testing.assert_allclose(model.A, a, rtol=0, atol=SAME_MATRICES)
+    np.testing.assert_allclose(model.B, b, rtol=0, atol=SAME_MATRICES)
+
+
+def test_delays_are_ordered_as_in_pykoop(make_run):
+    s, z = 2, 3
+    run = make_run(samples=60)
+    names = list(koopman_pipeline([run], s, z).get_feature_names_out())
+    states = ["x0", "x1", "D1(x0)", "D1(x1)", "D2(x0)", "D2(x1)"]
+    inputs = [
+        f"D{lag}(u{channel})" if lag else f"u{channel}" for lag in range(4) for channel in (0, 1)
+    ]
+    assert names == ["ep", *states, *inputs]
+
+
+@pytest.mark.parametrize(("delay_rows", "relift"), [("ridge", False), ("exact", True)])
+@pytest.mark.parametrize(("s", "z"), [(4, 7), (6, 3)])
+def test_forecasts_equal_pykoop(make_run, delay_rows, relift, s, z):
+    runs = [make_run(samples=200), make_run(samples=180, seed=1)]
+    other = make_run(samples=160, seed=2)
+    model = fit(runs, s, z, delay_rows=delay_rows)
+    pipeline = koopman_pipeline(runs, s, z)
+    first = model.history_samples
+    expected = pipeline.predict_trajectory(
+        matrix(other, STATES)[:first],
+        matrix(other, INPUTS),
+        relift_state=relift,
+        episode_feature=False,
+    )
+    forecast = model.forecast(other, start=float(other.time[first - 1]), steps=160 - first)
+    np.testing.assert_allclose(
+        matrix(forecast, STATES), expected[first:], rtol=0, atol=SAME_FORECAST
+    )
+
+
+def test_ridge_and_exact_rows_forecast_differently(make_run):
+    # Else the two comparisons with pykoop above would show the same thing twice.
+    run = make_run(samples=200)
+    pair = [
+        fit(run, 4, 7, ridge=50.0, delay_rows=rows).forecast(run, start=2.0, steps=100)
+        for rows in ("ridge", "exact")
+    ]
+    assert float(np.abs(pair[0].heave - pair[1].heave).max()) > 1e-3
+
+
+@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
+@pytest.mark.parametrize(("samples", "ridge"), [(60, 0.5), (400, 0.5), (400, 20.0)])
+def test_the_first_rows_equal_scikit_learn(make_run, delay_rows, samples, ridge):
+    linear_model = pytest.importorskip("sklearn.linear_model")
+    s, z = 5, 20
+    run = make_run(samples=samples)
+    model = fit(run, s, z, ridge=ridge, delay_rows=delay_rows)
+    x, u = matrix(run, STATES), matrix(run, INPUTS)
+    rows = [
+        np.concatenate([x[j - s : j + 1][::-1].ravel(), u[j - z : j + 1][::-1].ravel()])
+        for j in range(z, samples - 1)
+    ]
+    oracle = linear_model.Ridge(alpha=ridge, fit_intercept=False, solver="cholesky")
+    oracle.fit(np.array(rows), x[z + 1 :])
+    ours = np.concatenate([model.A[:N], model.B[:N]], axis=1)
+    np.testing.assert_allclose(ours, oracle.coef_, rtol=0, atol=SAME_MATRICES)
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A model, what drives its exported system, and the forecast to compare with."""
+
+    model: HankelDMDcModel
+    deviations: np.ndarray
+    initial_state: np.ndarray
+    measured: np.ndarray
+    forecast: np.ndarray
+
+
+@pytest.fixture(params=[(4, 7), (6, 3), (5, 0), (3, 1)], ids=lambda delays: f"s, z = {delays}")
+def delays(request):
+    return request.param
+
+
+@pytest.fixture(params=["ridge", "exact"])
+def exported(request, make_run, delays):
+    run = make_run(samples=300)
+    # Ridge enough for a stable model: an unstable one would compare rounding of large numbers.
+    model = fit(run, *delays, ridge=2.0, delay_rows=request.param, standardize=True)
+    assert model.spectral_radius < 1
+    start, steps = 100, 150
+    instant = float(run.time[start])
+    return Exported(
+        model,
+        matrix(run, INPUTS)[start : start + steps + 1] - model.input_mean,
+        model.initial_state(run, start=instant),
+        matrix(run, STATES)[start],
+        matrix(model.forecast(run, start=instant, steps=steps), STATES),
+    )
+
+
+def test_scipy_simulates_the_exported_system_like_our_forecast(exported, delays):
+    s, z = delays
+    system = exported.model.to_state_space()
+    assert isinstance(system, signal.StateSpace)
+    assert system.dt == exported.model.dt
+    assert not np.any(system.D)
+    assert system.A.shape == (N * (s + 1) + Q * z,) * 2
+    _, output, _ = signal.dlsim(system, exported.deviations, x0=exported.initial_state)
+    physical = output + exported.model.state_mean
+    # The first output is the measured state at the start; values are of order one.
+    np.testing.assert_allclose(physical[0], exported.measured, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(physical[1:], exported.forecast, rtol=0, atol=1e-10)
+
+
+def test_python_control_simulates_the_exported_system_like_our_forecast(exported):
+    control = pytest.importorskip("control")
+    system = exported.model.to_control()
+    assert (system.input_labels, system.output_labels) == (INPUTS, STATES)
+    assert system.dt == exported.model.dt
+    response = control.forced_response(
+        system,
+        exported.model.dt * np.arange(len(exported.deviations)),
+        exported.deviations.T,
+        initial_state=exported.initial_state,
+    )
+    physical = response.outputs.T + exported.model.state_mean
+    np.testing.assert_allclose(physical[1:], exported.forecast, rtol=0, atol=1e-10)
+
+
+def test_the_exported_system_without_standardisation_holds_the_matrices_themselves(make_run):
+    model = fit(make_run(), 2, 0)
+    system = model.to_state_space()
+    np.testing.assert_array_equal(system.A, model.A)
+    np.testing.assert_array_equal(system.B, model.B)
+
+
+@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
+@pytest.mark.parametrize("rank", [4, 12])
+def test_a_rank_equals_truncated_singular_values_in_plain_numpy(make_run, rank, delay_rows):
+    s, z = 3, 8
+    run = make_run(samples=200)
+    model = fit(run, s, z, ridge=0.0, rank=rank, delay_rows=delay_rows)
+    x, u = matrix(run, STATES), matrix(run, INPUTS)
+    columns = np.arange(z, 199)
+    y = np.vstack(
+        [x[columns - lag].T for lag in range(s + 1)] + [u[columns - lag].T for lag in range(z + 1)]
+    )
+    left, values, right = np.linalg.svd(y, full_matrices=False)
+    g = x[columns + 1].T @ right[:rank].T / values[:rank] @ left[:, :rank].T
+    ours = np.concatenate([model.A[:N], model.B[:N]], axis=1)
+    # Singular values kept are above 1e-2 of the largest, so the pseudo-inverse keeps 1e-13.
+    np.testing.assert_allclose(ours, g, rtol=0, atol=SAME_MATRICES)
+
+
+def test_the_papers_formula_in_plain_numpy_at_the_papers_size():
+    rng = np.random.default_rng(0)
+    n, q, m, s, z, ridge = 11, 2, 640, 32, 160, 100.0
+    x = np.cumsum(rng.standard_normal((z + m, n)), axis=0)
+    x = (x - x[z:].mean(axis=0)) / x[z:].std(axis=0, ddof=1)
+    u = rng.standard_normal((z + m, q))
+    u = (u - u[z:].mean(axis=0)) / u[z:].std(axis=0, ddof=1)
+
+    # x_j … x_{m−1} and their successors, the Hankel matrices of lags below (equations of HDMDc).
+    columns = np.arange(z, z + m - 1)
+    extended_x = np.vstack([x[columns - lag].T for lag in range(s + 1)])
+    extended_u = np.vstack([u[columns - lag].T for lag in range(z + 1)])
+    successors = np.vstack([x[columns + 1 - lag].T for lag in range(s + 1)])
+    y = np.vstack([extended_x, extended_u])
+    assert y.shape == (685, 639)
+    g = successors @ y.T @ np.linalg.inv(y @ y.T + ridge * np.eye(len(y)))
+
+    names = [f"x{i}" for i in range(n)], [f"u{i}" for i in range(q)]
+    run = xr.Dataset(
+        {name: ("time", x[:, i]) for i, name in enumerate(names[0])}
+        | {name: ("time", u[:, i]) for i, name in enumerate(names[1])},
+        coords={"time": 0.05125 * np.arange(z + m)},
+    )
+    spec = HankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32)
+    model = spec.fit(run, states=names[0], inputs=names[1])
+    assert model.training.columns == (639,)
+    assert model.training.method == "dual"
+    # The primal inverse at this size, condition number near 1e4, is good to about 1e-12.
+    np.testing.assert_allclose(model.A, g[:, : n * (s + 1)], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(model.B, g[:, n * (s + 1) :], rtol=0, atol=1e-10)

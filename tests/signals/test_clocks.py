@@ -1,0 +1,129 @@
+"""Time axes and resampling."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seakeep.errors import DataError, RequestError
+from seakeep.signals import resample, uniform_step
+
+
+def test_step_comes_back_as_meant():
+    assert uniform_step(np.cumsum(np.full(1000, 0.04))) == 0.04
+    assert uniform_step(100.0 + np.arange(500) * 0.774) == 0.774
+
+
+@pytest.mark.parametrize("rate", [30.0, 60.0, 29.97, 512.0])
+def test_times_with_few_decimals_are_uniform(rate):
+    # Milliseconds: the instants are off by up to 3 % of a step at 60 Hz, 26 % at 512 Hz.
+    time = np.round(np.arange(3000) / rate, 4 if rate > 100 else 3)
+    # The ends of the record are rounded too, by a part of a step in 3000.
+    assert uniform_step(time) == pytest.approx(1 / rate, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("time", "message"),
+    [
+        ([0.0], r"the run has 1 instant\(s\); a time axis needs at least two"),
+        ([0.0, np.nan, 0.2], "hold a value that is not finite at sample 1 .1 in all.*Remove these"),
+        (
+            [0.0, 0.1, 0.1, 0.2],
+            r"repeat: 0\.1 s stands at samples 1 and 2 \(1 repetitions in all\)\. Remove the doub",
+        ),
+        (
+            [0.0, 0.1, 0.05, 0.2],
+            r"not sorted: 0\.05 s follows 0\.1 s at sample 2\. Sort the rows by time",
+        ),
+        (
+            [0.0, 0.1, 0.2, 0.5, 0.6, 0.7, 0.8],
+            r"1 gap\(s\): after t = 0\.2 s, 2 sample\(s\) of 0\.1 s are missing; the longest gap, "
+            r"after t = 0\.2 s, lasts 0\.3 s\. Fill the gap",
+        ),
+        (
+            [0.0, 0.1, 0.2, 0.34, 0.45, 0.5, 0.6],
+            r"not uniform: steps run from 0\.05 to 0\.14 s \(median 0\.1 s\), the oddest after "
+            r"t = 0\.4",
+        ),
+    ],
+)
+def test_what_is_no_uniform_axis(time, message):
+    with pytest.raises(DataError, match=message):
+        uniform_step(time)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.floats(min_value=0.3, max_value=12.0),
+    st.floats(min_value=0.0, max_value=0.75),
+    st.floats(min_value=0.0, max_value=6.28),
+)
+def test_any_ratio_keeps_what_both_rates_hold(ratio, part, phase):
+    """A sine below 0.8 of the lower Nyquist frequency survives any change of the step."""
+    dt, new_dt = 1.0, ratio
+    time = np.arange(3000) * dt
+    new_time = 3.7 + np.arange(int((time[-1] - 4) / new_dt)) * new_dt
+    frequency = part * 0.5 / max(dt, new_dt)
+    wave = lambda t: np.cos(2 * np.pi * frequency * t + phase)  # noqa: E731
+    out = resample(wave(time), time, new_time)
+    margin = (new_time > 700) & (new_time < 2300)  # half a kernel from either end
+    # 60 dB is 1e-3; Kaiser's formula is met within about 1 dB.
+    assert np.max(np.abs(out - wave(new_time))[margin], initial=0.0) < 1.5e-3
+
+
+@pytest.mark.parametrize("new_dt", [4.0, 5.25, 10.0])
+def test_what_would_alias_is_removed(new_dt):
+    time = np.arange(6000.0)
+    new_time = np.arange(0, 5990, new_dt)
+    for factor in (1.05, 1.3, 1.9):
+        above = np.sin(2 * np.pi * factor * 0.5 / new_dt * time)
+        out = resample(above, time, new_time)
+        inner = slice(int(800 / new_dt), -int(800 / new_dt))
+        # 60 dB, within about 1 dB.
+        assert np.max(np.abs(out[inner])) < 1.5e-3
+
+
+def test_more_attenuation_is_more_attenuation():
+    time, new_time = np.arange(6000.0), np.arange(0, 5990, 5.0)
+    above = np.sin(2 * np.pi * np.linspace(0.101, 0.13, 30) * time[:, None])
+    worst = [np.max(np.abs(resample(above, time, new_time, a)[200:-200])) for a in (60.0, 90.0)]
+    # 1e-3 and 3e-5, within about 1 dB.
+    assert worst[0] < 1.2e-3
+    assert worst[1] < 4e-5
+
+
+def test_same_instants_hand_the_samples_on():
+    time = 2.0 + np.arange(50) * 0.04
+    series = np.random.default_rng(0).standard_normal((50, 2))
+    np.testing.assert_array_equal(resample(series, time, time[3:20]), series[3:20])
+
+
+def test_constants_are_kept_exactly_to_the_ends():
+    time = np.arange(0, 20, 0.01)
+    out = resample(np.full(time.size, 7.0), time, np.arange(0, 19.9, 0.0513))
+    np.testing.assert_allclose(out, 7.0, rtol=1e-14)  # rounding of a sum
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (
+            lambda t: resample(t, t, t + 1.0),
+            DataError,
+            r"new instants from 1 to 10\.9 s lie outside the series, which runs from 0 to 9\.9 s",
+        ),
+        (
+            lambda t: resample(t[:50], t, t),
+            DataError,
+            "the series has 50 samples and the time axis 100; they must agree",
+        ),
+        (
+            lambda t: resample(np.where(t > 5, np.nan, t), t, t),
+            RequestError,
+            "values that are not finite, the first at sample 51",
+        ),
+    ],
+)
+def test_what_cannot_be_resampled(call, error, message):
+    with pytest.raises(error, match=message):
+        call(np.arange(100) * 0.1)

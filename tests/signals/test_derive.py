@@ -1,0 +1,105 @@
+"""Integrals, derivatives and envelopes against analytic signals."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seakeep.errors import RequestError
+from seakeep.signals import band_pass, differentiate, envelope_squared, integrate
+
+DT = 0.01
+T = np.arange(0, 80, DT)
+INNER = slice(2500, -2500)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    st.floats(min_value=0.5, max_value=4.0),
+    st.floats(min_value=0.0, max_value=6.28),
+    st.sampled_from([1, 2]),
+)
+def test_integral_of_a_wave_in_the_band(frequency, phase, times):
+    omega = 2 * np.pi * frequency
+    wave = np.sin(omega * T + phase)
+    derivative = omega**times * np.sin(omega * T + phase + times * np.pi / 2)
+    out = integrate(derivative + 0.2, DT, (0.4, 5.0), times)
+    # Linear prediction continues a wave over the ends; what is left is the offset's end.
+    assert np.max(np.abs(out - wave)[INNER]) < 0.005
+    assert np.max(np.abs(out - wave)) < 0.05
+
+
+def test_drift_does_not_pass():
+    out = integrate(0.5 + 0.01 * T + 0.1 * np.sin(2 * np.pi * 0.02 * T), DT, (0.4, 5.0), 2)
+    assert np.max(np.abs(out[INNER])) < 2e-3  # against 0.1/ω² = 6 m unfiltered
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(min_value=0.55, max_value=4.4), st.floats(min_value=0.0, max_value=6.28))
+def test_band_pass_keeps_the_band_and_its_phase(frequency, phase):
+    wave = np.sin(2 * np.pi * frequency * T + phase)
+    out = band_pass(wave + 0.2, DT, (0.4, 5.0))
+    assert np.max(np.abs(out - wave)[INNER]) < 0.005  # the gain is one there; ends leak a little
+
+
+@pytest.mark.parametrize(("frequency", "gain"), [(0.2, 0.0), (0.4, 0.5), (5.0, 0.5), (6.0, 0.0)])
+def test_gain_of_the_band(frequency, gain):
+    wave = np.sin(2 * np.pi * frequency * T)
+    out = band_pass(wave, DT, (0.4, 5.0))[INNER]
+    # Read off a record of 30 s with flanks of 0.2 Hz: a few per cent.
+    assert np.sqrt(2) * out.std() == pytest.approx(gain, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (((0.3, 5.0), 3), "integrate once or twice: times must be 1 or 2; received 3"),
+        (((0.0, 5.0), 1), r"needs 0 < low < high.*received \(0, 5\) Hz"),
+        (((2.0, 1.0), 1), r"received \(2, 1\) Hz"),
+        (((0.3, 60.0), 1), r"at most the Nyquist frequency \(50 Hz\)"),
+    ],
+)
+def test_bands_that_are_none(arguments, message):
+    with pytest.raises(RequestError, match=message):
+        integrate(T, DT, *arguments)
+
+
+def test_derivative_of_a_quartic_is_exact():
+    # Fourth order, at the ends too; rounding of T⁴ = 4e7 over dt.
+    t = np.arange(0, 2, 0.1)
+    np.testing.assert_allclose(differentiate(t**4 - t, 0.1), 4 * t**3 - 1, atol=1e-11)
+
+
+def test_error_of_the_derivative_is_the_one_stated():
+    omega, dt = 2 * np.pi, 0.02
+    t = np.arange(0, 5, dt)
+    error = differentiate(np.sin(omega * t), dt) - omega * np.cos(omega * t)
+    # dt⁴ f⁗′/30, its next term (ω dt)² smaller: 1.6 %.
+    assert np.max(np.abs(error[2:-2])) == pytest.approx(dt**4 * omega**5 / 30, rel=0.02)
+
+
+def test_derivative_needs_five_samples():
+    with pytest.raises(RequestError, match="at least 5 are needed"):
+        differentiate([1.0, 2.0, 3.0, 4.0], 0.1)
+
+
+def test_envelope_of_a_group():
+    slow = 1.0 + 0.4 * np.cos(2 * np.pi * 0.05 * T)
+    out = envelope_squared(5.0 + slow * np.sin(2 * np.pi * 1.0 * T), DT)
+    # The kernel of the Hilbert transform falls as 1/(π t): a kink at an end, 25 s away, leaks
+    # about 1/(π ω t) = 0.002 of its size, twice an amplitude of 1.4, into a square of 2.
+    np.testing.assert_allclose(out[INNER], (slow**2)[INNER], atol=0.03)
+
+
+def test_channels_side_by_side():
+    both = np.column_stack([np.sin(5 * T), np.cos(3 * T)])
+    for function in (
+        lambda x: integrate(x, DT, (0.3, 5.0)),
+        lambda x: differentiate(x, DT),
+        lambda x: envelope_squared(x, DT),
+    ):
+        together = function(both)
+        assert together.shape == both.shape
+        for i in range(2):
+            # Rounding of the mean, which the prediction of a pure sine magnifies at the ends.
+            np.testing.assert_allclose(together[:, i], function(both[:, i]), atol=1e-6)

@@ -1,0 +1,75 @@
+"""Low-pass filters: what they were asked for, measured."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import signal
+
+from seakeep.errors import RequestError
+from seakeep.signals import low_pass, lowpass_taps
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.floats(min_value=0.02, max_value=0.3),
+    st.floats(min_value=1.1, max_value=1.5),
+    st.sampled_from([50.0, 60.0, 80.0]),
+)
+def test_gains_of_the_taps(passband, ratio, attenuation):
+    stopband = passband * ratio
+    taps = lowpass_taps(1.0, passband, stopband, attenuation)
+    frequency, response = signal.freqz(taps, worN=8192, fs=1.0)
+    gain = np.abs(response)
+    # The design is checked on a grid; between its points, 1/64 of a lobe apart, 1 ‰ may hide.
+    ripple = 1.002 * 10 ** (-attenuation / 20)
+    assert np.max(np.abs(gain[frequency <= passband] - 1)) < ripple
+    assert np.max(gain[frequency >= stopband]) < ripple
+    assert taps.size % 2 == 1
+    np.testing.assert_array_equal(taps, taps[::-1])
+    assert taps.sum() == pytest.approx(1.0, rel=1e-12)  # unit gain at 0 Hz, to rounding
+
+
+def test_the_filter_of_the_paper_has_about_2400_taps():
+    assert 2300 < lowpass_taps(500.0, 10.0, 10.75, 60.0).size < 2500
+
+
+def test_phase_is_kept():
+    dt = 0.01
+    t = np.arange(0, 40, dt)
+    slow = np.sin(2 * np.pi * 0.7 * t + 0.4)
+    out = low_pass(slow, dt, passband=3.0)
+    # The pass-band ripple of 60 dB is 1e-3; the ends rest on a reflection.
+    assert np.max(np.abs(out - slow)[200:-200]) < 1e-3
+
+
+def test_constants_and_ramps_are_kept_up_to_the_ends():
+    t = np.arange(0, 10, 0.01)
+    for series in (np.full(t.size, 3.0), 2.0 * t - 1.0):
+        # Point reflection continues a ramp exactly: only rounding is left.
+        np.testing.assert_allclose(low_pass(series, 0.01, 2.0), series, atol=1e-12)
+
+
+def test_channels_side_by_side():
+    series = np.random.default_rng(0).standard_normal((500, 3))
+    together = low_pass(series, 0.1, 1.0)
+    for i in range(3):
+        # The convolution by blocks sums in another order.
+        np.testing.assert_allclose(together[:, i], low_pass(series[:, i], 0.1, 1.0), atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: low_pass(np.ones(50), 0.1, 6.0), r"0 < passband < stopband < half the sampling"),
+        (lambda: low_pass(np.ones(50), 0.0, 1.0), r"the time step must be positive \(s\); rec"),
+        (lambda: low_pass(1.0, 0.1, 1.0), "the series has 0 samples along its first axis"),
+        (
+            lambda: low_pass([0.0, np.nan, 1.0], 0.1, 1.0),
+            "holds 1 values that are not finite, the first at sample 1. Fill or cut the gap",
+        ),
+    ],
+)
+def test_what_cannot_be_filtered(call, message):
+    with pytest.raises(RequestError, match=message):
+        call()

@@ -1,0 +1,117 @@
+"""From a campaign's [model] table to a model, and which samples train and test."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import seakeep
+from seakeep.campaign import ModelSettings
+from seakeep.errors import RequestError
+from seakeep.study import build_spec, compare, fit_campaign, training_runs
+
+RATE = 10.0
+
+
+@pytest.fixture
+def halves(tmp_path):
+    """One run of 200 s: its first half trains, its second tests."""
+    rng = np.random.default_rng(4)
+    time = np.arange(2001) / RATE
+    eta = np.sin(2 * np.pi * 0.5 * time + np.sin(time / 9)) + 0.1 * rng.standard_normal(time.size)
+    heave = np.zeros(time.size)
+    for k in range(2, time.size):
+        heave[k] = 1.7 * heave[k - 1] - 0.8 * heave[k - 2] + 0.1 * eta[k - 1]
+    table = np.column_stack([time, eta, heave])
+    np.savetxt(
+        tmp_path / "run.csv", table, delimiter=",", header="t [s],eta [m],z [m]", comments=""
+    )
+    return tmp_path
+
+
+def campaign(folder: Path, model: str, runs: str | None = None) -> seakeep.Campaign:
+    runs = runs or '[runs.all]\nfile = "run.csv"\ntrain = [0.0, 100.0]\ntest = [100.0, 200.0]\n'
+    (folder / "campaign.toml").write_text(
+        '[channels.eta_fwd]\ncolumn = "eta"\n[channels.heave]\ncolumn = "z"\n'
+        f'{runs}\n[model]\nstates = ["heave"]\ninputs = ["eta_fwd"]\n{model}\n'
+    )
+    return seakeep.read_campaign(folder / "campaign.toml")
+
+
+EXACT = "state_delays = 2\ninput_delays = 2\nridge = 1e-9"
+
+
+def test_only_the_training_span_trains(halves):
+    model = fit_campaign(campaign(halves, EXACT))
+    assert model.training.stop == (100.0,)
+    assert model.training.columns == (1001 - 1 - 2,)
+
+
+def test_the_test_starts_in_the_test_span_with_history_from_before_it(halves):
+    model = fit_campaign(campaign(halves, "state_delays = 2\ninput_delays = 60\nridge = 1e-9"))
+    (judged,) = compare(model, campaign(halves, EXACT))
+    assert judged.start == 100.0  # the 60 samples of history lie in the training half
+    assert float(judged.forecast.time[-1]) == 200.0
+    # The system is linear; what is left is the mean: the window's means are not those of a steady
+    # state, and a model of deviations has no constant term (the ends of the window over its
+    # length, some 1e-4 here).
+    assert judged.anrmse < 1e-3
+
+
+def test_a_run_that_only_tests_starts_when_its_history_is_full(halves):
+    runs = (
+        '[runs.a]\nfile = "run.csv"\nspan = [0.0, 100.0]\nrole = "train"\n'
+        '[runs.b]\nfile = "run.csv"\nspan = [100.0, 200.0]\nrole = "test"\n'
+    )
+    whole = campaign(halves, "state_delays = 2\ninput_delays = 60\nridge = 1e-9", runs)
+    (judged,) = compare(fit_campaign(whole), whole)
+    assert judged.run == "b"
+    assert judged.start == pytest.approx(106.0)
+
+
+def test_start_and_steps_of_the_user_are_taken(halves):
+    whole = campaign(halves, EXACT)
+    (judged,) = compare(fit_campaign(whole), whole, ["all"], start=150.0, steps=20)
+    assert judged.forecast.sizes["time"] == 20
+    assert float(judged.forecast.time[0]) == pytest.approx(150.1)
+
+
+def test_steps_one_past_the_record_are_judged_where_there_is_a_measurement(halves):
+    whole = campaign(halves, EXACT)
+    (judged,) = compare(fit_campaign(whole), whole, ["all"], start=199.0, steps=11)
+    assert judged.forecast.sizes["time"] == 10
+    assert judged.status == "ok"
+
+
+def test_a_preset_counts_in_encounter_periods_and_keys_override_it():
+    settings = ModelSettings(states=("heave",), inputs=("eta_fwd",), preset="paper", ridge=7.0)
+    spec = build_spec(settings, encounter_period=2.0, dt=0.1)
+    assert (spec.state_delays, spec.input_delays, spec.window) == (20, 100, 400)
+    assert spec.ridge == 7.0
+    assert spec.delay_rows == "ridge"
+
+
+def test_a_preset_without_period_says_where_to_state_it():
+    settings = ModelSettings(states=("heave",), preset="recommended")
+    with pytest.raises(RequestError, match=r"State encounter_period \(s\) in \[campaign\]"):
+        build_spec(settings, encounter_period=None, dt=0.1)
+
+
+def test_a_missing_key_is_named_with_the_preset_as_a_way_out():
+    settings = ModelSettings(states=("heave",), state_delays=3)
+    with pytest.raises(
+        RequestError, match=r"no input_delays\. Add input_delays, ridge, or a preset"
+    ):
+        build_spec(settings, encounter_period=1.0, dt=0.1)
+
+
+def test_a_campaign_without_training_run_is_refused(halves):
+    whole = campaign(halves, EXACT, '[runs.b]\nfile = "run.csv"\nrole = "test"\n')
+    with pytest.raises(RequestError, match="no run of the campaign trains a model"):
+        training_runs(whole.prepare())
+
+
+def test_a_campaign_without_test_run_is_told_to_name_one(halves):
+    whole = campaign(halves, EXACT, '[runs.a]\nfile = "run.csv"\nrole = "train"\n')
+    with pytest.raises(RequestError, match="no run of the campaign tests a model"):
+        compare(fit_campaign(whole), whole)

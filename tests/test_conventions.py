@@ -1,0 +1,95 @@
+"""Channels and units."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seakeep.conventions import canonical_channel, canonical_names, conversion, si_unit
+from seakeep.errors import RequestError
+
+
+@pytest.mark.parametrize(
+    ("unit", "si", "factor"),
+    [
+        ("m", "m", 1.0),
+        ("mm", "m", 1e-3),
+        ("cm", "m", 1e-2),
+        ("in", "m", 0.0254),
+        ("ft", "m", 0.3048),
+        ("deg", "rad", math.pi / 180),
+        ("°", "rad", math.pi / 180),
+        ("deg/s", "rad/s", math.pi / 180),
+        ("°/s²", "rad/s^2", math.pi / 180),
+        ("rad s-1", "rad/s", 1.0),
+        ("mrad", "rad", 1e-3),
+        ("rpm_is_not_known_but_rev/min", "", 0.0),
+        ("rev/min", "rad/s", 2 * math.pi / 60),
+        ("m/s2", "m/s^2", 1.0),
+        ("m/s^2", "m/s^2", 1.0),
+        ("m s^-2", "m/s^2", 1.0),
+        ("m·s⁻²", "m/s^2", 1.0),
+        ("m/s/s", "m/s^2", 1.0),
+        ("g", "m/s^2", 9.80665),
+        ("kn", "m/s", 0.5144444444444445),
+        ("km/h", "m/s", 1 / 3.6),
+        ("kN", "N", 1e3),
+        ("kgf", "N", 9.80665),
+        ("lbf", "N", 4.4482216152605),
+        ("Nm", "N m", 1.0),
+        ("kN m", "N m", 1e3),
+        ("kPa", "Pa", 1e3),
+        ("mbar", "Pa", 1e2),
+        ("hPa", "Pa", 1e2),
+        ("ms", "s", 1e-3),
+        ("mV", "V", 1e-3),
+        ("%", "1", 1e-2),
+        ("-", "1", 1.0),
+        ("", "1", 1.0),
+    ],
+)
+def test_units(unit, si, factor):
+    if not si:
+        with pytest.raises(RequestError, match="is not known"):
+            si_unit(unit)
+        return
+    assert si_unit(unit) == si
+    # conversion() rounds to 15 digits, so that 1 mm is 0.001 m.
+    assert conversion(unit, si) == pytest.approx(factor, rel=1e-14)
+
+
+@pytest.mark.parametrize("name", canonical_names())
+def test_every_canonical_unit_is_si(name):
+    channel = canonical_channel(name)
+    assert si_unit(channel.units) == channel.units
+    assert conversion(channel.units, channel.units) == 1.0
+    assert channel.name == name
+    assert channel.long_name
+
+
+def test_families_of_channels():
+    assert canonical_channel("eta_fwd").long_name == "wave elevation fwd"
+    assert canonical_channel("mooring_port").units == "N"
+    assert canonical_channel("Eta") is None
+
+
+@given(st.sampled_from(["mm", "cm", "m", "ft"]), st.sampled_from(["mm", "m", "km", "in"]))
+def test_there_and_back(one, other):
+    # Each factor is rounded to 15 digits.
+    assert conversion(one, other) * conversion(other, one) == pytest.approx(1.0, rel=3e-15)
+
+
+def test_an_angle_is_no_number_and_no_length():
+    with pytest.raises(
+        RequestError,
+        match=r"the unit 'mm' does not fit pitch, which is measured in 'rad'\. Correct the unit",
+    ):
+        conversion("mm", "rad", "pitch")
+    with pytest.raises(RequestError, match="does not fit the channel"):
+        conversion("-", "rad")
+
+
+def test_unknown_unit():
+    with pytest.raises(RequestError, match=r"the unit 'furlong' is not known.*Write it as 'mm'"):
+        si_unit("furlong")

@@ -1,0 +1,317 @@
+"""Error measures: by hand, by MATLAB's formula, by scikit-learn, and who is left out of them."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seakeep import DataError, HankelDMDc, RequestError, metrics
+
+MEASURED = np.array([[0.0, 10.0], [2.0, 30.0], [4.0, 20.0], [2.0, 40.0]])
+PREDICTED = np.array([[1.0, 10.0], [2.0, 20.0], [3.0, 20.0], [2.0, 50.0]])
+# SD with ddof = 1: √(8/3) and √(500/3). Squared errors: 1, 0, 1, 0 and 0, 100, 0, 100.
+SD = np.sqrt(np.array([8.0, 500.0]) / 3)
+ALL = [
+    metrics.nrmse,
+    metrics.anrmse,
+    metrics.error_over_time,
+    metrics.nammae,
+    metrics.normalised_extremes_error,
+    metrics.fit_percent,
+]
+
+
+def labelled(values, names=("heave", "mooring_bow"), dims=("time",), step=0.5, **attrs):
+    return xr.Dataset(
+        {name: (dims, values[..., column], attrs) for column, name in enumerate(names)},
+        coords={"time": step * np.arange(values.shape[-2])},
+    )
+
+
+def both(predicted=PREDICTED, measured=MEASURED):
+    return {"predicted": predicted, "measured": measured}
+
+
+def test_nrmse_by_hand():
+    # Arithmetic of four numbers: rounding alone, here and below.
+    np.testing.assert_allclose(metrics.nrmse(**both()), np.sqrt([0.5, 50.0]) / SD, rtol=1e-14)
+
+
+def test_anrmse_is_the_average_over_the_channels():
+    expected = np.mean(np.sqrt([0.5, 50.0]) / SD)
+    value = metrics.anrmse(**both())
+    assert isinstance(value, float)
+    assert value == pytest.approx(expected, rel=1e-14)
+
+
+def test_error_over_time_by_hand():
+    errors = np.array([[1.0, 0.0], [0.0, 10.0], [1.0, 0.0], [0.0, 10.0]])
+    np.testing.assert_allclose(
+        metrics.error_over_time(**both()), (errors / SD).mean(axis=1), rtol=1e-14
+    )
+
+
+def test_nammae_by_hand():
+    # Minima 1 and 0, 10 and 10; maxima 3 and 4, 50 and 40.
+    each = 0.5 * np.array([1.0 + 1.0, 0.0 + 10.0]) / SD
+    np.testing.assert_allclose(metrics.normalised_extremes_error(**both()), each, rtol=1e-14)
+    assert metrics.nammae(**both()) == pytest.approx(each.mean(), rel=1e-14)
+
+
+def test_fit_percent_is_matlabs_formula():
+    # 100 (1 − ‖y − ŷ‖ / ‖y − mean(y)‖), as the help page of compare states it.
+    expected = 100 * (1 - np.sqrt([2.0, 200.0]) / np.sqrt([8.0, 500.0]))
+    np.testing.assert_allclose(metrics.fit_percent(**both()), expected, rtol=1e-13)
+
+
+def test_measures_of_a_perfect_forecast():
+    perfect = both(MEASURED, MEASURED)
+    assert metrics.anrmse(**perfect) == metrics.nammae(**perfect) == 0.0
+    np.testing.assert_array_equal(metrics.fit_percent(**perfect), 100.0)
+    np.testing.assert_array_equal(metrics.error_over_time(**perfect), 0.0)
+
+
+def test_the_mean_as_forecast_has_no_fit():
+    mean = np.broadcast_to(MEASURED.mean(axis=0), MEASURED.shape)
+    np.testing.assert_allclose(metrics.fit_percent(**both(mean)), 0.0, atol=1e-12)  # of 100
+
+
+@pytest.mark.oracle
+def test_nrmse_and_fit_agree_with_scikit_learn():
+    sklearn = pytest.importorskip("sklearn.metrics")
+    rng = np.random.default_rng(0)
+    measured = rng.standard_normal((200, 3)) * [1, 5, 0.1] + [0, 3, -1]
+    predicted = measured + 0.3 * rng.standard_normal((200, 3))
+    root = sklearn.root_mean_squared_error(measured, predicted, multioutput="raw_values")
+    np.testing.assert_allclose(
+        metrics.nrmse(**both(predicted, measured)), root / measured.std(axis=0, ddof=1), rtol=1e-12
+    )
+    # R² = 1 − (1 − fit)², as both are ratios of the same sums.
+    fit = metrics.fit_percent(**both(predicted, measured)) / 100
+    r2 = sklearn.r2_score(measured, predicted, multioutput="raw_values")
+    np.testing.assert_allclose(1 - (1 - fit) ** 2, r2, rtol=1e-10)
+
+
+@given(scale=st.floats(1e-3, 1e3), offset=st.floats(-100, 100), seed=st.integers(0, 50))
+def test_measures_do_not_depend_on_unit_or_offset(scale, offset, seed):
+    rng = np.random.default_rng(seed)
+    predicted, measured = rng.standard_normal((2, 30, 2))
+    moved = both(scale * predicted + offset, scale * measured + offset)
+    for measure in ALL:
+        # An offset of 100 on a spread of 1e-3 costs five digits of sixteen, twice squared.
+        np.testing.assert_allclose(
+            measure(**moved), measure(**both(predicted, measured)), rtol=1e-8, atol=1e-8
+        )
+
+
+@given(seed=st.integers(0, 50))
+def test_the_mean_square_of_the_error_over_time_is_the_squared_nrmse_of_one_channel(seed):
+    predicted, measured = np.random.default_rng(seed).standard_normal((2, 20, 1))
+    over_time = metrics.error_over_time(**both(predicted, measured))
+    whole = metrics.anrmse(**both(predicted, measured))
+    assert np.sqrt(np.mean(over_time**2)) == pytest.approx(whole, rel=1e-12)
+
+
+def test_arguments_must_be_named():
+    for measure in ALL:
+        with pytest.raises(TypeError, match="takes 0 positional arguments"):
+            measure(PREDICTED, MEASURED)
+
+
+# Who is left out
+
+
+@pytest.mark.parametrize("part", [0.0, 0.0099])
+def test_a_slack_channel_is_nan_and_left_out_of_averages(part):
+    training = [1.0, 1.0]
+    slack = MEASURED.copy()
+    slack[:, 1] = 7.0 + part * (MEASURED[:, 1] - 25) / SD[1]
+    arguments = both(PREDICTED, slack) | {"training_std": training}
+    alone = both(PREDICTED[:, :1], slack[:, :1])
+    for measure in (metrics.nrmse, metrics.normalised_extremes_error, metrics.fit_percent):
+        values = measure(**arguments)
+        assert np.isnan(values[1])
+        assert values[0] == measure(**alone)[0]
+    for average in (metrics.anrmse, metrics.nammae):
+        assert average(**arguments) == average(**alone)
+    np.testing.assert_array_equal(
+        metrics.error_over_time(**arguments), metrics.error_over_time(**alone)
+    )
+
+
+def test_a_channel_just_above_the_limit_is_judged():
+    tight = MEASURED.copy()
+    tight[:, 1] = 7.0 + 0.0101 * (MEASURED[:, 1] - 25) / SD[1]
+    values = metrics.nrmse(**both(PREDICTED, tight), training_std=[1.0, 1.0])
+    assert np.all(np.isfinite(values))
+
+
+@pytest.mark.parametrize("value", [0.0, 0.1, 1e5 / 3])
+def test_a_constant_measurement_cannot_be_judged(value):
+    # Of thirty samples the mean is off by rounding, and the spread with it.
+    predicted, measured = np.tile(PREDICTED, (8, 1))[:30], np.tile(MEASURED, (8, 1))[:30]
+    measured[:, 1] = value
+    each = metrics.nrmse(**both(predicted, measured))
+    assert np.isnan(each[1])
+    assert metrics.anrmse(**both(predicted, measured)) == each[0]
+
+
+def test_without_any_channel_to_judge_the_average_is_nan():
+    flat = both(PREDICTED, np.full_like(MEASURED, 0.1))
+    assert np.isnan(metrics.anrmse(**flat))
+    assert np.isnan(metrics.nammae(**flat))
+    assert np.all(np.isnan(metrics.error_over_time(**flat)))
+
+
+def test_a_diverged_forecast_is_nan_and_not_left_out():
+    diverged = PREDICTED.copy()
+    diverged[2:, 1] = np.nan
+    for measure in (metrics.nrmse, metrics.normalised_extremes_error, metrics.fit_percent):
+        values = measure(**both(diverged))
+        assert np.isfinite(values[0])
+        assert np.isnan(values[1])
+    assert np.isnan(metrics.anrmse(**both(diverged)))
+    assert np.isnan(metrics.nammae(**both(diverged)))
+    over_time = metrics.error_over_time(**both(diverged))
+    np.testing.assert_array_equal(np.isnan(over_time), [False, False, True, True])
+
+
+def test_a_gap_in_the_measurement_is_nan_and_not_left_out():
+    gap = MEASURED.copy()
+    gap[2, 1] = np.nan
+    assert np.isnan(metrics.nrmse(**both(PREDICTED, gap))[1])
+    assert np.isnan(metrics.anrmse(**both(PREDICTED, gap)))
+    assert np.isnan(metrics.nammae(**both(PREDICTED, gap)))
+    assert np.all(np.isnan(metrics.error_over_time(**both(PREDICTED, gap))))
+
+
+# Members
+
+
+def test_members_are_judged_one_by_one():
+    members = np.stack([PREDICTED, MEASURED, 2 * MEASURED])
+    for measure, shape in (
+        (metrics.nrmse, (3, 2)),
+        (metrics.fit_percent, (3, 2)),
+        (metrics.anrmse, (3,)),
+        (metrics.nammae, (3,)),
+        (metrics.error_over_time, (3, 4)),
+    ):
+        together = measure(**both(members))
+        assert together.shape == shape
+        for one in range(3):
+            np.testing.assert_array_equal(together[one], measure(**both(members[one])))
+
+
+def test_labelled_members_keep_their_dimension():
+    members = labelled(np.stack([PREDICTED, MEASURED]), dims=("member", "time"))
+    measured = labelled(MEASURED)
+    each = metrics.nrmse(predicted=members, measured=measured)
+    assert each.heave.dims == ("member",)
+    assert float(each.heave[1]) == 0.0
+    average = metrics.anrmse(predicted=members, measured=measured)
+    assert average.dims == ("member",)
+    np.testing.assert_allclose(average, [metrics.anrmse(**both()), 0.0], rtol=1e-14)
+    over_time = metrics.error_over_time(predicted=members, measured=measured)
+    assert over_time.dims == ("member", "time")
+
+
+# Datasets
+
+
+def test_datasets_give_what_arrays_give():
+    datasets = both(labelled(PREDICTED), labelled(MEASURED))
+    for measure in (metrics.nrmse, metrics.normalised_extremes_error, metrics.fit_percent):
+        result = measure(**datasets)
+        assert list(result.data_vars) == ["heave", "mooring_bow"]
+        np.testing.assert_array_equal(
+            [float(result.heave), float(result.mooring_bow)], measure(**both())
+        )
+    assert metrics.anrmse(**datasets) == metrics.anrmse(**both())
+    assert metrics.nammae(**datasets) == metrics.nammae(**both())
+    over_time = metrics.error_over_time(**datasets)
+    np.testing.assert_array_equal(over_time, metrics.error_over_time(**both()))
+    np.testing.assert_array_equal(over_time.time, datasets["predicted"].time)
+
+
+def test_channels_are_matched_by_name_and_instants_by_time():
+    longer = np.concatenate([np.full((3, 2), 99.0), MEASURED, np.full((2, 2), -99.0)])
+    measured = labelled(longer)[["mooring_bow", "heave"]]
+    measured = measured.assign(other=measured.heave, time=measured.time - 1.5)
+    predicted = labelled(PREDICTED)
+    assert metrics.anrmse(predicted=predicted, measured=measured) == metrics.anrmse(**both())
+
+
+def test_times_may_differ_by_rounding():
+    measured = labelled(MEASURED)
+    measured = measured.assign_coords(time=measured.time + 1e-9)
+    assert metrics.anrmse(predicted=labelled(PREDICTED), measured=measured) == metrics.anrmse(
+        **both()
+    )
+
+
+def test_a_forecast_carries_the_training_spread_that_finds_slack_lines(run, channels):
+    model = HankelDMDc(3, 8, 1.0).fit(run, **channels)
+    forecast = model.forecast(run, start=5.0, steps=100)
+    measured = run.copy(deep=True)
+    measured.pitch[:] = measured.pitch.mean() + 1e-4 * (measured.pitch - measured.pitch.mean())
+    each = metrics.nrmse(predicted=forecast, measured=measured)
+    assert np.isnan(float(each.pitch))
+    assert metrics.anrmse(predicted=forecast, measured=measured) == float(each.heave)
+    told = metrics.nrmse(predicted=forecast, measured=measured, training_std=[0.0, 0.0])
+    assert np.isfinite(float(told.pitch))
+
+
+# Refused
+
+
+@pytest.mark.parametrize("measure", ALL)
+def test_a_transposed_array_is_refused(measure):
+    message = r"shape \(2, 4\) and measured \(4, 2\); .*\(time, channel\).* looks transposed"
+    with pytest.raises(RequestError, match=message):
+        measure(**both(PREDICTED.T))
+
+
+@pytest.mark.parametrize("measure", ALL)
+def test_lengths_that_differ_are_refused(measure):
+    with pytest.raises(RequestError, match=r"predicted has shape \(3, 2\) and measured \(4, 2\)"):
+        measure(**both(PREDICTED[:3]))
+
+
+def test_one_sample_has_no_spread():
+    with pytest.raises(RequestError, match=r"a window of 1 sample\(s\) has no standard deviation"):
+        metrics.nrmse(**both(PREDICTED[:1], MEASURED[:1]))
+
+
+def test_a_dataset_and_an_array_are_refused():
+    with pytest.raises(RequestError, match=r"both be Datasets .* received Dataset and ndarray"):
+        metrics.nrmse(predicted=labelled(PREDICTED), measured=MEASURED)
+
+
+def test_a_channel_that_was_not_measured_is_named():
+    message = r"measured has no channel 'mooring_bow'\. Did you mean 'mooring_bo'\? It has: heave"
+    with pytest.raises(RequestError, match=message):
+        metrics.nrmse(
+            predicted=labelled(PREDICTED), measured=labelled(MEASURED, ("heave", "mooring_bo"))
+        )
+
+
+@pytest.mark.parametrize("shift", [0.1, 0.5, 10.0])
+def test_instants_that_were_not_measured_are_refused(shift):
+    predicted = labelled(PREDICTED)
+    predicted = predicted.assign_coords(time=predicted.time + shift)
+    with pytest.raises(DataError, match=r"not every instant of the first is one of the second"):
+        metrics.nrmse(predicted=predicted, measured=labelled(MEASURED))
+
+
+def test_units_that_differ_are_refused():
+    predicted, measured = labelled(PREDICTED, units="m"), labelled(MEASURED, units="mm")
+    message = r"channel 'heave' is in 'm' in predicted and in 'mm' in measured\. Convert one"
+    with pytest.raises(DataError, match=message):
+        metrics.nrmse(predicted=predicted, measured=measured)
+
+
+def test_training_spreads_must_be_one_a_channel():
+    with pytest.raises(RequestError, match=r"training_std has shape \(3,\); .* 2 channels"):
+        metrics.nrmse(**both(), training_std=[1.0, 1.0, 1.0])
