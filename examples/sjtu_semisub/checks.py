@@ -12,9 +12,20 @@ from scipy import signal
 
 import seakeep
 from seakeep.campaign import read_table
-from seakeep.study import fit_campaign
+from seakeep.study import compare, fit_campaign
 
 HERE = Path(__file__).parent
+
+
+def tenths(campaign, model):
+    """NRMSE of heave in ten pieces of the forecast: does it fade?"""
+    (judged,) = compare(model, campaign)
+    error = (judged.forecast.heave - judged.measured.heave).values
+    pieces = zip(
+        np.array_split(error, 10), np.array_split(judged.measured.heave.values, 10), strict=True
+    )
+    parts = [np.sqrt(np.mean(e**2)) / m.std(ddof=1) for e, m in pieces]
+    print("NRMSE of heave by tenths of the forecast: " + ", ".join(f"{p:.2f}" for p in parts))
 
 
 def other_record(campaign, model):
@@ -40,6 +51,7 @@ def linear_bound(campaign, model):
 def main():
     campaign = seakeep.read_campaign(HERE / "campaign.toml")
     model = fit_campaign(campaign)
+    tenths(campaign, model)
     other_record(campaign, model)
     linear_bound(campaign, model)
 
