@@ -1,8 +1,10 @@
 """Models: what is identified from prepared runs, and what it forecasts."""
 
+import warnings
+from dataclasses import asdict, replace
 from pathlib import Path
 
-from seakeep.errors import DataError
+from seakeep.errors import DataError, SeakeepWarning
 from seakeep.models import store
 from seakeep.models.hankel import HankelDMDc
 from seakeep.models.model import HankelDMDcModel
@@ -38,6 +40,9 @@ def load_model(path: str | Path) -> HankelDMDcModel:
             "Update seakeep."
         )
     try:
-        return HankelDMDcModel.from_dataset(dataset)
+        model = HankelDMDcModel.from_dataset(dataset)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SeakeepWarning)  # given when the model was made
+            return replace(model, settings=HankelDMDc(**asdict(model.settings)))
     except (KeyError, TypeError, ValueError) as error:
         raise DataError(f"{path} is incomplete: {error}. Save the model again.") from error

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -175,6 +176,12 @@ def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
                 f"{what} must be a list of channel names; received the string '{names}'. "
                 f"Write {what}=['{names}']."
             )
+        listed = isinstance(cast("object", names), Iterable)
+        if not listed or not all(isinstance(cast("object", name), str) for name in names):
+            raise RequestError(
+                f"{what} must be a list of channel names; received {names!r}. A model without "
+                "input takes inputs=[]."
+            )
         double = {name for name in names if list(names).count(name) > 1}
         if double:
             raise RequestError(
@@ -209,7 +216,7 @@ def _stops(stop: Stop, names: list[str]) -> dict[str, float | None]:
                 "one a run."
             )
         return dict(zip(names, values, strict=True))
-    return dict.fromkeys(names, float(np.asarray(stop, dtype=float)))
+    return dict.fromkeys(names, labelled.as_instant(stop, "stop"))
 
 
 def _last_sample(time: FloatArray, stop: float | None, name: str) -> int:

@@ -187,7 +187,9 @@ def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
     Dataset
         Over ``run`` and ``channel``: ``nrmse``, ``fit`` (%), ``nammae``, ``sd_ratio`` (predicted
         over measured), ``measured_min``, ``measured_max``, ``predicted_min``, ``predicted_max``
-        (in ``channel_units``); over ``run``: ``anrmse``, ``mean_nammae``, ``status``, ``start``.
+        (in ``channel_units``); over ``run``: ``anrmse`` and ``mean_nammae`` over
+        the channels that can be judged, ``slack_channels`` (how many cannot), ``status``,
+        ``start``.
     """
     rows = [_row(comparison) for comparison in comparisons]
     table = xr.concat(rows, dim="run")
@@ -231,6 +233,7 @@ def _row(comparison: Comparison) -> xr.Dataset:
         | {
             "anrmse": comparison.anrmse,
             "mean_nammae": float(metrics.nammae(predicted=p, measured=m)),
+            "slack_channels": int(metrics.is_slack(predicted=p, measured=m).to_array().sum()),
             "status": comparison.status,
             "start": comparison.start,
         },
