@@ -3,6 +3,7 @@
 import base64
 import html
 import io
+import re
 from importlib import metadata
 
 from docutils import nodes
@@ -44,7 +45,7 @@ suppress_warnings = ["myst.xref_missing"]  # the examples' pages link to files b
 def formula(text):
     """Draw a formula with matplotlib: pages show it without network and without LaTeX."""
     picture = io.BytesIO()
-    source = " ".join(text.split())
+    source = re.sub(r"\\mathcal (\w)", r"\\mathcal{\1}", " ".join(text.split()))
     for unknown, known in ((r"\|", r"\Vert "), (r"\tfrac12", r"\frac{1}{2}")):
         source = source.replace(unknown, known)
     style = {"svg.hashsalt": "seakeep", "mathtext.fontset": "stix", "svg.fonttype": "path"}
