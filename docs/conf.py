@@ -46,7 +46,7 @@ def formula(text):
     """Draw a formula with matplotlib: pages show it without network and without LaTeX."""
     picture = io.BytesIO()
     source = re.sub(r"\\mathcal (\w)", r"\\mathcal{\1}", " ".join(text.split()))
-    for unknown, known in ((r"\|", r"\Vert "), (r"\tfrac12", r"\frac{1}{2}")):
+    for unknown, known in ((r"\#", "N"), (r"\|", r"\Vert "), (r"\tfrac12", r"\frac{1}{2}")):
         source = source.replace(unknown, known)
     style = {"svg.hashsalt": "seakeep", "mathtext.fontset": "stix", "svg.fonttype": "path"}
     try:
