@@ -6,18 +6,16 @@
 Figures of results are drawn small and in few colours, so that the repository stays light.
 """
 
-import io
 import sys
 from pathlib import Path
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from PIL import Image
 
 import seakeep
 from seakeep.report.overlay import overlay_figure
-from seakeep.report.style import figure_style
+from seakeep.report.style import save_figure
 from seakeep.study import compare, fit_campaign, in_degrees
 
 HERE = Path(__file__).parent
@@ -169,18 +167,13 @@ def indices():
             bottom -= part
             draw(figure.add_axes((0.0, bottom, 1.0, part)))
         figure.savefig(HERE / "indices.svg", metadata={"Date": None})
-        save_light(figure, HERE / "indices.png", dpi=110)
+        save(figure, HERE / "indices.png")
 
 
 # --- figures of results --------------------------------------------------------------------------
-def save_light(figure, path, dpi=90, colours=128):
-    """Write a PNG with a small palette; line drawings lose nothing by it."""
+def save(figure, path):
     path.parent.mkdir(parents=True, exist_ok=True)
-    with figure_style():
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png", dpi=dpi)
-    picture = Image.open(stream).convert("RGB").quantize(colours)
-    picture.save(path, optimize=True)
+    save_figure(figure, path)
     print(f"{path.relative_to(ROOT)}  {path.stat().st_size / 1000:.0f} kB")
 
 
@@ -189,7 +182,7 @@ def overlays(campaign_file, model, runs, folder, prefix=""):
     campaign = seakeep.read_campaign(campaign_file)
     identified = fit_campaign(campaign, model)
     for each in compare(identified, campaign, runs):
-        save_light(overlay_figure(in_degrees(each)), folder / f"{prefix}{each.run}.png")
+        save(overlay_figure(in_degrees(each)), folder / f"{prefix}{each.run}.png")
 
 
 def ntnu():

@@ -149,10 +149,10 @@ def compare(
 
 
 def _prepared(campaign: Campaign, run: str) -> xr.Dataset:
-    if run not in campaign.runs:
+    known = list(campaign.settings.runs)
+    if run not in known:
         raise RequestError(
-            f"the campaign has no run '{run}'.{did_you_mean(run, campaign.runs)} "
-            f"Runs: {', '.join(campaign.runs)}."
+            f"the campaign has no run '{run}'.{did_you_mean(run, known)} Runs: {', '.join(known)}."
         )
     return load_prepared(campaign, names=[run])[run]
 
