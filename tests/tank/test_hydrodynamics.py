@@ -1,4 +1,5 @@
 import shutil
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -217,3 +218,29 @@ def test_response_can_take_the_kernels_coefficients(hydro, rig):
     # Splines between tabulated kernel coefficients, against the kernel itself.
     assert response(same, omega, rig.linear_damping) == pytest.approx(from_kernel, rel=1e-3)
     assert np.abs(from_file[:, :3]) == pytest.approx(np.abs(from_kernel[:, :3]), rel=0.01)
+
+
+@pytest.mark.oracle
+def test_builder_is_a_command(tmp_path, capsys):
+    pytest.importorskip("capytaine", reason="needs the extra tank-build")
+    from seakeep.tank.build import main
+
+    settings = tmp_path / "hull.toml"
+    coarse = "panels_along = 6\npanels_across = 6\npanels_down = 3\npanels_bottom = 2\n"
+    settings.write_text(f"[hull]\nmass = 55.0\n{coarse}", encoding="utf-8")
+    out = tmp_path / "hull.nc"
+    assert main([str(settings), "-o", str(out), "--frequencies", "2", "4"]) == 0
+    assert "kB" in capsys.readouterr().out
+    made = load_hydrodynamics(out)
+    assert made.omega == pytest.approx([2.0, 4.0])
+    assert made.attrs["vessel_mass"] == 55.0
+    assert main([str(tmp_path / "none.toml")]) == 2
+    assert "does not exist" in capsys.readouterr().err
+
+
+def test_missing_solver_names_the_extra(monkeypatch):
+    from seakeep.tank.build import build_hydrodynamics
+
+    monkeypatch.setitem(sys.modules, "capytaine", None)
+    with pytest.raises(RequestError, match=r"pip install 'seakeep\[tank-build\]'"):
+        build_hydrodynamics(HullSettings())
