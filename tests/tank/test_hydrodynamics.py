@@ -220,20 +220,34 @@ def test_response_can_take_the_kernels_coefficients(hydro, rig):
     assert np.abs(from_file[:, :3]) == pytest.approx(np.abs(from_kernel[:, :3]), rel=0.01)
 
 
+COARSE = "panels_along = 6\npanels_across = 6\npanels_down = 3\npanels_bottom = 2\n"
+
+
 @pytest.mark.oracle
-def test_builder_is_a_command(tmp_path, capsys):
+def test_another_hull_is_built_and_played_from_a_settings_file(tmp_path, capsys):
+    """No code: its dimensions, one command, its file in the settings."""
     pytest.importorskip("capytaine", reason="needs the extra tank-build")
     from seakeep.tank.build import main
+    from seakeep.tank.play import play_run
+    from seakeep.tank.settings import read_settings
 
     settings = tmp_path / "hull.toml"
-    coarse = "panels_along = 6\npanels_across = 6\npanels_down = 3\npanels_bottom = 2\n"
-    settings.write_text(f"[hull]\nmass = 55.0\n{coarse}", encoding="utf-8")
+    settings.write_text(
+        '[vessel]\nhydrodynamics = "hull.nc"\n'
+        f"[hull]\nmass = 55.0\nwaterplane_area = 1.05\npool = false\n{COARSE}"
+        "[runs.one]\nwavelength = 2.8\nheight = 0.1\nstartup = 5.0\nduration = 10.0\n",
+        encoding="utf-8",
+    )
+    frequencies = [str(0.5 * i) for i in range(1, 21)]
     out = tmp_path / "hull.nc"
-    assert main([str(settings), "-o", str(out), "--frequencies", "2", "4"]) == 0
+    assert main([str(settings), "-o", str(out), "--frequencies", *frequencies]) == 0
     assert "kB" in capsys.readouterr().out
     made = load_hydrodynamics(out)
-    assert made.omega == pytest.approx([2.0, 4.0])
+    assert made.names == ("surge", "heave", "pitch")
     assert made.attrs["vessel_mass"] == 55.0
+    played = play_run(read_settings(settings), "one")
+    assert played.motion.names == made.names
+    assert 0.01 < played.motion.position[1, -500:].std() < 0.05
     assert main([str(tmp_path / "none.toml")]) == 2
     assert "does not exist" in capsys.readouterr().err
 

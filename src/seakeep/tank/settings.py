@@ -7,7 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from seakeep.errors import RequestError, did_you_mean
 
@@ -58,8 +58,15 @@ class PoolGeometry(_Settings):
         return self
 
 
+def _no_pool(value: object) -> object:
+    return None if value is False else value
+
+
 class HullSettings(_Settings):
-    """Dimensions of the hull and the panels of its mesh; read by the mesh builder alone."""
+    """Dimensions of the hull and the panels of its mesh; read by the mesh builder alone.
+
+    ``pool = false`` in TOML is a hull without a moon pool.
+    """
 
     mass: Positive = 60.7
     centre_of_gravity: float = 0.03
@@ -68,7 +75,7 @@ class HullSettings(_Settings):
     beam_waterline: Positive = 0.86
     waterplane_area: Positive = 0.9035
     bottom_taper: Annotated[float, Field(ge=0, lt=0.6)] = 0.3165
-    pool: PoolGeometry | None = PoolGeometry()
+    pool: Annotated[PoolGeometry | None, BeforeValidator(_no_pool)] = PoolGeometry()
     internal_lid: Annotated[float, Field(lt=0)] = -0.005
     panels_along: Annotated[int, Field(ge=4)] = 14
     panels_across: Annotated[int, Field(ge=4)] = 10
