@@ -214,16 +214,15 @@ def tank():
     rig = check_settings(settings)
     played = {name: play_run(settings, name, rig) for name in settings.runs}
     measured = [realise(each, name) for name, each in played.items()]
-    save_light(hydrodynamics_figure(rig, settings), HERE / "tank_hydrodynamics.png")
-    save_light(spectrum_figure(settings, measured), HERE / "tank_spectrum.png")
+    save(hydrodynamics_figure(rig, settings), HERE / "tank_hydrodynamics.png")
+    save(spectrum_figure(settings, measured), HERE / "tank_spectrum.png")
     channels = ["eta_kn_fwd", "surge", "heave", "pitch", "piston", "mooring_bow", "mooring_stern"]
     run = truth(played["irregular_1"], "irregular_1", 0.05)
-    save_light(run_figure(run, channels), HERE / "tank_run.png")
+    save(run_figure(run, channels), HERE / "tank_run.png")
     cv2 = check_video()
     frame = next(side_view(played["irregular_1"], np.random.default_rng(0), [88.8]))
-    Image.fromarray(cv2.cvtColor(frame, cv2.COLOR_BGR2RGB)).resize((640, 360)).save(
-        HERE / "tank_side_view.jpg", quality=85, optimize=True
-    )
+    small = cv2.resize(frame, (640, 360), interpolation=cv2.INTER_AREA)
+    cv2.imwrite(str(HERE / "tank_side_view.jpg"), small, [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 
 DRAWINGS = {each.__name__: each for each in (indices, ntnu, sjtu, tank)}

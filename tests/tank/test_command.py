@@ -7,6 +7,8 @@ from typer.testing import CliRunner
 from seakeep.cli.tank import tank
 from seakeep.errors import RequestError
 
+pytest.importorskip("numba", reason="needs the extra tank")
+
 pytest.importorskip("matplotlib", reason="needs the extra figures")
 
 

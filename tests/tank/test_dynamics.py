@@ -23,6 +23,8 @@ from seakeep.tank.seas import Sea, regular_sea
 from seakeep.tank.settings import DriftSettings, VesselSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber
 
+pytest.importorskip("numba", reason="needs the extra tank")
+
 
 def small_sea(omega, amplitude=1e-5):
     omega = np.asarray(omega)

@@ -227,6 +227,7 @@ COARSE = "panels_along = 6\npanels_across = 6\npanels_down = 3\npanels_bottom = 
 def test_another_hull_is_built_and_played_from_a_settings_file(tmp_path, capsys):
     """No code: its dimensions, one command, its file in the settings."""
     pytest.importorskip("capytaine", reason="needs the extra tank-build")
+    pytest.importorskip("numba", reason="needs the extra tank")
     from seakeep.tank.build import main
     from seakeep.tank.play import play_run
     from seakeep.tank.settings import read_settings

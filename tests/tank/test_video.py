@@ -6,6 +6,7 @@ from seakeep.tank.play import play_run
 from seakeep.tank.video import METRES_PER_PIXEL, PANEL, PANEL_HEIGHT, pixel_of, render_side_view
 
 cv2 = pytest.importorskip("cv2", reason="needs the extra video")
+pytest.importorskip("numba", reason="needs the extra tank")
 
 
 @pytest.fixture(scope="module")
