@@ -1,12 +1,18 @@
-"""Zero crossings and the encounter period."""
+"""Zero crossings, the encounter period, spectra and heights."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seakeep.errors import DataError
-from seakeep.signals import encounter_period, zero_up_crossings
+from seakeep.errors import DataError, RequestError
+from seakeep.signals import (
+    encounter_period,
+    significant_height,
+    wave_heights,
+    wave_spectrum,
+    zero_up_crossings,
+)
 
 
 @given(
@@ -38,3 +44,40 @@ def test_still_water_has_no_period():
         match=r"the record of 5 s crosses its mean upwards 0 time\(s\); at least two .* Give a lo",
     ):
         encounter_period(np.zeros(100), 0.05)
+
+
+def test_the_spectrum_holds_the_variance():
+    rng = np.random.default_rng(0)
+    series = rng.standard_normal(20_000)
+    for options in ({}, {"segment": 4096, "overlap": 128, "padded": 65536}):
+        frequency, density = wave_spectrum(series, 0.05, **options)
+        # White noise of unit variance, 5 to 16 segments: a per cent or two of the variance.
+        assert np.trapezoid(density, frequency) == pytest.approx(1.0, rel=0.04)
+
+
+def test_a_tones_peak_is_found_between_the_segments_lines():
+    t = np.arange(0, 210, 0.01)
+    frequency, density = wave_spectrum(np.sin(2 * np.pi * 0.4717 * t), 0.01, 819, 25, 13107)
+    # A segment of 8.2 s has lines 0.12 Hz apart; padding places the peak to 0.0076 Hz.
+    assert frequency[np.argmax(density)] == pytest.approx(0.4717, abs=0.008)
+
+
+def test_segments_that_do_not_fit_are_refused():
+    with pytest.raises(RequestError, match=r"segments of 2 to 100 samples .* received segments of"):
+        wave_spectrum(np.ones(100), 0.1, segment=200)
+    with pytest.raises(RequestError, match="at least as long as a segment"):
+        wave_spectrum(np.ones(100), 0.1, segment=50, padded=20)
+
+
+def test_heights_are_crest_less_trough():
+    t = np.arange(0, 40, 0.005)
+    # Beats: the heights follow the envelope, twice the amplitude on average.
+    heights = wave_heights((1 + 0.1 * np.sin(0.5 * t)) * np.sin(6.0 * t), 0.005)
+    assert heights.size == pytest.approx(40 * 6 / (2 * np.pi), abs=1.5)
+    assert heights.mean() == pytest.approx(2.0, rel=0.01)
+    assert np.ptp(heights) == pytest.approx(0.4, rel=0.05)
+
+
+def test_significant_height_is_four_deviations():
+    t = np.arange(0, 100, 0.01)
+    assert significant_height(0.1 * np.sin(t * 2 * np.pi)) == pytest.approx(4 * 0.1 / np.sqrt(2))
