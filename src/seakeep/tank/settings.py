@@ -224,7 +224,7 @@ class ProbeSettings(_Settings):
 
 
 class SlapSettings(_Settings):
-    """Pulses on a load cell when its line goes slack or taut (mean N, Hz, s)."""
+    """Pulses on a load cell when its line is immersed or emerges (mean N, Hz, s)."""
 
     mean: NotNegative
     frequency: Pair = (2.0, 6.0)
