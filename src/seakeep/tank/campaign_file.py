@@ -20,6 +20,7 @@ STATES = (
     "surge", "heave", "pitch", "surge_rate", "heave_rate", "pitch_rate",
     "surge_acceleration", "heave_acceleration", "pitch_acceleration",
 )  # fmt: skip
+EDGES = (10.0, 10.75)  # Hz, of the paper's low-pass filter
 BAND = (0.2, 5.0)  # Hz, of the accelerations that are integrated
 
 
@@ -38,20 +39,19 @@ def _channel(name: str, column: str, unit: str, long_name: str = "") -> list[str
     return [*lines, ""]
 
 
-def _probe_channels(settings: TankSettings) -> dict[str, str]:
-    """Channel of each probe: the short name for the probes without drop-outs."""
-    channels: dict[str, str] = {}
-    for name, probe in settings.instruments.probes.items():
-        short = name.removeprefix("kn_") if probe.dropouts == 0 else name
-        channels[name] = f"eta_{short}"
-    return channels
+def _filtered(settings: TankSettings) -> dict[str, str]:
+    """Low-passed channel of each probe without drop-outs: ``kn_fwd`` → ``eta_fwd``."""
+    probes = settings.instruments.probes
+    sound = [name for name in probes if probes[name].dropouts == 0]
+    short = {name: name.partition("_")[2] or name for name in sound}
+    unique = len(set(short.values())) == len(short)
+    return {name: f"eta_{short[name]}" if unique else f"eta_{name}_filtered" for name in sound}
 
 
 def _inputs(settings: TankSettings) -> list[str]:
-    """Return the two channels that drive a model: the first probe downstream and one at rest."""
-    channels = _probe_channels(settings)
-    sound = {n: p for n, p in settings.instruments.probes.items() if p.dropouts == 0}
-    probes = sound or settings.instruments.probes
+    """Return the channels that drive a model: the first probe downstream and one at rest."""
+    channels = _filtered(settings)
+    probes = {name: settings.instruments.probes[name] for name in channels}
     if not probes:
         return []
     first = min(probes, key=lambda n: probes[n].position)
@@ -67,12 +67,14 @@ def _spans(run: RunSettings) -> list[str]:
     return [f"role = {_quoted(run.role)}", f"span = [{begin:g}, {end:g}]"]
 
 
-def _head(settings: TankSettings) -> list[str]:
+def _head(settings: TankSettings, lost: bool) -> list[str]:
+    probes = settings.instruments.probes
     positions = {
-        channel: settings.instruments.probes[probe].position
-        for probe, channel in _probe_channels(settings).items()
+        f"eta_{name}": probe.position
+        for name, probe in probes.items()
+        if lost or probe.dropouts == 0
     }
-    positions["cog_at_rest"] = settings.vessel.position
+    positions |= {channel: probes[name].position for name, channel in _filtered(settings).items()}
     return [
         "# Written by `seakeep tank`. Spans are in seconds of the reference clock (wave probes);",
         "# what lies before them is the start-up of the waves: cut it from every analysis.",
@@ -95,15 +97,24 @@ def _head(settings: TankSettings) -> list[str]:
 
 def _channels(settings: TankSettings, kind: str, lost: bool) -> list[str]:
     lines = []
-    for probe, channel in _probe_channels(settings).items():
-        if lost or settings.instruments.probes[probe].dropouts == 0:
-            lines += _channel(channel, _column(probe, "mm", kind), "mm")
+    for name, probe in settings.instruments.probes.items():
+        if lost or probe.dropouts == 0:
+            lines += _channel(f"eta_{name}", _column(name, "mm", kind), "mm")
     for channel, (column, unit) in MOTIONS.items():
         lines += _channel(channel, _column(column, unit, kind), unit)
     lines += _channel("surge", _column("surge", "m", kind), "m", "surge, tracked in the video")
     for name in settings.moorings:
         column = _column(f"mooring_{name}", "N", kind)
         lines += _channel(f"mooring_{name}", column, "N")
+    for name, channel in _filtered(settings).items():
+        lines += [
+            f"[derived.{channel}]",
+            f'from = "eta_{name}"',
+            'step = "low_pass"',
+            f"passband = {EDGES[0]}",
+            f"stopband = {EDGES[1]}",
+            "",
+        ]
     for rate, source in (("surge_rate", "surge"), ("heave_rate", "heave")):
         lines += [
             f"[derived.{rate}]",
@@ -161,7 +172,9 @@ def campaign_text(
     str
         TOML.
     """
-    lines = _head(settings) + _channels(settings, kind, lost=not one_logger)
+    # A single logger's file is for readers that know no gaps: its probes with drop-outs stay out.
+    lost = not one_logger
+    lines = _head(settings, lost) + _channels(settings, kind, lost)
     if not one_logger:
         lines += _instruments(settings)
     for name, run in settings.runs.items():

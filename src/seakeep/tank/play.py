@@ -29,14 +29,14 @@ MARGIN = 2.0  # s simulated before and after what any logger records
 STREAMS = {"waves": 0, "instruments": 1, "truth": 2}
 
 
-def _generator(settings: TankSettings, run: str, stream: str) -> np.random.Generator:
+def generator(settings: TankSettings, run: str, stream: str) -> np.random.Generator:
     """Independent generator of a run's stream: adding or leaving out a run changes no other."""
     return np.random.default_rng([settings.seed, zlib.crc32(run.encode()), STREAMS[stream]])
 
 
 def _sea(settings: TankSettings, rig: Rig, name: str) -> Sea:
     sea = sea_of_run(
-        name, settings.runs[name], settings.facility, _generator(settings, name, "waves")
+        name, settings.runs[name], settings.facility, generator(settings, name, "waves")
     )
     try:
         excitation_at(rig.hydro, sea.omega)
@@ -215,7 +215,7 @@ def noisy_truth(
         The eleven channels of the paper and the wave probes, start-up included.
     """
     played = play_run(settings, name, rig)
-    rng = _generator(settings, name, "truth")
+    rng = generator(settings, name, "truth")
     noise = settings.instruments
     clean = truth(played, name, step)
     sigma = {
@@ -284,7 +284,7 @@ def play(
         if progress is not None:
             progress(name, done, len(chosen))
         played = play_run(part, name, rig)
-        rng = _generator(part, name, "instruments")
+        rng = generator(part, name, "instruments")
         records = (
             [record_together(played, SINGLE_RATE, rng)] if one_logger else record_run(played, rng)
         )

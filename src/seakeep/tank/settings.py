@@ -261,7 +261,7 @@ class TankSettings(_Settings):
     """All settings of a virtual campaign."""
 
     name: str = "virtual towing tank"
-    seed: Annotated[int, Field(ge=0)] = 14
+    seed: Annotated[int, Field(ge=0)] = 0
     scale_factor: Positive = 50.0
     facility: FacilitySettings = FacilitySettings()
     hull: HullSettings = HullSettings()
