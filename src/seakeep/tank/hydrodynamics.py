@@ -176,8 +176,14 @@ def load_hydrodynamics(path: Path | str | None = None) -> Hydrodynamics:
             f"the hydrodynamics file {source} does not exist. Correct vessel.hydrodynamics, or "
             "build one: python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
         )
-    with xr.open_dataset(source, engine="h5netcdf") as opened:
-        data = opened.load()
+    try:
+        with xr.open_dataset(source, engine="h5netcdf") as opened:
+            data = opened.load()
+    except (OSError, ValueError) as error:
+        raise RequestError(
+            f"{source} is no NetCDF file that can be read ({error}). Build the file again: "
+            "python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
+        ) from error
     for key, expected in CONVENTIONS.items():
         if data.attrs.get(key) != expected:
             raise RequestError(
@@ -221,7 +227,8 @@ def _passive(matrices: FloatArray) -> FloatArray:
     """Nearest symmetric positive semi-definite matrices (Frobenius norm)."""
     values, vectors = np.linalg.eigh(0.5 * (matrices + matrices.swapaxes(-1, -2)))
     clipped = np.maximum(values, 0.0)[..., None, :]
-    result: FloatArray = (vectors * clipped) @ vectors.swapaxes(-1, -2)
+    projected = (vectors * clipped) @ vectors.swapaxes(-1, -2)
+    result: FloatArray = 0.5 * (projected + projected.swapaxes(-1, -2))
     return result
 
 
