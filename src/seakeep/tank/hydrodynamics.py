@@ -7,7 +7,6 @@ a moon pool, the absolute elevations of its piston and of its first longitudinal
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -19,6 +18,7 @@ import xarray as xr
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from seakeep.errors import RequestError
+from seakeep.files import replacing
 from seakeep.waves import GRAVITY
 
 __all__ = [
@@ -140,10 +140,8 @@ def save_hydrodynamics(data: xr.Dataset, path: Path | str) -> None:
     path : path
         Where to.
     """
-    target = Path(path)
-    part = target.with_name(target.name + ".part")
-    data.to_netcdf(part, engine="h5netcdf")
-    os.replace(part, target)
+    with replacing(Path(path)) as temporary:
+        data.to_netcdf(temporary, engine="h5netcdf")
 
 
 def shipped_hydrodynamics(name: str = "ck14e.nc") -> Path:
