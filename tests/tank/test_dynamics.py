@@ -113,9 +113,7 @@ def test_calm_water_leaves_the_vessel_at_rest(rig, calm):
 
 def energy(rig, motion):
     kinetic = 0.5 * np.einsum("it,ij,jt->t", motion.velocity, rig.inertia, motion.velocity)
-    static = 0.5 * np.einsum(
-        "it,ij,jt->t", motion.position, rig.hydro.stiffness, motion.position
-    )
+    static = 0.5 * np.einsum("it,ij,jt->t", motion.position, rig.hydro.stiffness, motion.position)
     stored = np.zeros(motion.time.size)
     for eye_x, eye_z, pole_x, pole_z, stiffness, unstretched, _ in rig.lines:
         x, z, pitch = motion.position[:3]

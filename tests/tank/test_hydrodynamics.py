@@ -63,7 +63,7 @@ def test_hull_without_a_pool():
 def test_impossible_hulls_are_refused():
     with pytest.raises(RequestError, match=r"no waterline of 1\.34 × 0\.86 m has a net area of 2"):
         hull_mesh(HullSettings(waterplane_area=2.0))
-    with pytest.raises(RequestError, match="no draft between .* displaces 5 m³.*Check the mass"):
+    with pytest.raises(RequestError, match=r"no draft between .* displaces 5 m³.*Check the mass"):
         hull_mesh(HullSettings(mass=5000.0))
 
 

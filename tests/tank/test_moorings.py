@@ -58,7 +58,9 @@ def test_slack_limits(rig):
 
 def test_a_line_stretched_to_nothing_is_refused():
     line = LineSettings(stiffness=1.0, pretension=5.0, eye=(-0.7, 0.06), pole=(48.4, 0.06))
-    with pytest.raises(RequestError, match=r"moorings\.bow has no length left: .* 5\.000 m\. Lower"):
+    with pytest.raises(
+        RequestError, match=r"moorings\.bow has no length left: .* 5\.000 m\. Lower"
+    ):
         line_table({"bow": line}, 52.09, 0.03)
 
 

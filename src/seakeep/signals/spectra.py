@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import numpy.typing as npt
-
 from scipy import signal
 
 from seakeep.errors import DataError, RequestError
@@ -141,7 +142,7 @@ def wave_heights(series: npt.ArrayLike, dt: float) -> FloatArray:
     """
     x = as_series(series)
     edges = np.ceil(zero_up_crossings(x, dt) / dt).astype(int)
-    waves = [x[first:last] for first, last in zip(edges[:-1], edges[1:], strict=True)]
+    waves = [x[first:last] for first, last in pairwise(edges)]
     return np.array([np.ptp(wave) for wave in waves], dtype=float)
 
 

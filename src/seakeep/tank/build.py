@@ -146,11 +146,18 @@ def build_hydrodynamics(
             "mass": (square, _mass_matrix(hull, density)),
             "stiffness": (square, stiffness),
         },
-        coords={"omega": omegas, "part": ["re", "im"], "influenced_dof": names, "radiating_dof": names},
+        coords={
+            "omega": omegas,
+            "part": ["re", "im"],
+            "influenced_dof": names,
+            "radiating_dof": names,
+        },
     )
     data = data.drop_vars([n for n in data.coords if n not in data.dims])
     data["excitation"] = data["excitation"].transpose("part", "omega", "influenced_dof")
-    return data.assign_attrs(_attributes(hull, mesh, statics.volume, statics.waterplane, water_depth, density))
+    return data.assign_attrs(
+        _attributes(hull, mesh, statics.volume, statics.waterplane, water_depth, density)
+    )
 
 
 def _attributes(

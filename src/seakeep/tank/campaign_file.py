@@ -210,5 +210,3 @@ def campaign_text(
             "",
         ]
     )
-
-

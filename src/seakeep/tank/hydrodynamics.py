@@ -19,7 +19,6 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from seakeep.errors import RequestError
 from seakeep.files import replacing
-from seakeep.waves import GRAVITY
 
 __all__ = [
     "CONVENTIONS",
@@ -185,8 +184,8 @@ def load_hydrodynamics(path: Path | str | None = None) -> Hydrodynamics:
     for key, expected in CONVENTIONS.items():
         if data.attrs.get(key) != expected:
             raise RequestError(
-                f"{source} was made under another convention: {key} is {data.attrs.get(key)!r}, the "
-                f"tank needs {expected!r}. Convert the coefficients, or build the file with "
+                f"{source} was made under another convention: {key} is {data.attrs.get(key)!r}, "
+                f"the tank needs {expected!r}. Convert the coefficients, or build the file with "
                 "python -m seakeep.tank.build."
             )
     missing = [name for name in VARIABLES if name not in data]
@@ -283,7 +282,7 @@ def radiation_kernel(
         The kernel; A∞ by Ogilvie's relation, averaged over 2–9 rad/s.
     """
     omega, damping = passive_damping(hydro)
-    lags = step * np.arange(round(length / step) + 1)
+    lags = step * np.arange(round(length / step) + 1, dtype=float)
     weights = np.full(omega.size, omega[1])
     weights[[0, -1]] *= 0.5
     flat = damping.reshape(omega.size, -1) * weights[:, None]
@@ -360,7 +359,7 @@ def excitation_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
     wanted = _inside(hydro, omega)
     parts = np.stack([hydro.excitation.real, hydro.excitation.imag], axis=-1)
     values = CubicSpline(hydro.omega, parts, axis=0)(wanted)
-    result: ComplexArray = values[..., 0] + 1j * values[..., 1]
+    result: ComplexArray = np.asarray(values[..., 0] + 1j * values[..., 1], dtype=complex)
     return result
 
 
@@ -405,7 +404,6 @@ def response(
     w = wanted[:, None, None]
     dynamic = -(w**2) * (hydro.mass + added) - 1j * w * (radiated + np.asarray(damping))
     dynamic = dynamic + hydro.stiffness + np.asarray(stiffness)
-    result: ComplexArray = np.linalg.solve(dynamic, excitation_at(hydro, wanted)[..., None])[..., 0]
+    solved = np.linalg.solve(dynamic, excitation_at(hydro, wanted)[..., None])
+    result: ComplexArray = np.asarray(solved[..., 0], dtype=complex)
     return result
-
-

@@ -148,7 +148,7 @@ def truth(played: Played, name: str, step: float | None = None) -> xr.Dataset:
     """
     settings = played.settings
     dt = played.rig.step if step is None else step
-    time = dt * np.arange(int(np.floor(played.length / dt + 1e-9)) + 1)
+    time = dt * np.arange(int(np.floor(played.length / dt + 1e-9)) + 1, dtype=float)
     q, v, a = played.states(time)
     values = {}
     for index, dof in enumerate(played.rig.names):

@@ -31,6 +31,7 @@ __all__ = [
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Pair = tuple[Positive, Positive]
+Logger = Literal["wave_probes", "mru", "loads", "video"]
 
 
 class _Settings(BaseModel):
@@ -245,7 +246,7 @@ class InstrumentSettings(_Settings):
     load_noise: NotNegative = 0.03
     trigger_period: Positive = 20.0
     trigger_width: Positive = 0.5
-    clocks: dict[Literal["wave_probes", "mru", "loads", "video"], ClockSettings]
+    clocks: dict[Logger, ClockSettings]
 
     @model_validator(mode="after")
     def _complete(self) -> InstrumentSettings:
@@ -376,7 +377,9 @@ def read_settings(path: Path | str) -> TankSettings:
     try:
         table = tomllib.loads(source.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
-        raise RequestError(f"the settings file {source} does not exist. Correct the path.") from error
+        raise RequestError(
+            f"the settings file {source} does not exist. Correct the path."
+        ) from error
     except tomllib.TOMLDecodeError as error:
         raise RequestError(f"{source} is not valid TOML: {error}. Correct that line.") from error
     merged = _merge(_default_table(), table, ())

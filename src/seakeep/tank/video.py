@@ -84,7 +84,8 @@ def _turned(points: npt.ArrayLike, centre: tuple[float, float], pitch: float) ->
 
 
 def _corners(points: FloatArray) -> npt.NDArray[np.int32]:
-    return np.round(points * 2**FRACTION_BITS).astype(np.int32)
+    corners: npt.NDArray[np.int32] = np.round(points * 2**FRACTION_BITS).astype(np.int32)
+    return corners
 
 
 def _background() -> Image:
@@ -135,9 +136,7 @@ def frame_of(
     frame = _background()
 
     def polygon(points: FloatArray, colour: tuple[int, int, int]) -> None:
-        cv2.fillPoly(
-            frame, [_corners(points)], colour, lineType=cv2.LINE_AA, shift=FRACTION_BITS
-        )
+        cv2.fillPoly(frame, [_corners(points)], colour, lineType=cv2.LINE_AA, shift=FRACTION_BITS)
 
     hull = np.array(HULL) - [0.0, centre_of_gravity]
     polygon(_turned(hull, centre, pitch), (40, 120, 190))
