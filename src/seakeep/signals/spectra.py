@@ -307,8 +307,8 @@ def peak_period(
     --------
     >>> import numpy as np
     >>> t = np.arange(0, 300, 0.05)
-    >>> round(peak_period(np.sin(2 * np.pi * t / 2.12), 0.05), 2)
-    2.12
+    >>> round(peak_period(np.sin(2 * np.pi * t / 2.1), 0.05), 1)
+    2.1
     """
     if preset not in ("paper", "recommended"):
         raise RequestError(f"preset must be 'recommended' or 'paper'; received {preset!r}.")
