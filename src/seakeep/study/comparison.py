@@ -133,11 +133,12 @@ def compare(
         If a run cannot be read or used.
     """
     wanted = list(runs) or campaign.test_runs
-    unknown = [name for name in wanted if name not in campaign.runs]
+    known = list(campaign.settings.runs)  # unused ones too: whoever names one wants it
+    unknown = [name for name in wanted if name not in known]
     if unknown:
         raise RequestError(
-            f"the campaign has no run '{unknown[0]}'.{did_you_mean(unknown[0], campaign.runs)} "
-            f"Runs: {', '.join(campaign.runs)}."
+            f"the campaign has no run '{unknown[0]}'.{did_you_mean(unknown[0], known)} "
+            f"Runs: {', '.join(known)}."
         )
     if not wanted:
         raise RequestError(
