@@ -5,7 +5,13 @@ from importlib import metadata
 from seakeep import core, metrics, signals
 from seakeep.campaign import Campaign, read_campaign
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
-from seakeep.models import HankelDMDc, HankelDMDcModel, load_model
+from seakeep.models import (
+    HankelDMDc,
+    HankelDMDcModel,
+    ProbeAlignment,
+    estimate_probe_offset,
+    load_model,
+)
 
 __version__ = metadata.version("seakeep")
 
@@ -14,10 +20,12 @@ __all__ = [
     "DataError",
     "HankelDMDc",
     "HankelDMDcModel",
+    "ProbeAlignment",
     "RequestError",
     "SeakeepError",
     "SeakeepWarning",
     "core",
+    "estimate_probe_offset",
     "load_model",
     "metrics",
     "read_campaign",

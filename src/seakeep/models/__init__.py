@@ -6,10 +6,20 @@ from pathlib import Path
 
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.models import store
+from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.hankel import HankelDMDc
 from seakeep.models.model import HankelDMDcModel
+from seakeep.models.offsets import ProbeOffset, estimate_probe_offset
 
-__all__ = ["HankelDMDc", "HankelDMDcModel", "load_model"]
+__all__ = [
+    "FittedAlignment",
+    "HankelDMDc",
+    "HankelDMDcModel",
+    "ProbeAlignment",
+    "ProbeOffset",
+    "estimate_probe_offset",
+    "load_model",
+]
 
 
 def load_model(path: str | Path) -> HankelDMDcModel:

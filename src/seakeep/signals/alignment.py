@@ -74,12 +74,12 @@ class CarriedElevation:
         half = 0.5 * (self.highest - self.lowest)
         place = np.asarray(distance, dtype=float) - 0.5 * (self.highest + self.lowest)
         scaled = np.clip(place / half, -1.0, 1.0) if half > 0 else np.zeros_like(place)
-        order = np.arange(chosen.shape[0])
-        polynomials = np.cos(np.multiply.outer(np.arccos(scaled), order))
-        if chosen.ndim == 2:
-            return np.asarray(polynomials @ chosen)
-        polynomials = np.broadcast_to(polynomials, (chosen.shape[1], order.size))
-        result: FloatArray = np.einsum("tp,ptc->tc", polynomials, chosen)
+        x = scaled[:, None] if scaled.ndim and chosen.ndim == 3 else scaled
+        # Clenshaw's recurrence from the highest polynomial down.
+        newer, older = np.zeros_like(chosen[0]), np.zeros_like(chosen[0])
+        for term in chosen[:0:-1]:
+            newer, older = term + 2.0 * x * newer - older, newer
+        result: FloatArray = chosen[0] + x * newer - older
         return result
 
 
