@@ -6,28 +6,40 @@ from seakeep import core, metrics, signals
 from seakeep.campaign import Campaign, read_campaign
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
 from seakeep.models import (
+    BayesianHankelDMDc,
+    Fixed,
     HankelDMDc,
     HankelDMDcModel,
+    HankelEnsemble,
+    LogUniform,
     ProbeAlignment,
+    Uniform,
     estimate_probe_offset,
     load_model,
+    summarize,
 )
 
 __version__ = metadata.version("seakeep")
 
 __all__ = [
+    "BayesianHankelDMDc",
     "Campaign",
     "DataError",
+    "Fixed",
     "HankelDMDc",
     "HankelDMDcModel",
+    "HankelEnsemble",
+    "LogUniform",
     "ProbeAlignment",
     "RequestError",
     "SeakeepError",
     "SeakeepWarning",
+    "Uniform",
     "core",
     "estimate_probe_offset",
     "load_model",
     "metrics",
     "read_campaign",
     "signals",
+    "summarize",
 ]

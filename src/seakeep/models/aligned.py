@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -21,9 +21,32 @@ if TYPE_CHECKING:
 
     from seakeep.models.model import HankelDMDcModel
 
-__all__ = ["align_history", "align_training", "align_window", "closed_loop", "mark"]
+__all__ = [
+    "align_history",
+    "align_training",
+    "align_window",
+    "aligned_inputs",
+    "closed_loop",
+    "notes",
+]
 
 FloatArray = npt.NDArray[np.float64]
+
+
+class Aligning(Protocol):
+    """What a model or an ensemble tells of its inputs."""
+
+    @property
+    def alignment(self) -> FittedAlignment | None:
+        """The alignment."""
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of the inputs."""
+
+    @property
+    def history_samples(self) -> int:
+        """Samples up to the start, that one included."""
 
 
 def align_training(
@@ -96,7 +119,7 @@ def _check_needed(
     labelled.check_finite(values, names, name, samples.start, time)
 
 
-def _place(model: HankelDMDcModel, run: xr.Dataset, window: ForecastWindow) -> tuple[int, int]:
+def _place(model: Aligning, run: xr.Dataset, window: ForecastWindow) -> tuple[int, int]:
     """Sample of the start, and the first sample of the history."""
     time = np.asarray(run["time"].values, dtype=float)
     at = labelled.nearest_sample(time, window.start, window.name)
@@ -127,7 +150,7 @@ def align_history(model: HankelDMDcModel, run: xr.Dataset, window: ForecastWindo
     return model.alignment.aligned(run, model.inputs, window.name, samples)
 
 
-def align_window(model: HankelDMDcModel, run: xr.Dataset, window: ForecastWindow) -> ForecastWindow:
+def align_window(model: Aligning, run: xr.Dataset, window: ForecastWindow) -> ForecastWindow:
     """Replace the inputs of a window by inputs carried to the measured position.
 
     Parameters
@@ -221,17 +244,29 @@ def aligned_inputs(model: HankelDMDcModel, run: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(variables, coords={"time": run["time"]}, attrs=run.attrs)
 
 
-def mark(model: HankelDMDcModel, run: xr.Dataset, forecast: xr.Dataset) -> xr.Dataset:
-    """Write into a forecast what its alignment read."""
-    assert model.alignment is not None
-    settings = model.alignment.settings
-    notes: dict[str, str | float] = {
+def notes(alignment: FittedAlignment, run: xr.Dataset) -> dict[str, str | float]:
+    """What a forecast's attributes say of its alignment.
+
+    Parameters
+    ----------
+    alignment : FittedAlignment
+        The model's.
+    run : Dataset
+        The run that was forecast.
+
+    Returns
+    -------
+    dict
+        Mode, surge, the run's probe offset, and with measured surge ``conditional_on``.
+    """
+    settings = alignment.settings
+    out: dict[str, str | float] = {
         "alignment_mode": settings.mode,
         "alignment_surge": settings.surge,
     }
     if settings.surge == "measured":
-        notes["conditional_on"] = settings.surge_channel
+        out["conditional_on"] = settings.surge_channel
     for key in ("probe_offset", "probe_offset_spread"):
         if key in run.attrs:
-            notes[key] = float(run.attrs[key])
-    return forecast.assign_attrs(notes)
+            out[key] = float(run.attrs[key])
+    return out

@@ -244,7 +244,8 @@ class HankelDMDcModel:
             values = aligned.closed_loop(self, run, window)
         else:
             values = self._free_run(aligned.align_window(self, run, window))
-        return aligned.mark(self, run, forecasting.label_forecast(self, window, values))
+        forecast = forecasting.label_forecast(self, window, values)
+        return forecast.assign_attrs(aligned.notes(self.alignment, run))
 
     def _free_run(self, window: forecasting.ForecastWindow) -> FloatArray:
         return self.forecast_arrays(
