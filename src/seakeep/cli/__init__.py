@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from seakeep.cli import campaigns, information, modelling
+from seakeep.cli import campaigns, information, modelling, tracking
 from seakeep.cli.console import messages, tell_warnings
 from seakeep.errors import SeakeepError
 
@@ -54,6 +54,7 @@ app.command("fit")(modelling.fit)
 app.command("forecast")(modelling.forecast)
 app.command("compare")(modelling.compare)
 app.add_typer(campaigns.datasets, name="datasets")
+app.command("track")(tracking.track)
 app.command("info")(information.info)
 
 

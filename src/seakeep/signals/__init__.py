@@ -1,9 +1,10 @@
 """The measurement chain: functions on sampled series, each usable alone.
 
 Series are arrays with time along the first axis; instants and steps are in seconds, frequencies
-in hertz. Nothing here knows of files.
+in hertz. Nothing here knows of files, the tracking of a video aside.
 """
 
+from seakeep.signals.agreement import compare_motion
 from seakeep.signals.clocks import resample, uniform_step
 from seakeep.signals.derive import band_pass, differentiate, envelope_squared, integrate
 from seakeep.signals.filters import low_pass, lowpass_taps
@@ -14,9 +15,12 @@ from seakeep.signals.spectra import (
     wave_spectrum,
     zero_up_crossings,
 )
+from seakeep.signals.tracking import TrackingSettings, track_video
 
 __all__ = [
+    "TrackingSettings",
     "band_pass",
+    "compare_motion",
     "differentiate",
     "encounter_period",
     "envelope_squared",
@@ -25,6 +29,7 @@ __all__ = [
     "lowpass_taps",
     "resample",
     "significant_height",
+    "track_video",
     "uniform_step",
     "wave_heights",
     "wave_spectrum",
