@@ -17,7 +17,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -203,16 +203,7 @@ def track_video(
     _tell(path, flag)
     motion, bridged = _motions(seen, flag, reference, how, rate, str(path))
     out = _dataset(seen, motion, rate, width * height)
-    out["quality"] = ("time", quality, {"units": "1", "long_name": "quality of the frame"})
-    out["flag"] = ("time", flag.astype(np.int8), _flag_attributes())
-    out["bridged"] = ("time", bridged, {"units": "1", "long_name": "whether the frame is bridged"})
-    picture = np.full(count, -1)
-    picture[frames] = np.arange(frames.size)
-    out["picture"] = (
-        "time",
-        picture,
-        {"units": "1", "long_name": "count of the frame in the file"},
-    )
+    out = out.assign(_judgement(flag, quality, bridged, frames))
     if how.lamp is not None:
         level = np.full(count, np.nan)
         level[frames] = lamp
@@ -387,6 +378,28 @@ def _dataset(
         data[name] = ("time", values, {"units": unit, "long_name": label})
     time = np.arange(seen["x"].size) / rate
     return xr.Dataset(data, {"time": ("time", time, {"units": "s", "long_name": "time"})})
+
+
+def _judgement(
+    flag: npt.NDArray[np.int64],
+    quality: FloatArray,
+    bridged: npt.NDArray[np.int8],
+    frames: npt.NDArray[np.int64],
+) -> dict[str, tuple[str, npt.NDArray[Any], dict[str, object]]]:
+    """Variables that say what a frame is worth, and which picture of the file it is."""
+    picture = np.full(flag.size, -1)
+    picture[frames] = np.arange(frames.size)
+    labels: dict[str, tuple[npt.NDArray[Any], str]] = {
+        "quality": (quality, "quality of the frame"),
+        "bridged": (bridged, "whether the frame is bridged"),
+        "picture": (picture, "count of the frame in the file"),
+    }
+    out: dict[str, tuple[str, npt.NDArray[Any], dict[str, object]]] = {
+        name: ("time", values, {"units": "1", "long_name": label})
+        for name, (values, label) in labels.items()
+    }
+    out["flag"] = ("time", flag.astype(np.int8), _flag_attributes())
+    return out
 
 
 def _flag_attributes() -> dict[str, object]:
