@@ -182,3 +182,12 @@ def test_netcdf_that_is_none(tmp_path):
     path.write_text("not a NetCDF file")
     with pytest.raises(DataError, match="cannot be read as NetCDF or HDF5"):
         read_table(path)
+
+
+def test_a_struct_with_its_rate_and_a_note_beside_it(tmp_path):
+    path = tmp_path / "run.mat"
+    heave = np.sin(np.arange(20.0))
+    io.savemat(path, {"data": {"heave": heave, "eta": 2 * heave}, "fs": 10.0, "note": "run 7"})
+    table = read_table(path)
+    np.testing.assert_array_equal(table["heave"].values, heave)
+    assert float(table["time"][1]) == pytest.approx(0.1)

@@ -50,8 +50,7 @@ def read_matlab(path: Path, options: FileSettings) -> Columns:
     """
     content = load_version_73(path) if is_version_73(path) else _load_older(path)
     found = {key: value for key, value in content.items() if not key.startswith("__")}
-    while len(found) == 1 and isinstance(only := next(iter(found.values())), dict):
-        found = only
+    found = _unwrapped(found)
     rate = _rate(found)
     named, units = _named_matrix(path, found), _units(found)
     vectors = named or _vectors(path, found)
@@ -67,6 +66,17 @@ def read_matlab(path: Path, options: FileSettings) -> Columns:
         headers=dict(zip(names, vectors, strict=True)),
         sampling_rate=rate,
     )
+
+
+def _unwrapped(found: dict[str, Any]) -> dict[str, Any]:
+    """What the only struct of a file holds, with the numbers and texts that stand beside it."""
+    while True:
+        structs = [key for key, value in found.items() if isinstance(value, dict)]
+        beside = {key: value for key, value in found.items() if not isinstance(value, dict)}
+        plain = all(isinstance(value, str) or np.size(value) == 1 for value in beside.values())
+        if len(structs) != 1 or structs[0] in _UNIT_KEYS or not plain:
+            return found
+        found = {**beside, **found[structs[0]]}
 
 
 def _load_older(path: Path) -> dict[str, Any]:

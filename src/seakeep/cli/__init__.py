@@ -22,7 +22,7 @@ app = typer.Typer(
     name="seakeep",
     help=(
         "Data-driven models of vessels in waves: from measured runs to judged forecasts.\n\n"
-        "Example: seakeep fit campaign.toml -o model.nc && seakeep compare model.nc campaign.toml"
+        "Example: seakeep fit docs/tutorial/campaign.toml -o model.nc"
     ),
     no_args_is_help=True,
     rich_markup_mode=None,

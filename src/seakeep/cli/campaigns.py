@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 from rich import box
-from rich.markup import escape
 from rich.table import Table
 
 from seakeep.campaign import draft_campaign, read_campaign, write_prepared
@@ -31,7 +30,7 @@ def init(
 
     Columns, units and canonical names are guessed: read the draft before you use it.
 
-    Example: seakeep init run1.csv run2.csv run3.csv -o campaign.toml
+    Example: seakeep init docs/tutorial/run1.csv docs/tutorial/run2.csv -o campaign.toml
     """
     folder = Path() if out is None else out.parent
     text = draft_campaign(files, folder)
@@ -89,10 +88,10 @@ def _list(context: typer.Context) -> None:
         table.add_row("cite", each.reference)
         table.add_row("here", state_of(each, folder))
         if each.note:
-            table.add_row("note", escape(each.note))
+            table.add_row("note", each.note)
         table.add_row("files", "with their SHA-256")
         for name, checksum in each.files:
-            table.add_row("", escape(f"{name}  {checksum}"))
+            table.add_row("", f"{name}  {checksum}")
         table.add_section()
     results().print(table)
 

@@ -84,9 +84,11 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
     at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
     needed = model.history_samples
     if at + 1 < needed:
+        near = abs(float(start) - time[at]) <= 1e-6 * model.dt
+        snapped = "" if near else f" (nearest sample {time[at]:.10g} s)"
         raise RequestError(
-            f"start = {time[at]:.10g} s leaves {at + 1} samples of history in {name} and the model "
-            f"needs {needed} (the start included): {needed - at - 1} are missing. Start at "
+            f"start = {float(start):.10g} s{snapped} leaves {at + 1} samples of history in "
+            f"{name} and the model needs {needed} (the start included): {needed - at - 1} are missing. Start at "
             f"{time[0] + (needed - 1) * model.dt:.10g} s or later."
         )
     available = time.size - 1 - at
@@ -254,12 +256,18 @@ def modes(eigenvalues: npt.NDArray[np.complex128], dt: float) -> xr.Dataset:
     )
 
 
+def counted(number: int, thing: str) -> str:
+    """A number and a word, in the plural where it must be."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
 def summary(model: HankelDMDcModel) -> str:
     """Text of ``HankelDMDcModel.summary``."""
     settings, training = model.settings, model.training
     states, inputs = len(model.states), len(model.inputs)
     lines = [
-        f"Hankel DMD with control: {states} states, {inputs} inputs, dt {model.dt:g} s",
+        f"Hankel DMD with control: {counted(states, 'state')}, "
+        f"{counted(inputs, 'input')}, dt {model.dt:g} s",
         f"  states        {', '.join(_with_units(model.state_labels))}",
         f"  inputs        {', '.join(_with_units(model.input_labels)) or 'none (autonomous)'}",
         f"  delays        {model.state_delays} of the states ({model.state_delays * model.dt:g} s),"
@@ -267,7 +275,8 @@ def summary(model: HankelDMDcModel) -> str:
         f"  history       {model.history_samples} samples up to the start of a forecast",
         f"  regression    {_regression(model)}; delay rows "
         f"{'exact' if settings.delay_rows == 'exact' else 'regressed'}",
-        f"  training      {sum(training.columns)} snapshot pairs of {len(training.runs)} run(s)",
+        f"  training      {sum(training.columns)} snapshot pairs of "
+        f"{counted(len(training.runs), 'run')}",
     ]
     lines += [
         f"    {name}: {columns} pairs, {first:.10g} to {stop:.10g} s"
