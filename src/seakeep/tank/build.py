@@ -19,7 +19,7 @@ import xarray as xr
 from seakeep.errors import RequestError
 from seakeep.tank.hydrodynamics import CONVENTIONS, save_hydrodynamics
 from seakeep.tank.settings import HullSettings, PoolGeometry
-from seakeep.tank.vessel import HullMesh, hull_mesh, hydrostatics
+from seakeep.tank.vessel import HullMesh, Hydrostatics, hull_mesh, hydrostatics
 from seakeep.waves import GRAVITY
 
 __all__ = ["build_hydrodynamics", "default_frequencies"]
@@ -125,46 +125,48 @@ def build_hydrodynamics(
         solver.solve_all(problems, progress_bar=progress, _check_wavelength=False),
         hydrostatics=False,
     )
-    names = list(modes)
-    radiation = {"radiating_dof": names, "influenced_dof": names}
+    return _dataset(solved, hull, list(modes), statics, density).assign_attrs(
+        _attributes(hull, mesh, statics, water_depth, density)
+    )
+
+
+def _dataset(
+    solved: xr.Dataset, hull: HullSettings, names: list[str], statics: Hydrostatics, density: float
+) -> xr.Dataset:
+    """Put the solver's results and the matrices of inertia and restoring together."""
+    both = {"radiating_dof": names, "influenced_dof": names}
     order = ("omega", "influenced_dof", "radiating_dof")
     force = (solved["Froude_Krylov_force"] + solved["diffraction_force"]).sel(
         influenced_dof=names, wave_direction=0.0
     )
+    force = force.transpose("omega", "influenced_dof")
     stiffness = np.zeros((len(names), len(names)))
     stiffness[:3, :3] = statics.stiffness
     if hull.pool is not None:
         area = hull.pool.length * hull.pool.beam
         stiffness[3, 3], stiffness[4, 4] = density * GRAVITY * area * np.array([1.0, 0.5])
-    square = ("influenced_dof", "radiating_dof")
-    excitation = np.stack([force.values.real, force.values.imag])
-    data = xr.Dataset(
+    parts = np.stack([force.values.real, force.values.imag])
+    return xr.Dataset(
         {
-            "added_mass": solved["added_mass"].sel(radiation).transpose(*order),
-            "damping": solved["radiation_damping"].sel(radiation).transpose(*order),
-            "excitation": (("part", *force.dims), excitation),
-            "mass": (square, _mass_matrix(hull, density)),
-            "stiffness": (square, stiffness),
+            "added_mass": (order, solved["added_mass"].sel(both).transpose(*order).values),
+            "damping": (order, solved["radiation_damping"].sel(both).transpose(*order).values),
+            "excitation": (("part", *order[:2]), parts),
+            "mass": (order[1:], _mass_matrix(hull, density)),
+            "stiffness": (order[1:], stiffness),
         },
         coords={
-            "omega": omegas,
+            "omega": solved["omega"].values,
             "part": ["re", "im"],
             "influenced_dof": names,
             "radiating_dof": names,
         },
-    )
-    data = data.drop_vars([n for n in data.coords if n not in data.dims])
-    data["excitation"] = data["excitation"].transpose("part", "omega", "influenced_dof")
-    return data.assign_attrs(
-        _attributes(hull, mesh, statics.volume, statics.waterplane, water_depth, density)
     )
 
 
 def _attributes(
     hull: HullSettings,
     mesh: HullMesh,
-    volume: float,
-    waterplane: float,
+    statics: Hydrostatics,
     depth: float,
     density: float,
 ) -> dict[str, Any]:
@@ -180,8 +182,8 @@ def _attributes(
         "draft": mesh.draft,
         "midship": mesh.midship,
         "waterline_exponent": mesh.exponent,
-        "displaced_volume": volume,
-        "waterplane_area": waterplane,
+        "displaced_volume": statics.volume,
+        "waterplane_area": statics.waterplane,
         "waterline_beam": hull.beam_waterline,
         "pool_centre": pool.centre,
         "pool_area": pool_area,

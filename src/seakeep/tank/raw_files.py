@@ -45,9 +45,9 @@ def _csv(record: Record) -> str:
     heads += [header(name, column.unit) for name, column in record.columns.items()]
     decimals = [time_decimals(record)] + [c.decimals for c in record.columns.values()]
     line = ",".join(f"%.{d}f" for d in decimals) + "\n"
-    table = np.column_stack([record.time] + [c.values for c in record.columns.values()])
+    columns = [record.time] + [c.values for c in record.columns.values()]
     # Adding zero turns the −0.0 of rounding into 0.0.
-    table = np.round(table, max(decimals)) + 0.0
+    table = np.column_stack([np.round(c, d) for c, d in zip(columns, decimals, strict=True)]) + 0.0
     parts = [",".join(heads) + "\n"]
     for first in range(0, len(table), ROWS_AT_ONCE):
         rows = table[first : first + ROWS_AT_ONCE]

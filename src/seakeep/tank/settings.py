@@ -239,8 +239,8 @@ class InstrumentSettings(_Settings):
     slap: dict[str, SlapSettings] = {}
     second_order: bool = True
     acceleration_noise: NotNegative = 0.03
-    rate_noise: NotNegative = 0.0026
-    angle_noise: NotNegative = 0.00087
+    rate_noise: NotNegative = 0.002618
+    angle_noise: NotNegative = 0.00087266
     heave_noise: NotNegative = 0.0008
     surge_noise: NotNegative = 0.006
     load_noise: NotNegative = 0.03
