@@ -7,6 +7,8 @@ in hertz. Nothing here knows of files.
 from seakeep.signals.clocks import resample, uniform_step
 from seakeep.signals.derive import band_pass, differentiate, envelope_squared, integrate
 from seakeep.signals.filters import low_pass, lowpass_taps
+from seakeep.signals.gaps import TimeReport, bridge, inspect_times, onto_uniform
+from seakeep.signals.lags import Lags, windowed_lags
 from seakeep.signals.spectra import (
     encounter_period,
     significant_height,
@@ -14,19 +16,37 @@ from seakeep.signals.spectra import (
     wave_spectrum,
     zero_up_crossings,
 )
+from seakeep.signals.synchronise import (
+    Clock,
+    clock_from_correlation,
+    clock_from_pulses,
+    clock_from_shared,
+    pool_drift,
+)
 
 __all__ = [
+    "Clock",
+    "Lags",
+    "TimeReport",
     "band_pass",
+    "bridge",
+    "clock_from_correlation",
+    "clock_from_pulses",
+    "clock_from_shared",
     "differentiate",
     "encounter_period",
     "envelope_squared",
+    "inspect_times",
     "integrate",
     "low_pass",
     "lowpass_taps",
+    "onto_uniform",
+    "pool_drift",
     "resample",
     "significant_height",
     "uniform_step",
     "wave_heights",
     "wave_spectrum",
+    "windowed_lags",
     "zero_up_crossings",
 ]

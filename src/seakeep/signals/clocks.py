@@ -92,14 +92,14 @@ def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
     t = check_order(time, name)
     step = float((t[-1] - t[0]) / (t.size - 1))
     off = np.abs(t - (t[0] + step * np.arange(t.size)))
-    if np.max(off) > max(STEP_TOLERANCE * step, _printed_tolerance(t, step)):
+    if np.max(off) > max(STEP_TOLERANCE * step, printed_tolerance(t, step)):
         raise DataError(_irregularity(t, name))
     # A decimal step such as 0.04 that was summed or printed comes back as what was meant.
     rounded = float(f"{step:.10g}")
     return rounded if abs(rounded - step) * t.size < 1e-6 * step else step
 
 
-def _printed_tolerance(t: FloatArray, step: float) -> float:
+def printed_tolerance(t: FloatArray, step: float) -> float:
     """How far rounding to the decimals that the times were written with may move an instant."""
     for decimals in range(7):
         unit = 10.0**-decimals
