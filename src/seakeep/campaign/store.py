@@ -12,7 +12,6 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.prepare import Campaign, Progress, version
-from seakeep.campaign.readers import checksum
 from seakeep.errors import SeakeepWarning
 
 __all__ = ["load_prepared", "write_prepared"]
@@ -104,7 +103,6 @@ def _folder(campaign: Campaign, out_dir: Path | str | None) -> Path:
 
 
 def _fresh(campaign: Campaign, name: str, file: Path) -> xr.Dataset | None:
-    raw = campaign.file_of(name)
     if not file.exists():
         return None
     try:
@@ -120,7 +118,7 @@ def _fresh(campaign: Campaign, name: str, file: Path) -> xr.Dataset | None:
         return None
     expected: Mapping[str, object] = {
         "campaign_digest": campaign.digest,
-        "file_sha256": checksum(raw),
+        "file_sha256": campaign.checksum_of(name),
         "seakeep_version": version(),
         "campaign": campaign.name,
     }

@@ -4,11 +4,20 @@ Series are arrays with time along the first axis; instants and steps are in seco
 in hertz. Nothing here knows of files.
 """
 
+from seakeep.signals.blending import blend
 from seakeep.signals.clocks import resample, uniform_step
 from seakeep.signals.derive import band_pass, differentiate, envelope_squared, integrate
 from seakeep.signals.filters import low_pass, lowpass_taps
+from seakeep.signals.froude import froude_factor, to_full_scale
 from seakeep.signals.gaps import TimeReport, bridge, inspect_times, onto_uniform
 from seakeep.signals.lags import Lags, windowed_lags
+from seakeep.signals.rigid_body import (
+    remove_gravity,
+    rotation_matrix,
+    transfer_acceleration,
+    transfer_position,
+    transfer_velocity,
+)
 from seakeep.signals.spectra import (
     encounter_period,
     significant_height,
@@ -29,6 +38,7 @@ __all__ = [
     "Lags",
     "TimeReport",
     "band_pass",
+    "blend",
     "bridge",
     "clock_from_correlation",
     "clock_from_pulses",
@@ -36,14 +46,21 @@ __all__ = [
     "differentiate",
     "encounter_period",
     "envelope_squared",
+    "froude_factor",
     "inspect_times",
     "integrate",
     "low_pass",
     "lowpass_taps",
     "onto_uniform",
     "pool_drift",
+    "remove_gravity",
     "resample",
+    "rotation_matrix",
     "significant_height",
+    "to_full_scale",
+    "transfer_acceleration",
+    "transfer_position",
+    "transfer_velocity",
     "uniform_step",
     "wave_heights",
     "wave_spectrum",

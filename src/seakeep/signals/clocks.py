@@ -137,6 +137,7 @@ def resample(
     new_time: npt.ArrayLike,
     attenuation: float = 60.0,
     passband: float = 0.8,
+    anti_alias: bool = True,
 ) -> FloatArray:
     """Band-limited resampling of a uniform series onto another uniform time axis.
 
@@ -156,6 +157,9 @@ def resample(
         Attenuation above the new Nyquist frequency, dB; less than 50 is taken as 50.
     passband : float, optional
         Edge of the pass band as a part of the lower Nyquist frequency.
+    anti_alias : bool, optional
+        False cuts at the old Nyquist frequency: samples are taken as they are, and what lies
+        above the new one is folded into the result, as in the paper's chain.
 
     Returns
     -------
@@ -198,7 +202,8 @@ def resample(
         same: FloatArray = array[nearest.astype(int)]
         return same
 
-    nyquist = 0.5 * min(1.0, dt / new_dt)  # the lower one, in cycles an old sample
+    # The lower one, in cycles an old sample.
+    nyquist = 0.5 * min(1.0, dt / new_dt if anti_alias else 1.0)
     return _sinc_sums(array, position, (passband * nyquist, nyquist), attenuation)
 
 
