@@ -151,7 +151,7 @@ degree = 0.017453292519943295 * radian = deg = ° = degrees
 revolution = 6.283185307179586 * radian = rev = revolutions
 newton = kilogram * metre / second ** 2 = N = newtons
 pascal = newton / metre ** 2 = Pa
-bar = 1e5 * pascal = bar
+bar = 1e5 * pascal
 joule = newton * metre = J
 newton_metre = newton * metre = Nm
 watt = joule / second = W

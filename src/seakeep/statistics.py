@@ -7,6 +7,7 @@ by channel. Every draw comes from the `numpy.random.Generator` that is passed.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
@@ -35,8 +36,9 @@ from seakeep.core.density import (
     kernel_density,
 )
 from seakeep.core.divergence import JsdInterval, jensen_shannon
+from seakeep.core.samples import as_generator
 from seakeep.core.trend import TrendTest, trend_test
-from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 
 __all__ = [
     "BandCoverage",
@@ -180,6 +182,30 @@ def moving_block_bootstrap(
     )
 
 
+def _divergence_of(
+    name: str,
+    predicted: xr.DataArray,
+    measured: npt.NDArray[np.float64],
+    block: int | BlockRule,
+    rng: np.random.Generator,
+    settings: dict[str, Any],
+) -> JsdInterval:
+    # The array core, its messages and warnings with the channel's name.
+    p = predicted.transpose(..., "time").values
+    try:
+        if isinstance(block, str):
+            choice = choose_block_length(measured, block, segments=settings["segments"])
+            block = choice.samples
+            if choice.capped:
+                message = f"channel '{name}': {_bootstrap.too_long(choice, measured.size)}"
+                warnings.warn(message, SeakeepWarning, stacklevel=4)
+        return _divergence.jsd_interval(
+            p.reshape(-1, p.shape[-1]), measured, block_length=block, rng=rng, **settings
+        )
+    except DataError as error:
+        raise DataError(f"channel '{name}': {error}") from error
+
+
 def jsd_interval(
     predicted: Labelled,
     measured: Labelled,
@@ -227,24 +253,24 @@ def jsd_interval(
         If a series is constant, has gaps, or instants differ.
     """
     settings: dict[str, Any] = {
-        "block_length": block_length,
         "n_series": n_series,
         "bandwidth": bandwidth,
         "segments": segments,
     }
     if not _all_or_none({"predicted": predicted, "measured": measured}):
-        return _divergence.jsd_interval(predicted, measured, rng=rng, grid=grid, **settings)
+        return _divergence.jsd_interval(
+            predicted, measured, block_length=block_length, rng=rng, grid=grid, **settings
+        )
     assert isinstance(predicted, xr.Dataset)
     assert isinstance(measured, xr.Dataset)
     if grid is not None:
         raise RequestError("channels of a Dataset have grids of their own; leave grid out.")
     names = _channels(predicted, measured, "measured")
     truth = _at_instants(measured[names], predicted, "measured")
-    found = []
-    for name, child in zip(names, rng.spawn(len(names)), strict=True):
-        p = predicted[name].transpose(..., "time").values
-        m = truth[name].values
-        found.append(_divergence.jsd_interval(p.reshape(-1, p.shape[-1]), m, rng=child, **settings))
+    found = [
+        _divergence_of(name, predicted[name], truth[name].values, block_length, child, settings)
+        for name, child in zip(names, as_generator(rng).spawn(len(names)), strict=True)
+    ]
     numbers = [
         field.name
         for field in fields(_divergence.JsdInterval)
@@ -297,6 +323,12 @@ def coverage(lower: Labelled, upper: Labelled, measured: Labelled) -> Any:
     low = np.stack([lower[name].transpose(*order).values for name in names], axis=-1)
     high = np.stack([above[name].transpose(*order).values for name in names], axis=-1)
     m = np.stack([truth[name].transpose(..., "time").values for name in names], axis=-1)
+    for column, name in enumerate(names):
+        if not np.all(np.isfinite(m[..., column])):
+            raise DataError(
+                f"channel '{name}' of measured holds values that are NaN or infinite. Fill its "
+                "gaps first, or judge a window without them."
+            )
     band = _coverage.coverage(low, high, m)
     units = [str(measured[name].attrs.get("units", "")) for name in names]
     return xr.Dataset(

@@ -235,6 +235,11 @@ def _check_widths(path: Path, layout: _Layout) -> None:
     )
 
 
+# To the last bit: what pandas does by itself from 3.1 on, and deprecates to ask for.
+_RELEASE = tuple(int(part) for part in pd.__version__.split(".")[:2])
+_EXACT = {"float_precision": "round_trip"} if _RELEASE < (3, 1) else {}
+
+
 def _numbers(
     path: Path, layout: _Layout, names: list[str], keep: list[int]
 ) -> tuple[dict[str, np.ndarray], dict[str, str]]:
@@ -253,7 +258,7 @@ def _numbers(
             io.StringIO(text),
             dtype=float,
             decimal=layout.decimal,
-            float_precision="round_trip",
+            **_EXACT,
             **form,  # type: ignore[call-overload]
         )
         return {names[i]: frame[i].to_numpy(dtype=float) for i in keep}, {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +13,7 @@ from seakeep.campaign import Campaign, load_prepared, read_campaign
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import replacing
-from seakeep.models import load_model
+from seakeep.models import HankelDMDcModel, load_model
 from seakeep.report.overlay import overlay_figure
 from seakeep.report.style import save_figure
 from seakeep.report.tables import rich_comparison, write_csv
@@ -118,6 +119,11 @@ def compare(
     if format_ not in ("png", "svg", "pdf"):
         raise RequestError(f"--format must be png, svg or pdf; received '{format_}'.")
     identified = load_model(model)
+    if not isinstance(identified, HankelDMDcModel):
+        raise RequestError(
+            f"{model} holds an ensemble; compare judges a single model. Forecast the ensemble with "
+            "`seakeep forecast`, or save one member with ensemble.member(0).save(...)."
+        )
     with progress_bar("Preparing") as progress:
         comparisons = compare_runs(
             identified, read_campaign(campaign), run or (), start, steps, progress
@@ -133,19 +139,25 @@ def compare(
             f"cannot make the folder {out}: {error.strerror or error}. Choose another with -o."
         ) from error
     written = [write_csv(table, out / "comparison.csv")]
-    for comparison in comparisons:
-        path = out / f"{comparison.run}.{format_}"
-        written.append(save_figure(overlay_figure(comparison), path))
+    if find_spec("matplotlib") is None:
+        messages().print(
+            "Note: no figures, because matplotlib is not installed. "
+            "Install it with: pip install 'seakeep[figures]'"
+        )
+    else:
+        for comparison in comparisons:
+            path = out / f"{comparison.run}.{format_}"
+            written.append(save_figure(overlay_figure(comparison), path))
     messages().print("Wrote " + ", ".join(map(str, written)))
     if any(comparison.status != "ok" for comparison in comparisons):
         raise typer.Exit(1)
 
 
 def _prepared(campaign: Campaign, run: str) -> xr.Dataset:
-    if run not in campaign.runs:
+    known = list(campaign.settings.runs)
+    if run not in known:
         raise RequestError(
-            f"the campaign has no run '{run}'.{did_you_mean(run, campaign.runs)} "
-            f"Runs: {', '.join(campaign.runs)}."
+            f"the campaign has no run '{run}'.{did_you_mean(run, known)} Runs: {', '.join(known)}."
         )
     return load_prepared(campaign, names=[run])[run]
 

@@ -15,7 +15,14 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.core.samples import FloatArray, IntArray, as_segments, as_series, whole_number
+from seakeep.core.samples import (
+    FloatArray,
+    IntArray,
+    as_generator,
+    as_segments,
+    as_series,
+    whole_number,
+)
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 
 __all__ = [
@@ -27,6 +34,7 @@ __all__ = [
     "lag_one_correlation",
     "moving_block_bootstrap",
     "resolve_block_length",
+    "too_long",
 ]
 
 BlockRule = Literal["carlstein", "politis_white", "encounter_periods"]
@@ -257,14 +265,29 @@ def block_length(
         segments=segments,
     )
     if choice.capped:
-        warnings.warn(
-            f"the rule '{rule}' asks for blocks of {choice.optimum:.0f} samples; cut to "
-            f"{choice.cap}, the longest that a series of {np.size(series)} samples allows. So few "
-            "blocks make an interval too narrow: take a longer series.",
-            SeakeepWarning,
-            stacklevel=2,
-        )
+        warnings.warn(too_long(choice, np.size(series)), SeakeepWarning, stacklevel=2)
     return choice.samples
+
+
+def too_long(choice: BlockChoice, samples: int) -> str:
+    """Word the warning of a rule that asked for longer blocks than a series allows.
+
+    Parameters
+    ----------
+    choice : BlockChoice
+        What the rule asked for, and what is used.
+    samples : int
+        Length of the series.
+
+    Returns
+    -------
+    str
+    """
+    return (
+        f"the rule '{choice.rule}' asks for blocks of {choice.optimum:.0f} samples; cut to "
+        f"{choice.cap}, the longest that a series of {samples} samples allows. So few blocks make "
+        "an interval too narrow: take a longer series."
+    )
 
 
 def resolve_block_length(
@@ -331,11 +354,7 @@ def bootstrap_indices(
     whole_number("n_samples", n_samples)
     whole_number("n_series", n_series)
     whole_number("block_length", block_length)
-    if not isinstance(rng, np.random.Generator):
-        raise RequestError(
-            f"rng must be a numpy.random.Generator; received {type(rng).__name__}. Make one with "
-            "numpy.random.default_rng(seed)."
-        )
+    as_generator(rng)
     lengths = as_segments(segments, n_samples)
     shortest = int(lengths.min())
     if block_length > shortest:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from seakeep.errors import DataError, RequestError
 
-__all__ = ["as_bundle", "as_grid", "as_segments", "as_series", "whole_number"]
+__all__ = ["as_bundle", "as_generator", "as_grid", "as_segments", "as_series", "whole_number"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
@@ -169,3 +169,28 @@ def whole_number(name: str, value: object, least: int = 1) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise RequestError(f"{name} must be a whole number of at least {least}; received {value}.")
     return int(value)
+
+
+def as_generator(rng: object) -> np.random.Generator:
+    """Check a source of random numbers.
+
+    Parameters
+    ----------
+    rng : object
+        What was received.
+
+    Returns
+    -------
+    numpy.random.Generator
+
+    Raises
+    ------
+    RequestError
+        If it is anything else, such as a seed.
+    """
+    if not isinstance(rng, np.random.Generator):
+        raise RequestError(
+            f"rng must be a numpy.random.Generator; received {type(rng).__name__}. Make one with "
+            "numpy.random.default_rng(seed)."
+        )
+    return rng

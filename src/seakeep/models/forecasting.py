@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,27 @@ DIVERGED = 1e6
 """A free run is given up where a state is this many training SDs from its mean."""
 
 
+class Reader(Protocol):
+    """What a forecast must know of a model, or of an ensemble, to read a run."""
+
+    @property
+    def dt(self) -> float: ...
+    @property
+    def state_labels(self) -> tuple[labelled.ChannelLabel, ...]: ...
+    @property
+    def input_labels(self) -> tuple[labelled.ChannelLabel, ...]: ...
+    @property
+    def states(self) -> list[str]: ...
+    @property
+    def inputs(self) -> list[str]: ...
+    @property
+    def state_delays(self) -> int: ...
+    @property
+    def input_delays(self) -> int: ...
+    @property
+    def history_samples(self) -> int: ...
+
+
 @dataclass(frozen=True, eq=False)
 class ForecastWindow:
     """Measured samples that a forecast reads, and the instants it writes.
@@ -40,7 +61,7 @@ class ForecastWindow:
         Inputs after the start.
     steps : int
         Number of instants forecast.
-    time : DataArray, shape (steps,)
+    time : Variable, shape (steps,)
         These instants.
     """
 
@@ -50,25 +71,23 @@ class ForecastWindow:
     input_history: FloatArray
     input_future: FloatArray
     steps: int
-    time: xr.DataArray
+    time: xr.Variable
 
 
-def read_window(
-    model: HankelDMDcModel, run: xr.Dataset, start: float, steps: int | None
-) -> ForecastWindow:
+def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None) -> ForecastWindow:
     """Cut what a forecast needs out of a run; arguments and errors as ``forecast``."""
     name = labelled.run_name(run, "the run")
     labelled.check_run(run, name)
     labelled.check_step(run, name, model.dt)
     labelled.check_units(run, model.state_labels + model.input_labels, name)
     time = np.asarray(run["time"].values, dtype=float)
-    at = labelled.nearest_sample(time, float(start), name)
+    at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
     needed = model.history_samples
     if at + 1 < needed:
         raise RequestError(
-            f"start = {time[at]:g} s leaves {at + 1} samples of history in {name} and the model "
+            f"start = {time[at]:.10g} s leaves {at + 1} samples of history in {name} and the model "
             f"needs {needed} (the start included): {needed - at - 1} are missing. Start at "
-            f"{time[0] + (needed - 1) * model.dt:g} s or later."
+            f"{time[0] + (needed - 1) * model.dt:.10g} s or later."
         )
     available = time.size - 1 - at
     count = available if steps is None else steps
@@ -83,8 +102,8 @@ def read_window(
     most = available + 1 if model.inputs else count
     if count > most:
         raise RequestError(
-            f"{count} steps from {time[at]:g} s need the input up to "
-            f"{time[at] + (count - 1) * model.dt:g} s and {name} ends at {time[-1]:g} s. "
+            f"{count} steps from {time[at]:.10g} s need the input up to "
+            f"{time[at] + (count - 1) * model.dt:.10g} s and {name} ends at {time[-1]:.10g} s. "
             f"At most {most} steps can be forecast from there."
         )
     first = at + 1 - needed
@@ -108,7 +127,7 @@ def read_window(
         input_history=u[:needed],
         input_future=u[needed:],
         steps=count,
-        time=xr.DataArray(np.concatenate([instants, beyond]), dims="time", attrs=attrs),
+        time=xr.Variable(("time",), np.concatenate([instants, beyond]), attrs),
     )
 
 
@@ -171,10 +190,10 @@ def label_forecast(
 ) -> xr.Dataset:
     """Dataset of a forecast of shape (steps, N), with units, spread in training, and status."""
     lost = np.flatnonzero(np.isnan(values).any(axis=1))
-    status = "ok" if lost.size == 0 else f"diverged at t = {float(window.time[lost[0]]):g} s"
+    status = "ok" if lost.size == 0 else f"diverged at t = {window.time.values[lost[0]]:.10g} s"
     variables = {
-        label.name: (
-            "time",
+        label.name: xr.Variable(
+            ("time",),
             values[:, column],
             {
                 "units": label.units,
@@ -198,7 +217,9 @@ def modes(eigenvalues: npt.NDArray[np.complex128], dt: float) -> xr.Dataset:
         poles = np.log(kept.astype(complex)) / dt
         natural = np.abs(poles)
         frequency = np.abs(poles.imag) / (2 * np.pi)
-        damping = np.where(natural > 0, -poles.real / natural, 1.0)
+        # An eigenvalue of zero is gone after a step: overdamped, not undefined.
+        oscillating = (natural > 0) & np.isfinite(natural)
+        damping = np.where(oscillating, -poles.real / natural, 1.0)
         decay = np.where(poles.real < 0, -1.0 / poles.real, np.inf)
         period = np.where(frequency > 0, 1.0 / frequency, np.inf)
     table = {
@@ -234,7 +255,7 @@ def summary(model: HankelDMDcModel) -> str:
         f"  training      {sum(training.columns)} snapshot pairs of {len(training.runs)} run(s)",
     ]
     lines += [
-        f"    {name}: {columns} pairs, {first:g} to {stop:g} s"
+        f"    {name}: {columns} pairs, {first:.10g} to {stop:.10g} s"
         for name, columns, first, stop in zip(
             training.runs, training.columns, training.first, training.stop, strict=True
         )

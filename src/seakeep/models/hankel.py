@@ -57,6 +57,13 @@ class HankelDMDc(HankelSettings):
     RequestError
         If a setting is out of range.
 
+    Notes
+    -----
+    With more delays than the system has states the regressors are linearly dependent (or nearly,
+    with noise): many pairs of Â and B̂ continue the data equally well, and which one is found is
+    decided by λ, or by least norm at λ = 0. Forecasts then compare with another method's;
+    coefficients, and the eigenvalues that the surplus delays bring, do not.
+
     Examples
     --------
     >>> HankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32).window

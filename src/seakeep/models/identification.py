@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,7 @@ from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.labelled import ChannelLabel
 
-__all__ = ["Scale", "TrainingData", "gather"]
+__all__ = ["Scale", "TrainingData", "gather", "last_sample", "moments", "stop_instants"]
 
 FloatArray = npt.NDArray[np.float64]
 Stop = float | Sequence[float] | Mapping[str, float] | None
@@ -118,15 +119,16 @@ def gather(
         If a run is too short, has gaps, another time step, other units, or a constant channel.
     """
     check_names(states, inputs)
-    stops = _stops(stop, list(runs))
+    stops = stop_instants(stop, list(runs))
     first_name, first_run = next(iter(runs.items()))
     dt = labelled.run_step(first_run, first_name)
     labels: tuple[tuple[ChannelLabel, ...], ...] = ()
     pieces = []
     for name, run in runs.items():
-        labelled.check_step(run, name, dt)
+        if run is not first_run:
+            labelled.check_step(run, name, dt)
         time = np.asarray(run["time"].values, dtype=float)
-        last = _last_sample(time, stops[name], name)
+        last = last_sample(time, stops[name], name)
         place = training_window(last, window, state_delays, input_delays, history)
         _check_length(place, name, window, max(state_delays, input_delays), history)
         reach = place.first_column - max(state_delays, input_delays)
@@ -150,8 +152,8 @@ def gather(
         pieces.append((name, arrays[0], arrays[1], shifted, time[place.first], time[last]))
 
     names, x, u, windows, first, final = zip(*pieces, strict=True)
-    state_scale = _moments(x, windows, states, standardize)
-    input_scale = _moments(u, windows, inputs, standardize)
+    state_scale = moments(x, windows, states, standardize)
+    input_scale = moments(u, windows, inputs, standardize)
     return TrainingData(
         names=names,
         states=tuple(state_scale.deviations(values) for values in x),
@@ -175,6 +177,12 @@ def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
                 f"{what} must be a list of channel names; received the string '{names}'. "
                 f"Write {what}=['{names}']."
             )
+        listed = isinstance(cast("object", names), Iterable)
+        if not listed or not all(isinstance(cast("object", name), str) for name in names):
+            raise RequestError(
+                f"{what} must be a list of channel names; received {names!r}. A model without "
+                "input takes inputs=[]."
+            )
         double = {name for name in names if list(names).count(name) > 1}
         if double:
             raise RequestError(
@@ -190,7 +198,8 @@ def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
         )
 
 
-def _stops(stop: Stop, names: list[str]) -> dict[str, float | None]:
+def stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
+    """Last instant of each run's window as the user gave it; None for the run's end."""
     if stop is None:
         return dict.fromkeys(names)
     if isinstance(stop, Mapping):
@@ -209,10 +218,11 @@ def _stops(stop: Stop, names: list[str]) -> dict[str, float | None]:
                 "one a run."
             )
         return dict(zip(names, values, strict=True))
-    return dict.fromkeys(names, float(np.asarray(stop, dtype=float)))
+    return dict.fromkeys(names, labelled.as_instant(stop, "stop"))
 
 
-def _last_sample(time: FloatArray, stop: float | None, name: str) -> int:
+def last_sample(time: FloatArray, stop: float | None, name: str) -> int:
+    """Last sample up to and including `stop`."""
     if stop is None:
         return time.size - 1
     nearest = labelled.nearest_sample(time, stop, name, "stop")
@@ -240,12 +250,19 @@ def _check_length(
         )
 
 
-def _moments(
+def moments(
     series: Sequence[FloatArray],
     windows: Sequence[TrainingWindow],
     names: Sequence[str],
     standardize: bool,
 ) -> Scale:
+    """Means and standard deviations (ddof = 1) over the windows of all runs.
+
+    Raises
+    ------
+    DataError
+        If a channel is constant there and `standardize` is set.
+    """
     pooled = np.concatenate(
         [values[window.samples] for values, window in zip(series, windows, strict=True)]
     )

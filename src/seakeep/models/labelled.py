@@ -150,14 +150,15 @@ def channel_matrix(
     """
     size = len(range(*samples.indices(run.sizes["time"])))
     out = np.empty((size, len(names)))
+    variables, coordinates = run.variables, set(run.coords)
     for column, channel in enumerate(names):
-        if channel not in run.data_vars:
+        if channel not in variables or channel in coordinates:
             known = [str(variable) for variable in run.data_vars]
             raise RequestError(
                 f"{name} has no channel '{channel}'.{did_you_mean(channel, known)} "
                 f"It has: {', '.join(known)}."
             )
-        variable = run[channel].variable
+        variable = variables[channel]
         if variable.dims != ("time",):
             raise DataError(
                 f"channel '{channel}' of {name} has the dimensions {variable.dims} and shape "
@@ -182,32 +183,42 @@ def check_finite(
     row, column = (int(index) for index in np.argwhere(bad)[0])
     raise DataError(
         f"channel '{names[column]}' of {name} has {int(bad[:, column].sum())} missing or infinite "
-        f"value(s) in the samples needed, the first at t = {time[first + row]:g} s. Fill the gap, "
-        "or choose a window without it: nothing is filled in silence."
+        f"value(s) in the samples needed, the first at t = {time[first + row]:.10g} s. "
+        "Fill the gap, or choose a window without it: nothing is filled in silence."
     )
 
 
 def channel_labels(run: xr.Dataset, names: Sequence[str]) -> tuple[ChannelLabel, ...]:
     """Labels of channels as the run states them."""
+    attributes = [run.variables[channel].attrs for channel in names]
     return tuple(
         ChannelLabel(
             channel,
-            str(run[channel].attrs.get("units", "")),
-            str(run[channel].attrs.get("long_name", channel.replace("_", " "))),
+            str(attrs.get("units", "")),
+            str(attrs.get("long_name", channel.replace("_", " "))),
         )
-        for channel in names
+        for channel, attrs in zip(names, attributes, strict=True)
     )
 
 
 def check_units(run: xr.Dataset, labels: Sequence[ChannelLabel], name: str) -> None:
     """Refuse a run that states another unit for a channel than the model was trained in."""
+    variables = run.variables
     for label in labels:
-        units = run[label.name].attrs.get("units") if label.name in run.data_vars else None
+        units = variables[label.name].attrs.get("units") if label.name in variables else None
         if units and label.units and str(units) != label.units:
             raise DataError(
                 f"channel '{label.name}' of {name} is in '{units}' and the model expects "
                 f"'{label.units}'. Convert the channel and its units attribute."
             )
+
+
+def as_instant(value: object, what: str) -> float:
+    """Return an instant in seconds as a float; a number or an array that holds one number."""
+    array = np.asarray(value)
+    if array.ndim or array.dtype.kind not in "iuf":
+        raise RequestError(f"{what} must be an instant in seconds; received {value!r}.")
+    return float(array)
 
 
 def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "start") -> int:
@@ -230,12 +241,13 @@ def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "sta
     Raises
     ------
     RequestError
-        If the instant is more than half a step outside the run, or not a number.
+        If the instant is outside the run by more than rounding, or not a number.
     """
     step = (time[-1] - time[0]) / (time.size - 1)
-    if not time[0] - 0.5 * step <= instant <= time[-1] + 0.5 * step:
+    rounding = 1e-3 * step
+    if not time[0] - rounding <= instant <= time[-1] + rounding:
         raise RequestError(
-            f"{what} = {instant:g} s is outside {name}, which runs from {time[0]:g} to "
-            f"{time[-1]:g} s. Choose an instant inside it."
+            f"{what} = {instant:.10g} s is outside {name}, which runs from {time[0]:.10g} to "
+            f"{time[-1]:.10g} s. Choose an instant inside it."
         )
     return int(np.clip(np.rint((instant - time[0]) / step), 0, time.size - 1))

@@ -1,0 +1,247 @@
+"""Block lengths and the moving-block bootstrap against closed forms and the arch package."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.signal import lfilter
+
+from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.statistics import (
+    block_length,
+    choose_block_length,
+    lag_one_correlation,
+    moving_block_bootstrap,
+)
+
+
+def autoregressive(phi, samples, seed):
+    noise = np.random.default_rng(seed).standard_normal(samples + 500)
+    return lfilter([1.0], [1.0, -phi], noise)[500:]
+
+
+# --- block lengths -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("phi", [0.5, 0.8, 0.9, -0.8])
+def test_carlstein_finds_the_closed_form_of_an_autoregression(phi):
+    samples = 40_000
+    expected = (2 * abs(phi) / (1 - phi**2)) ** (2 / 3) * samples ** (1 / 3)
+    found = choose_block_length(autoregressive(phi, samples, 1)).optimum
+    # The standard error of φ is √((1 − φ²)/T) = 0.002 to 0.004; the optimum's logarithm moves by
+    # up to 7 times that at φ = 0.9: 6 % is more than three standard errors.
+    assert found == pytest.approx(expected, rel=0.06)
+
+
+def test_the_lag_one_correlation_is_the_printed_sum_with_its_square():
+    x = np.random.default_rng(2).standard_normal(50).cumsum()
+    centred = x - x.mean()
+    by_hand = 50 * sum(centred[i + 1] * centred[i] for i in range(49))
+    by_hand /= 49 * sum(centred**2)
+    # Two orders of summation of fifty terms.
+    assert lag_one_correlation(x) == pytest.approx(by_hand, rel=1e-12)
+
+
+def test_a_join_is_no_neighbour():
+    x = np.concatenate([autoregressive(0.9, 200, 3), 50 + autoregressive(0.9, 200, 4)])
+    centred = x - x.mean()
+    pairs = [i for i in range(399) if i != 199]
+    by_hand = 400 * sum(centred[i + 1] * centred[i] for i in pairs) / (398 * sum(centred**2))
+    assert lag_one_correlation(x, [200, 200]) == pytest.approx(by_hand, rel=1e-12)
+    assert lag_one_correlation(x, [200, 200]) != lag_one_correlation(x)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("kind", ["circular", "stationary"])
+@pytest.mark.parametrize("phi", [0.3, 0.6, 0.9])
+def test_politis_white_agrees_with_arch(phi, kind):
+    arch = pytest.importorskip("arch.bootstrap")
+    ratios = []
+    for seed in range(20):
+        x = autoregressive(phi, 2000, seed)
+        theirs = float(arch.optimal_block_length(x)[kind].iloc[0])
+        ratios.append(choose_block_length(x, "politis_white", kind=kind).optimum / theirs)
+    # The same sums: equal to rounding, unless a correlation lies so near its threshold that the
+    # two normalisations (by the whole series, and by its two ends) judge it differently.
+    assert np.median(np.abs(np.array(ratios) - 1)) < 1e-10
+    assert max(abs(np.array(ratios) - 1)) < 0.05
+
+
+def test_politis_white_finds_the_closed_form_of_an_autoregression():
+    phi, samples = 0.6, 20_000
+    # G/g(0) = 2φ/(1 − φ²); D = 4/3 g(0)².
+    expected = (1.5 * (2 * phi / (1 - phi**2)) ** 2 * samples) ** (1 / 3)
+    found = [
+        choose_block_length(autoregressive(phi, samples, seed), "politis_white").optimum
+        for seed in range(20)
+    ]
+    # One estimate scatters by some 5 to 10 %; the median of twenty by less than 5 %.
+    assert np.median(found) == pytest.approx(expected, rel=0.05)
+
+
+def test_encounter_periods_are_counted_in_samples():
+    x = autoregressive(0.5, 1000, 0)
+    assert block_length(x, "encounter_periods", periods=2.5) == 80
+    assert block_length(x, "encounter_periods", periods=2.5, samples_per_period=20) == 50
+
+
+def test_a_slow_series_is_capped_at_a_quarter_with_a_warning():
+    slow = np.cos(np.linspace(0, np.pi, 400))
+    with pytest.warns(SeakeepWarning, match=r"rule 'carlstein' asks for blocks of .* cut to 100"):
+        assert block_length(slow) == 100
+    # Here T/(T − 1) carries φ beyond one, and the rule asks for an infinite block.
+    choice = choose_block_length(np.linspace(0, 1, 400) + 1e-9)
+    assert choice.samples == 100
+    assert choice.capped
+
+
+def test_a_block_is_cut_to_the_shortest_segment():
+    x = autoregressive(0.5, 1000, 0)
+    with pytest.warns(SeakeepWarning, match="cut to 60"):
+        found = block_length(x, "encounter_periods", periods=3.0, segments=[500, 60, 440])
+    assert found == 60
+
+
+def test_white_noise_asks_for_short_blocks():
+    x = autoregressive(0.0, 4000, 0)
+    assert block_length(x, "politis_white") == 1
+    assert block_length(x, "carlstein") <= 3
+
+
+# --- the moving-block bootstrap ------------------------------------------------------------------
+
+
+def test_white_noise_keeps_the_variance_of_its_mean():
+    x = np.random.default_rng(0).standard_normal(2000)
+    drawn = moving_block_bootstrap(x, 4000, 10, np.random.default_rng(1))
+    # A variance from 4000 draws has a standard error of 2.2 %, that of the blocks' means over
+    # 200 blocks 10 %; one seed, three standard errors.
+    assert drawn.mean(axis=1).var() == pytest.approx(x.var() / x.size, rel=0.3)
+
+
+def test_white_noise_has_the_right_variance_of_the_mean_on_average():
+    found = []
+    for seed in range(40):
+        x = np.random.default_rng(seed).standard_normal(500)
+        drawn = moving_block_bootstrap(x, 200, 5, np.random.default_rng(1000 + seed))
+        found.append(drawn.mean(axis=1).var() * 500)
+    # Forty independent estimates with standard errors of √(2/100 + 2/200) = 17 %: 2.7 % for
+    # their mean; three of them, and 1 % for the finite block (1 − b/T).
+    assert np.mean(found) == pytest.approx(1.0, abs=0.09)
+
+
+def test_an_autoregression_approaches_its_long_run_variance_as_blocks_grow():
+    phi, samples = 0.8, 20_000
+    long_run = 1.0 / (1 - phi) ** 2
+    x = autoregressive(phi, samples, 5)
+    found = {}
+    for length in (1, 20, 150):
+        drawn = moving_block_bootstrap(x, 1000, length, np.random.default_rng(6))
+        found[length] = drawn.mean(axis=1).var() * samples / long_run
+    # A block of b keeps about 1 − 2φ/(b (1 − φ²)) of it: 0.78 at 20, 0.97 at 150; single draws
+    # leave σ²/long-run = (1 − φ)/(1 + φ) = 0.11. Sampling: 14 % from 133 blocks, 4.5 % from draws.
+    assert found[1] == pytest.approx(0.111, rel=0.2)
+    assert found[20] == pytest.approx(0.78, rel=0.2)
+    assert found[150] == pytest.approx(0.97, rel=0.35)
+    assert found[1] < found[20] < found[150]
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    samples=st.integers(2, 60),
+    data=st.data(),
+    n_series=st.integers(1, 4),
+    seed=st.integers(0, 2**31),
+)
+def test_length_and_values_are_kept_and_blocks_run_on(samples, data, n_series, seed):
+    length = data.draw(st.integers(1, samples))
+    x = np.arange(samples, dtype=float)
+    drawn = moving_block_bootstrap(x, n_series, length, np.random.default_rng(seed))
+    again = moving_block_bootstrap(x, n_series, length, np.random.default_rng(seed))
+    assert drawn.shape == (n_series, samples)
+    assert np.isin(drawn, x).all()
+    assert np.array_equal(drawn, again)
+    inner = np.arange(1, samples) % length != 0
+    assert np.all(np.diff(drawn, axis=1)[:, inner] == 1)
+
+
+def test_channels_keep_step():
+    x = np.random.default_rng(0).standard_normal(50)
+    drawn = moving_block_bootstrap(np.stack([x, -x], 1), 7, 6, np.random.default_rng(1))
+    assert drawn.shape == (7, 50, 2)
+    assert np.array_equal(drawn[..., 0], -drawn[..., 1])
+    alone = moving_block_bootstrap(x, 7, 6, np.random.default_rng(1))
+    assert np.array_equal(alone, drawn[..., 0])
+
+
+def test_no_block_crosses_a_join_of_segments():
+    which = np.repeat([0.0, 1.0, 2.0], [20, 30, 12])
+    drawn = moving_block_bootstrap(which, 200, 12, np.random.default_rng(0), segments=[20, 30, 12])
+    blocks = drawn[:, :60].reshape(200, 5, 12)
+    assert np.all(blocks == blocks[..., :1])
+    assert set(np.unique(blocks)) == {0.0, 1.0, 2.0}
+
+
+# --- what is refused -----------------------------------------------------------------------------
+
+NOISE = np.random.default_rng(0).standard_normal(100)
+
+
+@pytest.mark.parametrize(
+    ("series", "message"),
+    [
+        (NOISE[:5], r"5 sample\(s\); at least 8 are needed"),
+        (np.full(40, 3.0), r"the series is constant \(3\)"),
+        (np.where(np.arange(100) == 4, np.nan, NOISE), r"1 value\(s\) that are NaN or infinite"),
+    ],
+)
+@pytest.mark.parametrize("rule", ["carlstein", "politis_white"])
+def test_series_without_a_block_length(series, message, rule):
+    with pytest.raises(DataError, match=message):
+        block_length(series, rule)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"rule": "carlsten"}, "unknown rule 'carlsten'.* Did you mean 'carlstein'?"),
+        ({"rule": "encounter_periods"}, "how many of them make a block.* periods=None"),
+        ({"rule": "encounter_periods", "periods": -1.0}, "periods=-1"),
+        ({"kind": "moving"}, "'circular' or 'stationary'; received 'moving'"),
+        ({"segments": [50, 60]}, "add up to 110 samples and the series has 100"),
+        ({"segments": [0, 100]}, "a segment must be a whole number of at least 1"),
+    ],
+)
+def test_block_length_settings_out_of_range(settings, message):
+    with pytest.raises(RequestError, match=message):
+        block_length(NOISE, **settings)
+
+
+def test_block_length_of_several_series_at_once():
+    with pytest.raises(RequestError, match=r"shape \(50, 2\); one series of shape \(time,\)"):
+        block_length(NOISE.reshape(50, 2))
+
+
+@pytest.mark.parametrize(
+    ("length", "message"),
+    [
+        (101, "block_length of 101 samples does not fit into the series of 100. Choose 1 to 100"),
+        (0, "block_length must be a whole number of at least 1; received 0"),
+        (2.5, "received 2.5"),
+    ],
+)
+def test_blocks_out_of_range(length, message):
+    with pytest.raises(RequestError, match=message):
+        moving_block_bootstrap(NOISE, 3, length, np.random.default_rng(0))
+
+
+def test_blocks_longer_than_a_segment():
+    with pytest.raises(RequestError, match="does not fit into the shortest segment of 30"):
+        moving_block_bootstrap(NOISE, 3, 40, np.random.default_rng(0), segments=[70, 30])
+
+
+def test_a_seed_is_no_generator_and_gaps_are_not_redrawn():
+    with pytest.raises(RequestError, match=r"received int. Make one with numpy.random.default_rng"):
+        moving_block_bootstrap(NOISE, 3, 4, 0)
+    with pytest.raises(DataError, match="NaN or infinite"):
+        moving_block_bootstrap([1.0, np.nan, 2.0], 3, 1, np.random.default_rng(0))

@@ -1,0 +1,187 @@
+"""The Jensen–Shannon divergence against scipy; pairing and noise floor by their definitions."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.signal import lfilter
+from scipy.spatial.distance import jensenshannon
+
+from seakeep.core.bootstrap import bootstrap_indices
+from seakeep.errors import DataError, RequestError
+from seakeep.statistics import (
+    density_grid,
+    jensen_shannon,
+    jsd_interval,
+    kernel_density,
+)
+
+RNG = np.random.default_rng(0)
+
+
+def wave_like(samples, seed):
+    noise = np.random.default_rng(seed).standard_normal(samples + 500)
+    radius, angle = 0.95, 2 * np.pi / 32
+    return lfilter([1.0], [1.0, -2 * radius * np.cos(angle), radius**2], noise)[500:]
+
+
+MEASURED = wave_like(2400, 1)
+
+MASSES = arrays(
+    float, 12, elements=st.floats(0, 1e6).map(lambda value: 0.0 if value < 1e-9 else value)
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(p=MASSES, q=MASSES)
+def test_it_is_bounded_symmetric_and_scipys_square(p, q):
+    assume(p.sum() > 0)
+    assume(q.sum() > 0)
+    found = float(jensen_shannon(p, q))
+    assert 0.0 <= found <= np.log(2)
+    assert found == float(jensen_shannon(q, p))
+    # scipy takes the root of a sum that cancels to about 1e-16, the rounding of its terms.
+    assert found == pytest.approx(float(jensenshannon(p, q)) ** 2, abs=1e-14)
+
+
+def test_its_ends():
+    assert float(jensen_shannon([1, 2, 3], [2, 4, 6])) == 0.0
+    assert float(jensen_shannon([1, 1, 0, 0], [0, 0, 3, 1])) == pytest.approx(np.log(2), rel=1e-15)
+    # Masses near the smallest number must not vanish.
+    assert float(jensen_shannon([1e-310, 0.0], [0.0, 1e300])) == pytest.approx(np.log(2))
+
+
+def test_two_shifted_normals():
+    grid = np.linspace(-12, 14, 4001)
+    p, q = np.exp(-0.5 * grid**2), np.exp(-0.5 * (grid - 0.1) ** 2)
+    # To leading order the divergence is 1/8 of the Fisher information times the shift squared.
+    assert float(jensen_shannon(p, q)) == pytest.approx(0.1**2 / 8, rel=2e-3)
+
+
+def test_leading_axes_are_kept():
+    p, q = RNG.random((3, 4, 20)), RNG.random((3, 4, 20))
+    found = jensen_shannon(p, q)
+    assert found.shape == (3, 4)
+    assert found[1, 2] == pytest.approx(float(jensen_shannon(p[1, 2], q[1, 2])), rel=1e-14)
+
+
+def test_the_bth_prediction_meets_the_bth_measurement_from_the_same_blocks():
+    predicted = np.stack([0.9 * MEASURED, MEASURED + 0.3])
+    found = jsd_interval(
+        predicted, MEASURED, block_length=50, n_series=5, rng=np.random.default_rng(7)
+    )
+    positions = bootstrap_indices(MEASURED.size, 5, 50, np.random.default_rng(7))
+    grid = density_grid(predicted, MEASURED)
+    for model in range(2):
+        for draw in range(5):
+            where = positions[draw]
+            p = kernel_density(predicted[model][where], grid)
+            q = kernel_density(MEASURED[where], grid)
+            # The same arithmetic in the same order.
+            assert found.draws[model, draw] == pytest.approx(
+                float(jensenshannon(p, q)) ** 2, abs=1e-14
+            )
+    assert found.mean == pytest.approx(found.draws.mean(), rel=1e-14)
+    assert found.lower == pytest.approx(np.quantile(found.draws, 0.025), rel=1e-14)
+    assert found.upper == pytest.approx(np.quantile(found.draws, 0.975), rel=1e-14)
+    assert found.uncertainty == found.upper - found.lower
+
+
+def test_a_perfect_prediction_is_zero_and_its_floor_is_not():
+    found = jsd_interval(MEASURED, MEASURED, block_length=100, rng=np.random.default_rng(0))
+    assert np.all(found.draws == 0.0)
+    assert found.of_series == 0.0
+    assert 0.0 < found.noise_floor_lower < found.noise_floor < found.noise_floor_upper < 0.05
+
+
+def test_the_floor_sinks_as_the_record_grows_and_tells_a_wrong_prediction():
+    floors = []
+    for samples in (1200, 19_200):
+        measured = wave_like(samples, 3)
+        found = jsd_interval(
+            1.5 * measured, measured, block_length=100, rng=np.random.default_rng(0)
+        )
+        floors.append(found.noise_floor)
+        # Half as much spread again: 0.02 by the sizes of two normals, far above a floor.
+        assert found.lower > found.noise_floor
+    # A smoothed density's variance goes as 1/T to T^(−4/5): a factor of 9 to 16.
+    assert 4 < floors[0] / floors[1] < 40
+
+
+def test_same_seed_same_bits():
+    first, again = (
+        jsd_interval(
+            0.9 * MEASURED, MEASURED, block_length="politis_white", rng=np.random.default_rng(3)
+        )
+        for _ in range(2)
+    )
+    assert np.array_equal(first.draws, again.draws)
+    assert np.array_equal(first.noise, again.noise)
+    assert first.block_length == again.block_length
+
+
+def test_segments_go_through():
+    found = jsd_interval(
+        0.9 * MEASURED,
+        MEASURED,
+        block_length=480,
+        rng=np.random.default_rng(3),
+        n_series=10,
+        segments=[480] * 5,
+        bandwidth="silverman",
+    )
+    assert found.block_length == 480
+    assert found.draws.shape == (1, 10)
+
+
+@pytest.mark.parametrize(
+    ("p", "q", "message"),
+    [
+        ([1, 2], [1, 2, 3], r"p has shape \(2,\) and q \(3,\); both must be given on one grid"),
+        ([1, -1], [1, 1], "p must be finite and not negative.* from -1 to 1"),
+        ([1, 1], [0, 0], "q must be .* positive sum.* Does the grid cover the series?"),
+        ([1, np.nan], [1, 1], "p must be finite"),
+    ],
+)
+def test_masses_that_are_none(p, q, message):
+    with pytest.raises(RequestError, match=message):
+        jensen_shannon(p, q)
+
+
+@pytest.mark.parametrize(
+    ("predicted", "measured", "settings", "error", "message"),
+    [
+        (
+            MEASURED[:-1],
+            MEASURED,
+            {},
+            RequestError,
+            "predicted has 2399 samples and measured 2400; the same block starts",
+        ),
+        (np.full(2400, 2.0), MEASURED, {}, DataError, r"series is constant \(2\)"),
+        (
+            np.where(np.arange(2400) > 2000, np.nan, MEASURED),
+            MEASURED,
+            {},
+            DataError,
+            r"predicted holds 399 value\(s\) that are NaN or infinite.* diverged forecast",
+        ),
+        (
+            MEASURED * 5,
+            MEASURED,
+            {"grid": np.linspace(-15, 15, 64)},
+            RequestError,
+            "the grid runs from -15 to 15",
+        ),
+        (MEASURED, MEASURED, {"block_length": 2401}, RequestError, "does not fit into the series"),
+        (MEASURED, MEASURED, {"block_length": "pw"}, RequestError, "unknown rule 'pw'"),
+    ],
+)
+def test_what_is_refused(predicted, measured, settings, error, message):
+    with pytest.raises(error, match=message):
+        jsd_interval(
+            predicted,
+            measured,
+            **{"block_length": 50, "rng": np.random.default_rng(0), **settings},
+        )

@@ -1,0 +1,138 @@
+"""The labelled face: Datasets in, the arrays' numbers out."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import statistics
+from seakeep.core import bootstrap as core_bootstrap
+from seakeep.core import divergence as core_divergence
+from seakeep.errors import DataError, RequestError, SeakeepWarning
+
+TIME = np.arange(400) / 32
+HEAVE, PITCH = np.random.default_rng(0).standard_normal((2, 400)).cumsum(axis=1)
+MEASURED = xr.Dataset(
+    {
+        "heave": ("time", HEAVE, {"units": "m"}),
+        "pitch": ("time", PITCH, {"units": "deg"}),
+        "surge": ("time", PITCH + HEAVE, {"units": "m"}),
+    },
+    coords={"time": TIME},
+)
+PREDICTED = 0.9 * MEASURED[["pitch", "heave"]]
+
+
+def test_every_name_is_there():
+    assert all(hasattr(statistics, name) for name in statistics.__all__)
+
+
+def test_a_dataset_is_redrawn_in_step():
+    drawn = statistics.moving_block_bootstrap(MEASURED, 5, 20, np.random.default_rng(1))
+    plain = core_bootstrap.moving_block_bootstrap(HEAVE, 5, 20, np.random.default_rng(1))
+    assert drawn["heave"].dims == ("draw", "time")
+    assert np.array_equal(drawn["heave"], plain)
+    # Sums of the same numbers.
+    assert np.array_equal(drawn["surge"], drawn["pitch"] + drawn["heave"])
+    assert drawn["pitch"].attrs["units"] == "deg"
+    assert np.array_equal(drawn["time"], TIME)
+
+
+def test_a_data_array_is_a_series():
+    channel = MEASURED["heave"]
+    drawn = statistics.moving_block_bootstrap(channel, 5, 20, np.random.default_rng(1))
+    assert isinstance(drawn, xr.DataArray)
+    assert drawn.name == "heave"
+    assert statistics.choose_block_length(channel) == statistics.choose_block_length(HEAVE)
+    assert statistics.kernel_bandwidth(channel) == statistics.kernel_bandwidth(HEAVE)
+
+
+def test_divergence_of_each_channel():
+    found = statistics.jsd_interval(
+        PREDICTED, MEASURED, block_length=40, rng=np.random.default_rng(2), n_series=10
+    )
+    children = np.random.default_rng(2).spawn(2)
+    assert found["channel"].values.tolist() == ["pitch", "heave"]
+    for name, child in zip(["pitch", "heave"], children, strict=True):
+        alone = core_divergence.jsd_interval(
+            PREDICTED[name].values,
+            MEASURED[name].values,
+            block_length=40,
+            rng=child,
+            n_series=10,
+        )
+        row = found.sel(channel=name)
+        for key in ("mean", "lower", "upper", "uncertainty", "noise_floor", "block_length"):
+            assert float(row[key]) == getattr(alone, key)
+
+
+def test_warnings_and_errors_name_the_channel():
+    rng = np.random.default_rng(0)
+    slow = MEASURED.assign(heave=MEASURED["heave"] * 0 + np.cos(TIME / 4))
+    with pytest.warns(SeakeepWarning, match="channel 'heave': the rule 'carlstein' asks for"):
+        statistics.jsd_interval(
+            0.9 * slow[["heave"]], slow, block_length="carlstein", rng=rng, n_series=5
+        )
+    slack = MEASURED.assign(heave=MEASURED["heave"] * 0)
+    with pytest.raises(DataError, match=r"channel 'heave': the series is constant \(0\)"):
+        statistics.jsd_interval(PREDICTED, slack, block_length="politis_white", rng=rng)
+    gap = MEASURED.assign(heave=MEASURED["heave"].where(MEASURED.time > 1))
+    with pytest.raises(DataError, match="channel 'heave' of measured holds values that are NaN"):
+        statistics.coverage(PREDICTED - 1, PREDICTED + 1, gap)
+
+
+def test_members_of_a_dataset_are_pooled():
+    both = xr.concat([PREDICTED, 0.8 * MEASURED[["pitch", "heave"]]], dim="window")
+    found = statistics.jsd_interval(
+        both.transpose("time", "window"),
+        MEASURED,
+        block_length=40,
+        rng=np.random.default_rng(2),
+        n_series=10,
+    )
+    alone = statistics.jsd_interval(
+        PREDICTED, MEASURED, block_length=40, rng=np.random.default_rng(2), n_series=10
+    )
+    assert np.all(found["mean"] > alone["mean"])
+    assert found["mean"].dims == ("channel",)
+
+
+def test_coverage_of_each_channel():
+    whole = MEASURED[["heave", "pitch"]]
+    shift = xr.DataArray([0.0, 50.0], dims="window", coords={"window": ["near", "far"]})
+    found = statistics.coverage(whole - 1 + shift, whole + 1 + shift, MEASURED)
+    assert found["inside"].dims == ("window", "channel")
+    assert found["inside"].sel(window="near").values.tolist() == [1.0, 1.0]
+    assert found["inside"].sel(window="far").values.tolist() == [0.0, 0.0]
+    assert found["unit"].values.tolist() == ["m", "deg"]
+    # The difference of numbers of order 100.
+    assert found["width"].values == pytest.approx(2.0, rel=1e-12)
+
+
+def test_a_window_is_found_in_a_longer_measurement():
+    window = PREDICTED.isel(time=slice(50, 150))
+    moved = window.assign_coords(time=window.time + 1e-6)
+    found = statistics.coverage(moved - 1e9, moved + 1e9, MEASURED)
+    assert np.all(found["inside"] == 1.0)
+
+
+def test_what_is_refused():
+    rng = np.random.default_rng(0)
+    with pytest.raises(RequestError, match="predicted: Dataset, measured: ndarray"):
+        statistics.jsd_interval(PREDICTED, HEAVE, block_length=4, rng=rng)
+    with pytest.raises(RequestError, match="measured has no channel 'heave'"):
+        statistics.jsd_interval(PREDICTED, MEASURED[["pitch"]], block_length=4, rng=rng)
+    with pytest.raises(RequestError, match="leave grid out"):
+        statistics.jsd_interval(PREDICTED, MEASURED, block_length=4, rng=rng, grid=[0, 1])
+    with pytest.raises(RequestError, match=r"a numpy\.random\.Generator; received int"):
+        statistics.jsd_interval(PREDICTED, MEASURED, block_length=4, rng=3)
+    late = PREDICTED.assign_coords(time=TIME + 5.3)
+    with pytest.raises(DataError, match=r"does not hold every instant from 5.3"):
+        statistics.coverage(late, late, MEASURED)
+    bare = PREDICTED.drop_vars("time").isel(time=slice(9))
+    with pytest.raises(RequestError, match="400 samples along time and the other 9"):
+        statistics.coverage(bare, bare, MEASURED)
+    stacked = MEASURED.expand_dims(member=2)
+    with pytest.raises(RequestError, match="Select one run and one member"):
+        statistics.moving_block_bootstrap(stacked, 2, 4, rng)
+    with pytest.raises(RequestError, match="holds no channel"):
+        statistics.coverage(MEASURED[[]], MEASURED[[]], MEASURED)
