@@ -58,8 +58,8 @@ MISTAKES = [
     (
         'file = "second.csv"\n',
         "",
-        "runs.second: a run needs either 'file', relative to the campaign file, or 'files', a table "
-        "of one file an instrument; received a table with role, span.",
+        "runs.second: a run needs either 'file', relative to the campaign file, or 'files', a "
+        "table of one file an instrument; received a table with role, span.",
     ),
     (
         "sampling_rate = 10",

@@ -152,6 +152,13 @@ class Campaign:
         sums = [checksum(path) for path in self.files_of(name).values()]
         return sums[0] if len(sums) == 1 else hashlib.sha256(" ".join(sums).encode()).hexdigest()
 
+    def basis_of(self, name: str) -> str:
+        """SHA-256 of all files on which a prepared run depends, through period and clocks too."""
+        settings = self.settings
+        pooled = settings.instruments.pool_drift and bool(settings.runs[name].files)
+        names = dict.fromkeys([name, *(self.runs if pooled or self._measures_period else [])])
+        return hashlib.sha256(" ".join(map(self.checksum_of, names)).encode()).hexdigest()
+
     def _run(self, name: str) -> RunSettings:
         runs = self.settings.runs
         if name not in runs:
@@ -407,6 +414,7 @@ class Campaign:
             "seakeep_version": version(),
             "file": settings.file or ", ".join(settings.files.values()),
             "file_sha256": self.checksum_of(name),
+            "basis_sha256": self.basis_of(name),
             "preparation_preset": self.settings.preparation.preset,
             "dt": float(dt),
             "scale_factor": general.scale_factor,

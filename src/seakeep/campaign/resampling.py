@@ -136,7 +136,7 @@ def _resampled(
     for i, name in enumerate(names):
         attributes = dict(group[name].attrs)
         if filtered and settings.low_pass is not None:
-            attributes["low_pass"] = list(settings.low_pass)
+            attributes["low_pass"] = tuple(settings.low_pass)
         out[str(name)] = ("time", series[:, i].copy(), attributes)
     return out
 

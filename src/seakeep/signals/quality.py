@@ -11,7 +11,7 @@ def flag_attributes(channel: str) -> dict[str, object]:
     """Attributes of a flag variable, by the CF conventions."""
     return {
         "long_name": f"quality flags of {channel}",
-        "flag_masks": list(FLAGS.values()),
+        "flag_masks": tuple(FLAGS.values()),
         "flag_meanings": " ".join(FLAGS),
         "units": "1",
     }
