@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from seakeep.campaign.checks import check_samples
 from seakeep.campaign.derivation import derive
 from seakeep.campaign.instruments import Logger, channels_of, homes
 from seakeep.campaign.readers import labelled_table
@@ -140,6 +141,7 @@ def _channels(
     if preparation.gaps == "refuse":
         _refuse_gaps(dataset, run, path)
     dataset = _bridged(_regular(dataset, preparation, f"run '{run}' ({path})"), preparation)
+    dataset = check_samples(dataset, preparation.outliers == "replace")
     for name, position in settings.rig.positions.items():
         if name in dataset:
             dataset[name].attrs["x_position"] = float(position)

@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.channels import Group, read_groups
+from seakeep.campaign.checks import checked
 from seakeep.campaign.instruments import open_loggers
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.resampling import inside, on_one_axis, strays
@@ -355,8 +356,10 @@ class Campaign:
                     f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                 )
             whole = on_one_axis(groups, dt, self.settings, name)
+            findings = checked(groups, whole, found.clocks[name], self.settings)
             run = self._cropped(whole, name, (float(reference[0]), float(reference[-1])))
             run.attrs.update(self._attributes(name, run, dt, found.clocks[name]))
+            run.attrs["quality"] = findings
             if period is not None:
                 run.attrs["encounter_period"] = period
             if progress is not None:
