@@ -46,7 +46,7 @@ def flag_attributes(channel: str) -> dict[str, object]:
 
 
 def find_outliers(
-    series: npt.ArrayLike, half_width: int = 5, threshold: float = 8.0, least: float = 0.1
+    series: npt.ArrayLike, half_width: int = 5, threshold: float = 6.0, least: float = 0.1
 ) -> BoolArray:
     """Single samples far from those beside them, by Hampel's rule.
 
@@ -87,7 +87,8 @@ def find_outliers(
     middle = np.median(views, axis=1)
     spread = 1.4826 * np.median(np.abs(views - middle[:, None]), axis=1)
     away = np.abs(x - middle)
-    noise = 1.4826 * float(np.median(away))
+    # Second differences of white noise have six times its variance, and know no slope.
+    noise = 1.4826 * float(np.median(np.abs(np.diff(x, 2)))) / np.sqrt(6.0)
     width = float(np.subtract(*np.percentile(x, [75, 25]))) / 1.349
     found: BoolArray = away > np.maximum(threshold * np.maximum(spread, noise), least * width)
     return found
@@ -340,12 +341,14 @@ def compare_sensors(
     if not kept.any():
         return nothing
     centre, lags, peak = found.centre[kept], found.lag[kept], found.correlation[kept]
-    straight = np.unwrap(lags, period=period)
+    # Where the two do not go together, a lag says nothing.
+    together = peak >= 0.6 if (peak >= 0.6).sum() > 3 else np.ones(peak.size, dtype=bool)
+    straight = np.unwrap(lags[together], period=period)
     growth = 0.0
-    if lags.size > 3:
+    if straight.size > 3:
         growth = float(straight[-2:].mean() - straight[:2].mean())
-    middle = float(np.median(lags))
+    middle = float(np.median(lags[together]))
     return Agreement(
-        period, middle, float(1.4826 * np.median(np.abs(lags - middle))), growth,
+        period, middle, float(1.4826 * np.median(np.abs(lags[together] - middle))), growth,
         float(np.median(peak)), float(np.median(found.at_zero[kept])), gain, centre, lags,
     )  # fmt: skip
