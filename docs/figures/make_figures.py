@@ -1,6 +1,7 @@
 """Draw the figures of the documentation and of the measured examples.
 
     python docs/figures/make_figures.py indices     # docs/figures/indices.svg and .png
+    python docs/figures/make_figures.py tank        # the virtual tank's; extras tank and video
     python docs/figures/make_figures.py ntnu sjtu   # examples/*/figures; need SEAKEEP_DATA_DIR
 
 Figures of results are drawn small and in few colours, so that the repository stays light.
@@ -10,6 +11,7 @@ import sys
 from pathlib import Path
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -200,7 +202,30 @@ def sjtu():
     overlays(folder / "campaign.toml", None, ["Data01"], folder / "figures")
 
 
-DRAWINGS = {each.__name__: each for each in (indices, ntnu, sjtu)}
+def tank():
+    """Coefficients, spectrum, a run and a video frame of the virtual tank."""
+    from seakeep.report.tank_figures import hydrodynamics_figure, run_figure, spectrum_figure
+    from seakeep.tank.play import check_settings, play_run, truth
+    from seakeep.tank.realised import realise
+    from seakeep.tank.settings import default_settings
+    from seakeep.tank.video import check_video, side_view
+
+    settings = default_settings()
+    rig = check_settings(settings)
+    played = {name: play_run(settings, name, rig) for name in settings.runs}
+    measured = [realise(each, name) for name, each in played.items()]
+    save(hydrodynamics_figure(rig, settings), HERE / "tank_hydrodynamics.png")
+    save(spectrum_figure(settings, measured), HERE / "tank_spectrum.png")
+    channels = ["eta_kn_fwd", "surge", "heave", "pitch", "piston", "mooring_bow", "mooring_stern"]
+    run = truth(played["irregular_1"], "irregular_1", 0.05)
+    save(run_figure(run, channels), HERE / "tank_run.png")
+    cv2 = check_video()
+    frame = next(side_view(played["irregular_1"], np.random.default_rng(0), [88.8]))
+    small = cv2.resize(frame, (640, 360), interpolation=cv2.INTER_AREA)
+    cv2.imwrite(str(HERE / "tank_side_view.jpg"), small, [cv2.IMWRITE_JPEG_QUALITY, 85])
+
+
+DRAWINGS = {each.__name__: each for each in (indices, ntnu, sjtu, tank)}
 
 if __name__ == "__main__":
     for wanted in sys.argv[1:] or ["indices"]:

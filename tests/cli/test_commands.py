@@ -17,7 +17,7 @@ from seakeep.cli import modelling
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial"
-VERBS = ("init", "prepare", "fit", "forecast", "compare", "datasets", "info")
+VERBS = ("tank", "init", "prepare", "fit", "forecast", "compare", "datasets", "info")
 
 
 @pytest.fixture(scope="module")

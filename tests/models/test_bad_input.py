@@ -335,7 +335,10 @@ def test_what_is_not_a_run_is_refused(channels, runs, message):
         ({"delay_rows": "shift"}, "delay_rows must be 'ridge' or 'exact'; received 'shift'"),
         ({"ridge_scale": "x"}, "ridge_scale must be 'absolute' or 'per_snapshot'; received 'x'"),
         ({"standardize": "no"}, "standardize must be True or False; received 'no'"),
-        ({"alignment": "effective"}, "alignment is not available in this version"),
+        (
+            {"alignment": "none"},
+            "alignment must be a seakeep.ProbeAlignment or None; received 'none",
+        ),
     ],
 )
 def test_wrong_settings_are_refused(settings, message):

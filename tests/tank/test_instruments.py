@@ -12,6 +12,8 @@ from seakeep.tank.instruments import (
 from seakeep.tank.play import generator, play_run, truth
 from seakeep.tank.settings import ClockSettings, SlapSettings
 
+pytest.importorskip("numba", reason="needs the extra tank")
+
 
 @pytest.fixture(scope="module")
 def short(settings):

@@ -6,6 +6,8 @@ from seakeep.tank.dynamics import tensions
 from seakeep.tank.moorings import line_table, mooring_stiffness, slack_offset, unstretched_length
 from seakeep.tank.settings import LineSettings
 
+pytest.importorskip("numba", reason="needs the extra tank")
+
 
 def test_unstretched_lengths_of_the_page(settings):
     lengths = [unstretched_length(n, line, 52.09) for n, line in settings.moorings.items()]

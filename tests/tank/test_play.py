@@ -11,6 +11,8 @@ from seakeep.errors import RequestError
 from seakeep.tank.play import check_settings, generator, noisy_truth, play, play_run, truth
 from seakeep.tank.settings import SpectrumSettings
 
+pytest.importorskip("numba", reason="needs the extra tank")
+
 
 @pytest.fixture(scope="module")
 def short(settings):

@@ -5,6 +5,8 @@ import seakeep
 from seakeep.tank.play import noisy_truth
 from seakeep.tank.realised import comparison, matrix_rows, realise_all
 
+pytest.importorskip("numba", reason="needs the extra tank")
+
 STATES = [
     "surge", "heave", "pitch", "surge_rate", "heave_rate", "pitch_rate",
     "surge_acceleration", "heave_acceleration", "pitch_acceleration",

@@ -76,3 +76,17 @@ def test_bad_settings_say_what_and_how_to_mend(tmp_path, text, message):
 def test_missing_file(tmp_path):
     with pytest.raises(RequestError, match=r"does not exist\. Correct the path"):
         read_settings(tmp_path / "none.toml")
+
+
+def test_a_measured_spectrum_comes_from_a_file(tmp_path):
+    (tmp_path / "sea.csv").write_text("f,E\n0.3,0.001\n0.6,0.003\n1.0,0.0\n", encoding="utf-8")
+    settings = read(
+        tmp_path, '[runs.a]\nspectrum = { file = "sea.csv", band = [0.3, 1.0] }\nstartup = 1\n'
+    )
+    assert settings.runs["a"].spectrum.frequencies == (0.3, 0.6, 1.0)
+    assert settings.runs["a"].spectrum.densities == (0.001, 0.003, 0.0)
+    with pytest.raises(RequestError, match=r"runs\.a\.spectrum\.file: .*none\.csv cannot be read"):
+        read(tmp_path, '[runs.a]\nspectrum = { file = "none.csv" }\n')
+    (tmp_path / "odd.csv").write_text("0.3,0.001\n0.6;0.003\n", encoding="utf-8")
+    with pytest.raises(RequestError, match=r"row 2 of .* is '0\.6;0\.003'; two numbers"):
+        read(tmp_path, '[runs.a]\nspectrum = { file = "odd.csv" }\n')

@@ -6,18 +6,23 @@ from seakeep.tank.play import play_run
 from seakeep.tank.video import METRES_PER_PIXEL, PANEL, PANEL_HEIGHT, pixel_of, render_side_view
 
 cv2 = pytest.importorskip("cv2", reason="needs the extra video")
+pytest.importorskip("numba", reason="needs the extra tank")
 
 
 @pytest.fixture(scope="module")
 def played(settings, rig):
     run = settings.runs["regular_2"].model_copy(update={"startup": 0.0, "duration": 14.0})
-    return play_run(settings.model_copy(update={"runs": {"one": run}}), "one", rig)
+    clocks = dict(settings.instruments.clocks)
+    clocks["video"] = clocks["video"].model_copy(update={"rate": 10.0})  # fewer frames to render
+    instruments = settings.instruments.model_copy(update={"clocks": clocks})
+    made = settings.model_copy(update={"runs": {"one": run}, "instruments": instruments})
+    return play_run(made, "one", rig)
 
 
 @pytest.fixture(scope="module")
 def video(played, tmp_path_factory):
     path = tmp_path_factory.mktemp("video") / "side_view.mp4"
-    return render_side_view(played, path, np.random.default_rng(0), length=12.0)
+    return render_side_view(played, path, np.random.default_rng(0), length=10.0)
 
 
 def frames(path, wanted):
@@ -34,15 +39,15 @@ def test_video_has_the_cameras_size_and_rate(video):
     reader = cv2.VideoCapture(str(video))
     assert reader.get(cv2.CAP_PROP_FRAME_WIDTH) == 1280
     assert reader.get(cv2.CAP_PROP_FRAME_HEIGHT) == 720
-    assert reader.get(cv2.CAP_PROP_FPS) == pytest.approx(30.0)
-    assert reader.get(cv2.CAP_PROP_FRAME_COUNT) == 361
+    assert reader.get(cv2.CAP_PROP_FPS) == pytest.approx(10.0)
+    assert reader.get(cv2.CAP_PROP_FRAME_COUNT) == 101
     reader.release()
 
 
 def test_white_panel_is_where_the_vessel_is(video, played):
-    _, instants = clock_instants(played.settings.instruments.clocks["video"], 12.0)
+    _, instants = clock_instants(played.settings.instruments.clocks["video"], 10.0)
     position, _, _ = played.states(instants)
-    for index, frame in frames(video, {0, 150, 250, 330, 355}):
+    for index, frame in frames(video, {0, 40, 55, 70, 99}):
         white = (frame.min(axis=2) > 150).astype(np.uint8)
         count, _, stats, centres = cv2.connectedComponentsWithStats(white)
         largest = 1 + np.argmax(stats[1:, cv2.CC_STAT_AREA])
@@ -59,11 +64,11 @@ def test_white_panel_is_where_the_vessel_is(video, played):
 
 def test_lamp_shows_the_trigger(video, played):
     clock = played.settings.instruments.clocks["video"]
-    readings, _ = clock_instants(clock, 12.0)
+    readings, _ = clock_instants(clock, 10.0)
     lit = round((10.0 + clock.offset) * clock.rate)  # the pulse at 10 s of the reference clock
-    level = {i: f[30:50, 30:50, 2].mean() for i, f in frames(video, {lit, lit - 60, lit + 60})}
-    assert readings[lit] == pytest.approx(8.8, abs=0.02)
-    assert level[lit] > 2.5 * max(level[lit - 60], level[lit + 60])
+    level = {i: f[30:50, 30:50, 2].mean() for i, f in frames(video, {lit, lit - 10, lit + 10})}
+    assert readings[lit] == pytest.approx(8.8, abs=0.05)
+    assert level[lit] > 2.5 * max(level[lit - 10], level[lit + 10])
 
 
 def test_missing_opencv_names_the_extra(monkeypatch):

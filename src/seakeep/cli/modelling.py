@@ -76,7 +76,7 @@ def forecast(
             _with_units(result).to_dataframe().to_csv(temporary)
     status = result.attrs["status"]
     messages().print(
-        f"Wrote {out}: {result.sizes['time']} instants after t = {result.attrs['start']:g} s, "
+        f"Wrote {out}: {result.sizes['time']} instants after t = {result.attrs['start']:.10g} s, "
         f"status {status}."
     )
     if status != "ok":

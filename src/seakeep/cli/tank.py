@@ -137,7 +137,8 @@ def _print(settings: TankSettings, measured: list[Realised]) -> None:
         for channel, spread in each.spread.items():
             slack = each.slack.get(channel.removeprefix("mooring_"))
             shown = "" if slack is None else f"{100 * slack:.0f} %"
-            table.add_row(each.run, channel, f"{each.mean[channel]:.4f}", f"{spread:.4f}", shown)
+            mean = round(each.mean[channel], 4) + 0.0  # no −0.0000
+            table.add_row(each.run, channel, f"{mean:.4f}", f"{spread:.4f}", shown)
     results().print(table)
 
 

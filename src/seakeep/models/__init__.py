@@ -6,21 +6,27 @@ from pathlib import Path
 
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.models import ensemble_store, store
+from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.ensemble import BayesianHankelDMDc
 from seakeep.models.fitted_ensemble import HankelEnsemble
 from seakeep.models.hankel import HankelDMDc
 from seakeep.models.model import HankelDMDcModel
+from seakeep.models.offsets import ProbeOffset, estimate_probe_offset
 from seakeep.models.priors import Fixed, LogUniform, Uniform
 from seakeep.models.summaries import summarize
 
 __all__ = [
     "BayesianHankelDMDc",
+    "FittedAlignment",
     "Fixed",
     "HankelDMDc",
     "HankelDMDcModel",
     "HankelEnsemble",
     "LogUniform",
+    "ProbeAlignment",
+    "ProbeOffset",
     "Uniform",
+    "estimate_probe_offset",
     "load_model",
     "summarize",
 ]

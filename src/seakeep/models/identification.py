@@ -169,6 +169,37 @@ def gather(
     )
 
 
+def until(runs: Mapping[str, xr.Dataset], stop: Stop) -> dict[str, xr.Dataset]:
+    """Cut runs at the last instants of their training windows.
+
+    Parameters
+    ----------
+    runs : mapping of str to Dataset
+        Runs.
+    stop : float, sequence or mapping of float, optional
+        Last instants, s.
+
+    Returns
+    -------
+    dict of str to Dataset
+        The runs up to and including these instants.
+
+    Raises
+    ------
+    RequestError
+        If a stop lies outside its run.
+    DataError
+        If the times of a run are not uniform.
+    """
+    stops = stop_instants(stop, list(runs))
+    out = {}
+    for name, run in runs.items():
+        labelled.run_step(run, name)
+        last = last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name)
+        out[name] = run.isel(time=slice(0, last + 1))
+    return out
+
+
 def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
     """Refuse lists of channels that are strings, empty, repeated or overlapping."""
     for what, names in (("states", states), ("inputs", inputs)):

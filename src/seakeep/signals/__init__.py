@@ -4,13 +4,16 @@ Series are arrays with time along the first axis; instants and steps are in seco
 in hertz. Nothing here knows of files.
 """
 
+from seakeep.signals.alignment import delay_by_celerity, delay_by_dispersion
 from seakeep.signals.blending import blend
+from seakeep.signals.celerity import correlation_peak, effective_celerity, phase_celerity
 from seakeep.signals.clocks import resample, uniform_step
 from seakeep.signals.derive import band_pass, differentiate, envelope_squared, integrate
 from seakeep.signals.filters import low_pass, lowpass_taps
 from seakeep.signals.froude import froude_factor, to_full_scale
 from seakeep.signals.gaps import TimeReport, bridge, inspect_times, onto_uniform
 from seakeep.signals.lags import Lags, windowed_lags
+from seakeep.signals.repeats import find_repeat
 from seakeep.signals.rigid_body import (
     remove_gravity,
     rotation_matrix,
@@ -20,9 +23,11 @@ from seakeep.signals.rigid_body import (
 )
 from seakeep.signals.spectra import (
     encounter_period,
+    peak_period,
     significant_height,
     wave_heights,
     wave_spectrum,
+    wave_statistics,
     zero_up_crossings,
 )
 from seakeep.signals.synchronise import (
@@ -43,15 +48,22 @@ __all__ = [
     "clock_from_correlation",
     "clock_from_pulses",
     "clock_from_shared",
+    "correlation_peak",
+    "delay_by_celerity",
+    "delay_by_dispersion",
     "differentiate",
+    "effective_celerity",
     "encounter_period",
     "envelope_squared",
+    "find_repeat",
     "froude_factor",
     "inspect_times",
     "integrate",
     "low_pass",
     "lowpass_taps",
     "onto_uniform",
+    "peak_period",
+    "phase_celerity",
     "pool_drift",
     "remove_gravity",
     "resample",
@@ -64,6 +76,7 @@ __all__ = [
     "uniform_step",
     "wave_heights",
     "wave_spectrum",
+    "wave_statistics",
     "windowed_lags",
     "zero_up_crossings",
 ]

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, SeakeepError
 from seakeep.tank.hydrodynamics import CONVENTIONS, save_hydrodynamics
 from seakeep.tank.settings import HullSettings, PoolGeometry
 from seakeep.tank.vessel import HullMesh, Hydrostatics, hull_mesh, hydrostatics
@@ -205,12 +205,25 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m seakeep.tank.build", description=__doc__)
     parser.add_argument("settings", nargs="?", type=Path, help="tank settings (TOML)")
     parser.add_argument("-o", "--out", type=Path, default=Path("hydrodynamics.nc"))
-    options = parser.parse_args(arguments)
-    settings = default_settings() if options.settings is None else read_settings(options.settings)
-    data = build_hydrodynamics(
-        settings.hull, water_depth=settings.facility.water_depth, progress=sys.stderr.isatty()
+    parser.add_argument(
+        "--frequencies", type=float, nargs="+", help="angular frequencies (rad/s) instead of fifty"
     )
-    save_hydrodynamics(data, options.out)
+    options = parser.parse_args(arguments)
+    try:
+        settings = (
+            default_settings() if options.settings is None else read_settings(options.settings)
+        )
+        data = build_hydrodynamics(
+            settings.hull,
+            options.frequencies,
+            settings.facility.water_depth,
+            settings.facility.density,
+            progress=sys.stderr.isatty(),
+        )
+        save_hydrodynamics(data, options.out)
+    except SeakeepError as error:
+        sys.stderr.write(f"Error: {error}\n")
+        return error.exit_status
     sys.stdout.write(f"{options.out}: {options.out.stat().st_size / 1000:.0f} kB\n")
     return 0
 

@@ -233,8 +233,7 @@ def passive_damping(hydro: Hydrodynamics, step: float = 0.02) -> tuple[FloatArra
     """Damping for the kernel: symmetric, passive, from 0 to the end of its tail.
 
     Zero at zero frequency, shape-preserving cubics between the solver's frequencies, ω⁻³ beyond
-    them; the piston's rows are tapered to zero over 9–12 rad/s, where the solver is not clean,
-    and the sloshing mode radiates nothing.
+    them; the moon pool's rows are tapered to zero over 9–12 rad/s: the solver is not clean there.
 
     Parameters
     ----------
@@ -257,8 +256,7 @@ def passive_damping(hydro: Hydrodynamics, step: float = 0.02) -> tuple[FloatArra
     if hydro.pool is not None:
         low, high = POOL_TAPER
         part = np.clip((omega - low) / (high - low), 0.0, 1.0)
-        weight[:, 3] = 0.5 * (1.0 + np.cos(np.pi * part))
-        weight[:, 4] = 0.0
+        weight[:, 3:] = 0.5 * (1.0 + np.cos(np.pi * part))[:, None]
     # A congruence keeps the matrices passive.
     tapered = weight[:, :, None] * inside * tail[:, None, None] * weight[:, None, :]
     return omega, _passive(tapered)

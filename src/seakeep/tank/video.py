@@ -7,6 +7,7 @@ moves in a plane of 2.5 mm a pixel. A lamp in the upper left corner shows the tr
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ __all__ = [
     "frame_of",
     "pixel_of",
     "render_side_view",
+    "side_view",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -166,10 +168,52 @@ def _noise(cv2: Any, rng: np.random.Generator) -> list[npt.NDArray[np.float32]]:
     return [cv2.resize(c, (WIDTH, HEIGHT), interpolation=cv2.INTER_LINEAR) for c in coarse]
 
 
+def side_view(played: Played, rng: np.random.Generator, instants: npt.ArrayLike) -> Iterator[Image]:
+    """Frames as the camera at the tank's side would see them.
+
+    Parameters
+    ----------
+    played : Played
+        The run.
+    rng : Generator
+        Source of the noise.
+    instants : array_like, shape (frame,)
+        Reference instants, s.
+
+    Yields
+    ------
+    ndarray of uint8, shape (720, 1280, 3)
+        Blue, green, red, as OpenCV wants it.
+
+    Raises
+    ------
+    RequestError
+        If OpenCV is not installed.
+    """
+    cv2 = check_video()
+    time = np.asarray(instants, dtype=float)
+    instruments = played.settings.instruments
+    position, _, _ = played.states(time)
+    lamp = trigger(time, instruments.trigger_period, instruments.trigger_width)
+    across = LEFT + METRES_PER_PIXEL * WIDTH * np.linspace(0.0, 1.0, 41)
+    place = played.settings.vessel.position
+    surface = np.stack([played.elevation(place + x, time) for x in across], axis=1)
+    light, stock = _light(), _noise(cv2, rng)
+    height = float(played.rig.hydro.attrs["centre_of_gravity"])
+    for i in range(time.size):
+        q = position[:3, i]
+        motion = (float(q[0]), float(q[1]), float(q[2]))
+        frame = frame_of(cv2, motion, surface[i], float(lamp[i]), height)
+        grain = np.roll(stock[rng.integers(NOISE_FRAMES)], rng.integers(WIDTH), axis=1)
+        lit = cv2.multiply(frame.astype(np.float32), light)
+        lit += grain[:, :, None]
+        yield np.clip(lit, 0, 255, out=lit).astype(np.uint8)
+
+
 def render_side_view(
     played: Played, path: Path, rng: np.random.Generator, length: float | None = None
 ) -> Path:
-    """Render a run as the camera at the tank's side would see it.
+    """Render a run to an MP4 file.
 
     Parameters
     ----------
@@ -195,16 +239,8 @@ def render_side_view(
         If it cannot write MP4 files here.
     """
     cv2 = check_video()
-    instruments = played.settings.instruments
-    clock = instruments.clocks["video"]
+    clock = played.settings.instruments.clocks["video"]
     _, instants = clock_instants(clock, played.length if length is None else length)
-    position, _, _ = played.states(instants)
-    lamp = trigger(instants, instruments.trigger_period, instruments.trigger_width)
-    across = LEFT + METRES_PER_PIXEL * WIDTH * np.linspace(0.0, 1.0, 41)
-    place = played.settings.vessel.position
-    surface = np.stack([played.elevation(place + x, instants) for x in across], axis=1)
-    light, stock = _light(), _noise(cv2, rng)
-    height = float(played.rig.hydro.attrs["centre_of_gravity"])
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=".video") as folder:
         part = Path(folder) / "side_view.mp4"
         code = cv2.VideoWriter_fourcc(*"mp4v")
@@ -214,15 +250,8 @@ def render_side_view(
                 "OpenCV cannot write MP4 files here. Install a build with FFmpeg: "
                 "pip install opencv-python-headless"
             )
-        for i in range(instants.size):
-            q = position[:3, i]
-            motion = (float(q[0]), float(q[1]), float(q[2]))
-            frame = frame_of(cv2, motion, surface[i], float(lamp[i]), height)
-            grain = stock[rng.integers(NOISE_FRAMES)]
-            grain = np.roll(grain, rng.integers(WIDTH), axis=1)
-            lit = cv2.multiply(frame.astype(np.float32), light)
-            lit += grain[:, :, None]
-            writer.write(np.clip(lit, 0, 255, out=lit).astype(np.uint8))
+        for frame in side_view(played, rng, instants):
+            writer.write(frame)
         writer.release()
         part.replace(path)
     return path
