@@ -173,7 +173,7 @@ def check_levels(run: xr.Dataset) -> list[Finding]:
         if not (name.startswith("eta_") or name in NO_SLOW_MOTION):
             continue
         x = _filled(run[name])
-        if not np.ptp(x):
+        if x.size < 16 or not np.ptp(x):
             continue
         change, sure = level_drift(x, dt, dominant_period(x, dt))
         # A level that moves by half the waves' spread shifts means and standardisation visibly.
@@ -213,7 +213,7 @@ def check_pairs(
     """
     out, compared = [], {}
     dt = float(run["time"][1] - run["time"][0])
-    for pair in settings.redundant.values():
+    for pair in settings.redundant.values() if run.sizes["time"] >= 16 else ():
         trusted = _filled(run[pair.channels[0]])
         for name in pair.channels[1:]:
             x = _filled(run[name])

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from seakeep.errors import RequestError
-from seakeep.signals.filters import as_series, positive
+from seakeep.signals.filters import as_series, odd_extension, positive
 from seakeep.signals.gaps import stretches
 from seakeep.signals.lags import windowed_lags
 
@@ -46,7 +46,7 @@ def flag_attributes(channel: str) -> dict[str, object]:
 
 
 def find_outliers(
-    series: npt.ArrayLike, half_width: int = 5, threshold: float = 6.0, least: float = 0.1
+    series: npt.ArrayLike, half_width: int = 5, threshold: float = 6.0, least: float = 0.5
 ) -> BoolArray:
     """Single samples far from those beside them, by Hampel's rule.
 
@@ -57,10 +57,12 @@ def find_outliers(
     half_width : int, optional
         Samples on either side that are compared.
     threshold : float, optional
-        Distance from their median, in standard deviations as the median absolute deviation gives
-        them (of the neighbours or of the whole record's noise, whichever is larger).
+        Distance from the mean of the medians on either side, in standard deviations as the median
+        absolute deviation gives them (of such distances nearby, or of the whole record's noise,
+        whichever is larger).
     least : float, optional
-        Least distance, in standard deviations of the series (by its quartiles): what is smaller
+        Least distance, in standard deviations of the series (by its
+        percentiles 1 and 99): what is smaller
         does no harm.
 
     Returns
@@ -82,15 +84,18 @@ def find_outliers(
     array([100])
     """
     x = as_series(series, minimum=2 * half_width + 1)
-    padded = np.pad(x, half_width, mode="reflect")
-    views = np.lib.stride_tricks.sliding_window_view(padded, 2 * half_width + 1)
-    middle = np.median(views, axis=1)
-    spread = 1.4826 * np.median(np.abs(views - middle[:, None]), axis=1)
+    width = half_width
+    # A point reflection continues slopes, and two sides that are averaged cancel them.
+    views = np.lib.stride_tricks.sliding_window_view(odd_extension(x, width), 2 * width + 1)
+    middle = 0.5 * (np.median(views[:, :width], axis=1) + np.median(views[:, -width:], axis=1))
     away = np.abs(x - middle)
+    around = np.pad(away, width, mode="reflect")
+    near = np.lib.stride_tricks.sliding_window_view(around, 2 * width + 1)
+    spread = 1.4826 * np.median(near, axis=1)
     # Second differences of white noise have six times its variance, and know no slope.
     noise = 1.4826 * float(np.median(np.abs(np.diff(x, 2)))) / np.sqrt(6.0)
-    width = float(np.subtract(*np.percentile(x, [75, 25]))) / 1.349
-    found: BoolArray = away > np.maximum(threshold * np.maximum(spread, noise), least * width)
+    scale = float(np.subtract(*np.percentile(x, [99, 1]))) / 4.653  # of a normal series, its SD
+    found: BoolArray = away > np.maximum(threshold * np.maximum(spread, noise), least * scale)
     return found
 
 
@@ -233,13 +238,17 @@ def level_drift(series: npt.ArrayLike, dt: float, period: float) -> tuple[float,
 def dominant_period(series: npt.ArrayLike, dt: float) -> float:
     """Period at the peak of a series' spectrum, s (Hann window, three bins smoothed).
 
+    NaN for fewer than eight samples.
+
     Examples
     --------
     >>> import numpy as np
     >>> round(dominant_period(np.sin(np.arange(0, 100, 0.05) * 2 * np.pi / 1.6), 0.05), 1)
     1.6
     """
-    x = as_series(series, minimum=8)
+    x = as_series(series)
+    if x.size < 8:
+        return float("nan")
     power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size))) ** 2
     power = np.convolve(power, [0.25, 0.5, 0.25], mode="same")
     power[:3] = 0.0
