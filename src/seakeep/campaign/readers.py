@@ -166,8 +166,14 @@ def read_table(
         If the file is damaged, a cell is no number, or times are missing, repeated or unsorted.
     """
     path, options = Path(path), options or FileSettings()
-    table = read_columns(path, options)
-    time_name, time = _time(path, table, options)
+    return labelled_table(path, read_columns(path, options), options, columns)
+
+
+def labelled_table(
+    path: Path, table: Columns, options: FileSettings, columns: Iterable[str] | None
+) -> xr.Dataset:
+    """Columns of a file as :func:`read_table` gives them."""
+    time_name, time = times_of(path, table, options)
     # A run has one `time`: a column of that name beside the stated one is left out.
     others = [name for name in table.names if name not in (time_name, "time")]
     wanted = others if columns is None else columns
@@ -212,7 +218,8 @@ def time_column(table: Columns, stated: str | None = None) -> str | None:
     return None
 
 
-def _time(path: Path, table: Columns, options: FileSettings) -> tuple[str | None, FloatArray]:
+def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | None, FloatArray]:
+    """Name of the time column, if there is one, and the instants, s, checked for their order."""
     name = time_column(table, options.time)
     rate = options.sampling_rate or table.sampling_rate
     if name is None and options.time is not None:

@@ -9,11 +9,12 @@ import typer
 from rich import box
 from rich.table import Table
 
-from seakeep.campaign import draft_campaign, read_campaign, write_prepared
+from seakeep.campaign import draft_campaign, load_prepared, read_campaign, write_prepared
 from seakeep.campaign.datasets import DATASETS, data_folder, fetch, find_dataset, state_of
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.errors import RequestError
 from seakeep.files import replacing
+from seakeep.report.quality_sheet import write_quality_sheet
 
 __all__ = ["datasets", "init", "prepare"]
 
@@ -50,18 +51,37 @@ def prepare(
         Path | None,
         typer.Option("-o", "--out", help="Folder; by default 'prepared' beside the campaign."),
     ] = None,
+    anew: Annotated[
+        bool, typer.Option("--anew", help="Prepare again what is fresh already.")
+    ] = False,
+    sheet: Annotated[
+        bool, typer.Option("--sheet/--no-sheet", help="Write the data-quality sheet.")
+    ] = True,
 ) -> None:
-    """Turn raw files into analysis-ready runs, one NetCDF file each.
+    """Turn raw files into analysis-ready runs, one NetCDF file each, and a data-quality sheet.
+
+    Each run is written as soon as it is done: interrupted, a second call continues.
 
     fit, forecast and compare use these files while they are fresh (same settings, same raw
     files), and prepare in memory what is missing.
 
     Example: seakeep prepare docs/tutorial/campaign.toml
     """
+    read = read_campaign(campaign)
     with progress_bar("Preparing") as progress:
-        files = write_prepared(read_campaign(campaign), out, progress=progress)
+        files = write_prepared(read, out, progress=progress, anew=anew)
     for path in files.values():
         typer.echo(str(path))
+    if not sheet:
+        return
+    try:
+        pages = write_quality_sheet(
+            load_prepared(read, out), read.settings, read.name, next(iter(files.values())).parent
+        )
+    except RequestError as error:
+        messages().print(f"Note: no data-quality sheet: {error}", style="yellow")
+        return
+    messages().print(f"Wrote {pages[0]}: look at it before you use the runs.")
 
 
 datasets = typer.Typer(

@@ -1,10 +1,17 @@
 """From campaign to judgement: which runs train which model, and how forecasts are compared."""
 
-from seakeep.study.comparison import Comparison, compare, comparison_table, in_degrees
+from seakeep.study.comparison import (
+    Comparison,
+    at_full_scale,
+    compare,
+    comparison_table,
+    in_degrees,
+)
 from seakeep.study.workflow import build_spec, fit_campaign, training_runs
 
 __all__ = [
     "Comparison",
+    "at_full_scale",
     "build_spec",
     "compare",
     "comparison_table",

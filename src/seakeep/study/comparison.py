@@ -16,9 +16,10 @@ from seakeep.conventions import conversion
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import HankelDMDcModel
 from seakeep.models.identification import is_constant
+from seakeep.signals import to_full_scale
 from seakeep.study.repeats import warn_of_repeats
 
-__all__ = ["Comparison", "compare", "comparison_table", "in_degrees"]
+__all__ = ["Comparison", "at_full_scale", "compare", "comparison_table", "in_degrees"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +80,34 @@ def in_degrees(comparison: Comparison) -> Comparison:
         forecast=_degrees(comparison.forecast),
         measured=_degrees(comparison.measured),
         inputs=_degrees(comparison.inputs),
+    )
+
+
+def at_full_scale(comparison: Comparison, scale: float) -> Comparison:
+    """Convert a comparison to full scale by Froude's law.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        At model scale, in SI units.
+    scale : float
+        Scale factor, full-scale length over model length.
+
+    Returns
+    -------
+    Comparison
+        Times and values at full scale; error measures do not change by it.
+
+    Raises
+    ------
+    RequestError
+        If the unit of a channel does not scale.
+    """
+    return replace(
+        comparison,
+        forecast=to_full_scale(comparison.forecast, scale),
+        measured=to_full_scale(comparison.measured, scale),
+        inputs=to_full_scale(comparison.inputs, scale),
     )
 
 
