@@ -88,8 +88,8 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
         snapped = "" if near else f" (nearest sample {time[at]:.10g} s)"
         raise RequestError(
             f"start = {float(start):.10g} s{snapped} leaves {at + 1} samples of history in "
-            f"{name} and the model needs {needed} (the start included): {needed - at - 1} are missing. "
-            f"Start at {time[0] + (needed - 1) * model.dt:.10g} s or later."
+            f"{name} and the model needs {needed} (the start included): {needed - at - 1} are "
+            f"missing. Start at {time[0] + (needed - 1) * model.dt:.10g} s or later."
         )
     available = time.size - 1 - at
     count = available if steps is None else steps
