@@ -47,6 +47,15 @@ class InstrumentSettings(Table):
         default=None, description="reading of its clock at reference time 0, s"
     )
     drift: Finite | None = Field(default=None, description="drift of its clock, ppm")
+    metres_per_pixel: Positive | None = Field(
+        default=None, description="of a camera, in the vessel's plane"
+    )
+    panel: Annotated[tuple[Positive, Positive], Field(strict=False)] | None = Field(
+        default=None, description="[length, height] of the panel that a camera tracks, m"
+    )
+    panel_height: Finite | None = Field(
+        default=None, description="of the panel's centre above the centre of gravity, m"
+    )
 
     @model_validator(mode="after")
     def _one_way(self) -> InstrumentSettings:
