@@ -7,7 +7,13 @@ in hertz. Nothing here knows of files.
 from seakeep.signals.clocks import resample, uniform_step
 from seakeep.signals.derive import band_pass, differentiate, envelope_squared, integrate
 from seakeep.signals.filters import low_pass, lowpass_taps
-from seakeep.signals.spectra import encounter_period, zero_up_crossings
+from seakeep.signals.spectra import (
+    encounter_period,
+    significant_height,
+    wave_heights,
+    wave_spectrum,
+    zero_up_crossings,
+)
 
 __all__ = [
     "band_pass",
@@ -18,6 +24,9 @@ __all__ = [
     "low_pass",
     "lowpass_taps",
     "resample",
+    "significant_height",
     "uniform_step",
+    "wave_heights",
+    "wave_spectrum",
     "zero_up_crossings",
 ]

@@ -5,10 +5,18 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.errors import DataError
+from scipy import signal
+
+from seakeep.errors import DataError, RequestError
 from seakeep.signals.filters import as_series, positive
 
-__all__ = ["encounter_period", "zero_up_crossings"]
+__all__ = [
+    "encounter_period",
+    "significant_height",
+    "wave_heights",
+    "wave_spectrum",
+    "zero_up_crossings",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -85,3 +93,122 @@ def encounter_period(series: npt.ArrayLike, dt: float) -> float:
             "state encounter_period in the campaign."
         )
     return float((crossings[-1] - crossings[0]) / (crossings.size - 1))
+
+
+def significant_height(series: npt.ArrayLike) -> float:
+    """Significant wave height of a record, four times its standard deviation.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Wave elevation without gaps.
+
+    Returns
+    -------
+    float
+        In the unit of the series.
+
+    Examples
+    --------
+    >>> round(significant_height([1.0, -1.0, 1.0, -1.0]), 6)
+    4.0
+    """
+    return 4.0 * float(np.std(as_series(series)))
+
+
+def wave_heights(series: npt.ArrayLike, dt: float) -> FloatArray:
+    """Heights of the single waves between successive zero-up-crossings.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Wave elevation, uniformly sampled, without gaps.
+    dt : float
+        Time step, s.
+
+    Returns
+    -------
+    ndarray, shape (wave,)
+        Crest less trough of each whole wave, in the unit of the series.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(0, 60, 0.01)
+    >>> heights = wave_heights(0.05 * np.sin(2 * np.pi * 0.8 * t), 0.01)
+    >>> heights.size, round(float(heights.mean()), 4)
+    (46, 0.1)
+    """
+    x = as_series(series)
+    edges = np.ceil(zero_up_crossings(x, dt) / dt).astype(int)
+    waves = [x[first:last] for first, last in zip(edges[:-1], edges[1:], strict=True)]
+    return np.array([np.ptp(wave) for wave in waves], dtype=float)
+
+
+def wave_spectrum(
+    series: npt.ArrayLike,
+    dt: float,
+    segment: int | None = None,
+    overlap: int | None = None,
+    padded: int | None = None,
+    window: str = "hamming",
+) -> tuple[FloatArray, FloatArray]:
+    """Power spectral density by Welch's method.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Uniformly sampled series without gaps; each segment's mean is removed.
+    dt : float
+        Time step, s.
+    segment : int, optional
+        Samples a segment; the default covers 60 s, or the whole series if it is shorter.
+    overlap : int, optional
+        Samples shared by successive segments; the default is half a segment.
+    padded : int, optional
+        Length of the transform, zeros filled in; the default is `segment`.
+    window : str, optional
+        Name of the window.
+
+    Returns
+    -------
+    frequency, density : ndarray
+        Hz, and the square of the series' unit a hertz.
+
+    Raises
+    ------
+    RequestError
+        If the segments do not fit the series, or the overlap not the segments.
+
+    Notes
+    -----
+    The paper takes segments of 2¹² samples at 500 Hz (8.2 s), an overlap of 2⁷ and transforms of
+    2¹⁶ points; a peak is then smeared over 0.12 Hz.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(0, 300, 0.05)
+    >>> f, density = wave_spectrum(np.sin(2 * np.pi * 0.5 * t), 0.05)
+    >>> round(float(f[np.argmax(density)]), 2), round(float(np.sum(density) * f[1]), 2)
+    (0.5, 0.5)
+    """
+    x = as_series(series)
+    rate = 1.0 / positive("the time step", dt, "s")
+    length = min(x.shape[0], round(60.0 * rate)) if segment is None else segment
+    shared = length // 2 if overlap is None else overlap
+    if not 1 < length <= x.shape[0] or not 0 <= shared < length:
+        raise RequestError(
+            f"Welch's method needs segments of 2 to {x.shape[0]} samples and an overlap below one "
+            f"segment; received segments of {length} and an overlap of {shared}. Shorten them, or "
+            "give a longer record."
+        )
+    if padded is not None and padded < length:
+        raise RequestError(
+            f"the transform must be at least as long as a segment ({length} samples); received "
+            f"{padded}. Lengthen it, or leave it out."
+        )
+    frequency, density = signal.welch(
+        x, rate, window=window, nperseg=length, noverlap=shared, nfft=padded
+    )
+    return frequency, density

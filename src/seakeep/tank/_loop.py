@@ -1,0 +1,257 @@
+"""The compiled time loop: Cummins' equation by classical Runge–Kutta steps.
+
+Imported only where a run is simulated; needs the extra ``tank`` (numba). Arrays in, arrays out;
+`dynamics` prepares them and gives the results names.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+# Reassociation lets the memory integral run in vector registers; NaN is still NaN.
+_FAST = {"reassoc", "contract"}
+
+
+@numba.njit(cache=True)
+def line_tension(
+    line: FloatArray, surge: float, heave: float, pitch: float, velocity: FloatArray
+) -> tuple[float, float, float, float]:
+    """Tension of a line and its force on the vessel.
+
+    `line` holds eye x, eye z, pole x, pole z (from the centre of gravity at rest), stiffness,
+    unstretched length and damping. Returns tension, force along x and z, moment about y.
+    """
+    cosine, sine = math.cos(pitch), math.sin(pitch)
+    arm_x = line[0] * cosine + line[1] * sine
+    arm_z = -line[0] * sine + line[1] * cosine
+    dx, dz = line[2] - surge - arm_x, line[3] - heave - arm_z
+    length = math.sqrt(dx * dx + dz * dz)
+    if length <= line[5]:
+        return 0.0, 0.0, 0.0, 0.0
+    speed_x = velocity[0] + velocity[2] * arm_z
+    speed_z = velocity[1] - velocity[2] * arm_x
+    rate = -(dx * speed_x + dz * speed_z) / length
+    tension = max(0.0, line[4] * (length - line[5]) + line[6] * rate)
+    force_x, force_z = tension * dx / length, tension * dz / length
+    return tension, force_x, force_z, arm_z * force_x - arm_x * force_z
+
+
+@numba.njit(cache=True)
+def line_tensions(lines: FloatArray, position: FloatArray, velocity: FloatArray) -> FloatArray:
+    """Tensions of all lines, shape (line, time), along a motion of shape (dof, time)."""
+    out = np.zeros((lines.shape[0], position.shape[1]))
+    for i in range(lines.shape[0]):
+        for j in range(position.shape[1]):
+            q = position[:, j]
+            out[i, j] = line_tension(lines[i], q[0], q[1], q[2], velocity[:, j])[0]
+    return out
+
+
+@numba.njit(cache=True, fastmath=_FAST)
+def _wave_forces(
+    real: FloatArray,
+    imag: FloatArray,
+    surge: float,
+    surge_speed: float,
+    place: float,
+    ramp: float,
+    waves: FloatArray,
+    excitation: FloatArray,
+    drift_damping: float,
+    force: FloatArray,
+) -> float:
+    """Add wave and drift forces to `force`; return the slow part of surge.
+
+    `real` and `imag` are the components' phases at `place`; `waves` holds a row each of ω, k,
+    amplitude, √D a, and the surge response (re, im) times a; `excitation` the forces times a.
+    """
+    fast = fast_speed = 0.0
+    for n in range(real.size):
+        first = waves[4, n] * real[n] - waves[5, n] * imag[n]
+        fast += first
+        fast_speed += waves[0, n] * (waves[4, n] * imag[n] + waves[5, n] * real[n])
+    slow = surge - ramp * fast
+    shift = slow - place
+    envelope_re = envelope_im = 0.0
+    dofs = force.size
+    for n in range(real.size):
+        angle = waves[1, n] * shift
+        # Second order in k·shift: within a step the vessel moves millimetres.
+        c, s = 1.0 - 0.5 * angle * angle, angle
+        re, im = real[n] * c - imag[n] * s, imag[n] * c + real[n] * s
+        envelope_re += waves[3, n] * re
+        envelope_im += waves[3, n] * im
+        for i in range(dofs):
+            force[i] += ramp * (excitation[i, n] * re - excitation[dofs + i, n] * im)
+    slow_speed = surge_speed - ramp * fast_speed
+    force[0] += ramp * ramp * (envelope_re * envelope_re + envelope_im * envelope_im)
+    force[0] -= ramp * ramp * drift_damping * slow_speed
+    return slow
+
+
+@numba.njit(cache=True, fastmath=_FAST)
+def _body_forces(
+    q: FloatArray,
+    v: FloatArray,
+    stiffness: FloatArray,
+    linear: FloatArray,
+    quadratic: FloatArray,
+    pool: FloatArray,
+    lines: FloatArray,
+    force: FloatArray,
+) -> None:
+    """Add restoring, viscous, moon-pool and mooring forces to `force`."""
+    dofs = q.size
+    for i in range(dofs):
+        total = linear[i] * v[i] + quadratic[i] * abs(v[i]) * v[i]
+        for j in range(dofs):
+            total += stiffness[i, j] * q[j]
+        force[i] -= total
+    if dofs > 3:
+        # pool: centre, quadratic and linear loss of the flow through the opening.
+        relative = v[3] - (v[1] - pool[0] * v[2])
+        loss = pool[1] * abs(relative) * relative + pool[2] * relative
+        force[3] -= loss
+        force[1] += loss
+        force[2] -= pool[0] * loss
+    for i in range(lines.shape[0]):
+        _, fx, fz, moment = line_tension(lines[i], q[0], q[1], q[2], v)
+        force[0] += fx
+        force[1] += fz
+        force[2] += moment
+
+
+@numba.njit(cache=True, fastmath=_FAST)
+def _memory_ahead(
+    pairs: npt.NDArray[np.int64], kernel: FloatArray, v: FloatArray, origin: int, out: FloatArray
+) -> None:
+    """Memory of the velocities up to column `origin`, for the next instant, less its own share."""
+    length = kernel.shape[1] - 1
+    out[:] = 0.0
+    for p in range(pairs.shape[0]):
+        total = 0.0
+        past = v[pairs[p, 1], origin - length + 1 : origin + 1]
+        lags = kernel[p]
+        for m in range(length):
+            total += lags[m] * past[m]
+        out[pairs[p, 0]] += total
+
+
+@numba.njit(cache=True, fastmath=_FAST)
+def _phases(
+    waves: FloatArray,
+    phase: FloatArray,
+    place: float,
+    time: float,
+    dt: float,
+    real: FloatArray,
+    imag: FloatArray,
+) -> None:
+    """Components' cosines and sines at `place`, now, half a step and a step later."""
+    for n in range(phase.size):
+        for part in range(3):
+            angle = waves[1, n] * place - waves[0, n] * (time + 0.5 * part * dt) + phase[n]
+            real[part, n], imag[part, n] = math.cos(angle), math.sin(angle)
+
+
+@numba.njit(cache=True, fastmath=_FAST)
+def _advance(
+    q: FloatArray, v: FloatArray, step: int, origin: int, dt: float, slopes: FloatArray
+) -> None:
+    """Fourth-order step from the four stages' slopes, shape (2, stage, dof)."""
+    for i in range(q.shape[0]):
+        for part in range(2):
+            s = slopes[part]
+            total = dt / 6.0 * (s[0, i] + 2.0 * (s[1, i] + s[2, i]) + s[3, i])
+            if part == 0:
+                q[i, step + 1] = q[i, step] + total
+            else:
+                v[i, origin + 1] = v[i, origin] + total
+
+
+@numba.njit(cache=True)
+def _ramp(elapsed: float, ramp_time: float) -> float:
+    if elapsed >= ramp_time:
+        return 1.0
+    return 0.5 * (1.0 - math.cos(math.pi * elapsed / ramp_time))
+
+
+@numba.njit(cache=True, fastmath=_FAST)
+def integrate(
+    steps: int,
+    dt: float,
+    ramp_time: float,
+    start: FloatArray,
+    inverse_mass: FloatArray,
+    stiffness: FloatArray,
+    linear: FloatArray,
+    quadratic: FloatArray,
+    pool: FloatArray,
+    lines: FloatArray,
+    pairs: npt.NDArray[np.int64],
+    kernel: FloatArray,
+    waves: FloatArray,
+    phase: FloatArray,
+    excitation: FloatArray,
+    drift_damping: float,
+    limits: FloatArray,
+) -> tuple[Any, ...]:
+    """Integrate the motion.
+
+    `start` holds position and velocity, shape (2, dof); `kernel` the memory of each pair (row,
+    column) of `pairs`, already times dt, its columns from the oldest lag to lag 0. Returns
+    position, velocity, acceleration, radiation memory (dof, time), slow surge (time,), and the
+    index and degree of freedom that passed a limit (−1 if none).
+    """
+    dofs, length, count = start.shape[1], kernel.shape[1] - 1, phase.size
+    q, a = np.zeros((dofs, steps + 1)), np.zeros((dofs, steps + 1))
+    memory = np.zeros((dofs, steps + 1))
+    v = np.zeros((dofs, steps + 1 + length))
+    slow = np.zeros(steps + 1)
+    q[:, 0], v[:, length] = start[0], start[1]
+    now, ahead, force, held = np.zeros(dofs), np.zeros(dofs), np.zeros(dofs), np.zeros(dofs)
+    real, imag = np.zeros((3, count)), np.zeros((3, count))
+    slopes, state = np.zeros((2, 4, dofs)), np.zeros((2, dofs))
+    place = start[0, 0]
+    for step in range(steps + 1):
+        origin = length + step  # column of v at this instant
+        _memory_ahead(pairs, kernel, v, origin, ahead)
+        _phases(waves, phase, place, step * dt, dt, real, imag)
+        for stage in range(4):
+            part = (stage + 1) // 2
+            fraction = 0.5 * part
+            for i in range(dofs):
+                state[0, i], state[1, i] = q[i, step], v[i, origin]
+                if stage > 0:
+                    state[0, i] += fraction * dt * slopes[0, stage - 1, i]
+                    state[1, i] += fraction * dt * slopes[1, stage - 1, i]
+                held[i] = (1.0 - fraction) * now[i] + fraction * ahead[i]
+            for p in range(pairs.shape[0]):
+                held[pairs[p, 0]] += kernel[p, length] * state[1, pairs[p, 1]]
+            force[:] = -held
+            _body_forces(state[0], state[1], stiffness, linear, quadratic, pool, lines, force)
+            reached = _wave_forces(
+                real[part], imag[part], state[0, 0], state[1, 0], place,
+                _ramp((step + fraction) * dt, ramp_time), waves, excitation, drift_damping, force,
+            )  # fmt: skip
+            slopes[0, stage] = state[1]
+            for i in range(dofs):
+                slopes[1, stage, i] = np.sum(inverse_mass[i] * force)
+            if stage == 0:
+                a[:, step], memory[:, step], slow[step] = slopes[1, 0], held, reached
+                if step == steps:
+                    return q, v[:, length:], a, memory, slow, -1, -1
+        place = slow[step]
+        _advance(q, v, step, origin, dt, slopes)
+        now[:] = ahead
+        for i in range(dofs):
+            if not abs(q[i, step + 1]) < limits[i]:
+                return q, v[:, length:], a, memory, slow, step + 1, i
+    return q, v[:, length:], a, memory, slow, -1, -1

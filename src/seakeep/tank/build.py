@@ -1,0 +1,210 @@
+"""Hydrodynamic coefficients of the virtual hull by a boundary element solver.
+
+Needs the extra ``tank-build`` (capytaine). The result is a small NetCDF file that the tank reads,
+so that running the tank needs no solver. Run it as ``python -m seakeep.tank.build``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.errors import RequestError
+from seakeep.tank.hydrodynamics import CONVENTIONS, save_hydrodynamics
+from seakeep.tank.settings import HullSettings, PoolGeometry
+from seakeep.tank.vessel import HullMesh, hull_mesh, hydrostatics
+from seakeep.waves import GRAVITY
+
+__all__ = ["build_hydrodynamics", "default_frequencies"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def default_frequencies() -> FloatArray:
+    """Return the fifty frequencies of the shipped file, rad/s: dense where the pool resonates."""
+    slow, middle = np.arange(0.3, 2.0, 0.4), np.arange(2.0, 9.0, 0.25)
+    return np.round(np.concatenate([slow, middle, np.arange(9.0, 15.01, 6 / 16)]), 6)
+
+
+def _solver() -> Any:
+    try:
+        import capytaine
+    except ImportError as error:
+        raise RequestError(
+            "hydrodynamic coefficients need capytaine, which is not installed. "
+            "Install the extra: pip install 'seakeep[tank-build]'. The tank itself runs without."
+        ) from error
+    return capytaine
+
+
+def _modes(mesh: HullMesh, hull: HullSettings, centres: FloatArray) -> dict[str, FloatArray]:
+    """Displacement of each panel in each degree of freedom, shape (face, 3)."""
+    rigid = (~mesh.pool_lid)[:, None]
+    x, z = centres[:, 0], centres[:, 2] - hull.centre_of_gravity
+    zero, one = np.zeros_like(x), np.ones_like(x)
+    modes = {
+        "surge": np.column_stack([one, zero, zero]) * rigid,
+        "heave": np.column_stack([zero, zero, one]) * rigid,
+        "pitch": np.column_stack([z, zero, -x]) * rigid,
+    }
+    if hull.pool is not None:
+        shape = np.sin(np.pi * (x - hull.pool.centre) / hull.pool.length)
+        modes["piston"] = np.column_stack([zero, zero, one]) * ~rigid
+        modes["slosh"] = np.column_stack([zero, zero, shape]) * ~rigid
+    return modes
+
+
+def _mass_matrix(hull: HullSettings, density: float) -> FloatArray:
+    """Inertia of the vessel and of the thin layer of water above the pool's lid."""
+    inertia = [hull.mass, hull.mass, hull.mass * hull.pitch_gyradius**2]
+    if hull.pool is not None:
+        layer = density * hull.pool.length * hull.pool.beam * -hull.pool.lid
+        inertia[0] += layer
+        inertia += [layer, 0.5 * layer]
+    return np.diag(inertia)
+
+
+def build_hydrodynamics(
+    hull: HullSettings,
+    frequencies: npt.ArrayLike | None = None,
+    water_depth: float = 3.6,
+    density: float = 1000.0,
+    progress: bool = False,
+) -> xr.Dataset:
+    """Solve the radiation and diffraction problems of a hull.
+
+    Parameters
+    ----------
+    hull : HullSettings
+        Dimensions and panels.
+    frequencies : array_like, optional
+        Angular frequencies, rad/s; the default is :func:`default_frequencies`.
+    water_depth : float, optional
+        Depth, m.
+    density : float, optional
+        Density of the water, kg/m³.
+    progress : bool, optional
+        Show the solver's progress bar.
+
+    Returns
+    -------
+    Dataset
+        Added mass, damping, excitation, mass and restoring matrices, with conventions, versions
+        and the digest of the mesh in the attributes.
+
+    Raises
+    ------
+    RequestError
+        If capytaine is not installed, or the hull cannot be built.
+    """
+    cpt = _solver()
+    mesh = hull_mesh(hull, density)
+    statics = hydrostatics(mesh, hull, density)
+    surface = cpt.Mesh(mesh.vertices, mesh.faces, auto_clean=False, auto_check=False)
+    lid = cpt.Mesh(*mesh.internal_lid, auto_clean=False, auto_check=False)
+    modes = _modes(mesh, hull, np.asarray(surface.faces_centers))
+    body = cpt.FloatingBody(surface, dofs=modes, lid_mesh=lid, name="hull")
+    omegas = default_frequencies() if frequencies is None else np.asarray(frequencies, dtype=float)
+    case = {"body": body, "water_depth": water_depth, "rho": density, "g": GRAVITY}
+    problems = []
+    for omega in omegas:
+        problems.append(cpt.DiffractionProblem(omega=omega, wave_direction=0.0, **case))
+        problems += [cpt.RadiationProblem(omega=omega, radiating_dof=m, **case) for m in modes]
+    # The indirect method breaks reciprocity at the shelf of the pool. The default fit of the
+    # finite-depth Green function draws random numbers; the compiled one gives the same each time.
+    green = cpt.Delhommeau(finite_depth_prony_decomposition_method="fortran")
+    solver = cpt.BEMSolver(green_function=green, method="direct")
+    solved = cpt.assemble_dataset(
+        solver.solve_all(problems, progress_bar=progress, _check_wavelength=False),
+        hydrostatics=False,
+    )
+    names = list(modes)
+    radiation = {"radiating_dof": names, "influenced_dof": names}
+    order = ("omega", "influenced_dof", "radiating_dof")
+    force = (solved["Froude_Krylov_force"] + solved["diffraction_force"]).sel(
+        influenced_dof=names, wave_direction=0.0
+    )
+    stiffness = np.zeros((len(names), len(names)))
+    stiffness[:3, :3] = statics.stiffness
+    if hull.pool is not None:
+        area = hull.pool.length * hull.pool.beam
+        stiffness[3, 3], stiffness[4, 4] = density * GRAVITY * area * np.array([1.0, 0.5])
+    square = ("influenced_dof", "radiating_dof")
+    excitation = np.stack([force.values.real, force.values.imag])
+    data = xr.Dataset(
+        {
+            "added_mass": solved["added_mass"].sel(radiation).transpose(*order),
+            "damping": solved["radiation_damping"].sel(radiation).transpose(*order),
+            "excitation": (("part", *force.dims), excitation),
+            "mass": (square, _mass_matrix(hull, density)),
+            "stiffness": (square, stiffness),
+        },
+        coords={"omega": omegas, "part": ["re", "im"], "influenced_dof": names, "radiating_dof": names},
+    )
+    data = data.drop_vars([n for n in data.coords if n not in data.dims])
+    data["excitation"] = data["excitation"].transpose("part", "omega", "influenced_dof")
+    return data.assign_attrs(_attributes(hull, mesh, statics.volume, statics.waterplane, water_depth, density))
+
+
+def _attributes(
+    hull: HullSettings,
+    mesh: HullMesh,
+    volume: float,
+    waterplane: float,
+    depth: float,
+    density: float,
+) -> dict[str, Any]:
+    pool = hull.pool or PoolGeometry()
+    pool_area = pool.length * pool.beam if hull.pool is not None else 0.0
+    return {
+        **CONVENTIONS,
+        "water_depth": depth,
+        "density": density,
+        "gravity": GRAVITY,
+        "vessel_mass": hull.mass,
+        "centre_of_gravity": hull.centre_of_gravity,
+        "draft": mesh.draft,
+        "midship": mesh.midship,
+        "waterline_exponent": mesh.exponent,
+        "displaced_volume": volume,
+        "waterplane_area": waterplane,
+        "waterline_beam": hull.beam_waterline,
+        "pool_centre": pool.centre,
+        "pool_area": pool_area,
+        "pool_opening": pool.bottom_length * pool.bottom_beam if pool_area else 0.0,
+        "pool_length": pool.length,
+        "panels": len(mesh.faces),
+        "panels_of_internal_lid": len(mesh.internal_lid[1]),
+        "mesh_sha256": mesh.digest,
+        "hull_settings": hull.model_dump_json(),
+        "solver": f"capytaine {metadata.version('capytaine')}, method direct",
+        "versions": ", ".join(f"{n} {metadata.version(n)}" for n in ("numpy", "scipy", "xarray")),
+    }
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Build the file of the default hull (or of the ``[hull]`` table of a settings file)."""
+    from seakeep.tank.settings import default_settings, read_settings
+
+    parser = argparse.ArgumentParser(prog="python -m seakeep.tank.build", description=__doc__)
+    parser.add_argument("settings", nargs="?", type=Path, help="tank settings (TOML)")
+    parser.add_argument("-o", "--out", type=Path, default=Path("hydrodynamics.nc"))
+    options = parser.parse_args(arguments)
+    settings = default_settings() if options.settings is None else read_settings(options.settings)
+    data = build_hydrodynamics(
+        settings.hull, water_depth=settings.facility.water_depth, progress=sys.stderr.isatty()
+    )
+    save_hydrodynamics(data, options.out)
+    sys.stdout.write(f"{options.out}: {options.out.stat().st_size / 1000:.0f} kB\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

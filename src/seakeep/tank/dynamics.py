@@ -1,0 +1,412 @@
+r"""Motion of the moored vessel in a sea: Cummins' equation in the time domain.
+
+.. math::
+
+   (M + A_\infty)\ddot q + \int_0^{T} K(\tau)\dot q(t-\tau)\,d\tau + K_h q + C\dot q
+   + F_\mathrm{visc} = F_\mathrm{exc} + F_\mathrm{drift} + F_\mathrm{moor} + F_\mathrm{wdd}
+
+Wave forces act at the slow part of surge (surge less its linear wave-frequency part): taken at
+the full surge they would feign a mean force.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import ModuleType
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.errors import RequestError, SeakeepError
+from seakeep.tank.hydrodynamics import (
+    Hydrodynamics,
+    Kernel,
+    excitation_at,
+    load_hydrodynamics,
+    radiation_kernel,
+    response,
+)
+from seakeep.tank.moorings import line_table, mooring_stiffness
+from seakeep.tank.seas import Sea
+from seakeep.tank.settings import DriftSettings, TankSettings
+from seakeep.waves import GRAVITY
+
+__all__ = [
+    "DivergenceError",
+    "Motion",
+    "Rig",
+    "assemble_rig",
+    "drift_coefficient",
+    "linear_response",
+    "simulate",
+    "tensions",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+LIMITS = {"surge": 20.0, "heave": 2.0, "pitch": 1.2, "piston": 2.0, "slosh": 2.0}
+"""Beyond these (m, rad) a simulation has left the physics it was made for."""
+
+STABLE = 2.7  # RK4 is stable for |λ|·dt up to 2.78 on the imaginary and 2.785 on the real axis
+KERNEL_RATE = 40.0  # rad/s, the fastest motion in the radiation kernel
+
+
+class DivergenceError(SeakeepError):
+    """A simulation left the range in which its physics holds."""
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Vessel and moorings, ready for the time loop.
+
+    Parameters
+    ----------
+    hydro : Hydrodynamics
+        Frequency-domain coefficients.
+    kernel : Kernel
+        Radiation memory at the step of the simulation.
+    linear, quadratic : ndarray, shape (dof,)
+        Viscous damping of each degree of freedom.
+    pool : ndarray, shape (3,)
+        Centre of the moon pool (m), quadratic and linear loss of the flow through its opening.
+    lines : ndarray, shape (line, 7)
+        Moorings, see ``moorings.COLUMNS``.
+    line_names : tuple of str
+        Their names.
+    drift : DriftSettings
+        Mean drift force and its damping.
+    step, ramp : float
+        s.
+    """
+
+    hydro: Hydrodynamics
+    kernel: Kernel
+    linear: FloatArray
+    quadratic: FloatArray
+    pool: FloatArray
+    lines: FloatArray
+    line_names: tuple[str, ...]
+    drift: DriftSettings
+    step: float
+    ramp: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Degrees of freedom."""
+        return self.hydro.names
+
+    @property
+    def inertia(self) -> FloatArray:
+        """Mass and added mass at infinite frequency, shape (dof, dof)."""
+        return self.hydro.mass + self.kernel.infinite_mass
+
+    @property
+    def mooring_stiffness(self) -> FloatArray:
+        """Linear stiffness of the taut lines at rest, shape (dof, dof)."""
+        total = np.zeros_like(self.hydro.mass)
+        total[:3, :3] = mooring_stiffness(self.lines)
+        return total
+
+    @property
+    def linear_damping(self) -> FloatArray:
+        """Linear viscous damping, the pool's coupling included, shape (dof, dof)."""
+        total = np.diag(self.linear)
+        if self.hydro.pool is not None:
+            flow = np.array([0.0, -1.0, self.pool[0], 1.0, 0.0])
+            total = total + self.pool[2] * np.outer(flow, flow)
+        return total
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a simulation gives: arrays of shape (dof, time), SI and radians.
+
+    Parameters
+    ----------
+    time : ndarray, shape (time,)
+        s.
+    names : tuple of str
+        Degrees of freedom.
+    position, velocity, acceleration : ndarray, shape (dof, time)
+        The motion.
+    memory : ndarray, shape (dof, time)
+        Radiation memory force (on the left-hand side of the equation).
+    slow_surge : ndarray, shape (time,)
+        Surge less its linear wave-frequency part, m.
+    """
+
+    time: FloatArray
+    names: tuple[str, ...]
+    position: FloatArray = field(repr=False)
+    velocity: FloatArray = field(repr=False)
+    acceleration: FloatArray = field(repr=False)
+    memory: FloatArray = field(repr=False)
+    slow_surge: FloatArray = field(repr=False)
+
+
+def _loop() -> ModuleType:
+    try:
+        from seakeep.tank import _loop
+    except ImportError as error:
+        raise RequestError(
+            "the virtual tank needs numba for its time loop, which is not installed. "
+            "Install the extra: pip install 'seakeep[tank]'."
+        ) from error
+    return _loop
+
+
+def _viscous(settings: TankSettings, hydro: Hydrodynamics) -> tuple[FloatArray, ...]:
+    rigid, square, losses = (
+        settings.vessel.linear_damping,
+        settings.vessel.quadratic_damping,
+        settings.vessel.pool,
+    )
+    linear = [rigid.surge, rigid.heave, rigid.pitch]
+    quadratic = [square.surge, square.heave, square.pitch]
+    pool = np.zeros(3)
+    if hydro.pool is not None:
+        linear += [0.0, losses.slosh_linear]
+        quadratic += [0.0, losses.slosh_quadratic]
+        contraction = (hydro.pool.area / hydro.pool.opening) ** 2
+        quadratic_loss = 0.5 * hydro.density * losses.loss_coefficient * contraction
+        pool = np.array(
+            [hydro.pool.centre, quadratic_loss * hydro.pool.area, losses.piston_linear]
+        )
+    return np.array(linear), np.array(quadratic), pool
+
+
+def _check_step(rig: Rig) -> None:
+    """Refuse a step beyond the stability of the integrator or the resolution of the kernel."""
+    dofs = len(rig.names)
+    stiffness = rig.hydro.stiffness + rig.mooring_stiffness
+    system = np.zeros((2 * dofs, 2 * dofs))
+    system[:dofs, dofs:] = np.eye(dofs)
+    system[dofs:, :dofs] = -np.linalg.solve(rig.inertia, stiffness)
+    system[dofs:, dofs:] = -np.linalg.solve(rig.inertia, rig.linear_damping)
+    fastest = float(np.max(np.abs(np.linalg.eigvals(system))))
+    largest = min(STABLE / fastest, 2.0 / KERNEL_RATE)
+    if rig.step > largest:
+        raise RequestError(
+            f"simulation.step = {rig.step:g} s is too large: the integration is stable and "
+            f"resolves the radiation kernel up to {largest:.3g} s (fastest natural frequency "
+            f"{fastest:.3g} rad/s). Take a smaller step; 0.01 s is usual."
+        )
+
+
+def assemble_rig(settings: TankSettings, hydro: Hydrodynamics | None = None) -> Rig:
+    """Put vessel, hydrodynamics and moorings together, and check that they fit.
+
+    Parameters
+    ----------
+    settings : TankSettings
+        The settings.
+    hydro : Hydrodynamics, optional
+        Coefficients; the default is the settings' file.
+
+    Returns
+    -------
+    Rig
+        Ready for :func:`simulate`.
+
+    Raises
+    ------
+    RequestError
+        If depth or density differ from the hydrodynamics file's, a line has no length, or the
+        step is too large.
+    """
+    coefficients = load_hydrodynamics(settings.hydrodynamics_path) if hydro is None else hydro
+    for name, wanted, made in (
+        ("water_depth", settings.facility.water_depth, coefficients.water_depth),
+        ("density", settings.facility.density, coefficients.density),
+    ):
+        if abs(wanted - made) > 1e-6 * made:
+            raise RequestError(
+                f"facility.{name} is {wanted:g} and the hydrodynamics file was made for {made:g}. "
+                "Set facility to the file's value, or build a file for this one: "
+                "python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
+            )
+    linear, quadratic, pool = _viscous(settings, coefficients)
+    step = settings.simulation.step
+    height = float(coefficients.attrs["centre_of_gravity"])
+    rig = Rig(
+        hydro=coefficients,
+        kernel=radiation_kernel(coefficients, step, settings.simulation.kernel_length),
+        linear=linear,
+        quadratic=quadratic,
+        pool=pool,
+        lines=line_table(settings.moorings, settings.vessel.position, height),
+        line_names=tuple(settings.moorings),
+        drift=settings.drift,
+        step=step,
+        ramp=settings.simulation.ramp,
+    )
+    _check_step(rig)
+    return rig
+
+
+def drift_coefficient(
+    drift: DriftSettings, omega: npt.ArrayLike, density: float = 1000.0
+) -> tuple[FloatArray, FloatArray]:
+    r"""Mean drift force and wave-drift damping a metre² of amplitude.
+
+    Parameters
+    ----------
+    drift : DriftSettings
+        The empirical curve.
+    omega : array_like
+        Angular frequencies, rad/s.
+    density : float, optional
+        kg/m³.
+
+    Returns
+    -------
+    force : ndarray
+        :math:`D = \tfrac12\rho g B\,r / (1 + (\omega_c/\omega)^4)`, N/m².
+    damping : ndarray
+        :math:`(\omega^2/g)\,D' + 4\omega D/g`, N s/m³ (Aranha).
+    """
+    w = np.asarray(omega, dtype=float)
+    scale = 0.5 * density * GRAVITY * drift.beam * drift.reflection
+    ratio = (drift.corner / w) ** 4
+    force = scale / (1.0 + ratio)
+    slope = scale * 4.0 * ratio / w / (1.0 + ratio) ** 2
+    return force, w**2 / GRAVITY * slope + 4.0 * w / GRAVITY * force
+
+
+def linear_response(rig: Rig, omega: npt.ArrayLike) -> npt.NDArray[np.complex128]:
+    """Linear response of the moored vessel as the time loop sees it, shape (frequency, dof).
+
+    Parameters
+    ----------
+    rig : Rig
+        Vessel and moorings.
+    omega : array_like
+        Angular frequencies, rad/s.
+
+    Returns
+    -------
+    ndarray of complex
+        Response a metre of wave amplitude, with the kernel's coefficients, the linear part of
+        the viscous damping and the taut lines' stiffness.
+    """
+    return response(rig.hydro, omega, rig.linear_damping, rig.mooring_stiffness, rig.kernel)
+
+
+def _wave_arrays(rig: Rig, sea: Sea) -> tuple[FloatArray, FloatArray, float]:
+    """Rows of `waves`, forces times amplitude, and the wave-drift damping."""
+    if sea.omega.size == 0:
+        return np.zeros((6, 0)), np.zeros((2 * len(rig.names), 0)), 0.0
+    force = excitation_at(rig.hydro, sea.omega) * sea.amplitude[:, None]
+    surge = linear_response(rig, sea.omega)[:, 0] * sea.amplitude
+    drift, damping = drift_coefficient(rig.drift, sea.omega, rig.hydro.density)
+    rows = [sea.omega, sea.wavenumber, sea.amplitude, np.sqrt(drift) * sea.amplitude]
+    waves = np.stack([*rows, surge.real, surge.imag])
+    parts = np.concatenate([force.real.T, force.imag.T])
+    total = float(np.sum(damping * sea.amplitude**2)) if rig.drift.damping else 0.0
+    return waves, np.ascontiguousarray(parts), total
+
+
+def _kernel_arrays(rig: Rig) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    """Pairs of degrees of freedom that have a memory, and their weights from the oldest lag."""
+    values = rig.kernel.values
+    pairs = np.argwhere(np.any(values != 0.0, axis=0))
+    weights = np.full(values.shape[0], rig.step)
+    weights[[0, -1]] *= 0.5
+    rows = (values * weights[:, None, None])[::-1, pairs[:, 0], pairs[:, 1]].T
+    return pairs, np.ascontiguousarray(rows)
+
+
+def simulate(
+    rig: Rig,
+    sea: Sea,
+    duration: float,
+    start: npt.ArrayLike | None = None,
+    begin: float = 0.0,
+) -> Motion:
+    """Simulate a run.
+
+    Parameters
+    ----------
+    rig : Rig
+        Vessel and moorings.
+    sea : Sea
+        The waves; they grow from rest over ``rig.ramp``.
+    duration : float
+        s.
+    start : array_like, shape (2, dof), optional
+        Position and velocity at the start; the default is rest.
+    begin : float, optional
+        Time of the first instant, s; the sea's phases refer to time zero.
+
+    Returns
+    -------
+    Motion
+        The motion at every step.
+
+    Raises
+    ------
+    RequestError
+        If numba is missing, or the sea leaves the band of the hydrodynamics file.
+    DivergenceError
+        If the simulation diverges; the message names the time and the degree of freedom.
+    """
+    loop = _loop()
+    dofs = len(rig.names)
+    steps = max(1, round(duration / rig.step))
+    waves, excitation, drift_damping = _wave_arrays(rig, sea)
+    pairs, kernel = _kernel_arrays(rig)
+    state = np.zeros((2, dofs)) if start is None else np.array(start, dtype=float)
+    if state.shape != (2, dofs):
+        raise RequestError(
+            f"start needs position and velocity of {', '.join(rig.names)}, shape (2, {dofs}); "
+            f"received {state.shape}. Transpose or complete it."
+        )
+    q, v, a, memory, slow, failed, which = loop.integrate(
+        steps,
+        rig.step,
+        rig.ramp,
+        state,
+        # Contiguous, so that every hull runs the same compiled code.
+        np.ascontiguousarray(np.linalg.inv(rig.inertia)),
+        np.ascontiguousarray(rig.hydro.stiffness),
+        np.ascontiguousarray(rig.linear),
+        np.ascontiguousarray(rig.quadratic),
+        np.ascontiguousarray(rig.pool),
+        np.ascontiguousarray(rig.lines),
+        pairs,
+        kernel,
+        waves,
+        sea.phase - sea.omega * begin,
+        excitation,
+        drift_damping,
+        np.array([LIMITS[name] for name in rig.names]),
+    )
+    if failed >= 0:
+        name = rig.names[which]
+        raise DivergenceError(
+            f"the simulation diverged at t = {begin + failed * rig.step:.2f} s in {name}, which "
+            f"passed {LIMITS[name]:g} {'rad' if name == 'pitch' else 'm'}. Lower the waves, raise "
+            "the damping, stiffen the moorings, or take a smaller simulation.step."
+        )
+    time = begin + rig.step * np.arange(steps + 1)
+    return Motion(time, rig.names, q, np.ascontiguousarray(v), a, memory, slow)
+
+
+def tensions(rig: Rig, position: FloatArray, velocity: FloatArray) -> FloatArray:
+    """Tension of each line along a motion, N.
+
+    Parameters
+    ----------
+    rig : Rig
+        Vessel and moorings.
+    position, velocity : ndarray, shape (dof, time)
+        The motion.
+
+    Returns
+    -------
+    ndarray, shape (line, time)
+    """
+    result: FloatArray = _loop().line_tensions(
+        rig.lines, np.ascontiguousarray(position), np.ascontiguousarray(velocity)
+    )
+    return result

@@ -1,0 +1,413 @@
+r"""Hydrodynamic coefficients: the file, its checks, the radiation kernel and the linear response.
+
+Time convention :math:`e^{-i\omega t}`; waves run along +x, their phase is zero at the centre of
+gravity. Degrees of freedom: surge, heave, pitch about the centre of gravity, and, for a hull with
+a moon pool, the absolute elevations of its piston and of its first longitudinal sloshing mode.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from scipy.interpolate import CubicSpline, PchipInterpolator
+
+from seakeep.errors import RequestError
+from seakeep.waves import GRAVITY
+
+__all__ = [
+    "CONVENTIONS",
+    "Hydrodynamics",
+    "Kernel",
+    "Pool",
+    "excitation_at",
+    "load_hydrodynamics",
+    "radiation_kernel",
+    "response",
+    "save_hydrodynamics",
+]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+CONVENTIONS = {
+    "format": "seakeep-hydrodynamics 1",
+    "time_convention": "exp(-i omega t)",
+    "wave_direction": "+x",
+    "frame": "x downstream, z up, pitch positive bow up, origin at the centre of gravity",
+    "pool_modes": "absolute elevations; rigid modes do not move the pool's lid",
+    "units": "SI, radians",
+}
+"""Attributes that a file of coefficients must carry, with these values."""
+
+RIGID = ("surge", "heave", "pitch")
+DEGREES = (*RIGID, "piston", "slosh")
+VARIABLES = ("added_mass", "damping", "excitation", "mass", "stiffness")
+TAIL_END = 40.0  # rad/s; the damping is continued as ω⁻³ from the last frequency to here
+POOL_TAPER = (9.0, 12.0)  # rad/s; above 12 rad/s the solver's pool rows are not clean
+KERNEL_LENGTH = 12.0  # s
+
+
+@dataclass(frozen=True)
+class Pool:
+    """Moon pool: centre (m), area of its free surface and of its opening (m²), length (m)."""
+
+    centre: float
+    area: float
+    opening: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Hydrodynamics:
+    """Frequency-domain coefficients of a hull.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Degrees of freedom.
+    omega : ndarray, shape (frequency,)
+        Angular frequencies, rad/s.
+    added_mass, damping : ndarray, shape (frequency, dof, dof)
+        As the solver gave them.
+    excitation : ndarray of complex, shape (frequency, dof)
+        Force a metre of wave amplitude.
+    mass, stiffness : ndarray, shape (dof, dof)
+        Inertia and hydrostatic restoring.
+    pool : Pool or None
+        The moon pool, if there is one.
+    attrs : dict
+        Attributes of the file: conventions, versions, digest of the mesh, dimensions.
+    """
+
+    names: tuple[str, ...]
+    omega: FloatArray
+    added_mass: FloatArray
+    damping: FloatArray
+    excitation: ComplexArray
+    mass: FloatArray
+    stiffness: FloatArray
+    pool: Pool | None
+    attrs: dict[str, Any]
+
+    @property
+    def water_depth(self) -> float:
+        """Depth for which the coefficients were computed, m."""
+        return float(self.attrs["water_depth"])
+
+    @property
+    def density(self) -> float:
+        """Density of the water, kg/m³."""
+        return float(self.attrs["density"])
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """Radiation memory: K at uniform lags, the added mass at infinite frequency.
+
+    Parameters
+    ----------
+    lags : ndarray, shape (lag,)
+        s, from 0.
+    values : ndarray, shape (lag, dof, dof)
+        K, kg/s².
+    infinite_mass : ndarray, shape (dof, dof)
+        A∞, kg.
+    omega, damping : ndarray
+        Grid and damping matrices (symmetric, passive) from which K was made.
+    """
+
+    lags: FloatArray
+    values: FloatArray
+    infinite_mass: FloatArray
+    omega: FloatArray
+    damping: FloatArray
+
+
+def save_hydrodynamics(data: xr.Dataset, path: Path | str) -> None:
+    """Write coefficients to NetCDF under a temporary name, then rename.
+
+    Parameters
+    ----------
+    data : Dataset
+        As ``build_hydrodynamics`` returns it.
+    path : path
+        Where to.
+    """
+    target = Path(path)
+    part = target.with_name(target.name + ".part")
+    data.to_netcdf(part, engine="h5netcdf")
+    os.replace(part, target)
+
+
+def shipped_hydrodynamics(name: str = "ck14e.nc") -> Path:
+    """Path of a file of coefficients that ships with the package."""
+    return Path(str(resources.files("seakeep.tank").joinpath("data", name)))
+
+
+def load_hydrodynamics(path: Path | str | None = None) -> Hydrodynamics:
+    """Read and check a file of coefficients.
+
+    Parameters
+    ----------
+    path : path, optional
+        NetCDF file; the default is the one that ships with the package (CK-14e-like).
+
+    Returns
+    -------
+    Hydrodynamics
+        The coefficients.
+
+    Raises
+    ------
+    RequestError
+        If the file does not exist, misses a variable, has values that are not finite, or was made
+        under another convention.
+    """
+    source = shipped_hydrodynamics() if path is None else Path(path)
+    if not source.is_file():
+        raise RequestError(
+            f"the hydrodynamics file {source} does not exist. Correct vessel.hydrodynamics, or "
+            "build one: python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
+        )
+    try:
+        with xr.open_dataset(source, engine="h5netcdf") as opened:
+            data = opened.load()
+    except (OSError, ValueError) as error:
+        raise RequestError(
+            f"{source} is no NetCDF file that can be read ({error}). Build the file again: "
+            "python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
+        ) from error
+    for key, expected in CONVENTIONS.items():
+        if data.attrs.get(key) != expected:
+            raise RequestError(
+                f"{source} was made under another convention: {key} is {data.attrs.get(key)!r}, the "
+                f"tank needs {expected!r}. Convert the coefficients, or build the file with "
+                "python -m seakeep.tank.build."
+            )
+    missing = [name for name in VARIABLES if name not in data]
+    if missing:
+        raise RequestError(f"{source} misses {', '.join(missing)}. Build the file again.")
+    bad = [name for name in VARIABLES if not np.all(np.isfinite(data[name].values))]
+    if bad:
+        raise RequestError(
+            f"{source} holds values that are not finite in {', '.join(bad)}. Build the file again."
+        )
+    names = tuple(str(n) for n in data["influenced_dof"].values)
+    if names not in (RIGID, DEGREES):
+        raise RequestError(
+            f"{source} has the degrees of freedom {', '.join(names)}; the tank needs "
+            f"{', '.join(RIGID)}, with piston and slosh after them for a hull with a moon pool."
+        )
+    force = data["excitation"].values
+    pool = None
+    if "piston" in names:
+        keys = ("pool_centre", "pool_area", "pool_opening", "pool_length")
+        pool = Pool(*(float(data.attrs[key]) for key in keys))
+    return Hydrodynamics(
+        names=names,
+        omega=data["omega"].values,
+        added_mass=data["added_mass"].values,
+        damping=data["damping"].values,
+        excitation=force[0] + 1j * force[1],
+        mass=data["mass"].values,
+        stiffness=data["stiffness"].values,
+        pool=pool,
+        attrs=dict(data.attrs),
+    )
+
+
+def _passive(matrices: FloatArray) -> FloatArray:
+    """Nearest symmetric positive semi-definite matrices (Frobenius norm)."""
+    values, vectors = np.linalg.eigh(0.5 * (matrices + matrices.swapaxes(-1, -2)))
+    clipped = np.maximum(values, 0.0)[..., None, :]
+    projected = (vectors * clipped) @ vectors.swapaxes(-1, -2)
+    result: FloatArray = 0.5 * (projected + projected.swapaxes(-1, -2))
+    return result
+
+
+def passive_damping(hydro: Hydrodynamics, step: float = 0.02) -> tuple[FloatArray, FloatArray]:
+    """Damping for the kernel: symmetric, passive, from 0 to the end of its tail.
+
+    Zero at zero frequency, shape-preserving cubics between the solver's frequencies, ω⁻³ beyond
+    them; the piston's rows are tapered to zero over 9–12 rad/s, where the solver is not clean,
+    and the sloshing mode radiates nothing.
+
+    Parameters
+    ----------
+    hydro : Hydrodynamics
+        The coefficients.
+    step : float, optional
+        Step of the grid, rad/s.
+
+    Returns
+    -------
+    omega : ndarray, shape (grid,)
+    damping : ndarray, shape (grid, dof, dof)
+    """
+    omega = np.arange(0.0, TAIL_END + 0.5 * step, step)
+    last = hydro.omega[-1]
+    known = np.concatenate([np.zeros((1, *hydro.mass.shape)), _passive(hydro.damping)])
+    inside = PchipInterpolator(np.append(0.0, hydro.omega), known, axis=0)(np.minimum(omega, last))
+    tail = np.where(omega > last, (last / np.maximum(omega, last)) ** 3, 1.0)
+    weight = np.ones((omega.size, len(hydro.names)))
+    if hydro.pool is not None:
+        low, high = POOL_TAPER
+        part = np.clip((omega - low) / (high - low), 0.0, 1.0)
+        weight[:, 3] = 0.5 * (1.0 + np.cos(np.pi * part))
+        weight[:, 4] = 0.0
+    # A congruence keeps the matrices passive.
+    tapered = weight[:, :, None] * inside * tail[:, None, None] * weight[:, None, :]
+    return omega, _passive(tapered)
+
+
+def radiation_kernel(
+    hydro: Hydrodynamics, step: float = 0.01, length: float = KERNEL_LENGTH
+) -> Kernel:
+    r"""Radiation kernel :math:`K(t) = \frac{2}{\pi}\int B(\omega)\cos\omega t\,d\omega` and A∞.
+
+    Parameters
+    ----------
+    hydro : Hydrodynamics
+        The coefficients.
+    step, length : float, optional
+        Step and length of the lags, s.
+
+    Returns
+    -------
+    Kernel
+        The kernel; A∞ by Ogilvie's relation, averaged over 2–9 rad/s.
+    """
+    omega, damping = passive_damping(hydro)
+    lags = step * np.arange(round(length / step) + 1)
+    weights = np.full(omega.size, omega[1])
+    weights[[0, -1]] *= 0.5
+    flat = damping.reshape(omega.size, -1) * weights[:, None]
+    values = (2.0 / np.pi) * np.cos(np.outer(lags, omega)) @ flat
+    band = (hydro.omega >= 2.0) & (hydro.omega <= POOL_TAPER[0])
+    if not np.any(band):
+        band = np.ones(hydro.omega.size, dtype=bool)
+    added = 0.5 * (hydro.added_mass + hydro.added_mass.swapaxes(1, 2))[band]
+    lag_weights = np.full(lags.size, step)
+    lag_weights[[0, -1]] *= 0.5
+    sines = np.sin(np.outer(hydro.omega[band], lags)) * lag_weights / hydro.omega[band, None]
+    infinite = added + (sines @ values).reshape(added.shape)
+    shape = hydro.mass.shape
+    return Kernel(lags, values.reshape(-1, *shape), infinite.mean(axis=0), omega, damping)
+
+
+def kernel_coefficients(kernel: Kernel, omega: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Added mass and damping that a kernel reproduces, each of shape (frequency, dof, dof).
+
+    Parameters
+    ----------
+    kernel : Kernel
+        The kernel.
+    omega : array_like
+        Angular frequencies, rad/s.
+
+    Returns
+    -------
+    added_mass, damping : ndarray
+        From sine and cosine transforms of the kernel over its lags.
+    """
+    frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
+    weights = np.full(kernel.lags.size, kernel.lags[1])
+    weights[[0, -1]] *= 0.5
+    flat = kernel.values.reshape(kernel.lags.size, -1) * weights[:, None]
+    phase = np.outer(frequencies, kernel.lags)
+    shape = (-1, *kernel.infinite_mass.shape)
+    added = kernel.infinite_mass - (np.sin(phase) @ flat / frequencies[:, None]).reshape(shape)
+    return added, (np.cos(phase) @ flat).reshape(shape)
+
+
+def _inside(hydro: Hydrodynamics, omega: npt.ArrayLike) -> FloatArray:
+    wanted = np.atleast_1d(np.asarray(omega, dtype=float))
+    low, high = hydro.omega[0], hydro.omega[-1]
+    if wanted.size and (wanted.min() < low or wanted.max() > high):
+        raise RequestError(
+            f"frequencies from {wanted.min():g} to {wanted.max():g} rad/s leave the band of the "
+            f"hydrodynamics file, {low:g} to {high:g} rad/s. Narrow the spectrum, or build a file "
+            "with more frequencies."
+        )
+    return wanted
+
+
+def excitation_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
+    """Wave excitation between the solver's frequencies, by cubic splines.
+
+    Parameters
+    ----------
+    hydro : Hydrodynamics
+        The coefficients.
+    omega : array_like, shape (frequency,)
+        Angular frequencies, rad/s.
+
+    Returns
+    -------
+    ndarray of complex, shape (frequency, dof)
+        Force a metre of amplitude.
+
+    Raises
+    ------
+    RequestError
+        If a frequency lies outside the file's band.
+    """
+    wanted = _inside(hydro, omega)
+    parts = np.stack([hydro.excitation.real, hydro.excitation.imag], axis=-1)
+    values = CubicSpline(hydro.omega, parts, axis=0)(wanted)
+    result: ComplexArray = values[..., 0] + 1j * values[..., 1]
+    return result
+
+
+def response(
+    hydro: Hydrodynamics,
+    omega: npt.ArrayLike,
+    damping: npt.ArrayLike = 0.0,
+    stiffness: npt.ArrayLike = 0.0,
+    kernel: Kernel | None = None,
+) -> ComplexArray:
+    r"""Linear response a metre of wave amplitude.
+
+    Solves :math:`[-\omega^2 (M + A) - i\omega (B + C) + K_h + K]\,q = X`.
+
+    Parameters
+    ----------
+    hydro : Hydrodynamics
+        The coefficients.
+    omega : array_like, shape (frequency,)
+        Angular frequencies, rad/s.
+    damping, stiffness : array_like, shape (dof, dof), optional
+        Linear damping C and stiffness K besides the hydrodynamic ones.
+    kernel : Kernel, optional
+        Take A and B from the kernel (what the time domain sees) instead of the file.
+
+    Returns
+    -------
+    ndarray of complex, shape (frequency, dof)
+        Response amplitude operators.
+
+    Raises
+    ------
+    RequestError
+        If a frequency lies outside the file's band.
+    """
+    wanted = _inside(hydro, omega)
+    if kernel is None:
+        added = CubicSpline(hydro.omega, hydro.added_mass, axis=0)(wanted)
+        radiated = CubicSpline(hydro.omega, hydro.damping, axis=0)(wanted)
+    else:
+        added, radiated = kernel_coefficients(kernel, wanted)
+    w = wanted[:, None, None]
+    dynamic = -(w**2) * (hydro.mass + added) - 1j * w * (radiated + np.asarray(damping))
+    dynamic = dynamic + hydro.stiffness + np.asarray(stiffness)
+    result: ComplexArray = np.linalg.solve(dynamic, excitation_at(hydro, wanted)[..., None])[..., 0]
+    return result
+
+

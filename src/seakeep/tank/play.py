@@ -1,0 +1,303 @@
+"""Play a campaign: simulate its runs, record them, and write what a tank would deliver."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Iterable, Mapping
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from seakeep.conventions import canonical_channel
+from seakeep.errors import RequestError, did_you_mean
+from seakeep.tank.campaign_file import campaign_text
+from seakeep.tank.dynamics import Rig, assemble_rig, simulate
+from seakeep.tank.hydrodynamics import excitation_at
+from seakeep.tank.instruments import Played, record_run, record_together
+from seakeep.tank.raw_files import write_dataset, write_record, write_text
+from seakeep.tank.seas import Sea, sea_of_run
+from seakeep.tank.settings import TankSettings
+
+__all__ = ["check_settings", "noisy_truth", "play", "play_run", "truth"]
+
+Progress = Callable[[str, int, int], None]
+
+SINGLE_RATE = 100.0  # Hz, where all instruments share a logger
+MARGIN = 2.0  # s simulated before and after what any logger records
+STREAMS = {"waves": 0, "instruments": 1, "truth": 2}
+
+
+def generator(settings: TankSettings, run: str, stream: str) -> np.random.Generator:
+    """Independent generator of a run's stream: adding or leaving out a run changes no other."""
+    return np.random.default_rng([settings.seed, zlib.crc32(run.encode()), STREAMS[stream]])
+
+
+def _sea(settings: TankSettings, rig: Rig, name: str) -> Sea:
+    sea = sea_of_run(
+        name, settings.runs[name], settings.facility, generator(settings, name, "waves")
+    )
+    try:
+        excitation_at(rig.hydro, sea.omega)
+    except RequestError as error:
+        raise RequestError(f"runs.{name}: {error}") from error
+    return sea
+
+
+def _chosen(settings: TankSettings, names: Iterable[str] | None) -> list[str]:
+    wanted = list(settings.runs) if names is None else list(names)
+    for name in wanted:
+        if name not in settings.runs:
+            raise RequestError(
+                f"there is no run {name!r}.{did_you_mean(name, settings.runs)} The runs are "
+                f"{', '.join(settings.runs)}."
+            )
+    if not wanted:
+        raise RequestError("no run was asked for. Add a table [runs.NAME] to the settings.")
+    return wanted
+
+
+def check_settings(settings: TankSettings, names: Iterable[str] | None = None) -> Rig:
+    """Check all that can be refused before a run is simulated.
+
+    Parameters
+    ----------
+    settings : TankSettings
+        The settings.
+    names : iterable of str, optional
+        Runs; the default is all.
+
+    Returns
+    -------
+    Rig
+        Vessel and moorings, ready to simulate.
+
+    Raises
+    ------
+    RequestError
+        If hydrodynamics, moorings, step or waves are not possible.
+    """
+    rig = assemble_rig(settings)
+    for name in _chosen(settings, names):
+        _sea(settings, rig, name)
+    return rig
+
+
+def play_run(settings: TankSettings, name: str, rig: Rig | None = None) -> Played:
+    """Simulate one run.
+
+    Parameters
+    ----------
+    settings : TankSettings
+        The settings.
+    name : str
+        The run.
+    rig : Rig, optional
+        From :func:`check_settings`, to save its making for each run.
+
+    Returns
+    -------
+    Played
+        Sea and motion, from a little before to a little after the record.
+    """
+    made = assemble_rig(settings) if rig is None else rig
+    (name,) = _chosen(settings, [name])
+    sea = _sea(settings, made, name)
+    run = settings.runs[name]
+    length = run.startup + run.duration
+    clocks = settings.instruments.clocks.values()
+    beyond = max(abs(c.offset) + 1e-6 * abs(c.drift) * length for c in clocks) + MARGIN
+    margin = made.step * np.ceil(beyond / made.step)
+    motion = simulate(made, sea, length + 2 * margin, begin=-margin)
+    return Played(settings, made, sea, motion, length)
+
+
+def _labelled(name: str) -> dict[str, str]:
+    channel = canonical_channel(name)
+    extra = {
+        "piston": ("m", "moon-pool piston elevation"),
+        "slosh": ("m", "moon-pool sloshing elevation"),
+        "surge_slow": ("m", "slow part of surge"),
+    }
+    if channel is not None:
+        return {"units": channel.units, "long_name": channel.long_name}
+    unit, label = extra[name]
+    return {"units": unit, "long_name": label}
+
+
+def truth(played: Played, name: str, step: float | None = None) -> xr.Dataset:
+    """All true channels of a run on the reference clock, without noise or slap.
+
+    Parameters
+    ----------
+    played : Played
+        The run.
+    name : str
+        Its name.
+    step : float, optional
+        Time step, s; the default is the simulation's.
+
+    Returns
+    -------
+    Dataset
+        Motions with rates and accelerations, pool, slow surge, loads, the linear elevation at
+        each probe (``eta_NAME``) and at the moving vessel (``eta_vessel``), second-order crests
+        (``eta_NAME_crest``); clocks and seed in the attributes.
+    """
+    settings = played.settings
+    dt = played.rig.step if step is None else step
+    time = dt * np.arange(int(np.floor(played.length / dt + 1e-9)) + 1)
+    q, v, a = played.states(time)
+    values = {}
+    for index, dof in enumerate(played.rig.names):
+        values[dof] = q[index]
+        if index < 3:
+            values[f"{dof}_rate"], values[f"{dof}_acceleration"] = v[index], a[index]
+    values["surge_slow"] = np.interp(time, played.motion.time, played.motion.slow_surge)
+    for line, load in zip(played.rig.line_names, played.loads(time), strict=True):
+        values[f"mooring_{line}"] = load
+    values["eta_vessel"] = played.elevation(settings.vessel.position + q[0], time)
+    for probe, at in settings.instruments.probes.items():
+        values[f"eta_{probe}"] = played.elevation(at.position, time)
+        if settings.instruments.second_order:
+            values[f"eta_{probe}_crest"] = played.crest(at.position, time)
+    data = xr.Dataset(
+        {key: ("time", value, _labelled(key)) for key, value in values.items()},
+        coords={"time": ("time", time, {"units": "s", "long_name": "time, reference clock"})},
+    )
+    for probe, at in settings.instruments.probes.items():
+        data[f"eta_{probe}"].attrs["x_position"] = at.position
+    return data.assign_attrs(_attributes(played, name))
+
+
+def _attributes(played: Played, name: str) -> dict[str, str | float]:
+    settings, run = played.settings, played.settings.runs[name]
+    attrs: dict[str, str | float] = {
+        "run": name,
+        "seed": settings.seed,
+        "startup": run.startup,
+        "water_depth": settings.facility.water_depth,
+        "x_position": settings.vessel.position,
+        "frame": "x downstream, z up, pitch positive bow up; motions of the centre of gravity",
+        "hydrodynamics": str(played.rig.hydro.attrs["mesh_sha256"]),
+        "versions": ", ".join(f"{n} {metadata.version(n)}" for n in ("numpy", "scipy", "numba")),
+        "settings": settings.model_dump_json(exclude={"folder"}),
+    }
+    for logger, clock in settings.instruments.clocks.items():
+        attrs[f"clock_{logger}_offset"] = clock.offset
+        attrs[f"clock_{logger}_drift_ppm"] = clock.drift
+    return attrs
+
+
+def noisy_truth(
+    settings: TankSettings, name: str, step: float, rig: Rig | None = None
+) -> xr.Dataset:
+    """Channels of a run as ideal instruments would give them: true values plus stated noise.
+
+    No clock is off, nothing slaps, drops out or is derived: what is left between this and the
+    raw files is the measurement chain's work.
+
+    Parameters
+    ----------
+    settings : TankSettings
+        The settings.
+    name : str
+        The run.
+    step : float
+        Time step, s.
+    rig : Rig, optional
+        From :func:`check_settings`.
+
+    Returns
+    -------
+    Dataset
+        The eleven channels of the paper and the wave probes, start-up included.
+    """
+    played = play_run(settings, name, rig)
+    rng = generator(settings, name, "truth")
+    noise = settings.instruments
+    clean = truth(played, name, step)
+    sigma = {
+        "surge": noise.surge_noise, "heave": noise.heave_noise, "pitch": noise.angle_noise,
+        "surge_rate": 0.0, "heave_rate": 0.0, "pitch_rate": noise.rate_noise,
+        "surge_acceleration": noise.acceleration_noise,
+        "heave_acceleration": noise.acceleration_noise,
+        "pitch_acceleration": 0.0,
+    }  # fmt: skip
+    sigma |= {f"mooring_{line}": noise.load_noise for line in settings.moorings}
+    sigma |= {f"eta_{probe}": at.noise for probe, at in noise.probes.items()}
+    data = clean[list(sigma)]
+    for channel, level in sigma.items():
+        data[channel] = data[channel] + level * rng.standard_normal(data.sizes["time"])
+        data[channel].attrs = dict(clean[channel].attrs)
+    return data
+
+
+def play(
+    settings: TankSettings,
+    out: Path | str,
+    *,
+    kind: str = "csv",
+    one_logger: bool = False,
+    names: Iterable[str] | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Mapping[str, Path]]:
+    """Play a campaign and write raw files, campaign.toml and, in a folder apart, the truth.
+
+    Parameters
+    ----------
+    settings : TankSettings
+        The settings.
+    out : path
+        Folder to write to; made if it does not exist.
+    kind : {"csv", "nc"}, optional
+        Format of the raw files.
+    one_logger : bool, optional
+        Record all instruments on one logger (one file a run, no clock errors) instead of one
+        file an instrument.
+    names : iterable of str, optional
+        Runs; the default is all.
+    progress : callable, optional
+        Called with the run's name, how many are done, and how many there are.
+
+    Returns
+    -------
+    dict of str to mapping of str to Path
+        Run → instrument → file.
+
+    Raises
+    ------
+    RequestError
+        If a setting is wrong; nothing has been written then.
+    DivergenceError
+        If a simulation diverges.
+    """
+    if kind not in ("csv", "nc"):
+        raise RequestError(f"raw files are 'csv' or 'nc'; received {kind!r}. Choose one.")
+    chosen = _chosen(settings, names)
+    part = settings.model_copy(update={"runs": {n: settings.runs[n] for n in chosen}})
+    rig = check_settings(part)
+    folder = Path(out)
+    files: dict[str, Mapping[str, Path]] = {}
+    for done, name in enumerate(chosen):
+        if progress is not None:
+            progress(name, done, len(chosen))
+        played = play_run(part, name, rig)
+        rng = generator(part, name, "instruments")
+        records = (
+            [record_together(played, SINGLE_RATE, rng)] if one_logger else record_run(played, rng)
+        )
+        raw, hidden = folder / "raw" / name, folder / "truth"
+        raw.mkdir(parents=True, exist_ok=True)
+        hidden.mkdir(parents=True, exist_ok=True)
+        files[name] = {record.name: write_record(record, raw, kind) for record in records}
+        write_dataset(truth(played, name), hidden / f"{name}.nc")
+    relative = {
+        run: {key: path.relative_to(folder).as_posix() for key, path in paths.items()}
+        for run, paths in files.items()
+    }
+    write_text(folder / "campaign.toml", campaign_text(part, relative, kind, one_logger))
+    if progress is not None:
+        progress("", len(chosen), len(chosen))
+    return files

@@ -1,0 +1,290 @@
+"""What the waves and lines of a played campaign came out as, beside the paper's numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.errors import RequestError
+from seakeep.signals import (
+    encounter_period,
+    low_pass,
+    significant_height,
+    wave_heights,
+    wave_spectrum,
+)
+from seakeep.tank.dynamics import Rig, assemble_rig
+from seakeep.tank.instruments import Played, record_run
+from seakeep.tank.play import generator, play_run
+from seakeep.tank.settings import TankSettings
+from seakeep.waves import group_speed, phase_speed, wavelength_to_frequency
+
+__all__ = ["PAPER", "Realised", "Row", "comparison", "matrix_rows", "paper_peak", "realise"]
+
+FloatArray = npt.NDArray[np.float64]
+
+PAPER = {
+    "significant height": (0.16, 0.01, "m"),
+    "zero-up-crossing period": (1.64, 0.05, "s"),
+    "peak period (paper's Welch)": (1.98, 0.15, "s"),
+    "height, wavelength 2.10 m": (0.105, 0.01, "m"),
+    "height, wavelength 2.80 m": (0.107, 0.01, "m"),
+    "height, wavelength 4.20 m": (0.116, 0.01, "m"),
+}
+"""The paper's realised waves, the tolerance we hold ours to, and the unit."""
+
+HULL_LENGTH = 1.40  # m, by which the paper divides wavelengths
+
+
+@dataclass(frozen=True)
+class Realised:
+    """One run as measured by its forward probe, its start-up left out.
+
+    Parameters
+    ----------
+    run : str
+        Its name.
+    irregular : bool
+        Kind of its sea.
+    elevation : ndarray, shape (time,)
+        Low-passed forward probe, m.
+    dt : float
+        Its step, s.
+    significant_height, zero_up_period, peak_period : float
+        m, s, s (the last by the paper's Welch settings).
+    height, height_spread : float
+        Mean and standard deviation of the single waves' heights, m.
+    slack : dict of str to float
+        Part of the time for which each line was slack (true loads).
+    spread : dict of str to float
+        Standard deviation of each true motion and load.
+    mean : dict of str to float
+        Mean of the same.
+    """
+
+    run: str
+    irregular: bool
+    elevation: FloatArray
+    dt: float
+    significant_height: float
+    zero_up_period: float
+    peak_period: float
+    height: float
+    height_spread: float
+    slack: dict[str, float]
+    spread: dict[str, float]
+    mean: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A realised number beside the paper's."""
+
+    name: str
+    unit: str
+    ours: float
+    paper: float
+    tolerance: float
+
+    @property
+    def agrees(self) -> bool:
+        """Whether ours lies within the tolerance."""
+        return abs(self.ours - self.paper) <= self.tolerance
+
+
+def paper_peak(elevation: npt.ArrayLike, dt: float) -> tuple[float, FloatArray, FloatArray]:
+    """Peak period by the paper's Welch settings, with the spectrum.
+
+    Parameters
+    ----------
+    elevation : array_like, shape (time,)
+        m.
+    dt : float
+        s. The paper's segments of 2¹² samples at 500 Hz are kept in seconds.
+
+    Returns
+    -------
+    period : float
+        s.
+    frequency, density : ndarray
+        Hz, m²/Hz.
+    """
+    segment = round(2**12 * 0.002 / dt)
+    overlap, padded = round(2**7 * 0.002 / dt), round(2**16 * 0.002 / dt)
+    frequency, density = wave_spectrum(elevation, dt, segment, overlap, padded)
+    return float(1.0 / frequency[np.argmax(density)]), frequency, density
+
+
+def _forward_probe(settings: TankSettings) -> str:
+    probes = settings.instruments.probes
+    if not probes:
+        raise RequestError("no wave probe is set. Add a table under [instruments.probes].")
+    return min(probes, key=lambda n: (probes[n].position, probes[n].noise))
+
+
+def realise(played: Played, name: str) -> Realised:
+    """Measure one run as the paper measures it.
+
+    Parameters
+    ----------
+    played : Played
+        The run.
+    name : str
+        Its name.
+
+    Returns
+    -------
+    Realised
+    """
+    settings, run = played.settings, played.settings.runs[name]
+    probe = _forward_probe(settings)
+    record = record_run(played, generator(settings, name, "instruments"))[0]
+    dt = 1.0 / settings.instruments.clocks["wave_probes"].rate
+    values = 1e-3 * record.columns[probe].values
+    good = np.isfinite(values)
+    values = np.interp(record.time, record.time[good], values[good])
+    edges = (10.0, 10.75) if dt < 1 / 22 else (0.4 / dt, 0.45 / dt)
+    eta = low_pass(values, dt, *edges)[record.time >= run.startup]
+    time = played.rig.step * np.arange(int(played.length / played.rig.step) + 1)
+    time = time[time >= run.startup]
+    position, _, _ = played.states(time)
+    loads = played.loads(time)
+    channels = dict(zip(played.rig.names, position, strict=True))
+    channels["surge_fast"] = position[0] - np.interp(
+        time, played.motion.time, played.motion.slow_surge
+    )
+    channels |= {f"mooring_{n}": x for n, x in zip(played.rig.line_names, loads, strict=True)}
+    heights = wave_heights(eta, dt)
+    return Realised(
+        run=name,
+        irregular=run.irregular,
+        elevation=eta,
+        dt=dt,
+        significant_height=significant_height(eta),
+        zero_up_period=encounter_period(eta, dt),
+        peak_period=paper_peak(eta, dt)[0],
+        height=float(heights.mean()),
+        height_spread=float(heights.std(ddof=1)),
+        slack={
+            n: float(np.mean(x <= 0.0)) for n, x in zip(played.rig.line_names, loads, strict=True)
+        },
+        spread={n: float(x.std()) for n, x in channels.items()},
+        mean={n: float(x.mean()) for n, x in channels.items()},
+    )
+
+
+def realise_all(settings: TankSettings, rig: Rig | None = None) -> list[Realised]:
+    """Play and measure all runs.
+
+    Parameters
+    ----------
+    settings : TankSettings
+        The settings.
+    rig : Rig, optional
+        Vessel and moorings.
+
+    Returns
+    -------
+    list of Realised
+    """
+    made = assemble_rig(settings) if rig is None else rig
+    return [realise(play_run(settings, name, made), name) for name in settings.runs]
+
+
+def comparison(settings: TankSettings, realised: list[Realised]) -> list[Row]:
+    """Numbers that the paper states, ours beside them.
+
+    Parameters
+    ----------
+    settings : TankSettings
+        The settings.
+    realised : list of Realised
+        From :func:`realise_all`.
+
+    Returns
+    -------
+    list of Row
+        Means over the irregular runs; the mean height of each regular run whose wavelength is
+        one of the paper's.
+    """
+    rows = []
+    seas = [r for r in realised if r.irregular]
+    means = {
+        "significant height": [r.significant_height for r in seas],
+        "zero-up-crossing period": [r.zero_up_period for r in seas],
+        "peak period (paper's Welch)": [r.peak_period for r in seas],
+    }
+    for each in realised:
+        length = settings.runs[each.run].wavelength
+        if length is not None:
+            means[f"height, wavelength {length:.2f} m"] = [each.height]
+    for name, values in means.items():
+        if values and name in PAPER:
+            paper, tolerance, unit = PAPER[name]
+            rows.append(Row(name, unit, float(np.mean(values)), paper, tolerance))
+    return rows
+
+
+def matrix_rows(settings: TankSettings, realised: list[Realised]) -> list[dict[str, str]]:
+    """Test matrix as in the paper's first table, with realised heights.
+
+    Parameters
+    ----------
+    settings : TankSettings
+        The settings.
+    realised : list of Realised
+        From :func:`realise_all`.
+
+    Returns
+    -------
+    list of dict of str to str
+        One row a sea: nominal height, wavelength over hull length, phase and group speed,
+        realised height ± standard deviation, number of runs.
+    """
+    depth = settings.facility.water_depth
+    rows: list[dict[str, str]] = []
+    seas: dict[str, list[Realised]] = {}
+    for each in realised:
+        run = settings.runs[each.run]
+        if run.spectrum is not None:
+            high = run.nominal_height or run.spectrum.height
+            label = f"{high:.2f}|{run.spectrum.kind.replace('_', '–').title()}"
+            seas.setdefault(label, []).append(each)
+    for label, runs in seas.items():
+        nominal, kind = label.split("|")
+        values = np.array([r.significant_height for r in runs])
+        spread = values.std(ddof=1) if values.size > 1 else 0.0
+        rows.append(
+            _row(nominal, f"{kind} spectrum", "", "", f"{values.mean():.3f} ± {spread:.3f}", runs)
+        )
+    for each in realised:
+        run = settings.runs[each.run]
+        if run.wavelength is None:
+            continue
+        omega = wavelength_to_frequency(run.wavelength, depth)
+        rows.append(
+            _row(
+                f"{run.nominal_height or run.height:.2f}",
+                f"{run.wavelength / HULL_LENGTH:g}",
+                f"{float(phase_speed(omega, depth)):.3f}",
+                f"{float(group_speed(omega, depth)):.3f}",
+                f"{each.height:.3f} ± {each.height_spread:.3f}",
+                [each],
+            )
+        )
+    return rows
+
+
+def _row(
+    nominal: str, ratio: str, phase: str, group: str, height: str, runs: list[Realised]
+) -> dict[str, str]:
+    return {
+        "h [m]": nominal,
+        "λ/L": ratio,
+        "phase speed [m/s]": phase,
+        "group speed [m/s]": group,
+        "realised h [m]": height,
+        "runs": str(len(runs)),
+    }

@@ -1,0 +1,323 @@
+r"""Head seas of the virtual tank: spectra, their components, elevation at any place and time.
+
+Elevation is :math:`\eta = \sum a_n \cos(k_n x - \omega_n t + \varphi_n)` with x measured from
+the vessel's position at rest, downstream.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.errors import RequestError
+from seakeep.tank.settings import FacilitySettings, RunSettings, SpectrumSettings
+from seakeep.waves import wavelength_to_frequency, wavenumber
+
+__all__ = [
+    "Sea",
+    "irregular_sea",
+    "jonswap",
+    "pierson_moskowitz",
+    "regular_sea",
+    "sea_of_run",
+    "spectral_density",
+]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+
+BLOCK = 512  # instants evaluated at a time at a fixed place
+
+
+@dataclass(frozen=True)
+class Sea:
+    """Components of a unidirectional linear sea.
+
+    Parameters
+    ----------
+    omega : ndarray, shape (component,)
+        Angular frequencies, rad/s.
+    amplitude : ndarray, shape (component,)
+        m.
+    phase : ndarray, shape (component,)
+        rad, at x = 0 and t = 0.
+    wavenumber : ndarray, shape (component,)
+        rad/m.
+    """
+
+    omega: FloatArray
+    amplitude: FloatArray
+    phase: FloatArray
+    wavenumber: FloatArray
+
+    def analytic(self, x: npt.ArrayLike, time: npt.ArrayLike) -> ComplexArray:
+        """Complex elevation: its real part is the elevation, its modulus the envelope.
+
+        Parameters
+        ----------
+        x : array_like
+            Places, m; broadcast against `time`.
+        time : array_like, shape (time,)
+            Instants, s.
+
+        Returns
+        -------
+        ndarray of complex, shape (time,)
+        """
+        place, t = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(time, dtype=float))
+        if np.ndim(x) == 0 and t.ndim == 1 and t.size > BLOCK:
+            steps = np.diff(t)
+            if np.ptp(steps) < 1e-9 * abs(steps[0]) + 1e-11:
+                return self._at_rest(float(x), t)
+        out = np.zeros(t.shape, dtype=complex)
+        for w, a, p, k in zip(
+            self.omega, self.amplitude, self.phase, self.wavenumber, strict=True
+        ):
+            out += a * np.exp(1j * (k * place - w * t + p))
+        return out
+
+    def _at_rest(self, x: float, time: FloatArray) -> ComplexArray:
+        """Complex elevation at one place and uniform instants, block by block."""
+        step = (time[-1] - time[0]) / (time.size - 1)
+        starts = time[0] + step * BLOCK * np.arange(-(-time.size // BLOCK))
+        heads = self.amplitude * np.exp(
+            1j * (self.wavenumber * x + self.phase - np.outer(starts, self.omega))
+        )
+        inside = np.exp(-1j * np.outer(self.omega, step * np.arange(BLOCK)))
+        # einsum, not a matrix product: its bits do not depend on the number of threads.
+        blocks: ComplexArray = np.einsum("sn,nb->sb", heads, inside)
+        return blocks.ravel()[: time.size]
+
+    def elevation(self, x: npt.ArrayLike, time: npt.ArrayLike) -> FloatArray:
+        """Elevation at places and instants, m.
+
+        Parameters
+        ----------
+        x : array_like
+            Places, m; broadcast against `time` (a moving place has one x an instant).
+        time : array_like, shape (time,)
+            Instants, s.
+
+        Returns
+        -------
+        ndarray, shape (time,)
+        """
+        return self.analytic(x, time).real
+
+    @property
+    def mean_wavenumber(self) -> float:
+        """Wavenumber at the energy-weighted mean frequency, rad/m."""
+        energy = self.amplitude**2
+        if not energy.sum() > 0:
+            return 0.0
+        middle = int(np.argmin(np.abs(self.omega - np.average(self.omega, weights=energy))))
+        return float(self.wavenumber[middle])
+
+
+def pierson_moskowitz(
+    frequency: npt.ArrayLike, height: float, peak_period: float
+) -> FloatArray:
+    """Pierson–Moskowitz spectrum.
+
+    Parameters
+    ----------
+    frequency : array_like
+        Hz, positive.
+    height : float
+        Significant wave height, m.
+    peak_period : float
+        s.
+
+    Returns
+    -------
+    ndarray
+        m²/Hz (equation eq:pm of the paper).
+
+    Examples
+    --------
+    >>> f = np.arange(0.005, 20, 0.001)
+    >>> round(float(4 * np.sqrt(np.sum(pierson_moskowitz(f, 0.15, 2.12)) * 0.001)), 4)
+    0.15
+    """
+    f = np.asarray(frequency, dtype=float)
+    relative = (peak_period * f) ** -4.0
+    return 5 / 16 * height**2 * relative / f * np.exp(-1.25 * relative)
+
+
+def jonswap(
+    frequency: npt.ArrayLike, height: float, peak_period: float, peak_enhancement: float = 3.3
+) -> FloatArray:
+    """JONSWAP spectrum, normalised so that its significant height is `height`.
+
+    Parameters
+    ----------
+    frequency : array_like
+        Hz, positive.
+    height : float
+        Significant wave height, m.
+    peak_period : float
+        s.
+    peak_enhancement : float, optional
+        γ; 1 gives Pierson–Moskowitz.
+
+    Returns
+    -------
+    ndarray
+        m²/Hz.
+    """
+
+    def shape(f: FloatArray) -> FloatArray:
+        relative = f * peak_period
+        width = np.where(relative <= 1.0, 0.07, 0.09)
+        peak = peak_enhancement ** np.exp(-0.5 * ((relative - 1.0) / width) ** 2)
+        return pierson_moskowitz(f, height, peak_period) * peak
+
+    grid = np.geomspace(0.1, 40.0, 8001) / peak_period
+    variance = np.trapezoid(shape(grid), grid)
+    return shape(np.asarray(frequency, dtype=float)) * (height**2 / 16 / variance)
+
+
+def spectral_density(settings: SpectrumSettings, frequency: npt.ArrayLike) -> FloatArray:
+    """Density of a spectrum that settings describe.
+
+    Parameters
+    ----------
+    settings : SpectrumSettings
+        The spectrum.
+    frequency : array_like
+        Hz.
+
+    Returns
+    -------
+    ndarray
+        m²/Hz; a table is interpolated linearly and is zero outside its span.
+    """
+    f = np.asarray(frequency, dtype=float)
+    if settings.kind == "table":
+        return np.interp(f, settings.frequencies, settings.densities, left=0.0, right=0.0)
+    height, period = settings.height or 0.0, settings.peak_period or 0.0
+    if settings.kind == "jonswap":
+        return jonswap(f, height, period, settings.peak_enhancement)
+    return pierson_moskowitz(f, height, period)
+
+
+def irregular_sea(
+    settings: SpectrumSettings, depth: float, rng: np.random.Generator
+) -> Sea:
+    """Draw the components of an irregular sea.
+
+    Parameters
+    ----------
+    settings : SpectrumSettings
+        Spectrum, band, number and spacing of components. Equal spacing repeats the sea's envelope
+        after one over the spacing; jittered frequencies (one uniform in each bin) do not.
+    depth : float
+        Water depth, m.
+    rng : Generator
+        Source of the phases and of the jitter.
+
+    Returns
+    -------
+    Sea
+        Components of amplitude √(2 E Δf) with uniform random phases.
+    """
+    count, (low, high) = settings.components, settings.band
+    if settings.spacing == "equal":
+        frequency = np.linspace(low, high, count) if count > 1 else np.array([0.5 * (low + high)])
+        width = (high - low) / max(count - 1, 1)
+    else:
+        width = (high - low) / count
+        frequency = low + width * (np.arange(count) + rng.uniform(size=count))
+    amplitude = np.sqrt(2.0 * spectral_density(settings, frequency) * width)
+    omega = 2 * np.pi * frequency
+    phase = rng.uniform(0.0, 2 * np.pi, count)
+    return Sea(omega, amplitude, phase, wavenumber(omega, depth))
+
+
+def regular_sea(
+    wavelength: float, height: float, unsteadiness: float, depth: float, rng: np.random.Generator
+) -> Sea:
+    """Draw a regular wave with a sideband at either side.
+
+    Parameters
+    ----------
+    wavelength, height : float
+        m.
+    unsteadiness : float
+        Amplitude of each sideband as a part of the wave's; the sidebands lie 3–6 % away in
+        frequency and make the height wander as a real wave maker's does.
+    depth : float
+        Water depth, m.
+    rng : Generator
+        Source of phases and sideband frequencies.
+
+    Returns
+    -------
+    Sea
+        One component, or three.
+    """
+    centre = float(wavelength_to_frequency(wavelength, depth))
+    phase = rng.uniform(0.0, 2 * np.pi, 3)
+    shift = rng.uniform(0.03, 0.06, 2)
+    omega = centre * np.array([1.0, 1.0 - shift[0], 1.0 + shift[1]])
+    amplitude = 0.5 * height * np.array([1.0, unsteadiness, unsteadiness])
+    kept = slice(0, 3 if unsteadiness > 0 else 1)
+    omega, amplitude, phase = omega[kept], amplitude[kept], phase[kept]
+    return Sea(omega, amplitude, phase, wavenumber(omega, depth))
+
+
+def sea_of_run(
+    name: str, run: RunSettings, facility: FacilitySettings, rng: np.random.Generator
+) -> Sea:
+    """Sea of one run, checked against what the tank can make.
+
+    Parameters
+    ----------
+    name : str
+        Name of the run, for messages.
+    run : RunSettings
+        Its waves.
+    facility : FacilitySettings
+        Depth, wave band and greatest height.
+    rng : Generator
+        Source of the phases.
+
+    Returns
+    -------
+    Sea
+        The components.
+
+    Raises
+    ------
+    RequestError
+        If a frequency or the height is beyond the wave maker.
+    """
+    low, high = facility.wave_band
+    if run.spectrum is not None:
+        sea = irregular_sea(run.spectrum, facility.water_depth, rng)
+        asked = (run.spectrum.band[0], run.spectrum.band[1])
+        height = 4.0 * float(np.sqrt(0.5 * np.sum(sea.amplitude**2)))
+    else:
+        length, height = run.wavelength or 0.0, run.height or 0.0
+        sea = regular_sea(length, height, run.unsteadiness, facility.water_depth, rng)
+        centre = float(wavelength_to_frequency(length, facility.water_depth)) / (2 * np.pi)
+        asked = (centre, centre)
+    if asked[0] < low or asked[1] > high:
+        shortest, longest = (
+            2 * np.pi / float(wavenumber(2 * np.pi * f, facility.water_depth)) for f in (high, low)
+        )
+        received = f"{asked[0]:.3g}" if asked[0] == asked[1] else f"{asked[0]:.3g}–{asked[1]:.3g}"
+        raise RequestError(
+            f"runs.{name} asks for waves of {received} Hz; the wave maker covers {low:g}–{high:g} Hz "
+            f"(wavelengths of {shortest:.2f}–{longest:.1f} m). Change the wave, or "
+            "facility.wave_band."
+        )
+    if height > facility.greatest_height:
+        raise RequestError(
+            f"runs.{name} asks for waves {height:.3g} m high; the wave maker reaches "
+            f"{facility.greatest_height:g} m. Lower the height, or raise facility.greatest_height."
+        )
+    return sea

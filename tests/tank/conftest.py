@@ -1,0 +1,54 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seakeep.tank.dynamics import assemble_rig
+from seakeep.tank.hydrodynamics import load_hydrodynamics
+from seakeep.tank.seas import Sea
+from seakeep.tank.settings import DriftSettings, default_settings
+
+
+@pytest.fixture(scope="session")
+def settings():
+    return default_settings()
+
+
+@pytest.fixture(scope="session")
+def hydro():
+    return load_hydrodynamics()
+
+
+@pytest.fixture(scope="session")
+def rig(settings, hydro):
+    return assemble_rig(settings, hydro)
+
+
+@pytest.fixture(scope="session")
+def linear_rig(rig):
+    """The rig without drag, drift or quadratic pool loss."""
+    return replace(
+        rig,
+        quadratic=np.zeros_like(rig.quadratic),
+        pool=rig.pool * [1.0, 0.0, 1.0],
+        drift=DriftSettings(reflection=0.0),
+    )
+
+
+@pytest.fixture(scope="session")
+def ideal_rig(linear_rig):
+    """The rig with no losses but radiation."""
+    lines = linear_rig.lines.copy()
+    lines[:, 6] = 0.0
+    return replace(
+        linear_rig,
+        linear=np.zeros_like(linear_rig.linear),
+        pool=linear_rig.pool * [1.0, 0.0, 0.0],
+        lines=lines,
+    )
+
+
+@pytest.fixture(scope="session")
+def calm():
+    none = np.zeros(0)
+    return Sea(none, none, none, none)

@@ -1,0 +1,219 @@
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep.errors import RequestError
+from seakeep.tank.hydrodynamics import (
+    KERNEL_LENGTH,
+    excitation_at,
+    kernel_coefficients,
+    load_hydrodynamics,
+    passive_damping,
+    radiation_kernel,
+    response,
+    shipped_hydrodynamics,
+)
+from seakeep.tank.settings import HullSettings
+from seakeep.tank.vessel import hull_mesh, hydrostatics
+from seakeep.waves import GRAVITY, phase_speed, wavelength_to_frequency
+
+
+def test_phase_speeds_of_the_papers_table():
+    omega = wavelength_to_frequency([2.1, 2.8, 4.2], 3.6)
+    # The paper prints three decimals; its depth and gravity are ours to that digit.
+    assert phase_speed(omega, 3.6) == pytest.approx([1.811, 2.090, 2.560], abs=1.5e-3)
+
+
+def test_mesh_is_the_one_of_the_shipped_coefficients(hydro):
+    assert hull_mesh(HullSettings()).digest == hydro.attrs["mesh_sha256"]
+
+
+def test_mesh_has_the_mass_area_and_trim_asked_for():
+    hull = HullSettings()
+    mesh = hull_mesh(hull)
+    statics = hydrostatics(mesh, hull)
+    # Solved by root finding to 1e-12 m of draft.
+    assert statics.volume == pytest.approx(0.0607, rel=1e-9)
+    assert statics.waterplane == pytest.approx(0.9035, rel=1e-9)
+    assert statics.buoyancy[0] == pytest.approx(0.0, abs=1e-9)
+    assert mesh.draft == pytest.approx(0.0830, abs=5e-5)
+
+
+def test_mesh_is_closed_below_the_surface():
+    mesh = hull_mesh(HullSettings())
+    corners = mesh.vertices[mesh.faces]
+    first = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    second = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 0])
+    total = 0.5 * (first + second).sum(axis=0)
+    # Horizontal areas cancel to rounding; the vertical one is the gross waterplane.
+    assert total[:2] == pytest.approx([0, 0], abs=1e-14)
+    assert -total[2] == pytest.approx(0.9035 + 0.45 * 0.36, rel=1e-9)
+
+
+def test_hull_without_a_pool():
+    hull = HullSettings(pool=None, waterplane_area=1.05)
+    mesh = hull_mesh(hull)
+    assert not mesh.pool_lid.any()
+    assert hydrostatics(mesh, hull).volume == pytest.approx(0.0607, rel=1e-9)
+
+
+def test_impossible_hulls_are_refused():
+    with pytest.raises(RequestError, match=r"no waterline of 1\.34 × 0\.86 m has a net area of 2"):
+        hull_mesh(HullSettings(waterplane_area=2.0))
+    with pytest.raises(RequestError, match="no draft between .* displaces 5 m³.*Check the mass"):
+        hull_mesh(HullSettings(mass=5000.0))
+
+
+def test_coefficients_are_reciprocal(hydro):
+    for matrices in (hydro.added_mass, hydro.damping):
+        size = np.sqrt(np.abs(np.einsum("wii,wjj->wij", matrices, matrices)))
+        rigid = (np.abs(matrices - matrices.swapaxes(1, 2)) / np.maximum(size, 1e-3))[:, :3, :3]
+        # Quadrilaterals of 8 cm: a per cent below 12 rad/s is what this mesh resolves.
+        assert rigid[hydro.omega < 12].max() < 0.012
+    added = hydro.added_mass[hydro.omega < 9]
+    size = np.sqrt(np.abs(np.einsum("wii,wjj->wij", added, added)))
+    # The pool's shelf is where the solver is weakest; the indirect method misses by 40 %.
+    assert (np.abs(added - added.swapaxes(1, 2)) / size).max() < 0.05
+
+
+def test_low_frequency_limits(hydro):
+    lowest = hydro.omega[0]
+    force = excitation_at(hydro, [lowest])[0]
+    area = hydro.attrs["waterplane_area"]
+    # At 0.3 rad/s waves are 63 m long: radiation and diffraction still take half a per cent.
+    assert abs(force[1]) == pytest.approx(1000 * GRAVITY * area, rel=0.01)
+    assert abs(force[3]) == pytest.approx(1000 * GRAVITY * hydro.pool.area, rel=0.01)
+    motion = np.abs(response(hydro, [lowest])[0])
+    assert motion[1] == pytest.approx(1.0, abs=0.005)
+    assert motion[3] == pytest.approx(1.0, abs=0.005)
+    # In shallow, long waves water moves 1/tanh(kh) times its height to and fro.
+    wavenumber = lowest / phase_speed(lowest, 3.6)
+    assert motion[0] == pytest.approx(1 / np.tanh(wavenumber * 3.6), rel=0.01)
+    assert motion[2] == pytest.approx(wavenumber, rel=0.02)
+
+
+def test_natural_frequencies(hydro):
+    found = {}
+    for index, name in enumerate(hydro.names[1:], 1):
+        inertia = hydro.mass[index, index] + hydro.added_mass[:, index, index]
+        natural = np.sqrt(hydro.stiffness[index, index] / inertia)
+        crossing = np.argmin(np.abs(natural - hydro.omega))
+        found[name] = natural[crossing] / (2 * np.pi)
+    # The feasibility study's values; its hull was another guess of the same vessel.
+    expected = {"heave": 1.00, "pitch": 1.13, "piston": 0.83, "slosh": 1.06}
+    assert found == pytest.approx(expected, abs=0.03)
+
+
+def test_damping_of_the_kernel_is_passive(hydro):
+    omega, damping = passive_damping(hydro)
+    assert omega[0] == 0.0
+    assert np.all(damping[0] == 0.0)
+    assert np.array_equal(damping, damping.swapaxes(1, 2))
+    values = np.linalg.eigvalsh(damping)
+    assert values.min() > -1e-9 * values.max()  # rounding of the projection
+
+
+def test_kernel_gives_the_damping_back(hydro):
+    kernel = radiation_kernel(hydro)
+    wanted = np.linspace(1.0, 12.0, 45)
+    grid = np.searchsorted(kernel.omega, wanted)
+    _, damping = kernel_coefficients(kernel, kernel.omega[grid])
+    made = kernel.damping[grid]
+    for i in range(4):
+        scale = np.abs(made[:, i, i]).max()
+        # The issue asks for 1 %: 12 s of kernel lose the slowest part of heave's memory.
+        assert np.abs(damping[:, i, i] - made[:, i, i]).max() < 0.01 * scale
+
+
+def test_infinite_mass_does_not_depend_on_the_frequency(hydro):
+    kernel = radiation_kernel(hydro)
+    added, _ = kernel_coefficients(kernel, hydro.omega)
+    band = (hydro.omega >= 2) & (hydro.omega <= 9)
+    for i in range(3):
+        # Kramers–Kronig holds between A and B as far as the mesh resolves them.
+        assert added[band, i, i] == pytest.approx(hydro.added_mass[band, i, i], rel=0.015)
+    assert np.linalg.eigvalsh(hydro.mass + kernel.infinite_mass).min() > 0
+
+
+def test_kernel_is_bounded_in_length(hydro):
+    kernel = radiation_kernel(hydro, 0.02)
+    assert kernel.lags[-1] == pytest.approx(KERNEL_LENGTH)
+    assert kernel.values.shape == (601, 5, 5)
+
+
+def test_frequencies_outside_the_file_are_refused(hydro):
+    with pytest.raises(RequestError, match=r"leave the band of the hydrodynamics file, 0\.3 to 15"):
+        excitation_at(hydro, [1.0, 16.0])
+
+
+def test_shipped_file_is_small():
+    assert shipped_hydrodynamics().stat().st_size <= 200_000
+
+
+def changed(tmp_path, change):
+    path = tmp_path / "hull.nc"
+    with xr.open_dataset(shipped_hydrodynamics(), engine="h5netcdf") as opened:
+        data = change(opened.load())
+    data.to_netcdf(path, engine="h5netcdf")
+    return path
+
+
+def test_file_of_another_convention_is_refused(tmp_path):
+    path = changed(tmp_path, lambda d: d.assign_attrs(time_convention="exp(+i omega t)"))
+    with pytest.raises(
+        RequestError, match=r"another convention: time_convention is 'exp\(\+i.*Convert"
+    ):
+        load_hydrodynamics(path)
+
+
+def test_incomplete_and_damaged_files_are_refused(tmp_path):
+    with pytest.raises(RequestError, match=r"misses damping\. Build the file again"):
+        load_hydrodynamics(changed(tmp_path, lambda d: d.drop_vars("damping")))
+    with pytest.raises(RequestError, match="not finite in added_mass"):
+        load_hydrodynamics(
+            changed(tmp_path, lambda d: d.assign(added_mass=d.added_mass.where(d.omega > 1)))
+        )
+    with pytest.raises(RequestError, match="does not exist"):
+        load_hydrodynamics(tmp_path / "none.nc")
+    other = tmp_path / "text.nc"
+    shutil.copy(__file__, other)
+    with pytest.raises(RequestError, match="is no NetCDF file"):
+        load_hydrodynamics(other)
+
+
+def test_file_with_other_degrees_of_freedom_is_refused(tmp_path):
+    path = changed(
+        tmp_path, lambda d: d.isel(influenced_dof=slice(0, 2), radiating_dof=slice(0, 2))
+    )
+    with pytest.raises(RequestError, match="has the degrees of freedom surge, heave; the tank"):
+        load_hydrodynamics(path)
+
+
+@pytest.mark.oracle
+def test_coefficients_are_reproduced_by_the_builder(hydro):
+    pytest.importorskip("capytaine", reason="needs the extra tank-build")
+    from seakeep.tank.build import build_hydrodynamics
+
+    made = build_hydrodynamics(HullSettings(), frequencies=[6.0])
+    at = int(np.argmin(np.abs(hydro.omega - 6.0)))
+    assert made.attrs["mesh_sha256"] == hydro.attrs["mesh_sha256"]
+    for name, shipped in (("added_mass", hydro.added_mass), ("damping", hydro.damping)):
+        # Rounding of a linear solve with a condition number of about 1e3, by any BLAS.
+        scale = np.abs(shipped[at]).max()
+        assert made[name].values[0] == pytest.approx(shipped[at], abs=1e-8 * scale)
+    force = made["excitation"].values[:, 0]
+    assert force[0] + 1j * force[1] == pytest.approx(hydro.excitation[at], rel=1e-8)
+
+
+def test_response_can_take_the_kernels_coefficients(hydro, rig):
+    omega = np.array([3.0, 4.5])
+    from_file = response(hydro, omega, rig.linear_damping)
+    from_kernel = response(hydro, omega, rig.linear_damping, kernel=rig.kernel)
+    added, damping = kernel_coefficients(rig.kernel, hydro.omega)
+    same = replace(hydro, added_mass=added, damping=damping)
+    # Splines between tabulated kernel coefficients, against the kernel itself.
+    assert response(same, omega, rig.linear_damping) == pytest.approx(from_kernel, rel=1e-3)
+    assert np.abs(from_file[:, :3]) == pytest.approx(np.abs(from_kernel[:, :3]), rel=0.01)

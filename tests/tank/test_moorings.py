@@ -1,0 +1,77 @@
+import numpy as np
+import pytest
+
+from seakeep.errors import RequestError
+from seakeep.tank.dynamics import tensions
+from seakeep.tank.moorings import line_table, mooring_stiffness, slack_offset, unstretched_length
+from seakeep.tank.settings import LineSettings
+
+
+def test_unstretched_lengths_of_the_page(settings):
+    lengths = [unstretched_length(n, line, 52.09) for n, line in settings.moorings.items()]
+    assert lengths == pytest.approx([2.53, 2.90], abs=0.005)  # two decimals are stated
+
+
+def along_surge(rig, offsets):
+    position = np.zeros((5, offsets.size))
+    position[0] = offsets
+    return tensions(rig, position, np.zeros_like(position))
+
+
+def test_level_lines_are_springs_that_only_pull(rig):
+    offsets = np.linspace(-1.0, 2.0, 61)
+    bow, stern = along_surge(rig, offsets)
+    assert bow == pytest.approx(np.maximum(0.0, 0.8 + 1.89 * offsets), abs=1e-12)
+    assert stern == pytest.approx(np.maximum(0.0, 0.8 - 1.33 * offsets), abs=1e-12)
+
+
+def test_a_line_damps_only_while_it_pulls(rig):
+    position, velocity = np.zeros((5, 3)), np.zeros((5, 3))
+    velocity[0] = [1.0, -1.0, -10.0]
+    bow = tensions(rig, position, velocity)[0]
+    assert bow == pytest.approx([0.95, 0.65, 0.0], abs=1e-12)
+
+
+def test_stiffness_is_the_slope_of_the_forces(rig):
+    def force(q):
+        total = np.zeros(3)
+        for line in rig.lines:
+            cosine, sine = np.cos(q[2]), np.sin(q[2])
+            arm = np.array([line[0] * cosine + line[1] * sine, -line[0] * sine + line[1] * cosine])
+            reach = line[2:4] - q[:2] - arm
+            length = np.hypot(*reach)
+            pull = max(0.0, line[4] * (length - line[5])) * reach / length
+            total += [*pull, arm[1] * pull[0] - arm[0] * pull[1]]
+        return total
+
+    step = 1e-6
+    slopes = [(force(step * e) - force(-step * e)) / (2 * step) for e in np.eye(3)]
+    # Central differences of step 1e-6: rounding of 1e-10.
+    assert mooring_stiffness(rig.lines) == pytest.approx(-np.array(slopes).T, abs=1e-8)
+    assert mooring_stiffness(rig.lines)[0, 0] == pytest.approx(1.89 + 1.33, rel=1e-9)
+
+
+def test_slack_limits(rig):
+    assert slack_offset(rig.lines, 0) == pytest.approx(-0.8 / 1.89, rel=1e-9)
+    assert slack_offset(rig.lines, 1) == pytest.approx(0.8 / 1.33, rel=1e-9)
+
+
+def test_a_line_stretched_to_nothing_is_refused():
+    line = LineSettings(stiffness=1.0, pretension=5.0, eye=(-0.7, 0.06), pole=(48.4, 0.06))
+    with pytest.raises(RequestError, match=r"moorings\.bow has no length left: .* 5\.000 m\. Lower"):
+        line_table({"bow": line}, 52.09, 0.03)
+
+
+@pytest.mark.oracle
+def test_tension_is_that_of_a_catenary_solver(rig):
+    catenary = pytest.importorskip("moorpy.Catenary", reason="oracle").catenary
+    unstretched, stiffness = rig.lines[0, 5], rig.lines[0, 4]
+    for offset in (-0.2, 0.0, 0.5, 1.4):
+        reach = 2.95 + offset
+        # A line of 1 mg/m: its sag is far below a millimetre, the solver needs some weight.
+        weight = 1e-5
+        ends = catenary(reach, 0.0, unstretched, stiffness * unstretched, weight, CB=0.0)[0:4]
+        position = np.zeros((5, 1))
+        position[0] = offset
+        ours = tensions(rig, position, np.zeros_like(position))[0, 0]
+        assert ours == pytest.approx(np.hypot(*ends[2:4]), rel=1e-3)

@@ -1,0 +1,149 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as budget
+from hypothesis import strategies as st
+
+from seakeep.errors import RequestError
+from seakeep.signals import significant_height
+from seakeep.tank.seas import (
+    BLOCK,
+    Sea,
+    irregular_sea,
+    jonswap,
+    pierson_moskowitz,
+    regular_sea,
+    sea_of_run,
+    spectral_density,
+)
+from seakeep.tank.settings import RunSettings, SpectrumSettings
+from seakeep.waves import wavelength_to_frequency, wavenumber
+
+
+def rng():
+    return np.random.default_rng(3)
+
+
+def test_height_and_peak_of_the_spectra():
+    f = np.geomspace(0.02, 40, 40001)
+    for density in (pierson_moskowitz(f, 0.15, 2.12), jonswap(f, 0.15, 2.12)):
+        assert 4 * np.sqrt(np.trapezoid(density, f)) == pytest.approx(0.15, rel=1e-3)
+        assert 1 / f[np.argmax(density)] == pytest.approx(2.12, rel=1e-3)
+    assert jonswap(f, 0.15, 2.12, 1.0) == pytest.approx(pierson_moskowitz(f, 0.15, 2.12), rel=1e-3)
+
+
+@pytest.mark.oracle
+def test_spectra_are_those_of_wavespectra():
+    frequency = pytest.importorskip("wavespectra.construct.frequency", reason="oracle")
+    f = np.linspace(0.2, 2.0, 181)
+    theirs = np.asarray(frequency.pierson_moskowitz(f, hs=0.15, fp=1 / 2.12))
+    # The outside package integrates its shape over these frequencies to set its height.
+    ours = pierson_moskowitz(f, 0.15, 2.12)
+    assert theirs / theirs.max() == pytest.approx(ours / ours.max(), abs=1e-3)
+    theirs = np.asarray(frequency.jonswap(f, fp=1 / 2.12, gamma=3.3, hs=0.15))
+    ours = jonswap(f, 0.15, 2.12)
+    assert theirs / theirs.max() == pytest.approx(ours / ours.max(), abs=1e-3)
+
+
+def test_components_hold_the_energy_of_the_band():
+    spectrum = SpectrumSettings(height=0.15, peak_period=2.12, spacing="equal")
+    sea = irregular_sea(spectrum, 3.6, rng())
+    f = np.linspace(0.28, 1.13, 20001)
+    variance = np.trapezoid(pierson_moskowitz(f, 0.15, 2.12), f)
+    # √(2EΔf); the paper's √(4πEΔf) would give 0.37 m instead of 0.147 m.
+    assert 0.5 * np.sum(sea.amplitude**2) == pytest.approx(variance, rel=5e-3)
+    assert sea.omega.size == 100
+    assert sea.omega[[0, -1]] / (2 * np.pi) == pytest.approx([0.28, 1.13])
+
+
+def test_equal_spacing_repeats_and_jitter_does_not():
+    def repeat(spacing):
+        spectrum = SpectrumSettings(height=0.15, peak_period=2.12, spacing=spacing)
+        sea = irregular_sea(spectrum, 3.6, rng())
+        t = np.arange(0.0, 60.0, 0.05)
+        first, again = np.abs(sea.analytic(0.0, t)), np.abs(sea.analytic(0.0, t + 99 / 0.85))
+        return np.corrcoef(first, again)[0, 1]
+
+    assert repeat("equal") == pytest.approx(1.0, abs=1e-9)
+    assert abs(repeat("jittered")) < 0.6  # what is left is chance: 60 s hold a dozen groups
+
+
+def test_jitter_keeps_each_component_in_its_bin():
+    spectrum = SpectrumSettings(height=0.15, peak_period=2.12, components=40)
+    f = irregular_sea(spectrum, 3.6, rng()).omega / (2 * np.pi)
+    bins = np.floor((f - 0.28) / (0.85 / 40))
+    assert np.array_equal(bins, np.arange(40))
+
+
+def test_a_table_is_a_spectrum_as_well():
+    table = SpectrumSettings(
+        kind="table", frequencies=(0.3, 0.5, 0.9), densities=(0.0, 2e-3, 0.0), band=(0.3, 0.9)
+    )
+    assert spectral_density(table, [0.2, 0.4, 0.5, 1.0]) == pytest.approx([0, 1e-3, 2e-3, 0])
+    sea = irregular_sea(table, 3.6, rng())
+    assert 0.5 * np.sum(sea.amplitude**2) == pytest.approx(0.5 * 0.6 * 2e-3, rel=0.02)
+
+
+def test_fixed_places_are_evaluated_in_blocks_to_the_same_value():
+    sea = irregular_sea(SpectrumSettings(height=0.15, peak_period=2.12), 3.6, rng())
+    t = -1.2 + np.arange(3 * BLOCK + 7) / 500.0
+    whole = sea.elevation(-3.67, t)
+    parts = np.concatenate([sea.elevation(-3.67, part) for part in np.array_split(t, 8)])
+    assert whole == pytest.approx(parts, abs=1e-13)
+
+
+def test_a_moving_place_sees_the_doppler_shift():
+    omega = 4.0
+    k = float(wavenumber(omega, 3.6))
+    sea = Sea(np.array([omega]), np.array([0.1]), np.array([0.3]), np.array([k]))
+    t = np.linspace(0, 20, 400)
+    moving = sea.elevation(0.5 * t, t)
+    assert moving == pytest.approx(0.1 * np.cos((0.5 * k - omega) * t + 0.3), abs=1e-13)
+
+
+def test_steady_regular_waves_have_their_height():
+    sea = regular_sea(2.1, 0.105, 0.0, 3.6, rng())
+    assert sea.omega == pytest.approx([wavelength_to_frequency(2.1, 3.6)])
+    assert sea.amplitude == pytest.approx([0.0525])
+
+
+def test_unsteadiness_spreads_the_heights():
+    spreads = []
+    for unsteadiness in (0.03, 0.05):
+        sea = regular_sea(2.8, 0.1, unsteadiness, 3.6, rng())
+        envelope = np.abs(sea.analytic(0.0, np.arange(0, 3000, 0.5)))
+        spreads.append(envelope.std() / envelope.mean())
+    # Two sidebands of a part ε each: the envelope's deviation is ε.
+    assert spreads == pytest.approx([0.03, 0.05], rel=0.05)
+
+
+@budget(deadline=None, max_examples=25)
+@given(
+    height=st.floats(0.01, 0.4),
+    period=st.floats(1.0, 3.0),
+    count=st.integers(50, 400),
+    seed=st.integers(0, 2**31),
+)
+def test_any_sea_has_the_energy_of_its_components(height, period, count, seed):
+    spectrum = SpectrumSettings(height=height, peak_period=period, components=count)
+    sea = irregular_sea(spectrum, 3.6, np.random.default_rng(seed))
+    eta = sea.elevation(1.3, np.arange(0, 3000.0, 0.173))
+    stated = 4 * np.sqrt(0.5 * np.sum(sea.amplitude**2))
+    # Components closer than the inverse of the record do not average out: a few per cent.
+    assert significant_height(eta) == pytest.approx(stated, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("run", "message"),
+    [
+        ({"wavelength": 0.5, "height": 0.05}, r"runs\.odd asks for waves of 1\.77 Hz; .*0\.1–1\.4"),
+        ({"wavelength": 2.0, "height": 0.6}, r"runs\.odd asks for waves 0\.6 m high; .* 0\.45 m"),
+        (
+            {"spectrum": {"height": 0.1, "peak_period": 2.0, "band": (0.05, 1.0)}},
+            r"asks for waves of 0\.05–1 Hz; the wave maker covers",
+        ),
+    ],
+)
+def test_waves_beyond_the_wave_maker_are_refused(settings, run, message):
+    with pytest.raises(RequestError, match=message):
+        sea_of_run("odd", RunSettings.model_validate(run), settings.facility, rng())
