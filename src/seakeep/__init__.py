@@ -5,21 +5,37 @@ from importlib import metadata
 from seakeep import core, metrics, signals
 from seakeep.campaign import Campaign, read_campaign
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
-from seakeep.models import HankelDMDc, HankelDMDcModel, load_model
+from seakeep.models import (
+    BayesianHankelDMDc,
+    Fixed,
+    HankelDMDc,
+    HankelDMDcModel,
+    HankelEnsemble,
+    LogUniform,
+    Uniform,
+    load_model,
+    summarize,
+)
 
 __version__ = metadata.version("seakeep")
 
 __all__ = [
+    "BayesianHankelDMDc",
     "Campaign",
     "DataError",
+    "Fixed",
     "HankelDMDc",
     "HankelDMDcModel",
+    "HankelEnsemble",
+    "LogUniform",
     "RequestError",
     "SeakeepError",
     "SeakeepWarning",
+    "Uniform",
     "core",
     "load_model",
     "metrics",
     "read_campaign",
     "signals",
+    "summarize",
 ]

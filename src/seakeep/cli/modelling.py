@@ -12,7 +12,7 @@ from seakeep.campaign import Campaign, load_prepared, read_campaign
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import replacing
-from seakeep.models import load_model
+from seakeep.models import HankelDMDcModel, load_model
 from seakeep.report.overlay import overlay_figure
 from seakeep.report.style import save_figure
 from seakeep.report.tables import rich_comparison, write_csv
@@ -118,6 +118,11 @@ def compare(
     if format_ not in ("png", "svg", "pdf"):
         raise RequestError(f"--format must be png, svg or pdf; received '{format_}'.")
     identified = load_model(model)
+    if not isinstance(identified, HankelDMDcModel):
+        raise RequestError(
+            f"{model} holds an ensemble; compare judges a single model. Forecast the ensemble with "
+            "`seakeep forecast`, or save one member with ensemble.member(0).save(...)."
+        )
     with progress_bar("Preparing") as progress:
         comparisons = compare_runs(
             identified, read_campaign(campaign), run or (), start, steps, progress

@@ -1,10 +1,10 @@
 r"""Tikhonov-regularised and rank-truncated least squares, :math:`\hat X' \approx G \hat Y`.
 
-One function, :func:`solve`, whatever the shape and the conditioning:
+:func:`solve` takes any regressors; :func:`identify` those of delayed series, whose Gram matrices
+come from their structure (:mod:`seakeep.core.gram`). Both choose the form in one way:
 
-* primal, :math:`G = X' Y^T (Y Y^T + \lambda I)^{-1}` (the paper's formula), where there are no
-  fewer columns than rows;
-* dual, :math:`G = X' (Y^T Y + \lambda I)^{-1} Y^T`, the same matrix, where there are fewer;
+* primal, :math:`G = X' Y^T (Y Y^T + \lambda I)^{-1}` (the paper's formula), or dual,
+  :math:`G = X' (Y^T Y + \lambda I)^{-1} Y^T`, the same matrix, whichever is less work;
 * singular values, where forming a Gram matrix would square away the accuracy: the effective λ is
   below 1e-6 of the largest squared singular value, or λ = 0 (minimum norm), or a rank is given.
 """
@@ -18,8 +18,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 from scipy import linalg
+from scipy.linalg import blas, lapack
 
 from seakeep.core.embedding import TrainingWindow, snapshot_matrices
+from seakeep.core.gram import Piece, gram_trace, primal_system, snapshot_gram
+from seakeep.core.lagged import lagged_sums
 
 __all__ = ["Method", "Solution", "identify", "solve"]
 
@@ -88,17 +91,10 @@ def solve(
         return _by_singular_values(regressors, targets, ridge, None)
     full_rank = min(regressors.shape)
     if chosen == "primal":
-        gram = regressors @ regressors.T
-        gram.flat[:: gram.shape[0] + 1] += ridge
-        right = targets @ regressors.T
-        coefficients = linalg.solve(
-            gram, right.T, assume_a="pos", overwrite_a=True, overwrite_b=True, check_finite=False
-        ).T
-        return Solution(coefficients, "primal", ridge, full_rank)
-    gram = regressors.T @ regressors
-    gram.flat[:: gram.shape[0] + 1] += ridge
-    weights = linalg.solve(gram, targets.T, assume_a="pos", overwrite_a=True, check_finite=False)
-    return Solution(weights.T @ regressors.T, "dual", ridge, full_rank)
+        factor = _factor(regressors @ regressors.T, ridge)
+        return Solution(_apply(factor, targets @ regressors.T), "primal", ridge, full_rank)
+    weights = _apply(_factor(regressors.T @ regressors, ridge), targets.copy())
+    return Solution(weights @ regressors.T, "dual", ridge, full_rank)
 
 
 def choose_method(regressors: FloatArray, ridge: float) -> Method:
@@ -117,16 +113,60 @@ def choose_method(regressors: FloatArray, ridge: float) -> Method:
         The form.
     """
     rows, columns = regressors.shape
-    form: Method = "primal" if rows <= columns else "dual"
-    # The trace bounds the largest squared singular value from above; most often that settles it.
-    if ridge >= GRAM_LIMIT * float(np.einsum("ij,ij->", regressors, regressors)):
-        return form
-    if ridge <= 0:
+    trace = float(np.einsum("ij,ij->", regressors, regressors))
+    settled = _gram_suffices(ridge, trace, None)
+    if settled is None:
+        gram = regressors @ regressors.T if rows <= columns else regressors.T @ regressors
+        settled = _gram_suffices(ridge, trace, gram)
+    if not settled:
         return "svd"
-    gram = regressors @ regressors.T if rows <= columns else regressors.T @ regressors
-    size = gram.shape[0]
-    largest = linalg.eigvalsh(gram, subset_by_index=[size - 1, size - 1], check_finite=False)[0]
-    return form if ridge >= GRAM_LIMIT * largest else "svd"
+    return "primal" if rows <= columns else "dual"
+
+
+def _gram_suffices(ridge: float, trace: float, gram: FloatArray | None) -> bool | None:
+    """Whether λ ≥ 1e-6 σ²_max; None where only the (upper triangle of the) Gram matrix can tell."""
+    # Two bounds of the largest squared singular value from above, then the value itself.
+    if ridge >= GRAM_LIMIT * trace:
+        return True
+    if ridge <= 0:
+        return False
+    if gram is None:
+        return None
+    upper = np.triu(gram)
+    if ridge >= GRAM_LIMIT * float(np.linalg.norm(upper + np.triu(upper, 1).T)):
+        return True
+    top = len(gram) - 1
+    largest = linalg.eigvalsh(upper, lower=False, subset_by_index=[top, top], check_finite=False)
+    return bool(ridge >= GRAM_LIMIT * largest[0])
+
+
+def _factor(gram: FloatArray, ridge: float) -> FloatArray:
+    """Lower Cholesky factor, in Fortran order, of the upper triangle `gram` plus λ; in its place.
+
+    The triangle above the factor keeps what stood there.
+    """
+    size = len(gram)
+    gram.reshape(-1)[:: size + 1] += ridge
+    factor, failed = lapack.dpotrf(gram.T, lower=1, overwrite_a=1, clean=0)
+    if failed:
+        raise np.linalg.LinAlgError(
+            f"the Gram matrix of {size} rows with ridge {ridge:g} is not positive definite. Raise "
+            "ridge, or use method='svd'."
+        )
+    return np.asarray(factor)
+
+
+def _apply(factor: FloatArray, right: FloatArray) -> FloatArray:
+    """`right` times the inverse of the factored matrix; shape of `right`, which is overwritten."""
+    solved, _ = lapack.dpotrs(factor, right.T, lower=1, overwrite_b=1)
+    return np.asarray(solved).T
+
+
+def _symmetric_inverse(factor: FloatArray) -> FloatArray:
+    """Inverse of L L^T, both triangles of it; the factor, in Fortran order, is overwritten."""
+    lower, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
+    lower = np.tril(lower)
+    return np.asarray(lower + np.tril(lower, -1).T)
 
 
 def _by_singular_values(
@@ -189,10 +229,150 @@ def identify(
         Coefficients of shape (N(s+1) or N, N(s+1) + Q(z+1)).
     """
     pieces = [
-        snapshot_matrices(x, u, window, state_delays, input_delays, all_rows)
+        Piece(x, u, window.first_column, window.columns)
         for x, u, window in zip(states, inputs, windows, strict=True)
     ]
-    regressors = np.concatenate([piece[0] for piece in pieces], axis=1)
-    targets = np.concatenate([piece[1] for piece in pieces], axis=1)
-    effective = ridge * regressors.shape[1] if per_snapshot else ridge
-    return solve(regressors, targets, effective, rank, method)
+    columns = sum(piece.count for piece in pieces)
+    effective = ridge * columns if per_snapshot else ridge
+    problem = _Delayed(pieces, state_delays, input_delays, all_rows)
+    chosen = "svd" if rank is not None else method or problem.choose(effective)
+    full_rank = min(problem.rows, columns)
+    if chosen == "primal":
+        return Solution(problem.primal(effective), "primal", effective, full_rank)
+    if chosen == "dual":
+        return Solution(problem.dual(effective), "dual", effective, full_rank)
+    regressors, targets = problem.matrices()
+    if rank is not None:
+        return _by_singular_values(regressors, targets, 0.0, rank)
+    return _by_singular_values(regressors, targets, effective, None)
+
+
+@dataclass(frozen=True)
+class _Delayed:
+    """A regression of delayed series: snapshot pairs of several runs and two delays."""
+
+    pieces: Sequence[Piece]
+    state_delays: int
+    input_delays: int
+    all_rows: bool
+
+    @property
+    def states(self) -> int:
+        """Rows of the extended state."""
+        return int(self.pieces[0].states.shape[1]) * (self.state_delays + 1)
+
+    @property
+    def rows(self) -> int:
+        """Regressors."""
+        return self.states + int(self.pieces[0].inputs.shape[1]) * (self.input_delays + 1)
+
+    @property
+    def columns(self) -> int:
+        """Snapshot pairs."""
+        return sum(piece.count for piece in self.pieces)
+
+    def form(self) -> Method:
+        """The form that is less work, by its largest terms."""
+        p, n, a = self.rows, self.columns, self.states
+        if not self.all_rows:
+            return "primal" if p <= n else "dual"
+        b = p - a
+        primal = p**3 / 3 + 2 * a**3 / 3 + a * b * b + 2 * a * a * b
+        dual = n**3 / 3 + n * n * p + n * a * (a + 2 * b)
+        return "primal" if primal <= dual else "dual"
+
+    def choose(self, ridge: float) -> Method:
+        """The form, or singular values where λ is too small for a Gram matrix."""
+        trace = gram_trace(self.pieces, self.state_delays, self.input_delays)
+        settled = _gram_suffices(ridge, trace, None)
+        if settled is None:
+            settled = _gram_suffices(ridge, trace, self.gram())
+        return self.form() if settled else "svd"
+
+    def gram(self) -> FloatArray:
+        """The smaller Gram matrix, its upper triangle."""
+        if self.rows <= self.columns:
+            return primal_system(self.pieces, self.state_delays, self.input_delays)[0]
+        return snapshot_gram(self.pieces, self.state_delays, self.input_delays)
+
+    def matrices(self) -> tuple[FloatArray, FloatArray]:
+        """Hankel matrices of regressors and targets, built."""
+        built = []
+        for piece in self.pieces:
+            window = TrainingWindow(piece.first, piece.first + piece.count, piece.first)
+            built.append(
+                snapshot_matrices(
+                    piece.states,
+                    piece.inputs,
+                    window,
+                    self.state_delays,
+                    self.input_delays,
+                    self.all_rows,
+                )
+            )
+        regressors, targets = zip(*built, strict=True)
+        return np.concatenate(regressors, axis=1), np.concatenate(targets, axis=1)
+
+    def primal(self, ridge: float) -> FloatArray:
+        r"""Coefficients from :math:`C = \hat Y \hat Y^T`.
+
+        The rows that shift the delayed states need no right-hand side. With P the rows of
+        the identity that select the lags 0 … s−1 of the states, their targets are
+        :math:`P \hat Y`, and :math:`P C (C + \lambda I)^{-1} = P - \lambda P (C+\lambda I)^{-1}`:
+        a block of rows of the inverse. With the inputs first and the states last in
+        :math:`C + \lambda I = L L^T`, it is
+
+        .. math:: [-H T \;\; H], \quad H = (L_{22} L_{22}^T)^{-1}, \; T = L_{21} L_{11}^{-1}.
+        """
+        gram, right = primal_system(self.pieces, self.state_delays, self.input_delays)
+        factor = _factor(gram, ridge)
+        top = _apply(factor, right)
+        inputs, N = self.rows - self.states, len(top)
+        if not self.all_rows:
+            return np.concatenate([top[:, inputs:], top[:, :inputs]], axis=1)
+        out = np.empty((self.states, self.rows))
+        out[:N, : self.states] = top[:, inputs:]
+        out[:N, self.states :] = top[:, :inputs]
+        shifted = self.states - N
+        if shifted == 0:
+            return out
+        inverse = _symmetric_inverse(np.asfortranarray(factor[inputs:, inputs:]))[:shifted]
+        inverse *= ridge
+        np.negative(inverse, out=out[N:, : self.states])
+        out[N:].reshape(-1)[: shifted * self.rows : self.rows + 1] += 1.0
+        if inputs:
+            # f2py copies a block of a matrix element by element; asfortranarray does it by rows.
+            corner = np.asfortranarray(factor[:inputs, :inputs])
+            below = np.asfortranarray(factor[inputs:, :inputs])
+            ratio = blas.dtrsm(1.0, corner, below, side=1, lower=1, overwrite_b=1)
+            np.matmul(inverse, ratio, out=out[N:, self.states :])
+        return out
+
+    def dual(self, ridge: float) -> FloatArray:
+        r"""Coefficients from :math:`K = \hat Y^T \hat Y`.
+
+        With :math:`K + \lambda I = L L^T` the newest rows are :math:`(K + \lambda I)^{-1} X'^T`
+        summed against the lagged series; all rows are :math:`\hat X' L^{-T} Z` with
+        :math:`Z = L^{-1} \hat Y^T`, and those of the delayed states are :math:`P Z^T Z`.
+        """
+        factor = _factor(snapshot_gram(self.pieces, self.state_delays, self.input_delays), ridge)
+        targets = np.concatenate([piece.targets for piece in self.pieces])
+        if not self.all_rows:
+            weights = _apply(factor, targets.T.copy()).T
+            top, at = np.zeros((targets.shape[1], self.rows)), 0
+            for piece in self.pieces:
+                own = weights[at : at + piece.count]
+                at += piece.count
+                x = lagged_sums(own, piece.states, piece.first, self.state_delays + 1)
+                u = lagged_sums(own, piece.inputs, piece.first, self.input_delays + 1)
+                top[:, : self.states] += x
+                top[:, self.states :] += u
+            return top
+        N = targets.shape[1]
+        stacked = np.concatenate([self.matrices()[0], targets.T])
+        half = blas.dtrsm(1.0, factor, stacked.T, lower=1, overwrite_b=1)
+        regressors, newest = half[:, : self.rows], half[:, self.rows :]
+        out = np.empty((self.states, self.rows))
+        np.matmul(newest.T, regressors, out=out[:N])
+        np.matmul(regressors[:, : self.states - N].T, regressors, out=out[N:])
+        return out

@@ -1,15 +1,31 @@
-r"""Free runs of :math:`\hat x_{k+1} = \hat A \hat x_k + \hat B \hat u_k`, many windows at once."""
+r"""Free runs of :math:`\hat x_{k+1} = \hat A \hat x_k + \hat B \hat u_k`, many windows at once.
+
+Windows side by side are rows of one matrix, and several steps are one product
+(:mod:`seakeep.core.propagation`). A long run is taken in pieces, so that what is held beside the
+result does not grow with its length.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import blas
 
+from seakeep.core.propagation import (
+    Propagator,
+    doublings,
+    mirrored,
+    shifting_propagator,
+    square_propagator,
+)
 from seakeep.errors import RequestError
 
-__all__ = ["input_forcing", "rollout"]
+__all__ = ["rollout"]
 
 FloatArray = npt.NDArray[np.float64]
+
+PIECE = 4_000_000
+"""Numbers, about, that a piece of a long run holds at once."""
 
 
 def rollout(
@@ -77,15 +93,35 @@ def rollout(
         )
     if a.shape[0] == a.shape[1] and _shifts_exactly(a, b, count):
         a, b = a[:count], b[:count]
-    forcing = input_forcing(b, driving)
+    channels, steps = _input_steps(b, driving)
     with np.errstate(over="ignore", invalid="ignore"):
-        if a.shape[0] == count and a.shape[1] > count:
-            out = _run_shifting(a, start, forcing)
-        else:
-            out = _run_square(a, start, forcing, count)
-        lost = ~np.all((np.abs(out) <= limit) & np.isfinite(out), axis=2)
-    out[np.logical_or.accumulate(lost, axis=1)] = np.nan
+        symmetric, propagator = _prepare(a, b, count, channels, len(start), steps)
+        out = _run(propagator, symmetric, start, driving, steps, count)
+        lost = ~(np.abs(out) <= min(limit, np.finfo(float).max)).all(axis=2)
+    if lost.any():
+        out[np.logical_or.accumulate(lost, axis=1)] = np.nan
     return out
+
+
+def _prepare(
+    a: FloatArray, b: FloatArray, count: int, channels: int, windows: int, steps: int
+) -> tuple[FloatArray | None, Propagator]:
+    """Symmetric half of Â, where it is used, and the propagator."""
+    if a.shape[0] == count and a.shape[1] > count:
+        propagator = shifting_propagator(a, b, channels, steps)
+        if not np.isfinite(propagator.output_state).all():
+            propagator = shifting_propagator(a, b, channels, 1)
+        return None, propagator
+    symmetric = mirrored(a, b.shape[1], count, steps) if windows == 1 else None
+    times = 0
+    if symmetric is None:
+        times, _ = doublings(a.shape[1], b.shape[1], windows, steps)
+    propagator = square_propagator(a, b, count, channels, times)
+    assert propagator.state is not None
+    # A model that grows without bound overflows sooner in powers of Â than in single steps.
+    if times and not np.isfinite(propagator.state).all():
+        propagator = square_propagator(a, b, count, channels, 0)
+    return symmetric, propagator
 
 
 def _count_states(a: FloatArray, b: FloatArray, start: FloatArray, given: int | None) -> int:
@@ -117,74 +153,147 @@ def _shifts_exactly(a: FloatArray, b: FloatArray, count: int) -> bool:
     )
 
 
-def input_forcing(b: FloatArray, inputs: FloatArray) -> FloatArray:
-    r"""Input part :math:`\hat B \hat u_k` of every step, shape (window, steps, rows).
-
-    Parameters
-    ----------
-    b : ndarray, shape (rows, Q(z+1))
-        Input matrix.
-    inputs : ndarray, shape (window, steps, Q(z+1)) or (window, z + steps, Q)
-        As in :func:`rollout`.
-
-    Returns
-    -------
-    ndarray, shape (window, steps, rows)
-        The forcing.
-
-    Raises
-    ------
-    RequestError
-        If the channels of `inputs` do not divide the columns of `b`.
-    """
-    windows, length, width = inputs.shape
+def _input_steps(b: FloatArray, inputs: FloatArray) -> tuple[int, int]:
+    """Channels a sample of the inputs, and steps they drive; extended inputs count as channels."""
+    length, width = inputs.shape[1:]
     if width == b.shape[1]:
-        return inputs @ b.T
+        return width, length
     if width == 0 or b.shape[1] % width:
         raise RequestError(
             f"inputs with {width} channels do not fit B of shape {b.shape}: its columns must be "
             "Q(z+1). Check the number of inputs and their delays."
         )
     delays = b.shape[1] // width - 1
-    steps = length - delays
-    if steps < 1:
+    if length - delays < 1:
         raise RequestError(
             f"inputs of {length} samples do not reach one step: {delays} delays need at least "
             f"{delays + 1} samples."
         )
-    newest_first = np.ascontiguousarray(inputs[:, ::-1])
-    step = newest_first.strides[1]
-    extended = np.lib.stride_tricks.as_strided(
+    return width, length - delays
+
+
+def _run(
+    propagator: Propagator,
+    symmetric: FloatArray | None,
+    start: FloatArray,
+    inputs: FloatArray,
+    steps: int,
+    count: int,
+) -> FloatArray:
+    # In pieces of whole blocks of K steps; the state is handed on.
+    windows, size = start.shape
+    K = propagator.steps
+    held = propagator.output_input.shape[1] + K * count
+    held += 0 if propagator.state is None else 2 * size
+    blocks = -(-steps // K)
+    most = max(1, PIECE // (held * max(windows, 1)))
+    out = np.empty((windows, blocks * K, count))
+    state = start
+    for first in range(0, blocks, most):
+        number = min(most, blocks - first)
+        rows = _input_rows(propagator, inputs, first, number)
+        if propagator.state is None:
+            newest_first, state = _run_shifting(propagator, state, rows)
+        elif symmetric is not None:
+            newest_first, state = _run_mirrored(propagator, symmetric, state, rows)
+        else:
+            newest_first, state = _run_square(propagator, state, rows)
+        piece = out[:, first * K : (first + number) * K]
+        piece[:] = newest_first.reshape(windows, number * K, count)[:, ::-1]
+    return out[:, :steps]
+
+
+def _input_rows(propagator: Propagator, inputs: FloatArray, first: int, number: int) -> FloatArray:
+    """Inputs of each block, newest first: shape (number * window, Q(z+K)); the last block first.
+
+    Zeros stand where the last block reaches beyond the inputs; no output that is asked for sees
+    them.
+    """
+    windows, _, channels = inputs.shape
+    K, width = propagator.steps, propagator.output_input.shape[1]
+    if width == 0:
+        return np.zeros((number * windows, 0))
+    delays = width // channels - K
+    begin, length = first * K, number * K + delays
+    newest_first = np.zeros((windows, length, channels))
+    piece = inputs[:, begin : begin + length]
+    newest_first[:, length - piece.shape[1] :] = piece[:, ::-1]
+    window, step, channel = newest_first.strides
+    blocks = np.lib.stride_tricks.as_strided(
         newest_first,
-        shape=(windows, steps, b.shape[1]),
-        strides=(newest_first.strides[0], step, newest_first.strides[2]),
+        shape=(number, windows, width),
+        strides=(K * step, window, channel),
         writeable=False,
     )
-    return (extended @ b.T)[:, ::-1]
+    return np.ascontiguousarray(blocks).reshape(number * windows, width)
 
 
-def _run_shifting(a: FloatArray, start: FloatArray, forcing: FloatArray) -> FloatArray:
-    # Samples lie newest first in one long row a window, so the extended state of every step is a
-    # contiguous piece of it and nothing is ever moved.
-    windows, steps, count = forcing.shape
-    size = a.shape[1]
-    samples = np.empty((windows, steps * count + size))
-    samples[:, steps * count :] = start
-    transposed = np.ascontiguousarray(a.T)
-    at = steps * count
-    for step in range(steps):
-        samples[:, at - count : at] = samples[:, at : at + size] @ transposed + forcing[:, step]
-        at -= count
-    newest_first = samples[:, : steps * count].reshape(windows, steps, count)
-    return np.ascontiguousarray(newest_first[:, ::-1])
+def _run_shifting(
+    propagator: Propagator, start: FloatArray, rows: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    # Samples lie newest first in one long row a window, so the extended state of every block is a
+    # contiguous piece of it and nothing is ever moved. Rows come with the last block first too.
+    windows = len(start)
+    width, size = propagator.output_state.shape
+    number = len(rows) // windows
+    forcing = (rows @ propagator.output_input.T).reshape(number, windows, width)
+    samples = np.empty((windows, number * width + size))
+    samples[:, number * width :] = start
+    if windows == 1:
+        line, output = samples[0], propagator.output_state
+        for at in range((number - 1) * width, -1, -width):
+            piece = line[at : at + width]
+            np.matmul(output, line[at + width : at + width + size], out=piece)
+            piece += forcing[at // width, 0]
+    else:
+        transposed = np.ascontiguousarray(propagator.output_state.T)
+        for block in range(number - 1, -1, -1):
+            at = block * width
+            state = samples[:, at + width : at + width + size]
+            samples[:, at : at + width] = state @ transposed + forcing[block]
+    return samples[:, : number * width], samples[:, :size].copy()
 
 
-def _run_square(a: FloatArray, start: FloatArray, forcing: FloatArray, count: int) -> FloatArray:
-    windows, steps, _ = forcing.shape
-    out = np.empty((windows, steps, count))
-    transposed = np.ascontiguousarray(a.T)
-    state = start
-    for step in range(steps):
-        state = state @ transposed + forcing[:, step]
-        out[:, step] = state[:, :count]
-    return out
+def _run_mirrored(
+    propagator: Propagator, symmetric: FloatArray, start: FloatArray, rows: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    assert propagator.state_input is not None
+    number, size, N = len(rows), start.shape[1], len(propagator.output_state)
+    # A row holds a state and, after it, what the symmetric product says beyond the oldest delay.
+    states = np.zeros((number + 1, size + N))
+    states[number, :size] = start[0]
+    np.matmul(rows, propagator.state_input.T, out=states[:number, :size])
+    half, newest = symmetric.T, np.ascontiguousarray(propagator.output_state).T
+    symv, gemv = blas.dsymv, blas.dgemv
+    state = states[number, :size]
+    for block in range(number - 1, -1, -1):
+        row = states[block]
+        symv(1.0, half, state, beta=1.0, y=row[N:], overwrite_y=1, lower=1)
+        gemv(1.0, newest, state, beta=1.0, y=row[:N], overwrite_y=1, trans=1)
+        state = row[:size]
+    return states[:number, :N].reshape(1, -1), states[:1, :size]
+
+
+def _run_square(
+    propagator: Propagator, start: FloatArray, rows: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    windows, size = start.shape
+    number = len(rows) // windows
+    assert propagator.state is not None
+    assert propagator.state_input is not None
+    # states[block + 1] starts block; states[0] is what the piece ends with.
+    states = np.empty((number + 1, windows, size))
+    states[number] = start
+    np.matmul(rows, propagator.state_input.T, out=states[:number].reshape(-1, size))
+    if windows == 1:
+        line = states[:, 0]
+        for block in range(number - 1, -1, -1):
+            line[block] += propagator.state @ line[block + 1]
+    else:
+        transposed = np.ascontiguousarray(propagator.state.T)
+        for block in range(number - 1, -1, -1):
+            states[block] += states[block + 1] @ transposed
+    outputs = states[1:].reshape(-1, size) @ propagator.output_state.T
+    outputs += rows @ propagator.output_input.T
+    newest_first = outputs.reshape(number, windows, -1).transpose(1, 0, 2)
+    return np.ascontiguousarray(newest_first).reshape(windows, -1), states[0]

@@ -3,15 +3,29 @@
 from pathlib import Path
 
 from seakeep.errors import DataError
-from seakeep.models import store
+from seakeep.models import ensemble_store, store
+from seakeep.models.ensemble import BayesianHankelDMDc
+from seakeep.models.fitted_ensemble import HankelEnsemble
 from seakeep.models.hankel import HankelDMDc
 from seakeep.models.model import HankelDMDcModel
+from seakeep.models.priors import Fixed, LogUniform, Uniform
+from seakeep.models.summaries import summarize
 
-__all__ = ["HankelDMDc", "HankelDMDcModel", "load_model"]
+__all__ = [
+    "BayesianHankelDMDc",
+    "Fixed",
+    "HankelDMDc",
+    "HankelDMDcModel",
+    "HankelEnsemble",
+    "LogUniform",
+    "Uniform",
+    "load_model",
+    "summarize",
+]
 
 
-def load_model(path: str | Path) -> HankelDMDcModel:
-    """Read a model that was saved; no code from the file is run.
+def load_model(path: str | Path) -> HankelDMDcModel | HankelEnsemble:
+    """Read a model or an ensemble that was saved; no code from the file is run.
 
     Parameters
     ----------
@@ -20,7 +34,7 @@ def load_model(path: str | Path) -> HankelDMDcModel:
 
     Returns
     -------
-    HankelDMDcModel
+    HankelDMDcModel or HankelEnsemble
         The model, equal to the last bit.
 
     Raises
@@ -32,12 +46,13 @@ def load_model(path: str | Path) -> HankelDMDcModel:
     """
     dataset = store.read(path)
     kind = dataset.attrs["seakeep_kind"]
-    if kind != store.HANKEL_DMDC:
-        raise DataError(
-            f"{path} holds a model of kind '{kind}', which this version does not know. "
-            "Update seakeep."
-        )
     try:
-        return HankelDMDcModel.from_dataset(dataset)
+        if kind == store.HANKEL_DMDC:
+            return HankelDMDcModel.from_dataset(dataset)
+        if kind == ensemble_store.BAYESIAN_HANKEL_DMDC:
+            return HankelEnsemble.from_dataset(dataset)
     except (KeyError, TypeError, ValueError) as error:
         raise DataError(f"{path} is incomplete: {error}. Save the model again.") from error
+    raise DataError(
+        f"{path} holds a model of kind '{kind}', which this version does not know. Update seakeep."
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,27 @@ DIVERGED = 1e6
 """A free run is given up where a state is this many training SDs from its mean."""
 
 
+class Reader(Protocol):
+    """What a forecast must know of a model, or of an ensemble, to read a run."""
+
+    @property
+    def dt(self) -> float: ...
+    @property
+    def state_labels(self) -> tuple[labelled.ChannelLabel, ...]: ...
+    @property
+    def input_labels(self) -> tuple[labelled.ChannelLabel, ...]: ...
+    @property
+    def states(self) -> list[str]: ...
+    @property
+    def inputs(self) -> list[str]: ...
+    @property
+    def state_delays(self) -> int: ...
+    @property
+    def input_delays(self) -> int: ...
+    @property
+    def history_samples(self) -> int: ...
+
+
 @dataclass(frozen=True, eq=False)
 class ForecastWindow:
     """Measured samples that a forecast reads, and the instants it writes.
@@ -40,7 +61,7 @@ class ForecastWindow:
         Inputs after the start.
     steps : int
         Number of instants forecast.
-    time : DataArray, shape (steps,)
+    time : Variable, shape (steps,)
         These instants.
     """
 
@@ -50,12 +71,10 @@ class ForecastWindow:
     input_history: FloatArray
     input_future: FloatArray
     steps: int
-    time: xr.DataArray
+    time: xr.Variable
 
 
-def read_window(
-    model: HankelDMDcModel, run: xr.Dataset, start: float, steps: int | None
-) -> ForecastWindow:
+def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None) -> ForecastWindow:
     """Cut what a forecast needs out of a run; arguments and errors as ``forecast``."""
     name = labelled.run_name(run, "the run")
     labelled.check_run(run, name)
@@ -108,7 +127,7 @@ def read_window(
         input_history=u[:needed],
         input_future=u[needed:],
         steps=count,
-        time=xr.DataArray(np.concatenate([instants, beyond]), dims="time", attrs=attrs),
+        time=xr.Variable(("time",), np.concatenate([instants, beyond]), attrs),
     )
 
 
@@ -171,10 +190,10 @@ def label_forecast(
 ) -> xr.Dataset:
     """Dataset of a forecast of shape (steps, N), with units, spread in training, and status."""
     lost = np.flatnonzero(np.isnan(values).any(axis=1))
-    status = "ok" if lost.size == 0 else f"diverged at t = {float(window.time[lost[0]]):g} s"
+    status = "ok" if lost.size == 0 else f"diverged at t = {window.time.values[lost[0]]:g} s"
     variables = {
-        label.name: (
-            "time",
+        label.name: xr.Variable(
+            ("time",),
             values[:, column],
             {
                 "units": label.units,

@@ -14,7 +14,7 @@ from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.labelled import ChannelLabel
 
-__all__ = ["Scale", "TrainingData", "gather"]
+__all__ = ["Scale", "TrainingData", "gather", "last_sample", "moments", "stop_instants"]
 
 FloatArray = npt.NDArray[np.float64]
 Stop = float | Sequence[float] | Mapping[str, float] | None
@@ -118,15 +118,16 @@ def gather(
         If a run is too short, has gaps, another time step, other units, or a constant channel.
     """
     check_names(states, inputs)
-    stops = _stops(stop, list(runs))
+    stops = stop_instants(stop, list(runs))
     first_name, first_run = next(iter(runs.items()))
     dt = labelled.run_step(first_run, first_name)
     labels: tuple[tuple[ChannelLabel, ...], ...] = ()
     pieces = []
     for name, run in runs.items():
-        labelled.check_step(run, name, dt)
+        if run is not first_run:
+            labelled.check_step(run, name, dt)
         time = np.asarray(run["time"].values, dtype=float)
-        last = _last_sample(time, stops[name], name)
+        last = last_sample(time, stops[name], name)
         place = training_window(last, window, state_delays, input_delays, history)
         _check_length(place, name, window, max(state_delays, input_delays), history)
         reach = place.first_column - max(state_delays, input_delays)
@@ -150,8 +151,8 @@ def gather(
         pieces.append((name, arrays[0], arrays[1], shifted, time[place.first], time[last]))
 
     names, x, u, windows, first, final = zip(*pieces, strict=True)
-    state_scale = _moments(x, windows, states, standardize)
-    input_scale = _moments(u, windows, inputs, standardize)
+    state_scale = moments(x, windows, states, standardize)
+    input_scale = moments(u, windows, inputs, standardize)
     return TrainingData(
         names=names,
         states=tuple(state_scale.deviations(values) for values in x),
@@ -190,7 +191,8 @@ def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
         )
 
 
-def _stops(stop: Stop, names: list[str]) -> dict[str, float | None]:
+def stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
+    """Last instant of each run's window as the user gave it; None for the run's end."""
     if stop is None:
         return dict.fromkeys(names)
     if isinstance(stop, Mapping):
@@ -212,7 +214,8 @@ def _stops(stop: Stop, names: list[str]) -> dict[str, float | None]:
     return dict.fromkeys(names, float(np.asarray(stop, dtype=float)))
 
 
-def _last_sample(time: FloatArray, stop: float | None, name: str) -> int:
+def last_sample(time: FloatArray, stop: float | None, name: str) -> int:
+    """Last sample up to and including `stop`."""
     if stop is None:
         return time.size - 1
     nearest = labelled.nearest_sample(time, stop, name, "stop")
@@ -240,12 +243,19 @@ def _check_length(
         )
 
 
-def _moments(
+def moments(
     series: Sequence[FloatArray],
     windows: Sequence[TrainingWindow],
     names: Sequence[str],
     standardize: bool,
 ) -> Scale:
+    """Means and standard deviations (ddof = 1) over the windows of all runs.
+
+    Raises
+    ------
+    DataError
+        If a channel is constant there and `standardize` is set.
+    """
     pooled = np.concatenate(
         [values[window.samples] for values, window in zip(series, windows, strict=True)]
     )

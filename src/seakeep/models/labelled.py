@@ -150,14 +150,15 @@ def channel_matrix(
     """
     size = len(range(*samples.indices(run.sizes["time"])))
     out = np.empty((size, len(names)))
+    variables, coordinates = run.variables, set(run.coords)
     for column, channel in enumerate(names):
-        if channel not in run.data_vars:
+        if channel not in variables or channel in coordinates:
             known = [str(variable) for variable in run.data_vars]
             raise RequestError(
                 f"{name} has no channel '{channel}'.{did_you_mean(channel, known)} "
                 f"It has: {', '.join(known)}."
             )
-        variable = run[channel].variable
+        variable = variables[channel]
         if variable.dims != ("time",):
             raise DataError(
                 f"channel '{channel}' of {name} has the dimensions {variable.dims} and shape "
@@ -189,20 +190,22 @@ def check_finite(
 
 def channel_labels(run: xr.Dataset, names: Sequence[str]) -> tuple[ChannelLabel, ...]:
     """Labels of channels as the run states them."""
+    attributes = [run.variables[channel].attrs for channel in names]
     return tuple(
         ChannelLabel(
             channel,
-            str(run[channel].attrs.get("units", "")),
-            str(run[channel].attrs.get("long_name", channel.replace("_", " "))),
+            str(attrs.get("units", "")),
+            str(attrs.get("long_name", channel.replace("_", " "))),
         )
-        for channel in names
+        for channel, attrs in zip(names, attributes, strict=True)
     )
 
 
 def check_units(run: xr.Dataset, labels: Sequence[ChannelLabel], name: str) -> None:
     """Refuse a run that states another unit for a channel than the model was trained in."""
+    variables = run.variables
     for label in labels:
-        units = run[label.name].attrs.get("units") if label.name in run.data_vars else None
+        units = variables[label.name].attrs.get("units") if label.name in variables else None
         if units and label.units and str(units) != label.units:
             raise DataError(
                 f"channel '{label.name}' of {name} is in '{units}' and the model expects "

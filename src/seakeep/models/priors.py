@@ -1,0 +1,208 @@
+"""Prior distributions of the settings of an ensemble.
+
+A prior is anything with a quantile function ``ppf``: one of the classes here, or a frozen
+distribution of :mod:`scipy.stats`. One uniform number between 0 and 1 makes one draw, so Monte
+Carlo and quasi-random points are used alike.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from seakeep.errors import RequestError
+
+__all__ = ["Fixed", "LogUniform", "Prior", "Uniform", "check_prior", "describe", "rebuild"]
+
+
+@runtime_checkable
+class Prior(Protocol):
+    """What a prior must offer."""
+
+    def ppf(self, q: float) -> Any:
+        """Quantile function: the value below which lies the probability `q`."""
+        ...
+
+
+def _check_bounds(name: str, low: object, high: object, least: float) -> None:
+    numbers = [value for value in (low, high) if isinstance(value, int | float | np.number)]
+    if len(numbers) < 2 or not all(math.isfinite(value) for value in numbers):
+        raise RequestError(f"{name} needs two finite numbers; received {low!r} and {high!r}.")
+    if not numbers[0] < numbers[1]:
+        raise RequestError(
+            f"{name} needs its lower bound below the upper one; received {low!r} and {high!r}. "
+            "Swap them, or use seakeep.Fixed for a single value."
+        )
+    if numbers[0] < least:
+        raise RequestError(
+            f"{name} needs a positive lower bound; received {low!r}. Logarithms start above zero."
+        )
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Uniform between two bounds, as in the paper.
+
+    Parameters
+    ----------
+    low, high : float
+        Bounds.
+
+    Raises
+    ------
+    RequestError
+        If they are not finite, or not in order.
+
+    Examples
+    --------
+    >>> Uniform(10, 30).ppf(0.25)
+    15.0
+    """
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        _check_bounds("Uniform", self.low, self.high, -math.inf)
+
+    def ppf(self, q: float) -> float:
+        """Quantile function."""
+        return float(self.low + (self.high - self.low) * q)
+
+
+@dataclass(frozen=True)
+class LogUniform:
+    """Uniform in the logarithm between two positive bounds.
+
+    Parameters
+    ----------
+    low, high : float
+        Bounds.
+
+    Raises
+    ------
+    RequestError
+        If they are not finite, not positive, or not in order.
+
+    Examples
+    --------
+    >>> round(LogUniform(1, 100).ppf(0.5), 12)
+    10.0
+    """
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        _check_bounds("LogUniform", self.low, self.high, np.finfo(float).tiny)
+
+    def ppf(self, q: float) -> float:
+        """Quantile function."""
+        return float(self.low * (self.high / self.low) ** q)
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """One value, the same for every member.
+
+    Parameters
+    ----------
+    value : float
+        The value.
+
+    Raises
+    ------
+    RequestError
+        If it is not a finite number.
+    """
+
+    value: float
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.value, int | float | np.number) or not math.isfinite(self.value):
+            raise RequestError(f"Fixed needs a finite number; received {self.value!r}.")
+
+    def ppf(self, q: float) -> float:
+        """Quantile function: the value, whatever the probability."""
+        return float(self.value)
+
+
+def check_prior(name: str, prior: object) -> None:
+    """Refuse what is not a prior; `name` is the setting it is for."""
+    if not isinstance(prior, Prior):
+        raise RequestError(
+            f"{name} must be a prior; received {prior!r}. Pass seakeep.Uniform(low, high), "
+            "seakeep.LogUniform(low, high), seakeep.Fixed(value), or a frozen distribution such "
+            "as scipy.stats.norm(20, 2)."
+        )
+
+
+def describe(prior: Prior | None) -> dict[str, Any] | None:
+    """A prior as plain data, for a file.
+
+    Parameters
+    ----------
+    prior : Prior or None
+        One of this module, or a frozen distribution of scipy.stats by its public name.
+
+    Returns
+    -------
+    dict or None
+        Name and parameters.
+
+    Raises
+    ------
+    RequestError
+        If the prior is of another kind.
+    """
+    if prior is None:
+        return None
+    if isinstance(prior, Uniform | LogUniform | Fixed):
+        return {"prior": type(prior).__name__} | {k: float(v) for k, v in asdict(prior).items()}
+    distribution = getattr(getattr(prior, "dist", None), "name", None)
+    if distribution is None:
+        raise RequestError(
+            f"the prior {prior!r} cannot be written to a file. Use one of seakeep's, or a frozen "
+            "distribution of scipy.stats."
+        )
+    args = [float(value) for value in getattr(prior, "args", ())]
+    kwds = {key: float(value) for key, value in getattr(prior, "kwds", {}).items()}
+    return {"prior": f"scipy.stats.{distribution}", "args": args, "kwds": kwds}
+
+
+def rebuild(description: dict[str, Any] | None) -> Prior | None:
+    """The prior of a description; the inverse of :func:`describe`.
+
+    Parameters
+    ----------
+    description : dict or None
+        From :func:`describe`.
+
+    Returns
+    -------
+    Prior or None
+        Equal in all its quantiles.
+
+    Raises
+    ------
+    ValueError
+        If the description names no prior.
+    """
+    if description is None:
+        return None
+    known = {"Uniform": Uniform, "LogUniform": LogUniform, "Fixed": Fixed}
+    parameters = dict(description)
+    name = str(parameters.pop("prior"))
+    if name in known:
+        own: Prior = known[name](**parameters)
+        return own
+    from scipy import stats
+
+    kind = getattr(stats, name.removeprefix("scipy.stats."), None)
+    if not isinstance(kind, stats.rv_continuous | stats.rv_discrete):
+        raise ValueError(f"unknown prior '{name}'")
+    frozen: Prior = kind(*parameters["args"], **parameters["kwds"])
+    return frozen

@@ -1,0 +1,205 @@
+"""Mean, standard deviation and quantiles of an ensemble, piece by piece in time."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.errors import RequestError
+
+__all__ = ["STATISTICS", "first_lost", "reduce_members", "summarize"]
+
+FloatArray = npt.NDArray[np.float64]
+
+STATISTICS = ("mean", "std", "lower", "upper")
+HELD = 32 * 2**20
+"""Bytes of member series that are held in memory; more is spilled to a temporary file."""
+CHUNK = 8 * 2**20
+"""Bytes of one piece in time of all members."""
+
+
+def check_level(level: object) -> float:
+    """Refuse a level that is not between 0 and 1."""
+    if isinstance(level, bool) or not isinstance(level, int | float) or not 0 < level < 1:
+        raise RequestError(
+            f"level must lie between 0 and 1; received {level!r}. 0.95 is the 95 % band."
+        )
+    return float(level)
+
+
+def statistics_of(values: FloatArray, level: float) -> FloatArray:
+    """Statistics over the first axis.
+
+    Parameters
+    ----------
+    values : ndarray, shape (member, …)
+        Members.
+    level : float
+        Probability between the two quantiles.
+
+    Returns
+    -------
+    ndarray, shape (4, …)
+        Mean, standard deviation (ddof = 1; zero for one member) and the quantiles
+        (1 ∓ `level`)/2, exact with linear interpolation between order statistics. NaN without
+        members.
+    """
+    out = np.full((4, *values.shape[1:]), np.nan)
+    if len(values):
+        out[0] = values.mean(axis=0)
+        out[1] = values.std(axis=0, ddof=1) if len(values) > 1 else 0.0
+        out[2:] = np.quantile(values, [0.5 - level / 2, 0.5 + level / 2], axis=0)
+    return out
+
+
+def first_lost(values: FloatArray) -> npt.NDArray[np.int64]:
+    """First instant at which a channel is NaN, or −1, of values (…, steps, N)."""
+    gone: npt.NDArray[np.bool_] = np.isnan(values.sum(axis=-1))
+    first = np.argmax(gone, axis=-1)
+    return np.where(np.take_along_axis(gone, first[..., None], axis=-1)[..., 0], first, -1)
+
+
+def reduce_members(
+    series: Iterable[FloatArray], members: int, shape: tuple[int, int, int], level: float
+) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """Reduce members to statistics without holding all of them.
+
+    A member that is lost (NaN) anywhere in a window is left out of that window's statistics from
+    its first instant on: what is left of it would weigh in one part of the band and not in the
+    other.
+
+    Parameters
+    ----------
+    series : iterable of ndarray, each of shape `shape`
+        Members one after the other.
+    members : int
+        Their number.
+    shape : tuple of int
+        (window, steps, N).
+    level : float
+        Probability between the two quantiles.
+
+    Returns
+    -------
+    statistics : ndarray, shape (window, 4, steps, N)
+        As :func:`statistics_of`.
+    lost : ndarray of int, shape (member, window)
+        First instant lost, or −1.
+    """
+    windows, steps, N = shape
+    out = np.empty((windows, 4, steps, N))
+    lost = np.full((members, windows), -1, dtype=np.int64)
+    length = max(1, min(steps, CHUNK // max(1, 8 * N * members)))
+    pieces = math.ceil(steps / length)
+    with _store((windows, pieces, members, length, N)) as store:
+        for member, values in enumerate(series):
+            lost[member] = first_lost(values)
+            for piece in range(pieces):
+                part = values[:, piece * length : (piece + 1) * length]
+                store[:, piece, member, : part.shape[1]] = part
+        for window in range(windows):
+            kept = lost[:, window] < 0
+            for piece in range(pieces):
+                at = slice(piece * length, min((piece + 1) * length, steps))
+                block = store[window, piece][kept, : at.stop - at.start]
+                out[window, :, at] = statistics_of(block, level)
+    return out, lost
+
+
+@contextmanager
+def _store(shape: tuple[int, ...]) -> Iterator[FloatArray]:
+    size = 8 * math.prod(shape)
+    if size <= HELD:
+        yield np.empty(shape)
+        return
+    with tempfile.TemporaryDirectory(prefix="seakeep-") as folder:
+        yield np.memmap(Path(folder) / "members", dtype=np.float64, mode="w+", shape=shape)
+
+
+def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
+    """Mean, standard deviation and band of an ensemble forecast.
+
+    Parameters
+    ----------
+    forecast : Dataset
+        With the dimension ``member``, from ``forecast`` of an ensemble.
+    level : float, optional
+        Probability between ``lower`` and ``upper``.
+
+    Returns
+    -------
+    Dataset
+        The variables of `forecast` with ``statistic`` (mean, std, lower, upper) in the place of
+        ``member``. Members that diverged are left out of all instants; ``attrs["members"]`` and
+        ``attrs["diverged"]`` count them.
+
+    Raises
+    ------
+    RequestError
+        If there is no dimension ``member``, or `level` is not between 0 and 1.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> two = xr.Dataset({"heave": (("member", "time"), [[1.0, 2.0], [3.0, 4.0]])})
+    >>> summarize(two).heave.sel(statistic="mean").values
+    array([2., 3.])
+    """
+    level = check_level(level)
+    if not isinstance(forecast, xr.Dataset) or "member" not in forecast.dims:
+        received = (
+            f"dimensions {', '.join(map(str, forecast.dims))}"
+            if isinstance(forecast, xr.Dataset)
+            else type(forecast).__name__
+        )
+        raise RequestError(
+            f"summarize needs an ensemble forecast with the dimension 'member'; received "
+            f"{received}. Pass what BayesianHankelDMDc(...).fit(...).forecast(...) returns."
+        )
+    channels = [
+        name
+        for name, variable in forecast.data_vars.items()
+        if "member" in variable.dims and variable.dtype.kind == "f"
+    ]
+    lost = xr.zeros_like(forecast["member"], dtype=bool)
+    for name in channels:
+        others = [d for d in forecast[name].dims if d not in ("member", "window")]
+        lost = lost | forecast[name].isnull().any(others)
+    variables = {}
+    for name in channels:
+        values = forecast[name].transpose("member", ...)
+        gone = lost.transpose("member", ...)
+        variables[name] = _statistics_variable(values, gone, level)
+    members, dropped = forecast.sizes["member"], int(lost.sum())
+    coords: Mapping[str, object] = {
+        str(name): coordinate
+        for name, coordinate in forecast.coords.items()
+        if "member" not in coordinate.dims
+    }
+    return xr.Dataset(
+        variables,
+        coords={**coords, "statistic": list(STATISTICS)},
+        attrs={**forecast.attrs, "level": level, "members": members, "diverged": dropped},
+    )
+
+
+def _statistics_variable(values: xr.DataArray, lost: xr.DataArray, level: float) -> xr.Variable:
+    dims = [str(dim) for dim in values.dims[1:]]
+    if "window" not in lost.dims:
+        result = statistics_of(values.values[~lost.values], level)
+        return xr.Variable(("statistic", *dims), result, values.attrs)
+    result = np.stack(
+        [
+            statistics_of(values.isel(window=w).values[~lost.isel(window=w).values], level)
+            for w in range(values.sizes["window"])
+        ]
+    )
+    rest = [dim for dim in dims if dim != "window"]
+    return xr.Variable(("window", "statistic", *rest), result, values.attrs)

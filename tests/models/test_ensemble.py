@@ -1,0 +1,379 @@
+import dataclasses
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import seakeep
+from seakeep import BayesianHankelDMDc, DataError, Fixed, HankelDMDc, RequestError, Uniform
+from seakeep.models import summaries
+from seakeep.models.draws import child
+
+PERIOD, DT = 1.6, 0.1  # 16 samples a period
+STATES, INPUTS = ["heave", "pitch"], ["eta"]
+
+
+def wave_run(seed=0, samples=900, name="irregular"):
+    """A linear response to a narrow-banded input, with a little noise."""
+    rng = np.random.default_rng(seed)
+    time = DT * np.arange(samples)
+    frequencies = rng.uniform(0.3, 1.0, 40)
+    phases = rng.uniform(0, 2 * np.pi, 40)
+    angles = 2 * np.pi * np.outer(time, frequencies) + phases
+    gain = 1 / (1 + (frequencies / 0.6) ** 4)
+    series = {
+        "heave": np.cos(angles - 0.4) @ gain,
+        "pitch": np.sin(angles - 1.1) @ (gain * frequencies),
+        "eta": np.cos(angles).sum(axis=1),
+    }
+    for key in STATES:
+        series[key] += 0.02 * rng.normal(size=samples)
+    return xr.Dataset(
+        {key: ("time", values, {"units": "m"}) for key, values in series.items()},
+        coords={"time": ("time", time, {"units": "s"})},
+        attrs={"run": name},
+    )
+
+
+@pytest.fixture(scope="module")
+def run():
+    return wave_run()
+
+
+def small(**changes):
+    settings = {
+        "encounter_period": PERIOD,
+        "train_length": Uniform(8, 14),
+        "state_delay": Uniform(0.2, 0.6),
+        "input_delay": Uniform(0.5, 1.5),
+        "ridge": Uniform(0.5, 5),
+        "n_members": 6,
+        "seed": 3,
+    }
+    return BayesianHankelDMDc(**(settings | changes))
+
+
+def fitted(run, **changes):
+    return small(**changes).fit(run, STATES, INPUTS, stop=60.0)
+
+
+def arrays(forecast):
+    return np.stack([forecast[name].values for name in STATES], axis=-1)
+
+
+@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
+@pytest.mark.parametrize("history", ["before", "inside"])
+@pytest.mark.parametrize("ridge_scale", ["absolute", "per_snapshot"])
+def test_members_equal_the_deterministic_model(run, delay_rows, history, ridge_scale):
+    shared = {"delay_rows": delay_rows, "history": history, "ridge_scale": ridge_scale}
+    ensemble = fitted(run, **shared)
+    forecast = ensemble.forecast(run, start=65.0, steps=120)
+    for number in range(ensemble.n_members):
+        draw = ensemble.draws.isel(member=number)
+        model = HankelDMDc(
+            state_delays=int(draw.state_delay_samples),
+            input_delays=int(draw.input_delay_samples),
+            ridge=float(draw.ridge),
+            window=int(draw.train_length_samples),
+            **shared,
+        ).fit(run, STATES, INPUTS, stop=60.0)
+        alone = model.forecast(run, start=65.0, steps=120)
+        # One arithmetic in another order: the house rule for results.
+        np.testing.assert_allclose(arrays(forecast)[number], arrays(alone), atol=1e-10)
+        member = ensemble.member(number)
+        np.testing.assert_allclose(member.A, model.A, atol=1e-10)
+        np.testing.assert_array_equal(member.state_mean, model.state_mean)
+        assert member.training.columns == model.training.columns
+        assert member.training.stop == pytest.approx(model.training.stop)
+        assert member.training.first == pytest.approx(model.training.first)
+
+
+def test_several_runs_are_pooled_as_in_the_deterministic_model(run):
+    both = {"one": run, "two": wave_run(1)}
+    ensemble = small().fit(both, STATES, INPUTS, stop={"one": 60.0, "two": 70.0})
+    draw = ensemble.draws.isel(member=2)
+    model = HankelDMDc(
+        state_delays=int(draw.state_delay_samples),
+        input_delays=int(draw.input_delay_samples),
+        ridge=float(draw.ridge),
+        window=int(draw.train_length_samples),
+    ).fit(both, STATES, INPUTS, stop={"one": 60.0, "two": 70.0})
+    np.testing.assert_allclose(ensemble.member(2).A, model.A, atol=1e-10)
+    assert ensemble.member(2).training.runs == ("one", "two")
+
+
+def test_draws_are_rounded_to_the_nearest_sample(run):
+    draws = fitted(run).draws
+    for name in ("train_length", "state_delay", "input_delay"):
+        expected = np.floor(draws[name] * PERIOD / DT + 0.5)
+        np.testing.assert_array_equal(draws[f"{name}_samples"], expected)
+    assert draws.train_length.min() >= 8
+    assert draws.train_length.max() <= 14
+    assert draws.sizes == {"member": 6}
+
+
+@pytest.mark.parametrize("sampling", ["monte_carlo", "sobol"])
+def test_a_member_does_not_depend_on_the_number_of_members(run, sampling):
+    few = fitted(run, sampling=sampling).draws
+    many = fitted(run, sampling=sampling, n_members=8).draws
+    kept = many.isel(member=slice(6))
+    if sampling == "monte_carlo":
+        xr.testing.assert_equal(few, kept)
+    assert not np.allclose(few.ridge, fitted(run, sampling=sampling, seed=4).draws.ridge)
+
+
+def test_sobol_points_fill_the_prior_evenly(run):
+    draws = fitted(run, sampling="sobol", n_members=16).draws
+    # One point in each sixteenth of each margin: the property of the net.
+    cells = np.floor((draws.ridge.values - 0.5) / 4.5 * 16).astype(int)
+    assert sorted(cells) == list(range(16))
+
+
+def test_infeasible_draws_are_drawn_again_and_counted(run):
+    # 60 s are 601 samples: windows of up to 40 periods ask for up to 640 and their history.
+    draws = fitted(run, train_length=Uniform(30, 40), n_members=20).draws
+    reach = np.maximum(draws.state_delay_samples, draws.input_delay_samples)
+    assert np.all(draws.train_length_samples + reach <= 601)
+    assert draws.attrs["redrawn"] == int(draws.redrawn.sum()) > 0
+
+
+def test_priors_that_never_fit_are_refused(run):
+    text = (
+        r"no feasible draw in 1000: the shortest run has 601 samples up to stop, and the last "
+        r"draw asked for \d+ \(window 800, .*\). Give longer runs or a later stop, or narrow"
+    )
+    with pytest.raises(DataError, match=text):
+        fitted(run, train_length=Fixed(50))
+
+
+def test_the_same_seed_gives_the_same_arrays_for_any_workers(run):
+    ensemble = fitted(run)
+    serial = ensemble.forecast(run, start=65.0, steps=50)
+    for workers, backend in ((2, "threads"), (3, "threads"), (2, "processes")):
+        other = ensemble.forecast(run, start=65.0, steps=50, workers=workers, backend=backend)
+        xr.testing.assert_identical(serial, other)
+
+
+def test_the_seed_may_be_a_sequence_or_a_generator(run):
+    sequence = np.random.SeedSequence(3)
+    xr.testing.assert_equal(fitted(run).draws, fitted(run, seed=sequence).draws)
+    assert sequence.n_children_spawned == 0
+    spec = small(seed=np.random.default_rng(1))
+    first, second = (spec.fit(run, STATES, INPUTS, stop=60.0).draws for _ in range(2))
+    xr.testing.assert_identical(first, second)
+    assert child(sequence, 2).random() == np.random.default_rng(sequence.spawn(3)[2]).random()
+
+
+def test_the_summary_is_that_of_the_members(run, monkeypatch):
+    ensemble = fitted(run)
+    members = ensemble.forecast(run, start=65.0, steps=77)
+    expected = seakeep.summarize(members, level=0.9)
+    values = arrays(members)
+    np.testing.assert_allclose(
+        np.stack([expected[name].sel(statistic="lower") for name in STATES], axis=-1),
+        np.quantile(values, 0.05, axis=0),
+        rtol=1e-12,
+    )
+    np.testing.assert_allclose(
+        np.stack([expected[name].sel(statistic="std") for name in STATES], axis=-1),
+        values.std(axis=0, ddof=1),
+        rtol=1e-12,
+    )
+    for held, chunk in ((2**25, 2**23), (0, 1500)):
+        monkeypatch.setattr(summaries, "HELD", held)
+        monkeypatch.setattr(summaries, "CHUNK", chunk)
+        found = ensemble.forecast_summary(run, start=65.0, steps=77, level=0.9)
+        for name in STATES:
+            np.testing.assert_array_equal(found[name], expected[name])
+    assert (found.members, found.diverged, found.level) == (6, 0, 0.9)
+
+
+def test_windows_side_by_side_equal_single_forecasts(run):
+    ensemble = fitted(run)
+    starts = [65.0, 70.3]
+    together = ensemble.forecast_windows(run, starts, steps=60)
+    assert dict(together.sizes) == {"window": 2, "member": 6, "lead": 60}
+    for window, start in enumerate(starts):
+        alone = ensemble.forecast(run, start=start, steps=60)
+        for name in STATES:
+            # Two windows are one product: other roundings.
+            np.testing.assert_allclose(together[name][window], alone[name], atol=1e-10)
+    summary = ensemble.summarize_windows(run, starts, steps=60)
+    expected = seakeep.summarize(together)
+    for name in STATES:
+        np.testing.assert_array_equal(summary[name], expected[name])
+    np.testing.assert_allclose(together.lead, DT * np.arange(1, 61))
+
+
+def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):
+    fixed = {
+        "train_length": Fixed(10),
+        "state_delay": Fixed(0.5),
+        "input_delay": Fixed(1),
+        "ridge": Fixed(1),
+    }
+    ensemble = fitted(run, train_on="windows", **fixed)
+    draws = ensemble.draws
+    assert len(np.unique(draws.last_sample)) == 6
+    assert draws.last_sample.min() >= 160 + 16 - 1
+    assert draws.last_sample.max() <= 600
+    last = float(run.time[int(draws.last_sample[1])])
+    model = HankelDMDc(state_delays=8, input_delays=16, ridge=1.0, window=160)
+    expected = model.fit(run, STATES, INPUTS, stop=last)
+    np.testing.assert_allclose(ensemble.member(1).A, expected.A, atol=1e-10)
+    assert ensemble.member(1).training.stop == pytest.approx((last,))
+
+
+def test_members_over_runs_learn_from_one_run_each(run):
+    runs = {"one": run, "two": wave_run(1), "three": wave_run(2)}
+    ensemble = small(train_on="runs", n_members=12).fit(runs, STATES, INPUTS)
+    assert set(ensemble.draws.training_run.values) == {0, 1, 2}
+    for number in range(3):
+        draw = ensemble.draws.isel(member=number)
+        chosen = list(runs.values())[int(draw.training_run)]
+        model = HankelDMDc(
+            state_delays=int(draw.state_delay_samples),
+            input_delays=int(draw.input_delay_samples),
+            ridge=float(draw.ridge),
+            window=int(draw.train_length_samples),
+        ).fit(chosen, STATES, INPUTS)
+        np.testing.assert_allclose(ensemble.member(number).A, model.A, atol=1e-10)
+
+
+def test_a_file_gives_back_the_ensemble_to_the_last_bit(run, tmp_path):
+    ensemble = small(train_on="windows").fit([run, wave_run(1, name="b")], STATES, INPUTS)
+    path = ensemble.save(tmp_path / "ensemble.nc")
+    back = seakeep.load_model(path)
+    assert back.members == ensemble.members
+    xr.testing.assert_identical(back.draws, ensemble.draws)
+    xr.testing.assert_identical(
+        back.forecast(run, start=65.0, steps=20), ensemble.forecast(run, start=65.0, steps=20)
+    )
+
+
+def test_a_damaged_file_is_refused(run, tmp_path):
+    ensemble = fitted(run)
+    damaged = ensemble.to_dataset().drop_vars("inputs_0")
+    path = seakeep.models.store.write(damaged, tmp_path / "e.nc", "bayesian_hankel_dmdc")
+    with pytest.raises(DataError, match=r"e.nc is incomplete: .*inputs_0.* Save the model again"):
+        seakeep.load_model(path)
+
+
+def test_diverged_members_are_counted_and_left_out(run):
+    ensemble = fitted(run)
+    forecast = ensemble.forecast(run, start=65.0, steps=30)
+    broken = forecast.copy(deep=True)
+    broken["heave"][1, 20:] = np.nan
+    broken["pitch"][1, 20:] = np.nan
+    summary = seakeep.summarize(broken)
+    rest = seakeep.summarize(forecast.drop_isel(member=1))
+    for name in STATES:
+        np.testing.assert_array_equal(summary[name], rest[name])
+    assert summary.attrs["diverged"] == 1
+    assert summary.attrs["members"] == 6
+
+
+def test_members_that_diverge_say_when():
+    # Explosive data make explosive members.
+    rng = np.random.default_rng(0)
+    time = DT * np.arange(300)
+    growth = np.exp(2.5 * time) * np.cos(5 * time) * 1e-9
+    run = xr.Dataset(
+        {
+            "heave": ("time", growth + 1e-12 * rng.normal(size=300)),
+            "pitch": ("time", rng.normal(size=300)),
+            "eta": ("time", rng.normal(size=300)),
+        },
+        coords={"time": time},
+    )
+    spec = small(train_length=Fixed(10), ridge=Fixed(1e-3))
+    ensemble = spec.fit(run, STATES, INPUTS, stop=20.0)
+    forecast = ensemble.forecast(run, start=20.0, steps=99)
+    summary = ensemble.forecast_summary(run, start=20.0, steps=99)
+    lost = np.isnan(forecast.heave).any("time").values
+    assert lost.any()
+    assert all(text.startswith("diverged at t = ") for text in forecast.status.values[lost])
+    np.testing.assert_array_equal(summary.status, forecast.status)
+    assert summary.attrs["diverged"] == forecast.attrs["diverged"] == lost.sum()
+    assert forecast.attrs["status"] == f"{lost.sum()} of 6 members diverged"
+
+
+def test_the_presets():
+    paper = BayesianHankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32)
+    assert (paper.train_length, paper.ridge) == (Uniform(10, 30), Uniform(50, 150))
+    assert (paper.delay_rows, paper.ridge_scale, paper.n_members) == ("ridge", "absolute", 100)
+    ours = BayesianHankelDMDc.recommended(encounter_period=1.64, n_members=5)
+    assert (ours.train_length, ours.delay_rows) == (None, "exact")
+    assert ours.ridge.ppf(0.5) == pytest.approx(100 / 640 * 0.9**0.5)
+
+
+def test_all_of_the_runs_train_where_no_length_is_drawn(run):
+    ensemble = fitted(run, train_length=None)
+    assert set(ensemble.draws.train_length_samples.values) == {-1}
+    draw = ensemble.draws.isel(member=0)
+    model = HankelDMDc(
+        state_delays=int(draw.state_delay_samples),
+        input_delays=int(draw.input_delay_samples),
+        ridge=float(draw.ridge),
+    ).fit(run, STATES, INPUTS, stop=60.0)
+    np.testing.assert_allclose(ensemble.member(0).A, model.A, atol=1e-10)
+
+
+def test_an_ensemble_without_inputs(run):
+    ensemble = small().fit(run, STATES, [], stop=60.0)
+    forecast = ensemble.forecast(run, start=65.0, steps=40)
+    alone = ensemble.member(4).forecast(run, start=65.0, steps=40)
+    np.testing.assert_allclose(arrays(forecast)[4], arrays(alone), atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"ridge": 100}, "ridge must be a prior; received 100"),
+        ({"n_members": 0}, "n_members must be an integer of at least 1; received 0"),
+        ({"sampling": "grid"}, "sampling must be one of 'monte_carlo', 'sobol'; received 'grid'"),
+        ({"train_on": "half"}, "train_on must be one of 'all', 'runs', 'windows'; received 'half'"),
+        ({"seed": -1}, "seed must be an integer, zero or more, a SeedSequence or a Generator"),
+        ({"encounter_period": 0}, "encounter_period must be a positive number of seconds"),
+        ({"delay_rows": "none"}, "delay_rows must be 'ridge' or 'exact'"),
+    ],
+)
+def test_settings_out_of_range(changes, text):
+    with pytest.raises(RequestError, match=text):
+        small(**changes)
+
+
+def test_messages_of_forecasts(run):
+    ensemble = fitted(run)
+    with pytest.raises(RequestError, match="workers must be a positive integer; received 0"):
+        ensemble.forecast(run, start=65.0, steps=5, workers=0)
+    with pytest.raises(
+        RequestError, match="backend must be 'threads' or 'processes'; received 'x'"
+    ):
+        ensemble.forecast(run, start=65.0, steps=5, backend="x")
+    with pytest.raises(RequestError, match="level must lie between 0 and 1; received 95"):
+        ensemble.forecast_summary(run, start=65.0, steps=5, level=95)
+    with pytest.raises(RequestError, match="starts is empty"):
+        ensemble.forecast_windows(run, [], steps=5)
+    with pytest.raises(RequestError, match="no member 6: the ensemble has 6, counted from 0 to 5"):
+        ensemble.member(6)
+    with pytest.raises(
+        RequestError, match="needs an ensemble forecast with the dimension 'member'"
+    ):
+        seakeep.summarize(run)
+    with pytest.raises(RequestError, match=r"leaves \d+ samples of history"):
+        ensemble.forecast(run, start=0.5, steps=5)
+    other = dataclasses.replace(small(), dt=0.2)
+    with pytest.raises(DataError, match=r"has a time step of 0.1 s and the model one of 0.2 s"):
+        other.fit(run, STATES, INPUTS)
+
+
+def test_the_spec_is_not_changed_and_the_ensemble_cannot_be(run):
+    spec = small()
+    before = dataclasses.asdict(spec) | {"seed_sequence": None}
+    ensemble = spec.fit(run, STATES, INPUTS, stop=60.0)
+    assert dataclasses.asdict(spec) | {"seed_sequence": None} == before
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        ensemble.dt = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        ensemble.arrays.states[0][0, 0] = 1.0

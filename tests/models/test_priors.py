@@ -1,0 +1,69 @@
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from seakeep import Fixed, LogUniform, RequestError, Uniform
+from seakeep.models.priors import check_prior, describe, rebuild
+
+PRIORS = [
+    Uniform(10, 30),
+    LogUniform(0.1, 10),
+    Fixed(2.5),
+    stats.norm(20, 2),
+    stats.truncnorm(-1, 1, loc=20, scale=5),
+    stats.randint(1, 5),
+]
+
+
+@given(st.floats(0, 1, exclude_min=True, exclude_max=True))
+def test_quantiles_are_those_of_scipy(q):
+    assert Uniform(10, 30).ppf(q) == pytest.approx(stats.uniform(10, 20).ppf(q), rel=1e-12)
+    assert LogUniform(0.1, 10).ppf(q) == pytest.approx(stats.loguniform(0.1, 10).ppf(q), rel=1e-9)
+    assert Fixed(3).ppf(q) == 3
+
+
+@pytest.mark.parametrize("prior", PRIORS, ids=lambda prior: type(prior).__name__)
+def test_a_prior_comes_back_from_its_description(prior):
+    text = json.dumps(describe(prior))
+    back = rebuild(json.loads(text))
+    for q in (0.025, 0.5, 0.9):
+        assert back.ppf(q) == prior.ppf(q)
+
+
+def test_no_prior_is_no_prior():
+    assert rebuild(describe(None)) is None
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: Uniform(3, 1), "lower bound below the upper one; received 3 and 1. Swap them"),
+        (lambda: Uniform(1, 1), "use seakeep.Fixed for a single value"),
+        (lambda: Uniform("a", 1), "Uniform needs two finite numbers; received 'a' and 1"),
+        (lambda: LogUniform(0, 1), "positive lower bound; received 0. Logarithms start above zero"),
+        (lambda: LogUniform(1, np.inf), "two finite numbers; received 1 and inf"),
+        (lambda: Fixed(np.nan), "Fixed needs a finite number; received nan"),
+        (lambda: check_prior("ridge", 100), "ridge must be a prior; received 100. Pass"),
+    ],
+)
+def test_messages(make, text):
+    with pytest.raises(RequestError, match=text):
+        make()
+
+
+def test_a_prior_of_another_kind_is_not_written():
+    class Own:
+        def ppf(self, q):
+            return q
+
+    with pytest.raises(RequestError, match=r"cannot be written to a file. Use one of seakeep's"):
+        describe(Own())
+
+
+def test_a_description_of_something_else_is_refused():
+    with pytest.raises(ValueError, match=r"unknown prior 'scipy.stats.linregress'"):
+        rebuild({"prior": "scipy.stats.linregress", "args": [], "kwds": {}})
