@@ -267,6 +267,25 @@ def _single_cells(
             write(name, {"mean": values[row]})
 
 
+def _batches(groups: Mapping[str, Windows]) -> list[tuple[list[str], Windows]]:
+    """Test sets of the same length side by side: what a free run prepares serves all of them."""
+    lengths: dict[int, list[str]] = {}
+    for test, windows in groups.items():
+        lengths.setdefault(windows.measured.shape[1], []).append(test)
+    return [
+        (
+            tests,
+            Windows(
+                tuple(n for test in tests for n in groups[test].numbers),
+                np.concatenate([groups[test].histories for test in tests]),
+                np.concatenate([groups[test].inputs for test in tests]),
+                np.concatenate([groups[test].measured for test in tests]),
+            ),
+        )
+        for tests in lengths.values()
+    ]
+
+
 def _ensemble_cells(
     plan: Plan,
     ensemble: HankelEnsemble,
@@ -276,20 +295,23 @@ def _ensemble_cells(
     write: Write,
 ) -> None:
     """Each member is identified once and forecasts all windows; then each cell is reduced."""
+    batches = _batches(groups)
     series: dict[str, list[FloatArray]] = {test: [] for test in groups}
     for number in range(ensemble.n_members):
         member = ensemble.member(number)
-        for test, windows in groups.items():
-            series[test].append(_forecast(member, windows))
+        for tests, windows in batches:
+            values = _forecast(member, windows)
+            edges = np.cumsum([len(groups[test].numbers) for test in tests])[:-1]
+            for test, part in zip(tests, np.split(values, edges), strict=True):
+                series[test].append(part)
     for test, windows in groups.items():
-        values = series.pop(test)
-        shape = values[0].shape
-        reduced, lost = reduce_members(values, len(values), shape, plan.level)
+        found = series.pop(test)
+        reduced, lost = reduce_members(found, len(found), found[0].shape, plan.level)
         pair = {"measured": windows.measured, "training_std": spread}
         errors = {
-            "member_nrmse": [metrics.nrmse(predicted=v, **pair) for v in values],
+            "member_nrmse": [metrics.nrmse(predicted=v, **pair) for v in found],
             "member_nammae": [
-                metrics.normalised_extremes_error(predicted=v, **pair) for v in values
+                metrics.normalised_extremes_error(predicted=v, **pair) for v in found
             ],
         }
         judged = {key: np.stack(each).astype(np.float32) for key, each in errors.items()}
@@ -298,7 +320,7 @@ def _ensemble_cells(
             arrays["lost"] = lost[:, row]
             arrays |= {key: each[:, row] for key, each in judged.items()}
             if plan.is_shown(unit.training, test, window):
-                arrays["members"] = np.stack([v[row] for v in values]).astype(np.float32)
+                arrays["members"] = np.stack([v[row] for v in found]).astype(np.float32)
             write(cell_name(unit.model, unit.training, test, window), arrays)
 
 
