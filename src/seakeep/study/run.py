@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from dataclasses import fields
 from multiprocessing.connection import wait as wait_for
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from seakeep.study.description import describe_study
 from seakeep.study.merge import merge_cells
 from seakeep.study.plan import Plan, make_plan
 from seakeep.study.settings import Study
+from seakeep.study.specs import Spec
 from seakeep.study.statistics import judge
 from seakeep.study.store import RESULT, CellFolder, StudyResult, read_result, versions, write_result
 
@@ -36,6 +38,7 @@ def run_study(
     workers: int = 1,
     progress: Progress | None = None,
     extra: Mapping[str, xr.Dataset] | None = None,
+    notes: Mapping[str, str] | None = None,
 ) -> StudyResult:
     """Run a study, or go on with one that was stopped.
 
@@ -52,6 +55,8 @@ def run_study(
         Called as ``progress(done, total, what)``.
     extra : mapping of str to Dataset, optional
         Groups to be kept beside the results.
+    notes : mapping of str to str, optional
+        Attributes to be kept beside them, such as ``preparation_note`` for the report.
 
     Returns
     -------
@@ -87,7 +92,7 @@ def run_study(
     groups = {**describe_study(study, plan, runs), **merge_cells(study, plan, runs, cells)}
     groups.update(judge(groups, study.settings, list(plan.states)))
     groups.update(extra or {})
-    result = write_result(out, _attributes(study, plan, groups), groups)
+    result = write_result(out, {**_attributes(study, plan, groups), **(notes or {})}, groups)
     cells.clear()
     return result
 
@@ -108,10 +113,23 @@ def _attributes(
         "dt": plan.dt,
         "longest_training": plan.needs.training * plan.dt,
         "settings": study.settings.model_dump_json(),
-        "specs": json.dumps({name: repr(spec) for name, spec in plan.specs.items()}),
+        "specs": json.dumps({name: _fields(spec) for name, spec in plan.specs.items()}),
+        "conditional_on": _conditional(plan),
         "versions": json.dumps(versions()),
         "groups": json.dumps(list(groups)),
     }
+
+
+def _fields(spec: Spec) -> dict[str, str]:
+    """Settings of a model as words."""
+    kept = [each for each in fields(spec) if each.repr and each.name != "dt"]
+    return {each.name: str(getattr(spec, each.name)) for each in kept}
+
+
+def _conditional(plan: Plan) -> str:
+    """Measured output that a forecast reads after its start, through the alignment."""
+    alignments = [getattr(spec, "alignment", None) for spec in plan.specs.values()]
+    return "surge" if any(getattr(a, "surge", "") == "measured" for a in alignments) else ""
 
 
 def _compute_all(

@@ -58,7 +58,8 @@ def error_over_time_figure(result: StudyResult) -> Figure:
                     time, at["lower_quartile"].values, upper, color=style["color"], alpha=0.15, lw=0
                 )
                 p = float(at["p_value"])
-                words = f"{model_words(model)} (trend p = {p:.2f})"
+                shown = "p < 0.01" if p < 0.01 else f"p = {p:.2f}"
+                words = f"{model_words(model)} (trend {shown})"
                 each.plot(time, at["error_mean"].values, label=words, **style)
                 tallest = max(tallest, float(np.nanmax(at["error_mean"].values, initial=0.0)))
             each.set_title(result.label_of(test), loc="left")

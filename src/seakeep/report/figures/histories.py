@@ -71,11 +71,10 @@ def history_figure(result: StudyResult, test: str, training: int, window: int) -
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper right", ncols=len(handles))
         run = str(cell["run"].values)
-        figure.suptitle(
+        axes[0].set_title(
             f"{run}, from {float(cell['start']):.1f} s; trained on {cell['training'].values}",
-            x=0.01,
-            ha="left",
-            fontsize=9,
+            loc="left",
+            fontsize=8,
         )
         return figure
 
