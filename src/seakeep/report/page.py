@@ -129,8 +129,7 @@ def write_report(result: StudyResult, progress: Progress | None = None) -> Path:
         for number, each in enumerate(figures):
             tell(number, len(figures), f"drawing {each.name.replace('_', ' ')}")
             figure = each.draw()
-            figure.draw_without_rendering()
-            figure.set_layout_engine("none")  # laid out once, not for each file
+            _lay_out(figure)
             save_figure(figure, result.folder / "figures" / f"{each.name}.png")
             text = svg_text(figure, each.name)
             with replacing(result.folder / "figures" / f"{each.name}.svg") as temporary:
@@ -141,6 +140,14 @@ def write_report(result: StudyResult, progress: Progress | None = None) -> Path:
             temporary.write_text(_page(result, tables, drawn), encoding="utf-8")
     tell(len(figures), len(figures), "report written")
     return page
+
+
+def _lay_out(figure: Figure) -> None:
+    """Lay a figure out once, not again for each file."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine("none")
 
 
 def svg_text(figure: Figure, name: str) -> str:
