@@ -93,3 +93,16 @@ def test_an_angle_is_no_number_and_no_length():
 def test_unknown_unit():
     with pytest.raises(RequestError, match=r"the unit 'furlong' is not known.*Write it as 'mm'"):
         si_unit("furlong")
+
+
+@pytest.mark.parametrize(
+    "unit", ["m**9**9**9", "m^9^9", "(((m^9)^9)^9)^9", "m^10", "m" + "*m" * 60, "*" * 70 + "€"]
+)
+def test_a_unit_that_would_keep_the_parser_busy_is_refused_at_once(unit):
+    with pytest.raises(RequestError, match=r"is not known\."):
+        si_unit(unit)
+
+
+def test_units_of_shafts_and_cranes_are_known():
+    assert conversion("rpm", "rad/s") == pytest.approx(0.10471975511965977, rel=1e-14)
+    assert conversion("tonf", "N") == pytest.approx(9806.65, rel=1e-14)

@@ -305,6 +305,29 @@ def test_instants_that_were_not_measured_are_refused(shift):
         metrics.nrmse(predicted=predicted, measured=labelled(MEASURED))
 
 
+@pytest.mark.parametrize("side", ["predicted", "measured"])
+@pytest.mark.parametrize(
+    ("time", "message"),
+    [
+        ([0.0, 1.0, 0.5, 1.5], r"the times of {} are not sorted"),
+        ([0.0, 0.5, 0.5, 1.0], r"the times of {} repeat"),
+    ],
+)
+def test_times_that_are_not_in_order_are_refused(side, time, message):
+    datasets = both(labelled(PREDICTED), labelled(MEASURED))
+    datasets[side] = datasets[side].assign_coords(time=time)
+    with pytest.raises(DataError, match=message.format(side)):
+        metrics.nrmse(**datasets)
+
+
+@pytest.mark.parametrize("side", ["predicted", "measured"])
+def test_a_dataset_without_time_is_refused(side):
+    datasets = both(labelled(PREDICTED), labelled(MEASURED))
+    datasets[side] = datasets[side].rename(time="sample")
+    with pytest.raises(DataError, match=rf"{side} has no coordinate 'time' .*sample"):
+        metrics.nrmse(**datasets)
+
+
 def test_units_that_differ_are_refused():
     predicted, measured = labelled(PREDICTED, units="m"), labelled(MEASURED, units="mm")
     message = r"channel 'heave' is in 'm' in predicted and in 'mm' in measured\. Convert one"

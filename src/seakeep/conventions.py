@@ -142,9 +142,10 @@ minute = 60 * second = min = minutes
 hour = 3600 * second = h = hours
 degree = 0.017453292519943295 * radian = deg = ° = degrees
 revolution = 6.283185307179586 * radian = rev = revolutions
+rpm = revolution / minute
 newton = kilogram * metre / second ** 2 = N = newtons
 pascal = newton / metre ** 2 = Pa
-bar = 1e5 * pascal = bar
+bar = 1e5 * pascal
 joule = newton * metre = J
 newton_metre = newton * metre = Nm
 watt = joule / second = W
@@ -153,6 +154,7 @@ tonne = 1e3 * kilogram = t = tonnes
 standard_gravity = 9.80665 * metre / second ** 2 = g = gee = g0
 kilogram_force = 9.80665 * newton = kgf
 gram_force = 9.80665e-3 * newton = gf
+tonne_force = 9806.65 * newton = tonf
 pound_force = 4.4482216152605 * newton = lbf
 knot = 0.5144444444444445 * metre / second = kn = knots = kt
 percent = 0.01 = pct
@@ -181,6 +183,20 @@ _SPELLINGS = (
 )
 
 
+# A header is anybody's text: powers of powers in it would keep the parser busy for ever.
+_PLAIN = re.compile(r"[\w°%.*/() +-]*\Z")
+_POWER = re.compile(r"\*\*(?!\s*\(?-?\d\)?(?!\s*\*\*|\d))")
+
+
+def _is_plain(text: str) -> bool:
+    """Whether a unit is short and its powers are single digits, not powers of powers."""
+    depth = deepest = 0
+    for letter in text:
+        depth += (letter == "(") - (letter == ")")
+        deepest = max(deepest, depth)
+    return len(text) <= 80 and deepest <= 2 and not _POWER.search(text) and bool(_PLAIN.match(text))
+
+
 @lru_cache(maxsize=256)
 def _parsed(unit: str) -> Any:
     text = unit.strip()
@@ -189,6 +205,8 @@ def _parsed(unit: str) -> Any:
     for pattern, replacement in _SPELLINGS:
         text = pattern.sub(replacement, text)
     try:
+        if not _is_plain(text):
+            raise ValueError(text)
         return _registry().parse_units(text)
     except Exception as error:
         known = sorted({name for name in dir(_registry()) if not name.startswith("_")})

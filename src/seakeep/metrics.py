@@ -19,18 +19,20 @@ import xarray as xr
 
 from seakeep.core import metrics as core
 from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.signals.clocks import check_order
 
 __all__ = [
     "anrmse",
     "error_over_time",
     "fit_percent",
+    "is_slack",
     "nammae",
     "normalised_extremes_error",
     "nrmse",
 ]
 
 Histories = npt.ArrayLike | xr.Dataset
-Measure = Callable[..., npt.NDArray[np.float64]]
+Measure = Callable[..., npt.NDArray[Any]]
 
 
 def _pair(
@@ -51,6 +53,13 @@ def _pair(
                 f"channel '{name}' is in '{units[0]}' in predicted and in '{units[1]}' in "
                 "measured. Convert one of them and its units attribute."
             )
+    for side, data in (("predicted", predicted), ("measured", measured)):
+        if "time" not in data.coords:
+            raise DataError(
+                f"{side} has no coordinate 'time' (dimensions: {', '.join(map(str, data.dims))}). "
+                "Give every channel the dimension 'time' and the instants in seconds."
+            )
+        check_order(data["time"].values, side)
     time = predicted["time"].values
     step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
     try:
@@ -102,6 +111,46 @@ def _per_channel(
             for column, name in enumerate(names)
         }
     )
+
+
+def is_slack(
+    *,
+    predicted: Histories,
+    measured: Histories,
+    training_std: npt.ArrayLike | None = None,
+) -> Any:
+    """Say which channels are not judged, because the measurement hardly moves.
+
+    Parameters
+    ----------
+    predicted, measured : array_like, shape (…, time, channel), or Dataset
+        Histories in the same units.
+    training_std : array_like, shape (channel,), optional
+        Standard deviations in training; by default the ones that a forecast carries.
+
+    Returns
+    -------
+    ndarray of bool, shape (channel,), or Dataset
+        True for a channel whose measured SD is below 1 % of its training SD, or zero.
+
+    Raises
+    ------
+    RequestError
+        If shapes or channels do not fit.
+    DataError
+        If the instants of two Datasets differ.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> measured = np.stack([np.sin(np.arange(9)), np.zeros(9)], axis=1)
+    >>> is_slack(predicted=measured, measured=measured)
+    array([False,  True])
+    """
+    values, names, _ = _apply(core.is_slack, predicted, measured, training_std)
+    if not names:
+        return values
+    return xr.Dataset({name: ((), values[column]) for column, name in enumerate(names)})
 
 
 def nrmse(

@@ -304,3 +304,26 @@ def test_file_that_is_not_there(tmp_path):
         read_table(tmp_path / "nowhere" / "run1.csv")
     with pytest.raises(RequestError, match="is a folder; give the file in it"):
         read_table(tmp_path)
+
+
+def test_a_comma_in_words_is_no_decimal_mark(tmp_path):
+    path = write(tmp_path, b"time;h;note\n0;1.5;a,b\n1;2.5;c,d\n")
+    table = read_table(path, columns=["h"])
+    assert list(table["h"].values) == [1.5, 2.5]
+
+
+def test_integers_before_decimal_commas_do_not_hide_them(tmp_path):
+    table = read_table(write(tmp_path, b"time;h\n0;1\n1;2\n2;2,5\n"))
+    assert list(table["h"].values) == [1.0, 2.0, 2.5]
+
+
+@pytest.mark.parametrize("cell", ["True", "1_0", "１"])
+def test_what_only_a_computer_takes_for_a_number_is_refused(tmp_path, cell):
+    path = write(tmp_path, f"time,h\n0,1\n1,{cell}\n2,3\n".encode())
+    with pytest.raises(DataError, match=r"line 3, column 'h': .* is not a number"):
+        read_table(path, columns=["h"])
+
+
+def test_a_form_feed_breaks_no_line(tmp_path):
+    table = read_table(write(tmp_path, b"time,h,note\n0,1,a\x0cb\n1,2,c\n"), columns=["h"])
+    assert list(table["h"].values) == [1.0, 2.0]

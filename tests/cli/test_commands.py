@@ -17,7 +17,7 @@ from seakeep.cli import modelling
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial"
-VERBS = ("init", "prepare", "fit", "forecast", "compare", "datasets", "info")
+VERBS = ("tank", "init", "prepare", "fit", "forecast", "compare", "datasets", "info")
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +109,17 @@ def test_forecast_writes_netcdf_and_csv_alike(run, place):
     np.testing.assert_array_equal(table["heave_[m]"], heave)  # CSV keeps all digits
 
 
+def test_compare_without_matplotlib_judges_and_says_what_is_missing(run, place, monkeypatch):
+    monkeypatch.setattr(modelling, "find_spec", lambda name: None)
+    status, out, err = run(f"compare model.nc {CAMPAIGN} -o plain")
+    assert status == 0
+    assert "NRMSE" in out
+    assert "no figures, because matplotlib is not installed. Install it with: pip" in err
+    assert [path.name for path in (place / "plain").iterdir()] == ["comparison.csv"]
+
+
 def test_compare_prints_the_table_and_writes_figure_and_csv(run, place):
+    pytest.importorskip("matplotlib")
     status, out, err = run(f"compare model.nc {CAMPAIGN} -o judged --format svg")
     assert status == 0
     header = next(line for line in out.splitlines() if "NRMSE" in line)

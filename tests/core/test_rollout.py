@@ -120,6 +120,12 @@ def test_a_limit_gives_a_window_up_earlier():
     np.testing.assert_array_equal(out[0, :, 0], [2, 4, 8, np.nan, np.nan])
 
 
+def test_a_window_that_was_given_up_does_not_come_back():
+    driving = np.array([1.0, 9.0, 1.0])[None, :, None]
+    out = rollout([[0.0]], [[1.0]], [[0.0]], driving, limit=8.0)
+    np.testing.assert_array_equal(out[0, :, 0], [1, np.nan, np.nan])
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

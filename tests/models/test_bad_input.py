@@ -31,6 +31,9 @@ def broken_times():
     def gap(t):
         return np.where(np.arange(t.size) < 50, t, t + 7 * DT)
 
+    def stretched(t):
+        return np.where(np.arange(t.size) < 200, t, t[200] + 1.2 * (t - t[200]))
+
     def missing(t):
         return np.where(np.arange(t.size) == 50, np.nan, t)
 
@@ -40,9 +43,10 @@ def broken_times():
         ),
         pytest.param(unsorted, r"times of .* are not sorted: .* Sort the rows", id="unsorted"),
         pytest.param(
-            gap,
-            r"have 1 gap\(s\): after t = 2\.45 s, 7 sample\(s\) of 0\.05 s are missing",
-            id="gap",
+            gap, r"1 gap\(s\): after t = 2\.45 s, 7 sample\(s\) of 0\.05 s are missing", id="gap"
+        ),
+        pytest.param(
+            stretched, r"are not uniform: steps run from 0\.05 to 0\.06 s", id="stretched"
         ),
         pytest.param(missing, r"a value that is not finite at sample 50", id="missing"),
     ]
@@ -227,6 +231,18 @@ def test_a_start_outside_the_run_is_refused(model, run, start):
         model.forecast(run, start=start, steps=5)
 
 
+@pytest.mark.parametrize("start", ["5", None, [5.0, 6.0]])
+def test_a_start_that_is_not_one_number_is_refused(model, run, start):
+    with pytest.raises(RequestError, match="start must be an instant in seconds; received"):
+        model.forecast(run, start=start, steps=5)
+
+
+def test_messages_keep_the_digits_of_late_instants(model, run):
+    late = run.assign_coords(time=run.time + 1234567.0)
+    with pytest.raises(RequestError, match=r"start = 1234567\.25 s .* Start at 1234567\.4 s"):
+        model.forecast(late, start=1234567.25, steps=5)
+
+
 def test_a_forecast_beyond_the_input_is_told_what_is_possible(model, run):
     message = r"201 steps from 10 s need the input up to 20 s .* ends at 19\.95 s\. At most 200"
     with pytest.raises(RequestError, match=message):
@@ -260,6 +276,8 @@ def test_an_unknown_channel_gets_a_suggestion(run, model):
         ("heave", ["eta_fwd"], r"states must be a list .* the string 'heave'\. Write states="),
         (["heave"], "eta_fwd", r"inputs must be a list .* Write inputs=\['eta_fwd'\]"),
         ([], ["eta_fwd"], "states is empty: name at least one channel"),
+        (["heave"], None, r"inputs must be a list .* received None\. .* takes inputs=\[\]"),
+        ([0], ["eta_fwd"], r"states must be a list of channel names; received \[0\]"),
     ],
 )
 def test_wrong_lists_of_channels_are_refused(run, states, inputs, message):
@@ -273,6 +291,7 @@ def test_wrong_lists_of_channels_are_refused(run, states, inputs, message):
         (25.0, r"stop = 25 s is outside run, which runs from 0 to 19\.95 s"),
         (-1.0, r"stop = -1 s is outside run"),
         (np.nan, r"stop = nan s is outside run"),
+        ("5", "stop must be an instant in seconds; received '5'"),
         ([5.0, 6.0], "stop has 2 instants for 1 runs"),
         ({"rum": 5.0}, r"stop names the run 'rum', which is not among .*Did you mean 'run'\?"),
     ],
@@ -316,7 +335,10 @@ def test_what_is_not_a_run_is_refused(channels, runs, message):
         ({"delay_rows": "shift"}, "delay_rows must be 'ridge' or 'exact'; received 'shift'"),
         ({"ridge_scale": "x"}, "ridge_scale must be 'absolute' or 'per_snapshot'; received 'x'"),
         ({"standardize": "no"}, "standardize must be True or False; received 'no'"),
-        ({"alignment": "effective"}, "alignment is not available in this version"),
+        (
+            {"alignment": "none"},
+            "alignment must be a seakeep.ProbeAlignment or None; received 'none",
+        ),
     ],
 )
 def test_wrong_settings_are_refused(settings, message):

@@ -72,6 +72,20 @@ def test_nothing_before_the_delays_of_each_group_is_read(make_run, channels, tes
     xr.testing.assert_identical(model.forecast(scrambled, start=5.0, steps=50), expected)
 
 
+def test_the_start_may_be_given_as_an_instant_of_the_run(model, test_run):
+    expected = model.forecast(test_run, start=5.0, steps=10)
+    xr.testing.assert_identical(
+        model.forecast(test_run, start=test_run.time[100], steps=10), expected
+    )
+
+
+def test_one_step_needs_no_input_after_the_start(model, test_run):
+    x, u = values(test_run, model.states), values(test_run, model.inputs)
+    out = model.forecast_arrays(x[:101], u[:101], np.zeros((0, 0)), steps=1)
+    expected = model.forecast(test_run, start=5.0, steps=1)
+    np.testing.assert_array_equal(out, values(expected, model.states))
+
+
 @pytest.mark.parametrize("offset", [-0.4, 0.4])
 def test_the_start_is_the_nearest_sample_and_the_result_says_which(model, test_run, offset):
     expected = model.forecast(test_run, start=5.0, steps=10)

@@ -5,7 +5,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -91,6 +90,15 @@ def test_saving_over_a_model_replaces_it(saved, run, channels):
     assert [path.name for path in saved.parent.iterdir()] == ["rom.nc"]
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="open files cannot be replaced there")
+def test_a_reader_that_has_the_old_file_open_keeps_it_whole(saved, run, channels):
+    before = saved.read_bytes()
+    with saved.open("rb") as reader:
+        HankelDMDc(4, 2, 1.0).fit(run, **channels).save(saved)
+        assert reader.read() == before
+    assert saved.read_bytes() != before
+
+
 def test_a_missing_file_is_told_how_to_be_made(tmp_path):
     with pytest.raises(RequestError, match=r"there is no model file .*rom\.nc\. Make one with"):
         load_model(tmp_path / "rom.nc")
@@ -153,10 +161,14 @@ def test_a_folder_that_does_not_exist_is_named(model, tmp_path):
 
 def test_a_folder_that_cannot_be_written_is_named(model, tmp_path, monkeypatch):
     # A mode without write permission does not stop an administrator, and tests may run as one.
-    def refuse(*args, **kwargs):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    usual = Path.open
 
-    monkeypatch.setattr(tempfile, "mkstemp", refuse)
+    def refuse(self, *args, **kwargs):
+        if self.parent == tmp_path:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        return usual(self, *args, **kwargs)
+
+    monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(RequestError, match=r"cannot write .*rom\.nc: Permission denied"):
         model.save(tmp_path / "rom.nc")
 

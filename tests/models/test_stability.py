@@ -121,3 +121,11 @@ def test_divergence_of_one_state_ends_all_of_them(make_dataset, standardize):
     np.testing.assert_array_equal(np.isnan(out[:, 0]), np.isnan(out[:, 1]))
     assert np.isnan(out[-1, 0])
     assert np.isfinite(out[0, 0])
+
+
+def test_a_forecast_that_was_lost_does_not_come_back(make_dataset):
+    model, _ = fit_growing(make_dataset)
+    object.__setattr__(model, "coefficients", np.array([[0.0, 1.0]]))
+    wild = np.array([[0.0], [1e9], [0.0]])
+    out = model.forecast_arrays([[1.0]], [[1.0]], wild, steps=4)
+    np.testing.assert_array_equal(np.isnan(out[:, 0]), [False, False, True, True])

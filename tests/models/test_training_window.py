@@ -5,8 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
 
 from seakeep import HankelDMDc, SeakeepWarning
+from seakeep.models.identification import Scale
 from seakeep.signals import uniform_step
 
 DT = 0.05
@@ -277,6 +280,24 @@ def test_times_in_single_precision_do_not_matter(run, channels):
     assert model.dt == pytest.approx(DT, rel=1e-5)  # 20 s in float32 has 2e-6 s of rounding
     np.testing.assert_array_equal(model.A, spec.fit(run, **channels).A)
     assert uniform_step(run.time) == spec.fit(run, **channels).dt == DT
+
+
+@given(
+    mean=st.floats(-1e3, 1e3),
+    std=st.floats(1e-3, 1e3),
+    values=st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=20),
+)
+def test_standardising_and_back_returns_the_values(mean, std, values):
+    scale = Scale(np.array([mean]), np.array([std]), np.array([std]))
+    series = np.array(values)[:, None]
+    # Numbers up to 2e3 are subtracted and added: rounding of these.
+    np.testing.assert_allclose(scale.physical(scale.deviations(series)), series, rtol=0, atol=1e-12)
+
+
+def test_the_same_data_give_the_same_bits(make_run, channels):
+    models = [HankelDMDc(3, 8, 1.0).fit(make_run(), **channels) for _ in range(2)]
+    np.testing.assert_array_equal(models[0].A, models[1].A)
+    np.testing.assert_array_equal(models[0].B, models[1].B)
 
 
 def test_runs_keep_the_names_that_were_given(make_run, channels):

@@ -1,12 +1,21 @@
-"""Zero crossings and the encounter period."""
+"""Zero crossings, the encounter period, spectra and heights."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seakeep.errors import DataError
-from seakeep.signals import encounter_period, zero_up_crossings
+from seakeep.errors import DataError, RequestError
+from seakeep.signals import (
+    encounter_period,
+    peak_period,
+    significant_height,
+    wave_heights,
+    wave_spectrum,
+    wave_statistics,
+    zero_up_crossings,
+)
+from seakeep.signals.spectra import paper_welch
 
 
 @given(
@@ -38,3 +47,86 @@ def test_still_water_has_no_period():
         match=r"the record of 5 s crosses its mean upwards 0 time\(s\); at least two .* Give a lo",
     ):
         encounter_period(np.zeros(100), 0.05)
+
+
+def test_the_spectrum_holds_the_variance():
+    rng = np.random.default_rng(0)
+    series = rng.standard_normal(20_000)
+    for options in ({}, {"segment": 4096, "overlap": 128, "padded": 65536}):
+        frequency, density = wave_spectrum(series, 0.05, **options)
+        # White noise of unit variance, 5 to 16 segments: a per cent or two of the variance.
+        assert np.trapezoid(density, frequency) == pytest.approx(1.0, rel=0.04)
+
+
+def test_a_tones_peak_is_found_between_the_segments_lines():
+    t = np.arange(0, 210, 0.01)
+    frequency, density = wave_spectrum(np.sin(2 * np.pi * 0.4717 * t), 0.01, 819, 25, 13107)
+    # A segment of 8.2 s has lines 0.12 Hz apart; padding places the peak to 0.0076 Hz.
+    assert frequency[np.argmax(density)] == pytest.approx(0.4717, abs=0.008)
+
+
+def test_segments_that_do_not_fit_are_refused():
+    with pytest.raises(RequestError, match=r"segments of 2 to 100 samples .* received segments of"):
+        wave_spectrum(np.ones(100), 0.1, segment=200)
+    with pytest.raises(RequestError, match="at least as long as a segment"):
+        wave_spectrum(np.ones(100), 0.1, segment=50, padded=20)
+
+
+def test_heights_are_crest_less_trough():
+    t = np.arange(0, 40, 0.005)
+    # Beats: the heights follow the envelope, twice the amplitude on average.
+    heights = wave_heights((1 + 0.1 * np.sin(0.5 * t)) * np.sin(6.0 * t), 0.005)
+    assert heights.size == pytest.approx(40 * 6 / (2 * np.pi), abs=1.5)
+    assert heights.mean() == pytest.approx(2.0, rel=0.01)
+    assert np.ptp(heights) == pytest.approx(0.4, rel=0.05)
+
+
+def test_significant_height_is_four_deviations():
+    t = np.arange(0, 100, 0.01)
+    assert significant_height(0.1 * np.sin(t * 2 * np.pi)) == pytest.approx(4 * 0.1 / np.sqrt(2))
+
+
+def test_a_coarse_spectrum_moves_the_peak():
+    # Nominal 2.12 s: segments of 8.2 s have bins of 0.12 Hz (the paper reads 2.02 s from them).
+    rng = np.random.default_rng(0)
+    t = np.arange(0, 600, 0.02)
+    f = np.linspace(0.28, 1.13, 400) + rng.uniform(-1e-3, 1e-3, 400)
+    density = f**-5 * np.exp(-1.25 * (1 / (2.12 * f)) ** 4)
+    phase = rng.uniform(0, 2 * np.pi, 400)
+    series = sum(
+        np.sqrt(d) * np.cos(2 * np.pi * a * t + p)
+        for a, d, p in zip(f, density, phase, strict=True)
+    )
+    coarse, fine = peak_period(series, 0.02, "paper"), peak_period(series, 0.02)
+    assert coarse < 2.08
+    # A minute's segments: bins of 1/60 Hz and 20 of them; the peak of a random sea scatters.
+    assert fine == pytest.approx(2.12, rel=0.08)
+
+
+@given(st.floats(1.0, 4.0), st.floats(0.01, 2.0))
+def test_statistics_of_a_regular_wave(period, height):
+    t = np.arange(0, 240, 0.05)
+    found = wave_statistics(0.5 * height * np.sin(2 * np.pi * t / period), 0.05)
+    # A broken number of waves in 240 s, and for the peak a parabola within bins of 1/60 Hz.
+    assert found.significant_height == pytest.approx(2**0.5 * height, rel=0.02)
+    assert found.zero_crossing_period == pytest.approx(period, rel=5e-3)
+    assert found.peak_period == pytest.approx(period, rel=0.01)
+    assert found.moment_period == pytest.approx(period, rel=0.02)
+
+
+def test_paper_welch_keeps_its_seconds():
+    segment, overlap, padded = paper_welch(0.05)
+    assert (segment * 0.05, overlap * 0.05) == pytest.approx((8.2, 0.25), abs=0.03)
+    assert padded * 0.05 == pytest.approx(131.07, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "message"),
+    [
+        (lambda: peak_period(np.ones(9), 1.0, "rec"), RequestError, "preset must be 'recommended'"),
+        (lambda: peak_period(np.ones(99), 1.0), DataError, "the record is constant: it has no pea"),
+    ],
+)
+def test_what_has_no_peak(call, kind, message):
+    with pytest.raises(kind, match=message):
+        call()

@@ -23,6 +23,8 @@ from seakeep.tank.seas import Sea, regular_sea
 from seakeep.tank.settings import DriftSettings, VesselSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber
 
+pytest.importorskip("numba", reason="needs the extra tank")
+
 
 def small_sea(omega, amplitude=1e-5):
     omega = np.asarray(omega)
@@ -42,7 +44,7 @@ def harmonics(motion, sea, begin):
 
 
 def test_response_in_time_is_that_in_frequency(linear_rig):
-    ratios = np.array([1.5, 1.75, 2.0, 2.5, 3.0, 4.0])
+    ratios = np.array([1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0])
     sea = small_sea(wavelength_to_frequency(1.4 * ratios, 3.6))
     motion = simulate(linear_rig, sea, 500.0)
     # Surge swings on its moorings with a decay time of 70 s: the ramp hardly excites it.
@@ -52,10 +54,8 @@ def test_response_in_time_is_that_in_frequency(linear_rig):
     damping[0, 0] += linear_rig.lines[:, 6].sum()
     expected = np.abs(response(linear_rig.hydro, sea.omega, damping, stiffness))
     error = np.abs(found / expected - 1.0)[:, :3]
-    # Heave at λ/L 1.5 is what is left of opposite forces of buoyancy and pool; it feels that the
-    # kernel makes A(ω) from B(ω), which the solver's heave–piston pair obeys to a few per cent.
-    assert error[0, 1] < 0.04
-    error[0, 1] = 0.0
+    # The bound; it grants 4 % to heave at λ/L 1.5, where opposite forces of buoyancy and
+    # pool all but cancel. Most of that was an irregular frequency in the kernel, now gone.
     assert error.max() < 0.01
 
 
@@ -113,9 +113,7 @@ def test_calm_water_leaves_the_vessel_at_rest(rig, calm):
 
 def energy(rig, motion):
     kinetic = 0.5 * np.einsum("it,ij,jt->t", motion.velocity, rig.inertia, motion.velocity)
-    static = 0.5 * np.einsum(
-        "it,ij,jt->t", motion.position, rig.hydro.stiffness, motion.position
-    )
+    static = 0.5 * np.einsum("it,ij,jt->t", motion.position, rig.hydro.stiffness, motion.position)
     stored = np.zeros(motion.time.size)
     for eye_x, eye_z, pole_x, pole_z, stiffness, unstretched, _ in rig.lines:
         x, z, pitch = motion.position[:3]

@@ -6,6 +6,8 @@ from seakeep.tank.dynamics import tensions
 from seakeep.tank.moorings import line_table, mooring_stiffness, slack_offset, unstretched_length
 from seakeep.tank.settings import LineSettings
 
+pytest.importorskip("numba", reason="needs the extra tank")
+
 
 def test_unstretched_lengths_of_the_page(settings):
     lengths = [unstretched_length(n, line, 52.09) for n, line in settings.moorings.items()]
@@ -58,7 +60,9 @@ def test_slack_limits(rig):
 
 def test_a_line_stretched_to_nothing_is_refused():
     line = LineSettings(stiffness=1.0, pretension=5.0, eye=(-0.7, 0.06), pole=(48.4, 0.06))
-    with pytest.raises(RequestError, match=r"moorings\.bow has no length left: .* 5\.000 m\. Lower"):
+    with pytest.raises(
+        RequestError, match=r"moorings\.bow has no length left: .* 5\.000 m\. Lower"
+    ):
         line_table({"bow": line}, 52.09, 0.03)
 
 

@@ -91,7 +91,7 @@ def draft_campaign(files: Sequence[Path | str], folder: Path | str | None = None
         )
     document = tomlkit.document()
     document.add(tomlkit.comment("Draft of a campaign. Read every line that says 'guessed', then"))
-    document.add(tomlkit.comment("run: seakeep prepare THIS-FILE"))
+    document.add(tomlkit.comment("run: seakeep fit THIS-FILE -o model.nc"))
     _general(document, paths, folder)
     _files_table(document, tables[0], time)
     _channels(document, guesses)

@@ -22,7 +22,8 @@ from seakeep.errors import DataError, SeakeepWarning
 __all__ = ["read_text"]
 
 _COMMENTS = ("#", "%")
-_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?\Z")
+_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?\Z", re.ASCII)
+_TRUTH = re.compile(r"\b(true|false)\b", re.IGNORECASE)
 _MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf", "+inf"}
 
 
@@ -93,7 +94,9 @@ def _lines(path: Path, options: FileSettings) -> list[str]:
             "(plain or gzip), MATLAB .mat (version 5 to 7.2), NetCDF and HDF5; export to one of "
             "these."
         )
-    return _decode(path, raw, options.encoding).splitlines()
+    # Not splitlines: it would break lines at form feeds and other marks inside a cell.
+    lines = re.split(r"\r\n|\r|\n", _decode(path, raw, options.encoding))
+    return lines if lines[-1] else lines[:-1]
 
 
 def _decode(path: Path, raw: bytes, encoding: str | None) -> str:
@@ -149,10 +152,25 @@ def _layout(path: Path, lines: list[str], options: FileSettings) -> _Layout:
         units, body = second, body[1:]
     if not body:
         raise DataError(f"{path} has a header and no rows of numbers. Export the run again.")
-    decimal = options.decimal
-    if decimal is None:
-        decimal = "," if delimiter != "," and any("," in line for _, line in body) else "."
+    decimal = options.decimal or _decimal([line for _, line in body], delimiter)
     return _Layout(delimiter, decimal, headers, units, body)
+
+
+def _decimal(lines: list[str], delimiter: str) -> str:
+    """The mark of decimals: a comma if cells are numbers with a comma and none has a point."""
+    if delimiter == ",":
+        return "."
+    found = ""
+    for line in lines:
+        if "," in line or "." in line:
+            for cell in _cells(line, delimiter):
+                if _NUMBER.match(cell) and "." in cell:
+                    return "."
+                if _NUMBER.match(cell) and "," in cell:
+                    found = ","
+        if found:
+            break
+    return found or "."
 
 
 def _refuse_transposed(path: Path, head: list[str], rows: int) -> None:
@@ -235,6 +253,11 @@ def _check_widths(path: Path, layout: _Layout) -> None:
     )
 
 
+# To the last bit: what pandas does by itself from 3.1 on, and deprecates to ask for.
+_RELEASE = tuple(int(part) for part in pd.__version__.split(".")[:2])
+_EXACT = {"float_precision": "round_trip"} if _RELEASE < (3, 1) else {}
+
+
 def _numbers(
     path: Path, layout: _Layout, names: list[str], keep: list[int]
 ) -> tuple[dict[str, np.ndarray], dict[str, str]]:
@@ -249,11 +272,13 @@ def _numbers(
         "skipinitialspace": True,
     }
     try:
+        if _TRUTH.search(text):
+            raise ValueError("truth values are no numbers")
         frame = pd.read_csv(
             io.StringIO(text),
             dtype=float,
             decimal=layout.decimal,
-            float_precision="round_trip",
+            **_EXACT,
             **form,  # type: ignore[call-overload]
         )
         return {names[i]: frame[i].to_numpy(dtype=float) for i in keep}, {}
@@ -282,6 +307,8 @@ def _number(cell: str, decimal: str) -> float:
     if decimal == ",":
         # A point would divide thousands, or the file mixes both marks: neither is guessed at.
         cell = cell.replace(".", "?").replace(",", ".")
+    if not _NUMBER.match(cell) and cell.lower() not in _MISSING:
+        raise ValueError(cell)  # Python would take 1_0 and digits of other scripts
     return float(cell)
 
 

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from seakeep.cli import campaigns, information, modelling
+from seakeep.cli import campaigns, information, modelling, tank
 from seakeep.cli import study as studying
 from seakeep.cli.console import messages, tell_warnings
 from seakeep.errors import SeakeepError
@@ -49,6 +49,7 @@ def _options(
     """Read the options that stand before the verb; ``main`` looks for --debug itself."""
 
 
+app.command("tank")(tank.tank)
 app.command("init")(campaigns.init)
 app.command("prepare")(campaigns.prepare)
 app.command("fit")(modelling.fit)

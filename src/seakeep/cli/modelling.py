@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -75,7 +76,7 @@ def forecast(
             _with_units(result).to_dataframe().to_csv(temporary)
     status = result.attrs["status"]
     messages().print(
-        f"Wrote {out}: {result.sizes['time']} instants after t = {result.attrs['start']:g} s, "
+        f"Wrote {out}: {result.sizes['time']} instants after t = {result.attrs['start']:.10g} s, "
         f"status {status}."
     )
     if status != "ok":
@@ -138,19 +139,25 @@ def compare(
             f"cannot make the folder {out}: {error.strerror or error}. Choose another with -o."
         ) from error
     written = [write_csv(table, out / "comparison.csv")]
-    for comparison in comparisons:
-        path = out / f"{comparison.run}.{format_}"
-        written.append(save_figure(overlay_figure(comparison), path))
+    if find_spec("matplotlib") is None:
+        messages().print(
+            "Note: no figures, because matplotlib is not installed. "
+            "Install it with: pip install 'seakeep[figures]'"
+        )
+    else:
+        for comparison in comparisons:
+            path = out / f"{comparison.run}.{format_}"
+            written.append(save_figure(overlay_figure(comparison), path))
     messages().print("Wrote " + ", ".join(map(str, written)))
     if any(comparison.status != "ok" for comparison in comparisons):
         raise typer.Exit(1)
 
 
 def _prepared(campaign: Campaign, run: str) -> xr.Dataset:
-    if run not in campaign.runs:
+    known = list(campaign.settings.runs)
+    if run not in known:
         raise RequestError(
-            f"the campaign has no run '{run}'.{did_you_mean(run, campaign.runs)} "
-            f"Runs: {', '.join(campaign.runs)}."
+            f"the campaign has no run '{run}'.{did_you_mean(run, known)} Runs: {', '.join(known)}."
         )
     return load_prepared(campaign, names=[run])[run]
 

@@ -15,6 +15,7 @@ __all__ = [
     "anrmse",
     "error_over_time",
     "fit_percent",
+    "is_slack",
     "nammae",
     "normalised_extremes_error",
     "nrmse",
@@ -63,6 +64,32 @@ def paired(
     constant = spread <= 1e-12 * np.abs(m).max(axis=-2)
     slack = constant | (spread < SLACK_PART * reference)
     return p, m, np.where(slack, np.nan, spread), ~slack
+
+
+def is_slack(
+    *,
+    predicted: npt.ArrayLike,
+    measured: npt.ArrayLike,
+    training_std: npt.ArrayLike | None = None,
+) -> BoolArray:
+    """Say which channels are not judged, because the measurement hardly moves.
+
+    Parameters
+    ----------
+    predicted, measured, training_std
+        As for :func:`nrmse`.
+
+    Returns
+    -------
+    ndarray of bool, shape (channel,)
+        True for a channel whose measured SD is below 1 % of its training SD, or zero.
+
+    Raises
+    ------
+    RequestError
+        As :func:`nrmse`.
+    """
+    return ~paired(predicted, measured, training_std)[3]
 
 
 def nrmse(

@@ -1,24 +1,32 @@
 """Models: what is identified from prepared runs, and what it forecasts."""
 
+import warnings
+from dataclasses import asdict, replace
 from pathlib import Path
 
-from seakeep.errors import DataError
+from seakeep.errors import DataError, SeakeepWarning
 from seakeep.models import ensemble_store, store
+from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.ensemble import BayesianHankelDMDc
 from seakeep.models.fitted_ensemble import HankelEnsemble
 from seakeep.models.hankel import HankelDMDc
 from seakeep.models.model import HankelDMDcModel
+from seakeep.models.offsets import ProbeOffset, estimate_probe_offset
 from seakeep.models.priors import Fixed, LogUniform, Uniform
 from seakeep.models.summaries import summarize
 
 __all__ = [
     "BayesianHankelDMDc",
+    "FittedAlignment",
     "Fixed",
     "HankelDMDc",
     "HankelDMDcModel",
     "HankelEnsemble",
     "LogUniform",
+    "ProbeAlignment",
+    "ProbeOffset",
     "Uniform",
+    "estimate_probe_offset",
     "load_model",
     "summarize",
 ]
@@ -48,7 +56,10 @@ def load_model(path: str | Path) -> HankelDMDcModel | HankelEnsemble:
     kind = dataset.attrs["seakeep_kind"]
     try:
         if kind == store.HANKEL_DMDC:
-            return HankelDMDcModel.from_dataset(dataset)
+            model = HankelDMDcModel.from_dataset(dataset)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", SeakeepWarning)  # given when the model was made
+                return replace(model, settings=HankelDMDc(**asdict(model.settings)))
         if kind == ensemble_store.BAYESIAN_HANKEL_DMDC:
             return HankelEnsemble.from_dataset(dataset)
     except (KeyError, TypeError, ValueError) as error:

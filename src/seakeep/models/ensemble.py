@@ -11,9 +11,11 @@ import numpy.typing as npt
 
 from seakeep.errors import RequestError
 from seakeep.models import labelled
+from seakeep.models.aligned import align_training
+from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.draws import Sampling, TrainOn, draw_members
 from seakeep.models.fitted_ensemble import HankelEnsemble
-from seakeep.models.identification import Stop, check_names, last_sample, stop_instants
+from seakeep.models.identification import Stop, check_names, last_sample, stop_instants, until
 from seakeep.models.labelled import Runs, as_runs
 from seakeep.models.members import TrainingArrays, reach
 from seakeep.models.priors import LogUniform, Prior, Uniform, check_prior, describe
@@ -92,7 +94,7 @@ class BayesianHankelDMDc:
     ridge_scale: RidgeScale = "absolute"
     rank: int | None = None
     standardize: bool = True
-    alignment: None = None
+    alignment: ProbeAlignment | None = None
     seed_sequence: np.random.SeedSequence = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -103,7 +105,7 @@ class BayesianHankelDMDc:
         periods_to_samples(1, self.encounter_period, self.dt if self.dt is not None else 1.0)
         _check_word("sampling", self.sampling, ("monte_carlo", "sobol"))
         _check_word("train_on", self.train_on, ("all", "runs", "windows"))
-        _ = self.shared
+        object.__setattr__(self, "alignment", self.shared.alignment)
         object.__setattr__(self, "seed_sequence", _seed_sequence(self.seed))
 
     @property
@@ -218,6 +220,10 @@ class BayesianHankelDMDc:
         """
         named = as_runs(runs)
         check_names(states, inputs)
+        fitted = None
+        if self.alignment is not None:
+            named, stop = until(named, stop), None
+            fitted, named = align_training(self.alignment, named, states, inputs, None, 0)
         stops = stop_instants(stop, list(named))
         first_name, first_run = next(iter(named.items()))
         dt = labelled.run_step(first_run, first_name)
@@ -240,6 +246,7 @@ class BayesianHankelDMDc:
             dt=dt,
             state_labels=labels[0],
             input_labels=labels[1],
+            alignment=fitted,
         )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.errors import SeakeepWarning
+from seakeep.models.alignment import FittedAlignment
 from seakeep.models.draws import Draw
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.members import TrainingArrays
@@ -48,6 +49,7 @@ class Parts:
     arrays: TrainingArrays
     dt: float
     labels: dict[str, tuple[ChannelLabel, ...]]
+    alignment: FittedAlignment | None
 
 
 def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Dataset:
@@ -79,6 +81,7 @@ def pack(
     arrays: TrainingArrays,
     dt: float,
     labels: Mapping[str, tuple[ChannelLabel, ...]],
+    alignment: FittedAlignment | None = None,
 ) -> xr.Dataset:
     """Put the parts of an ensemble into a Dataset of arrays and JSON texts."""
     dataset = draws_dataset(members, origin)
@@ -95,6 +98,7 @@ def pack(
         dt=dt,
         settings=json.dumps(asdict(settings)),
         runs=json.dumps(place),
+        alignment=json.dumps(None if alignment is None else asdict(alignment)),
         labels=json.dumps({k: [asdict(label) for label in v] for k, v in labels.items()}),
     )
 
@@ -106,6 +110,7 @@ def unpack(dataset: xr.Dataset) -> Parts:
         for group, entries in json.loads(dataset.attrs["labels"]).items()
     }
     place = json.loads(dataset.attrs["runs"])
+    alignment = json.loads(dataset.attrs.get("alignment", "null"))
     count = range(len(place["names"]))
     arrays = TrainingArrays(
         names=tuple(place["names"]),
@@ -132,6 +137,7 @@ def unpack(dataset: xr.Dataset) -> Parts:
         arrays=arrays,
         dt=float(dataset.attrs["dt"]),
         labels=labels,
+        alignment=FittedAlignment.from_dict(alignment) if alignment else None,
     )
 
 

@@ -14,12 +14,14 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.errors import RequestError
-from seakeep.models import ensemble_store, forecasting, store
+from seakeep.models import aligned, ensemble_store, forecasting, store
+from seakeep.models.alignment import FittedAlignment
 from seakeep.models.draws import Draw
 from seakeep.models.forecasting import ForecastWindow
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.members import Task, TrainingArrays, forecast_member, identify_member
 from seakeep.models.model import HankelDMDcModel, Training
+from seakeep.models.offsets import check_offset
 from seakeep.models.settings import HankelSettings
 from seakeep.models.summaries import STATISTICS, check_level, first_lost, reduce_members
 from seakeep.models.workers import Backend, check_workers, side_by_side
@@ -50,6 +52,8 @@ class HankelEnsemble:
         Time step, s.
     state_labels, input_labels : tuple of ChannelLabel
         Names and units of states and inputs.
+    alignment : FittedAlignment, optional
+        How the wave input is aligned to the vessel; the training arrays are aligned.
     """
 
     settings: HankelSettings = field(repr=False)
@@ -59,6 +63,7 @@ class HankelEnsemble:
     dt: float
     state_labels: tuple[ChannelLabel, ...]
     input_labels: tuple[ChannelLabel, ...]
+    alignment: FittedAlignment | None = None
 
     @property
     def n_members(self) -> int:
@@ -158,6 +163,7 @@ class HankelEnsemble:
                 ridge=found.solution.ridge,
                 rank=found.solution.rank,
             ),
+            alignment=self.alignment,
         )
 
     def forecast(
@@ -191,15 +197,15 @@ class HankelEnsemble:
         RequestError, DataError
             As :meth:`HankelDMDcModel.forecast`.
         """
-        windows = [forecasting.read_window(self, run, start, steps)]
-        values = np.stack(list(self._series(windows, workers, backend)))[:, 0]
+        windows = self._windows(run, [start], steps)
+        values = np.stack(list(self._series(run, windows, workers, backend)))[:, 0]
         lost = first_lost(values)
         variables = self._variables(values, ("member", "time"))
         variables["status"] = xr.Variable(("member",), _status(lost, windows[0].time.values))
         return xr.Dataset(
             variables,
             coords={"member": np.arange(self.n_members), "time": windows[0].time},
-            attrs=self._attributes(windows[0]) | _verdict(lost) | {"start": windows[0].start},
+            attrs=self._attributes(run, windows[0]) | _verdict(lost) | {"start": windows[0].start},
         )
 
     def forecast_summary(
@@ -234,8 +240,8 @@ class HankelEnsemble:
             As :meth:`forecast`.
         """
         level = check_level(level)
-        window = forecasting.read_window(self, run, start, steps)
-        series = self._series([window], workers, backend)
+        (window,) = self._windows(run, [start], steps)
+        series = self._series(run, [window], workers, backend)
         shape = (1, window.steps, len(self.states))
         values, lost = reduce_members(series, self.n_members, shape, level)
         variables = self._variables(values[0], ("statistic", "time"))
@@ -248,7 +254,7 @@ class HankelEnsemble:
                 "member": np.arange(self.n_members),
                 "time": window.time,
             },
-            attrs=self._attributes(window) | {"start": window.start} | counts,
+            attrs=self._attributes(run, window) | {"start": window.start} | counts,
         )
 
     def forecast_windows(
@@ -281,7 +287,7 @@ class HankelEnsemble:
             As :meth:`forecast`.
         """
         windows = self._windows(run, starts, steps)
-        values = np.stack(list(self._series(windows, workers, backend)), axis=1)
+        values = np.stack(list(self._series(run, windows, workers, backend)), axis=1)
         first = first_lost(values)
         variables = self._variables(values, ("window", "member", "lead"))
         status = [
@@ -289,7 +295,7 @@ class HankelEnsemble:
         ]
         variables["status"] = xr.Variable(("window", "member"), np.stack(status))
         coords = self._window_coords(windows) | {"member": np.arange(self.n_members)}
-        return xr.Dataset(variables, coords=coords, attrs=self._attributes(windows[0]))
+        return xr.Dataset(variables, coords=coords, attrs=self._attributes(run, windows[0]))
 
     def summarize_windows(
         self,
@@ -323,27 +329,42 @@ class HankelEnsemble:
         level = check_level(level)
         windows = self._windows(run, starts, steps)
         shape = (len(windows), windows[0].steps, len(self.states))
-        series = self._series(windows, workers, backend)
+        series = self._series(run, windows, workers, backend)
         values, lost = reduce_members(series, self.n_members, shape, level)
         variables = self._variables(values, ("window", "statistic", "lead"))
         variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
         coords = self._window_coords(windows) | {"statistic": list(STATISTICS)}
-        attrs = self._attributes(windows[0]) | {"level": level, "members": self.n_members}
+        attrs = self._attributes(run, windows[0]) | {"level": level, "members": self.n_members}
         return xr.Dataset(variables, coords=coords, attrs=attrs)
 
     def _windows(
-        self, run: xr.Dataset, starts: Sequence[float], steps: int
+        self, run: xr.Dataset, starts: Sequence[float], steps: int | None
     ) -> list[ForecastWindow]:
         windows = [forecasting.read_window(self, run, float(start), steps) for start in starts]
         if not windows:
             raise RequestError("starts is empty: name at least one instant to forecast from.")
-        return windows
+        if self.alignment is None:
+            return windows
+        check_offset(run)
+        if self.alignment.settings.surge == "predicted":
+            return windows
+        return [aligned.align_window(self, run, window) for window in windows]
 
     def _series(
-        self, windows: Sequence[ForecastWindow], workers: int, backend: Backend
+        self,
+        run: xr.Dataset,
+        windows: Sequence[ForecastWindow],
+        workers: int,
+        backend: Backend,
     ) -> Iterator[FloatArray]:
         """Members one after the other, each (window, steps, N)."""
         check_workers(workers, backend)
+        if self.alignment is not None and self.alignment.settings.surge == "predicted":
+            members = map(self.member, range(self.n_members))
+            return (
+                np.stack([aligned.closed_loop(member, run, window) for window in windows])
+                for member in members
+            )
         histories = np.stack([window.state_history for window in windows])
         inputs = np.stack([np.concatenate([w.input_history, w.input_future]) for w in windows])
         task = Task(self.arrays, self.settings, histories, inputs, windows[0].steps)
@@ -365,8 +386,9 @@ class HankelEnsemble:
             "lead": xr.Variable(("lead",), lead, {"units": "s", "long_name": "time after start"}),
         }
 
-    def _attributes(self, window: ForecastWindow) -> dict[str, Any]:
-        return {"run": window.name, "ensemble": json.dumps(self.origin)}
+    def _attributes(self, run: xr.Dataset, window: ForecastWindow) -> dict[str, Any]:
+        notes = {} if self.alignment is None else aligned.notes(self.alignment, run)
+        return {"run": window.name, "ensemble": json.dumps(self.origin), **notes}
 
     def save(self, path: str | Path) -> Path:
         """Write draws and training arrays as NetCDF, to a temporary name first.
@@ -392,6 +414,7 @@ class HankelEnsemble:
             arrays=self.arrays,
             dt=self.dt,
             labels={"state": self.state_labels, "input": self.input_labels},
+            alignment=self.alignment,
         )
 
     @classmethod
@@ -417,6 +440,7 @@ class HankelEnsemble:
             dt=parts.dt,
             state_labels=parts.labels["state"],
             input_labels=parts.labels["input"],
+            alignment=parts.alignment,
         )
 
 

@@ -81,13 +81,13 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
     labelled.check_step(run, name, model.dt)
     labelled.check_units(run, model.state_labels + model.input_labels, name)
     time = np.asarray(run["time"].values, dtype=float)
-    at = labelled.nearest_sample(time, float(start), name)
+    at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
     needed = model.history_samples
     if at + 1 < needed:
         raise RequestError(
-            f"start = {time[at]:g} s leaves {at + 1} samples of history in {name} and the model "
+            f"start = {time[at]:.10g} s leaves {at + 1} samples of history in {name} and the model "
             f"needs {needed} (the start included): {needed - at - 1} are missing. Start at "
-            f"{time[0] + (needed - 1) * model.dt:g} s or later."
+            f"{time[0] + (needed - 1) * model.dt:.10g} s or later."
         )
     available = time.size - 1 - at
     count = available if steps is None else steps
@@ -102,8 +102,8 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
     most = available + 1 if model.inputs else count
     if count > most:
         raise RequestError(
-            f"{count} steps from {time[at]:g} s need the input up to "
-            f"{time[at] + (count - 1) * model.dt:g} s and {name} ends at {time[-1]:g} s. "
+            f"{count} steps from {time[at]:.10g} s need the input up to "
+            f"{time[at] + (count - 1) * model.dt:.10g} s and {name} ends at {time[-1]:.10g} s. "
             f"At most {most} steps can be forecast from there."
         )
     first = at + 1 - needed
@@ -190,7 +190,7 @@ def label_forecast(
 ) -> xr.Dataset:
     """Dataset of a forecast of shape (steps, N), with units, spread in training, and status."""
     lost = np.flatnonzero(np.isnan(values).any(axis=1))
-    status = "ok" if lost.size == 0 else f"diverged at t = {window.time.values[lost[0]]:g} s"
+    status = "ok" if lost.size == 0 else f"diverged at t = {window.time.values[lost[0]]:.10g} s"
     variables = {
         label.name: xr.Variable(
             ("time",),
@@ -217,7 +217,9 @@ def modes(eigenvalues: npt.NDArray[np.complex128], dt: float) -> xr.Dataset:
         poles = np.log(kept.astype(complex)) / dt
         natural = np.abs(poles)
         frequency = np.abs(poles.imag) / (2 * np.pi)
-        damping = np.where(natural > 0, -poles.real / natural, 1.0)
+        # An eigenvalue of zero is gone after a step: overdamped, not undefined.
+        oscillating = (natural > 0) & np.isfinite(natural)
+        damping = np.where(oscillating, -poles.real / natural, 1.0)
         decay = np.where(poles.real < 0, -1.0 / poles.real, np.inf)
         period = np.where(frequency > 0, 1.0 / frequency, np.inf)
     table = {
@@ -253,7 +255,7 @@ def summary(model: HankelDMDcModel) -> str:
         f"  training      {sum(training.columns)} snapshot pairs of {len(training.runs)} run(s)",
     ]
     lines += [
-        f"    {name}: {columns} pairs, {first:g} to {stop:g} s"
+        f"    {name}: {columns} pairs, {first:.10g} to {stop:.10g} s"
         for name, columns, first, stop in zip(
             training.runs, training.columns, training.first, training.stop, strict=True
         )

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Self
 
 from seakeep.core.regression import identify
-from seakeep.models.identification import Stop, gather
+from seakeep.models.aligned import align_training
+from seakeep.models.identification import Stop, check_names, gather, until
 from seakeep.models.labelled import Runs, as_runs
 from seakeep.models.model import HankelDMDcModel, Training
 from seakeep.models.settings import HankelSettings, periods_to_samples
@@ -49,13 +50,21 @@ class HankelDMDc(HankelSettings):
     standardize : bool, optional
         Whether channels are centred and scaled by mean and standard deviation (ddof = 1) over
         the training windows, pooled over the runs.
-    alignment : None
-        Reserved for the alignment of the wave input to a moving vessel.
+    alignment : ProbeAlignment, optional
+        Alignment of the wave input to the moving vessel, the same in fit and forecast; a mapping
+        of its keys is taken too.
 
     Raises
     ------
     RequestError
         If a setting is out of range.
+
+    Notes
+    -----
+    With more delays than the system has states the regressors are linearly dependent (or nearly,
+    with noise): many pairs of Â and B̂ continue the data equally well, and which one is found is
+    decided by λ, or by least norm at λ = 0. Forecasts then compare with another method's;
+    coefficients, and the eigenvalues that the surplus delays bring, do not.
 
     Examples
     --------
@@ -145,8 +154,16 @@ class HankelDMDc(HankelSettings):
             If a run is too short, has gaps or times that are not uniform, another step than the
             first, or a constant channel while ``standardize`` is set.
         """
+        named, fitted = as_runs(runs), None
+        if self.alignment is not None:
+            check_names(states, inputs)
+            named, stop = until(named, stop), None
+            reach = self.history_samples - 1
+            fitted, named = align_training(
+                self.alignment, named, states, inputs, self.window, reach
+            )
         data = gather(
-            as_runs(runs),
+            named,
             states,
             inputs,
             stop,
@@ -184,4 +201,5 @@ class HankelDMDc(HankelSettings):
                 ridge=solution.ridge,
                 rank=solution.rank,
             ),
+            alignment=fitted,
         )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -168,6 +169,37 @@ def gather(
     )
 
 
+def until(runs: Mapping[str, xr.Dataset], stop: Stop) -> dict[str, xr.Dataset]:
+    """Cut runs at the last instants of their training windows.
+
+    Parameters
+    ----------
+    runs : mapping of str to Dataset
+        Runs.
+    stop : float, sequence or mapping of float, optional
+        Last instants, s.
+
+    Returns
+    -------
+    dict of str to Dataset
+        The runs up to and including these instants.
+
+    Raises
+    ------
+    RequestError
+        If a stop lies outside its run.
+    DataError
+        If the times of a run are not uniform.
+    """
+    stops = stop_instants(stop, list(runs))
+    out = {}
+    for name, run in runs.items():
+        labelled.run_step(run, name)
+        last = last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name)
+        out[name] = run.isel(time=slice(0, last + 1))
+    return out
+
+
 def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
     """Refuse lists of channels that are strings, empty, repeated or overlapping."""
     for what, names in (("states", states), ("inputs", inputs)):
@@ -175,6 +207,12 @@ def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
             raise RequestError(
                 f"{what} must be a list of channel names; received the string '{names}'. "
                 f"Write {what}=['{names}']."
+            )
+        listed = isinstance(cast("object", names), Iterable)
+        if not listed or not all(isinstance(cast("object", name), str) for name in names):
+            raise RequestError(
+                f"{what} must be a list of channel names; received {names!r}. A model without "
+                "input takes inputs=[]."
             )
         double = {name for name in names if list(names).count(name) > 1}
         if double:
@@ -211,7 +249,7 @@ def stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
                 "one a run."
             )
         return dict(zip(names, values, strict=True))
-    return dict.fromkeys(names, float(np.asarray(stop, dtype=float)))
+    return dict.fromkeys(names, labelled.as_instant(stop, "stop"))
 
 
 def last_sample(time: FloatArray, stop: float | None, name: str) -> int:

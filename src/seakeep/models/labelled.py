@@ -183,8 +183,8 @@ def check_finite(
     row, column = (int(index) for index in np.argwhere(bad)[0])
     raise DataError(
         f"channel '{names[column]}' of {name} has {int(bad[:, column].sum())} missing or infinite "
-        f"value(s) in the samples needed, the first at t = {time[first + row]:g} s. Fill the gap, "
-        "or choose a window without it: nothing is filled in silence."
+        f"value(s) in the samples needed, the first at t = {time[first + row]:.10g} s. "
+        "Fill the gap, or choose a window without it: nothing is filled in silence."
     )
 
 
@@ -213,6 +213,14 @@ def check_units(run: xr.Dataset, labels: Sequence[ChannelLabel], name: str) -> N
             )
 
 
+def as_instant(value: object, what: str) -> float:
+    """Return an instant in seconds as a float; a number or an array that holds one number."""
+    array = np.asarray(value)
+    if array.ndim or array.dtype.kind not in "iuf":
+        raise RequestError(f"{what} must be an instant in seconds; received {value!r}.")
+    return float(array)
+
+
 def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "start") -> int:
     """Sample nearest to an instant.
 
@@ -233,12 +241,13 @@ def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "sta
     Raises
     ------
     RequestError
-        If the instant is more than half a step outside the run, or not a number.
+        If the instant is outside the run by more than rounding, or not a number.
     """
     step = (time[-1] - time[0]) / (time.size - 1)
-    if not time[0] - 0.5 * step <= instant <= time[-1] + 0.5 * step:
+    rounding = 1e-3 * step
+    if not time[0] - rounding <= instant <= time[-1] + rounding:
         raise RequestError(
-            f"{what} = {instant:g} s is outside {name}, which runs from {time[0]:g} to "
-            f"{time[-1]:g} s. Choose an instant inside it."
+            f"{what} = {instant:.10g} s is outside {name}, which runs from {time[0]:.10g} to "
+            f"{time[-1]:.10g} s. Choose an instant inside it."
         )
     return int(np.clip(np.rint((instant - time[0]) / step), 0, time.size - 1))

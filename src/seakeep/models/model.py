@@ -15,9 +15,11 @@ import xarray as xr
 from seakeep.core.regression import Method
 from seakeep.core.rollout import rollout
 from seakeep.errors import SeakeepWarning
-from seakeep.models import export, forecasting, store
+from seakeep.models import aligned, export, forecasting, store
+from seakeep.models.alignment import FittedAlignment
 from seakeep.models.identification import Scale
 from seakeep.models.labelled import ChannelLabel
+from seakeep.models.offsets import settle_offset
 from seakeep.models.settings import HankelSettings
 
 if TYPE_CHECKING:
@@ -76,6 +78,8 @@ class HankelDMDcModel:
         Means and standard deviations.
     training : Training
         Runs, windows and form of the regression.
+    alignment : FittedAlignment, optional
+        How the wave input is aligned to the vessel, as completed from the training runs.
     """
 
     settings: HankelSettings
@@ -86,6 +90,7 @@ class HankelDMDcModel:
     state_scale: Scale = field(repr=False)
     input_scale: Scale = field(repr=False)
     training: Training
+    alignment: FittedAlignment | None = None
 
     def __post_init__(self) -> None:
         scales = (self.state_scale, self.input_scale)
@@ -202,7 +207,10 @@ class HankelDMDcModel:
     def forecast(self, run: xr.Dataset, start: float, steps: int | None = None) -> xr.Dataset:
         """Free run driven by the measured input of `run`.
 
-        States are read up to `start` and not after; inputs up to the instant before the last.
+        States are read up to `start` and not after; inputs up to the instant before the last. The
+        one exception is an alignment with ``surge="measured"``: it reads the surge after `start`
+        too, and writes ``conditional_on`` into the result's attributes. Elevation that is carried
+        upstream is read beyond these instants as well.
 
         Parameters
         ----------
@@ -228,11 +236,44 @@ class HankelDMDcModel:
         DataError
             If the step or the units are not the model's, or needed samples are missing.
         """
+        run = settle_offset(self, run)
         window = forecasting.read_window(self, run, start, steps)
-        values = self.forecast_arrays(
+        if self.alignment is None:
+            return forecasting.label_forecast(self, window, self._free_run(window))
+        if self.alignment.settings.surge == "predicted":
+            values = aligned.closed_loop(self, run, window)
+        else:
+            values = self._free_run(aligned.align_window(self, run, window))
+        forecast = forecasting.label_forecast(self, window, values)
+        return forecast.assign_attrs(aligned.notes(self.alignment, run))
+
+    def _free_run(self, window: forecasting.ForecastWindow) -> FloatArray:
+        return self.forecast_arrays(
             window.state_history, window.input_history, window.input_future, window.steps
         )
-        return forecasting.label_forecast(self, window, values)
+
+    def aligned_inputs(self, run: xr.Dataset) -> xr.Dataset:
+        """Inputs of a run as the model wants them: carried to the measured position.
+
+        What :meth:`forecast_arrays` and the exported systems take. Without an alignment, the
+        inputs as they are.
+
+        Parameters
+        ----------
+        run : Dataset
+            Inputs, and surge if the alignment reads it, without gaps.
+
+        Returns
+        -------
+        Dataset
+            The inputs over ``time``.
+
+        Raises
+        ------
+        RequestError, DataError
+            As :meth:`forecast`.
+        """
+        return aligned.aligned_inputs(self, settle_offset(self, run))
 
     def forecast_arrays(
         self,
@@ -248,7 +289,8 @@ class HankelDMDcModel:
         x_history : array_like, shape (at least s + 1, N)
             States up to and including instant k, oldest first, physical units.
         u_history : array_like, shape (at least z + 1, Q)
-            Inputs up to and including instant k.
+            Inputs up to and including instant k, aligned already if the model aligns them
+            (:meth:`aligned_inputs`).
         u_future : array_like, shape (at least steps − 1, Q)
             Inputs at k + 1, k + 2, …; shape (0, 0) for a model without input.
         steps : int
@@ -281,7 +323,8 @@ class HankelDMDcModel:
         """Discrete state-space system in physical deviations from the means.
 
         The delay line of the inputs is part of the state, D = 0, ``dt`` is set. Its input is
-        u − ``input_mean`` and its output x − ``state_mean``.
+        u − ``input_mean`` and its output x − ``state_mean``; u is aligned already
+        (:meth:`aligned_inputs`) if the model has an alignment.
 
         Returns
         -------
@@ -336,15 +379,20 @@ class HankelDMDcModel:
         Returns
         -------
         ndarray, shape (N(s+1) + Qz,)
-            State at `start`; the first output is the measured state there.
+            State at `start`; the first output is the measured state there. Inputs in it are
+            aligned with the measured surge up to `start`.
 
         Raises
         ------
         RequestError, DataError
             As :meth:`forecast`.
         """
+        run = settle_offset(self, run)
         window = forecasting.read_window(self, run, start, 1)
-        return export.initial_state(self, window.state_history, window.input_history)
+        history = window.input_history
+        if self.alignment is not None:
+            history = aligned.align_history(self, run, window)
+        return export.initial_state(self, window.state_history, history)
 
     def summary(self) -> str:
         """Text that says what the model is and how it was identified.
@@ -380,6 +428,7 @@ class HankelDMDcModel:
             scales={"state": self.state_scale, "input": self.input_scale},
             dt=self.dt,
             coefficients=self.coefficients,
+            alignment=self.alignment,
         )
 
     @classmethod
@@ -415,6 +464,9 @@ class HankelDMDcModel:
             state_scale=parts.scales["state"],
             input_scale=parts.scales["input"],
             training=Training(**parts.training),
+            alignment=None
+            if parts.alignment is None
+            else FittedAlignment.from_dict(parts.alignment),
         )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from seakeep.core.embedding import History
 from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.models.alignment import ProbeAlignment
 
 __all__ = [
     "DelayRows",
@@ -103,7 +104,7 @@ class HankelSettings:
     ridge_scale: RidgeScale = "absolute"
     rank: int | None = None
     standardize: bool = True
-    alignment: None = None
+    alignment: ProbeAlignment | None = None
 
     def __post_init__(self) -> None:
         check_integer("state_delays", self.state_delays, 0)
@@ -116,11 +117,7 @@ class HankelSettings:
         check_choice("ridge_scale", self.ridge_scale, ("absolute", "per_snapshot"))
         if not isinstance(self.standardize, bool | np.bool_):
             raise RequestError(f"standardize must be True or False; received {self.standardize!r}.")
-        if self.alignment is not None:
-            raise RequestError(
-                f"alignment is not available in this version; received {self.alignment!r}. "
-                "Leave it None, or align the elevation channels before fitting."
-            )
+        object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
         if self.rank is not None and self.ridge > 0:
             warnings.warn(
                 f"rank = {self.rank} truncates singular values instead of regularising, so "

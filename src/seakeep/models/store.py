@@ -37,6 +37,7 @@ class Parts:
     scales: dict[str, Scale]
     dt: float
     coefficients: FloatArray
+    alignment: dict[str, Any] | None
 
 
 def pack(
@@ -47,6 +48,7 @@ def pack(
     scales: Mapping[str, Scale],
     dt: float,
     coefficients: FloatArray,
+    alignment: object | None = None,
 ) -> xr.Dataset:
     """Put the parts of a model into a Dataset of arrays and JSON texts."""
     variables: dict[str, Any] = {
@@ -65,6 +67,8 @@ def pack(
         "training": _json(training),
         "labels": json.dumps({k: [asdict(label) for label in v] for k, v in labels.items()}),
     }
+    if alignment is not None:
+        attrs["alignment"] = _json(alignment)
     return xr.Dataset(variables, attrs=attrs)
 
 
@@ -89,6 +93,7 @@ def unpack(dataset: xr.Dataset) -> Parts:
         scales=scales,
         dt=float(dataset.attrs["dt"]),
         coefficients=_values(dataset, "coefficients"),
+        alignment=json.loads(dataset.attrs.get("alignment", "null")),
     )
 
 

@@ -59,6 +59,8 @@ def rich_comparison(table: xr.Dataset) -> Table:
                 str(at["channel_units"].values),
                 *(_shown(float(at[name]), form) for name, (_, form) in _HEADINGS.items()),
             )
+        slack = int(rows["slack_channels"])
+        left_out = f" ({slack} slack channel{'s' * (slack > 1)} left out)" if slack else ""
         status = str(rows["status"].values)
         mean = [
             _shown(float(rows["anrmse"]), "{:.3f}"),
@@ -67,7 +69,7 @@ def rich_comparison(table: xr.Dataset) -> Table:
         ]
         out.add_row(
             str(run),
-            "average" + ("" if status == "ok" else f" ({status})"),
+            "average" + left_out + ("" if status == "ok" else f" ({status})"),
             "",
             *mean,
             style="bold",

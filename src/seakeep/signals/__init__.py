@@ -4,29 +4,42 @@ Series are arrays with time along the first axis; instants and steps are in seco
 in hertz. Nothing here knows of files.
 """
 
+from seakeep.signals.alignment import delay_by_celerity, delay_by_dispersion
+from seakeep.signals.celerity import correlation_peak, effective_celerity, phase_celerity
 from seakeep.signals.clocks import resample, uniform_step
 from seakeep.signals.derive import band_pass, differentiate, envelope_squared, integrate
 from seakeep.signals.filters import low_pass, lowpass_taps
+from seakeep.signals.repeats import find_repeat
 from seakeep.signals.spectra import (
     encounter_period,
+    peak_period,
     significant_height,
     wave_heights,
     wave_spectrum,
+    wave_statistics,
     zero_up_crossings,
 )
 
 __all__ = [
     "band_pass",
+    "correlation_peak",
+    "delay_by_celerity",
+    "delay_by_dispersion",
     "differentiate",
+    "effective_celerity",
     "encounter_period",
     "envelope_squared",
+    "find_repeat",
     "integrate",
     "low_pass",
     "lowpass_taps",
+    "peak_period",
+    "phase_celerity",
     "resample",
     "significant_height",
     "uniform_step",
     "wave_heights",
     "wave_spectrum",
+    "wave_statistics",
     "zero_up_crossings",
 ]

@@ -2,23 +2,53 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
 import numpy as np
 import numpy.typing as npt
-
 from scipy import signal
 
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.filters import as_series, positive
 
 __all__ = [
+    "WaveStatistics",
     "encounter_period",
+    "paper_welch",
+    "peak_period",
     "significant_height",
     "wave_heights",
     "wave_spectrum",
+    "wave_statistics",
+    "welch_segments",
     "zero_up_crossings",
 ]
 
 FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WaveStatistics:
+    """Height and periods of a wave record.
+
+    Parameters
+    ----------
+    significant_height : float
+        H_s, four standard deviations, in the unit of the record.
+    peak_period : float
+        T_p, s.
+    zero_crossing_period : float
+        T_z, mean time between zero-up-crossings, s.
+    moment_period : float
+        T_02, from the spectrum's moments, s.
+    """
+
+    significant_height: float
+    peak_period: float
+    zero_crossing_period: float
+    moment_period: float
 
 
 def zero_up_crossings(series: npt.ArrayLike, dt: float) -> FloatArray:
@@ -141,8 +171,23 @@ def wave_heights(series: npt.ArrayLike, dt: float) -> FloatArray:
     """
     x = as_series(series)
     edges = np.ceil(zero_up_crossings(x, dt) / dt).astype(int)
-    waves = [x[first:last] for first, last in zip(edges[:-1], edges[1:], strict=True)]
+    waves = [x[first:last] for first, last in pairwise(edges)]
     return np.array([np.ptp(wave) for wave in waves], dtype=float)
+
+
+def welch_segments(
+    samples: int, dt: float, segment: int | None, overlap: int | None
+) -> tuple[int, int]:
+    """Length and overlap of Welch's segments in samples; defaults and errors of `wave_spectrum`."""
+    length = min(samples, round(60.0 / dt)) if segment is None else segment
+    shared = length // 2 if overlap is None else overlap
+    if not 1 < length <= samples or not 0 <= shared < length:
+        raise RequestError(
+            f"Welch's method needs segments of 2 to {samples} samples and an overlap below one "
+            f"segment; received segments of {length} and an overlap of {shared}. Shorten them, or "
+            "give a longer record."
+        )
+    return length, shared
 
 
 def wave_spectrum(
@@ -195,14 +240,7 @@ def wave_spectrum(
     """
     x = as_series(series)
     rate = 1.0 / positive("the time step", dt, "s")
-    length = min(x.shape[0], round(60.0 * rate)) if segment is None else segment
-    shared = length // 2 if overlap is None else overlap
-    if not 1 < length <= x.shape[0] or not 0 <= shared < length:
-        raise RequestError(
-            f"Welch's method needs segments of 2 to {x.shape[0]} samples and an overlap below one "
-            f"segment; received segments of {length} and an overlap of {shared}. Shorten them, or "
-            "give a longer record."
-        )
+    length, shared = welch_segments(x.shape[0], dt, segment, overlap)
     if padded is not None and padded < length:
         raise RequestError(
             f"the transform must be at least as long as a segment ({length} samples); received "
@@ -212,3 +250,116 @@ def wave_spectrum(
         x, rate, window=window, nperseg=length, noverlap=shared, nfft=padded
     )
     return frequency, density
+
+
+def paper_welch(dt: float) -> tuple[int, int, int]:
+    """Welch settings of the paper at another rate: segment, overlap and transform, in samples.
+
+    Parameters
+    ----------
+    dt : float
+        Time step, s.
+
+    Returns
+    -------
+    segment, overlap, padded : int
+        2¹², 2⁷ and 2¹⁶ samples at 500 Hz, kept in seconds (8.2, 0.26 and 131 s).
+
+    Examples
+    --------
+    >>> paper_welch(0.002)
+    (4096, 128, 65536)
+    """
+    step = positive("the time step", dt, "s")
+    segment, overlap, padded = (max(round(n * 0.002 / step), 1) for n in (2**12, 2**7, 2**16))
+    return segment, min(overlap, segment - 1), padded
+
+
+def peak_period(
+    series: npt.ArrayLike, dt: float, preset: Literal["paper", "recommended"] = "recommended"
+) -> float:
+    """Peak period T_p of a wave record.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Wave elevation, uniformly sampled, without gaps.
+    dt : float
+        Time step, s.
+    preset : {"recommended", "paper"}, optional
+        Welch's method over segments of at least 60 s with half overlap, or the paper's settings
+        (:func:`paper_welch`), whose bins are 0.12 Hz wide.
+
+    Returns
+    -------
+    float
+        Inverse of the frequency at which the spectrum is highest, s, its place between bins from
+        a parabola.
+
+    Raises
+    ------
+    RequestError
+        If the preset is not known or the record is shorter than a segment.
+    DataError
+        If the record is constant.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(0, 300, 0.05)
+    >>> round(peak_period(np.sin(2 * np.pi * t / 2.1), 0.05), 1)
+    2.1
+    """
+    if preset not in ("paper", "recommended"):
+        raise RequestError(f"preset must be 'recommended' or 'paper'; received {preset!r}.")
+    x = as_series(series)
+    if np.ptp(x) == 0:
+        raise DataError("the record is constant: it has no peak period. Look for a dead probe.")
+    options = paper_welch(dt) if preset == "paper" else (None, None, None)
+    frequency, density = wave_spectrum(x, dt, *options)
+    top = int(np.clip(np.argmax(density), 1, density.size - 2))
+    before, here, after = density[top - 1 : top + 2]
+    bend = before - 2 * here + after
+    shift = float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0 else 0.0
+    return float(1.0 / (frequency[top] + shift * frequency[1]))
+
+
+def wave_statistics(series: npt.ArrayLike, dt: float) -> WaveStatistics:
+    r"""Height and periods of a wave record.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Wave elevation, uniformly sampled, without gaps.
+    dt : float
+        Time step, s.
+
+    Returns
+    -------
+    WaveStatistics
+        H_s, T_p, T_z by counting, and T_02 from the moments :math:`\sqrt{m_0/m_2}` of the
+        recommended spectrum, taken up to five times its peak frequency.
+
+    Raises
+    ------
+    DataError
+        If the record is constant or has fewer than two zero-up-crossings.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(0, 300, 0.05)
+    >>> found = wave_statistics(0.05 * np.sin(2 * np.pi * t / 2), 0.05)
+    >>> round(found.significant_height, 3), round(found.zero_crossing_period, 3)
+    (0.141, 2.0)
+    """
+    peak = peak_period(series, dt)
+    frequency, density = wave_spectrum(series, dt)
+    kept = frequency <= 5.0 / peak  # beyond, noise times f² would rule the second moment
+    moments = [float(np.sum(frequency[kept] ** n * density[kept])) for n in (0, 2)]
+    return WaveStatistics(
+        significant_height=significant_height(series),
+        peak_period=peak,
+        zero_crossing_period=encounter_period(series, dt),
+        moment_period=float(np.sqrt(moments[0] / moments[1])),
+    )

@@ -133,11 +133,12 @@ def compare(
         If a run cannot be read or used.
     """
     wanted = list(runs) or campaign.test_runs
-    unknown = [name for name in wanted if name not in campaign.runs]
+    known = list(campaign.settings.runs)  # unused ones too: whoever names one wants it
+    unknown = [name for name in wanted if name not in known]
     if unknown:
         raise RequestError(
-            f"the campaign has no run '{unknown[0]}'.{did_you_mean(unknown[0], campaign.runs)} "
-            f"Runs: {', '.join(campaign.runs)}."
+            f"the campaign has no run '{unknown[0]}'.{did_you_mean(unknown[0], known)} "
+            f"Runs: {', '.join(known)}."
         )
     if not wanted:
         raise RequestError(
@@ -187,7 +188,9 @@ def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
     Dataset
         Over ``run`` and ``channel``: ``nrmse``, ``fit`` (%), ``nammae``, ``sd_ratio`` (predicted
         over measured), ``measured_min``, ``measured_max``, ``predicted_min``, ``predicted_max``
-        (in ``channel_units``); over ``run``: ``anrmse``, ``mean_nammae``, ``status``, ``start``.
+        (in ``channel_units``); over ``run``: ``anrmse`` and ``mean_nammae`` over
+        the channels that can be judged, ``slack_channels`` (how many cannot), ``status``,
+        ``start``.
     """
     rows = [_row(comparison) for comparison in comparisons]
     table = xr.concat(rows, dim="run")
@@ -231,6 +234,7 @@ def _row(comparison: Comparison) -> xr.Dataset:
         | {
             "anrmse": comparison.anrmse,
             "mean_nammae": float(metrics.nammae(predicted=p, measured=m)),
+            "slack_channels": int(metrics.is_slack(predicted=p, measured=m).to_array().sum()),
             "status": comparison.status,
             "start": comparison.start,
         },

@@ -227,12 +227,10 @@ def integrate(
         for stage in range(4):
             part = (stage + 1) // 2
             fraction = 0.5 * part
-            for i in range(dofs):
-                state[0, i], state[1, i] = q[i, step], v[i, origin]
-                if stage > 0:
-                    state[0, i] += fraction * dt * slopes[0, stage - 1, i]
-                    state[1, i] += fraction * dt * slopes[1, stage - 1, i]
-                held[i] = (1.0 - fraction) * now[i] + fraction * ahead[i]
+            state[0], state[1] = q[:, step], v[:, origin]
+            if stage > 0:
+                state += fraction * dt * slopes[:, stage - 1]
+            held[:] = (1.0 - fraction) * now + fraction * ahead
             for p in range(pairs.shape[0]):
                 held[pairs[p, 0]] += kernel[p, length] * state[1, pairs[p, 1]]
             force[:] = -held

@@ -16,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, SeakeepError
 from seakeep.tank.hydrodynamics import CONVENTIONS, save_hydrodynamics
 from seakeep.tank.settings import HullSettings, PoolGeometry
-from seakeep.tank.vessel import HullMesh, hull_mesh, hydrostatics
+from seakeep.tank.vessel import HullMesh, Hydrostatics, hull_mesh, hydrostatics
 from seakeep.waves import GRAVITY
 
 __all__ = ["build_hydrodynamics", "default_frequencies"]
@@ -125,39 +125,48 @@ def build_hydrodynamics(
         solver.solve_all(problems, progress_bar=progress, _check_wavelength=False),
         hydrostatics=False,
     )
-    names = list(modes)
-    radiation = {"radiating_dof": names, "influenced_dof": names}
+    return _dataset(solved, hull, list(modes), statics, density).assign_attrs(
+        _attributes(hull, mesh, statics, water_depth, density)
+    )
+
+
+def _dataset(
+    solved: xr.Dataset, hull: HullSettings, names: list[str], statics: Hydrostatics, density: float
+) -> xr.Dataset:
+    """Put the solver's results and the matrices of inertia and restoring together."""
+    both = {"radiating_dof": names, "influenced_dof": names}
     order = ("omega", "influenced_dof", "radiating_dof")
     force = (solved["Froude_Krylov_force"] + solved["diffraction_force"]).sel(
         influenced_dof=names, wave_direction=0.0
     )
+    force = force.transpose("omega", "influenced_dof")
     stiffness = np.zeros((len(names), len(names)))
     stiffness[:3, :3] = statics.stiffness
     if hull.pool is not None:
         area = hull.pool.length * hull.pool.beam
         stiffness[3, 3], stiffness[4, 4] = density * GRAVITY * area * np.array([1.0, 0.5])
-    square = ("influenced_dof", "radiating_dof")
-    excitation = np.stack([force.values.real, force.values.imag])
-    data = xr.Dataset(
+    parts = np.stack([force.values.real, force.values.imag])
+    return xr.Dataset(
         {
-            "added_mass": solved["added_mass"].sel(radiation).transpose(*order),
-            "damping": solved["radiation_damping"].sel(radiation).transpose(*order),
-            "excitation": (("part", *force.dims), excitation),
-            "mass": (square, _mass_matrix(hull, density)),
-            "stiffness": (square, stiffness),
+            "added_mass": (order, solved["added_mass"].sel(both).transpose(*order).values),
+            "damping": (order, solved["radiation_damping"].sel(both).transpose(*order).values),
+            "excitation": (("part", *order[:2]), parts),
+            "mass": (order[1:], _mass_matrix(hull, density)),
+            "stiffness": (order[1:], stiffness),
         },
-        coords={"omega": omegas, "part": ["re", "im"], "influenced_dof": names, "radiating_dof": names},
+        coords={
+            "omega": solved["omega"].values,
+            "part": ["re", "im"],
+            "influenced_dof": names,
+            "radiating_dof": names,
+        },
     )
-    data = data.drop_vars([n for n in data.coords if n not in data.dims])
-    data["excitation"] = data["excitation"].transpose("part", "omega", "influenced_dof")
-    return data.assign_attrs(_attributes(hull, mesh, statics.volume, statics.waterplane, water_depth, density))
 
 
 def _attributes(
     hull: HullSettings,
     mesh: HullMesh,
-    volume: float,
-    waterplane: float,
+    statics: Hydrostatics,
     depth: float,
     density: float,
 ) -> dict[str, Any]:
@@ -173,8 +182,8 @@ def _attributes(
         "draft": mesh.draft,
         "midship": mesh.midship,
         "waterline_exponent": mesh.exponent,
-        "displaced_volume": volume,
-        "waterplane_area": waterplane,
+        "displaced_volume": statics.volume,
+        "waterplane_area": statics.waterplane,
         "waterline_beam": hull.beam_waterline,
         "pool_centre": pool.centre,
         "pool_area": pool_area,
@@ -196,12 +205,25 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m seakeep.tank.build", description=__doc__)
     parser.add_argument("settings", nargs="?", type=Path, help="tank settings (TOML)")
     parser.add_argument("-o", "--out", type=Path, default=Path("hydrodynamics.nc"))
-    options = parser.parse_args(arguments)
-    settings = default_settings() if options.settings is None else read_settings(options.settings)
-    data = build_hydrodynamics(
-        settings.hull, water_depth=settings.facility.water_depth, progress=sys.stderr.isatty()
+    parser.add_argument(
+        "--frequencies", type=float, nargs="+", help="angular frequencies (rad/s) instead of fifty"
     )
-    save_hydrodynamics(data, options.out)
+    options = parser.parse_args(arguments)
+    try:
+        settings = (
+            default_settings() if options.settings is None else read_settings(options.settings)
+        )
+        data = build_hydrodynamics(
+            settings.hull,
+            options.frequencies,
+            settings.facility.water_depth,
+            settings.facility.density,
+            progress=sys.stderr.isatty(),
+        )
+        save_hydrodynamics(data, options.out)
+    except SeakeepError as error:
+        sys.stderr.write(f"Error: {error}\n")
+        return error.exit_status
     sys.stdout.write(f"{options.out}: {options.out.stat().st_size / 1000:.0f} kB\n")
     return 0
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from seakeep.tank.raw_files import header
 from seakeep.tank.settings import RunSettings, TankSettings
+from seakeep.tank.video import METRES_PER_PIXEL, PANEL, PANEL_HEIGHT
 
 __all__ = ["campaign_text"]
 
@@ -146,8 +147,14 @@ def _instruments(settings: TankSettings) -> list[str]:
             f"sampling_rate = {clock.rate:g}",
             f"trigger = {_quoted(trigger)}",
             f"trigger_unit = {_quoted(unit)}",
-            "",
         ]
+        if name == "video":
+            lines += [
+                f"metres_per_pixel = {METRES_PER_PIXEL}",
+                f"panel = [{PANEL[0]}, {PANEL[1]}]  # m, white, on the vessel",
+                f"panel_height = {PANEL_HEIGHT}  # m, of its centre above the centre of gravity",
+            ]
+        lines.append("")
     return lines
 
 
@@ -203,5 +210,3 @@ def campaign_text(
             "",
         ]
     )
-
-

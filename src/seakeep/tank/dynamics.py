@@ -169,9 +169,7 @@ def _viscous(settings: TankSettings, hydro: Hydrodynamics) -> tuple[FloatArray, 
         quadratic += [0.0, losses.slosh_quadratic]
         contraction = (hydro.pool.area / hydro.pool.opening) ** 2
         quadratic_loss = 0.5 * hydro.density * losses.loss_coefficient * contraction
-        pool = np.array(
-            [hydro.pool.centre, quadratic_loss * hydro.pool.area, losses.piston_linear]
-        )
+        pool = np.array([hydro.pool.centre, quadratic_loss * hydro.pool.area, losses.piston_linear])
     return np.array(linear), np.array(quadratic), pool
 
 
@@ -388,7 +386,7 @@ def simulate(
             f"passed {LIMITS[name]:g} {'rad' if name == 'pitch' else 'm'}. Lower the waves, raise "
             "the damping, stiffen the moorings, or take a smaller simulation.step."
         )
-    time = begin + rig.step * np.arange(steps + 1)
+    time = begin + rig.step * np.arange(steps + 1, dtype=float)
     return Motion(time, rig.names, q, np.ascontiguousarray(v), a, memory, slow)
 
 

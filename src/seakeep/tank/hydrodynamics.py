@@ -7,7 +7,6 @@ a moon pool, the absolute elevations of its piston and of its first longitudinal
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -19,7 +18,7 @@ import xarray as xr
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from seakeep.errors import RequestError
-from seakeep.waves import GRAVITY
+from seakeep.files import replacing
 
 __all__ = [
     "CONVENTIONS",
@@ -140,10 +139,8 @@ def save_hydrodynamics(data: xr.Dataset, path: Path | str) -> None:
     path : path
         Where to.
     """
-    target = Path(path)
-    part = target.with_name(target.name + ".part")
-    data.to_netcdf(part, engine="h5netcdf")
-    os.replace(part, target)
+    with replacing(Path(path)) as temporary:
+        data.to_netcdf(temporary, engine="h5netcdf")
 
 
 def shipped_hydrodynamics(name: str = "ck14e.nc") -> Path:
@@ -187,8 +184,8 @@ def load_hydrodynamics(path: Path | str | None = None) -> Hydrodynamics:
     for key, expected in CONVENTIONS.items():
         if data.attrs.get(key) != expected:
             raise RequestError(
-                f"{source} was made under another convention: {key} is {data.attrs.get(key)!r}, the "
-                f"tank needs {expected!r}. Convert the coefficients, or build the file with "
+                f"{source} was made under another convention: {key} is {data.attrs.get(key)!r}, "
+                f"the tank needs {expected!r}. Convert the coefficients, or build the file with "
                 "python -m seakeep.tank.build."
             )
     missing = [name for name in VARIABLES if name not in data]
@@ -236,8 +233,7 @@ def passive_damping(hydro: Hydrodynamics, step: float = 0.02) -> tuple[FloatArra
     """Damping for the kernel: symmetric, passive, from 0 to the end of its tail.
 
     Zero at zero frequency, shape-preserving cubics between the solver's frequencies, ω⁻³ beyond
-    them; the piston's rows are tapered to zero over 9–12 rad/s, where the solver is not clean,
-    and the sloshing mode radiates nothing.
+    them; the moon pool's rows are tapered to zero over 9–12 rad/s: the solver is not clean there.
 
     Parameters
     ----------
@@ -260,8 +256,7 @@ def passive_damping(hydro: Hydrodynamics, step: float = 0.02) -> tuple[FloatArra
     if hydro.pool is not None:
         low, high = POOL_TAPER
         part = np.clip((omega - low) / (high - low), 0.0, 1.0)
-        weight[:, 3] = 0.5 * (1.0 + np.cos(np.pi * part))
-        weight[:, 4] = 0.0
+        weight[:, 3:] = 0.5 * (1.0 + np.cos(np.pi * part))[:, None]
     # A congruence keeps the matrices passive.
     tapered = weight[:, :, None] * inside * tail[:, None, None] * weight[:, None, :]
     return omega, _passive(tapered)
@@ -285,7 +280,7 @@ def radiation_kernel(
         The kernel; A∞ by Ogilvie's relation, averaged over 2–9 rad/s.
     """
     omega, damping = passive_damping(hydro)
-    lags = step * np.arange(round(length / step) + 1)
+    lags = step * np.arange(round(length / step) + 1, dtype=float)
     weights = np.full(omega.size, omega[1])
     weights[[0, -1]] *= 0.5
     flat = damping.reshape(omega.size, -1) * weights[:, None]
@@ -362,7 +357,7 @@ def excitation_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
     wanted = _inside(hydro, omega)
     parts = np.stack([hydro.excitation.real, hydro.excitation.imag], axis=-1)
     values = CubicSpline(hydro.omega, parts, axis=0)(wanted)
-    result: ComplexArray = values[..., 0] + 1j * values[..., 1]
+    result: ComplexArray = np.asarray(values[..., 0] + 1j * values[..., 1], dtype=complex)
     return result
 
 
@@ -407,7 +402,6 @@ def response(
     w = wanted[:, None, None]
     dynamic = -(w**2) * (hydro.mass + added) - 1j * w * (radiated + np.asarray(damping))
     dynamic = dynamic + hydro.stiffness + np.asarray(stiffness)
-    result: ComplexArray = np.linalg.solve(dynamic, excitation_at(hydro, wanted)[..., None])[..., 0]
+    solved = np.linalg.solve(dynamic, excitation_at(hydro, wanted)[..., None])
+    result: ComplexArray = np.asarray(solved[..., 0], dtype=complex)
     return result
-
-

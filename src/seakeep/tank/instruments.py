@@ -15,7 +15,13 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from seakeep.tank.dynamics import Motion, Rig, tensions
 from seakeep.tank.seas import Sea
-from seakeep.tank.settings import ClockSettings, InstrumentSettings, SlapSettings, TankSettings
+from seakeep.tank.settings import (
+    ClockSettings,
+    InstrumentSettings,
+    Logger,
+    SlapSettings,
+    TankSettings,
+)
 
 __all__ = ["Column", "Played", "Record", "clock_instants", "record_run", "slap_pulses", "trigger"]
 
@@ -85,7 +91,6 @@ class Played:
     def elevation(self, place: npt.ArrayLike, time: FloatArray) -> FloatArray:
         """Linear elevation at a place in the tank (m from the wave maker), m."""
         x = np.asarray(place, dtype=float) - self.settings.vessel.position
-        x = x if x.ndim else float(x)
         return self.ramp(time) * self.sea.elevation(x, time)
 
     def crest(self, place: float, time: FloatArray) -> FloatArray:
@@ -166,7 +171,7 @@ def slap_pulses(
     """
     out = np.zeros(time.size)
     step = time[1] - time[0]
-    for start in np.flatnonzero(immersed[1:] != immersed[:-1]) + 1:
+    for start in (np.flatnonzero(immersed[1:] != immersed[:-1]) + 1).tolist():
         height = rng.exponential(slap.mean) * rng.choice([-1.0, 1.0])
         frequency, decay = rng.uniform(*slap.frequency), rng.uniform(*slap.decay)
         stop = min(time.size, start + int(8 * decay / step) + 1)
@@ -289,7 +294,7 @@ def record_run(played: Played, rng: np.random.Generator) -> list[Record]:
         ``wave_probes``, ``mru``, ``loads``, ``video``.
     """
     settings = played.settings.instruments
-    makers: dict[str, Callable[[FloatArray, np.random.Generator], dict[str, Column]]] = {
+    makers: dict[Logger, Callable[[FloatArray, np.random.Generator], dict[str, Column]]] = {
         "wave_probes": lambda t, r: _probes(played, t, settings.clocks["wave_probes"].rate, r),
         "mru": lambda t, r: _mru(played, t, r),
         "loads": lambda t, r: _loads(played, t, r),

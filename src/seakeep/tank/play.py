@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from importlib import metadata
 from pathlib import Path
 
@@ -19,14 +19,15 @@ from seakeep.tank.instruments import Played, record_run, record_together
 from seakeep.tank.raw_files import write_dataset, write_record, write_text
 from seakeep.tank.seas import Sea, sea_of_run
 from seakeep.tank.settings import TankSettings
+from seakeep.tank.video import check_video, render_side_view
 
-__all__ = ["check_settings", "noisy_truth", "play", "play_run", "truth"]
+__all__ = ["check_settings", "generator", "noisy_truth", "play", "play_run", "truth"]
 
-Progress = Callable[[str, int, int], None]
+Progress = Callable[[int, int, str], None]
 
 SINGLE_RATE = 100.0  # Hz, where all instruments share a logger
 MARGIN = 2.0  # s simulated before and after what any logger records
-STREAMS = {"waves": 0, "instruments": 1, "truth": 2}
+STREAMS = {"waves": 0, "instruments": 1, "truth": 2, "video": 3}
 
 
 def generator(settings: TankSettings, run: str, stream: str) -> np.random.Generator:
@@ -147,7 +148,7 @@ def truth(played: Played, name: str, step: float | None = None) -> xr.Dataset:
     """
     settings = played.settings
     dt = played.rig.step if step is None else step
-    time = dt * np.arange(int(np.floor(played.length / dt + 1e-9)) + 1)
+    time = dt * np.arange(int(np.floor(played.length / dt + 1e-9)) + 1, dtype=float)
     q, v, a = played.states(time)
     values = {}
     for index, dof in enumerate(played.rig.names):
@@ -241,8 +242,9 @@ def play(
     kind: str = "csv",
     one_logger: bool = False,
     names: Iterable[str] | None = None,
+    videos: Iterable[str] = (),
     progress: Progress | None = None,
-) -> dict[str, Mapping[str, Path]]:
+) -> dict[str, dict[str, Path]]:
     """Play a campaign and write raw files, campaign.toml and, in a folder apart, the truth.
 
     Parameters
@@ -258,8 +260,10 @@ def play(
         file an instrument.
     names : iterable of str, optional
         Runs; the default is all.
+    videos : iterable of str, optional
+        Runs of which to render the side view as MP4 (extra ``video``).
     progress : callable, optional
-        Called with the run's name, how many are done, and how many there are.
+        Called with how many runs are done, how many there are, and the next one's name.
 
     Returns
     -------
@@ -276,13 +280,16 @@ def play(
     if kind not in ("csv", "nc"):
         raise RequestError(f"raw files are 'csv' or 'nc'; received {kind!r}. Choose one.")
     chosen = _chosen(settings, names)
+    filmed = _chosen(settings, videos) if (videos := list(videos)) else []
+    if filmed:
+        check_video()
     part = settings.model_copy(update={"runs": {n: settings.runs[n] for n in chosen}})
     rig = check_settings(part)
     folder = Path(out)
-    files: dict[str, Mapping[str, Path]] = {}
+    files: dict[str, dict[str, Path]] = {}
     for done, name in enumerate(chosen):
         if progress is not None:
-            progress(name, done, len(chosen))
+            progress(done, len(chosen), name)
         played = play_run(part, name, rig)
         rng = generator(part, name, "instruments")
         records = (
@@ -292,6 +299,10 @@ def play(
         raw.mkdir(parents=True, exist_ok=True)
         hidden.mkdir(parents=True, exist_ok=True)
         files[name] = {record.name: write_record(record, raw, kind) for record in records}
+        if name in filmed:
+            files[name]["side_view"] = render_side_view(
+                played, raw / "side_view.mp4", generator(part, name, "video")
+            )
         write_dataset(truth(played, name), hidden / f"{name}.nc")
     relative = {
         run: {key: path.relative_to(folder).as_posix() for key, path in paths.items()}
@@ -299,5 +310,5 @@ def play(
     }
     write_text(folder / "campaign.toml", campaign_text(part, relative, kind, one_logger))
     if progress is not None:
-        progress("", len(chosen), len(chosen))
+        progress(len(chosen), len(chosen), "done")
     return files

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from seakeep.files import replacing
 from seakeep.tank.instruments import Record
 
-__all__ = ["header", "time_decimals", "write_record", "write_text"]
+__all__ = ["header", "time_decimals", "write_dataset", "write_record", "write_text"]
 
 ROWS_AT_ONCE = 20_000
 
@@ -36,9 +36,8 @@ def time_decimals(record: Record) -> int:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file under a temporary name, then rename it."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    part.write_text(text, encoding="utf-8", newline="\n")
-    part.replace(path)
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _csv(record: Record) -> str:
@@ -46,9 +45,9 @@ def _csv(record: Record) -> str:
     heads += [header(name, column.unit) for name, column in record.columns.items()]
     decimals = [time_decimals(record)] + [c.decimals for c in record.columns.values()]
     line = ",".join(f"%.{d}f" for d in decimals) + "\n"
-    table = np.column_stack([record.time] + [c.values for c in record.columns.values()])
+    columns = [record.time] + [c.values for c in record.columns.values()]
     # Adding zero turns the −0.0 of rounding into 0.0.
-    table = np.round(table, max(decimals)) + 0.0
+    table = np.column_stack([np.round(c, d) for c, d in zip(columns, decimals, strict=True)]) + 0.0
     parts = [",".join(heads) + "\n"]
     for first in range(0, len(table), ROWS_AT_ONCE):
         rows = table[first : first + ROWS_AT_ONCE]
@@ -90,10 +89,6 @@ def write_record(record: Record, folder: Path, kind: str) -> Path:
 
 def write_dataset(data: xr.Dataset, path: Path) -> None:
     """Write a Dataset to NetCDF, compressed, under a temporary name, then rename it."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     packed = {str(name): {"zlib": True, "complevel": 4} for name in data.data_vars}
-    try:
-        data.to_netcdf(part, engine="h5netcdf", encoding=packed)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    with replacing(path) as temporary:
+        data.to_netcdf(temporary, engine="h5netcdf", encoding=packed)

@@ -147,7 +147,7 @@ def realise(played: Played, name: str) -> Realised:
     values = np.interp(record.time, record.time[good], values[good])
     edges = (10.0, 10.75) if dt < 1 / 22 else (0.4 / dt, 0.45 / dt)
     eta = low_pass(values, dt, *edges)[record.time >= run.startup]
-    time = played.rig.step * np.arange(int(played.length / played.rig.step) + 1)
+    time = played.rig.step * np.arange(int(played.length / played.rig.step) + 1, dtype=float)
     time = time[time >= run.startup]
     position, _, _ = played.states(time)
     loads = played.loads(time)

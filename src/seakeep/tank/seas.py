@@ -71,11 +71,9 @@ class Sea:
         if np.ndim(x) == 0 and t.ndim == 1 and t.size > BLOCK:
             steps = np.diff(t)
             if np.ptp(steps) < 1e-9 * abs(steps[0]) + 1e-11:
-                return self._at_rest(float(x), t)
+                return self._at_rest(float(place[0]), t)
         out = np.zeros(t.shape, dtype=complex)
-        for w, a, p, k in zip(
-            self.omega, self.amplitude, self.phase, self.wavenumber, strict=True
-        ):
+        for w, a, p, k in zip(self.omega, self.amplitude, self.phase, self.wavenumber, strict=True):
             out += a * np.exp(1j * (k * place - w * t + p))
         return out
 
@@ -117,9 +115,7 @@ class Sea:
         return float(self.wavenumber[middle])
 
 
-def pierson_moskowitz(
-    frequency: npt.ArrayLike, height: float, peak_period: float
-) -> FloatArray:
+def pierson_moskowitz(frequency: npt.ArrayLike, height: float, peak_period: float) -> FloatArray:
     """Pierson–Moskowitz spectrum.
 
     Parameters
@@ -144,7 +140,8 @@ def pierson_moskowitz(
     """
     f = np.asarray(frequency, dtype=float)
     relative = (peak_period * f) ** -4.0
-    return 5 / 16 * height**2 * relative / f * np.exp(-1.25 * relative)
+    density: FloatArray = 5 / 16 * height**2 * relative / f * np.exp(-1.25 * relative)
+    return density
 
 
 def jonswap(
@@ -177,7 +174,8 @@ def jonswap(
 
     grid = np.geomspace(0.1, 40.0, 8001) / peak_period
     variance = np.trapezoid(shape(grid), grid)
-    return shape(np.asarray(frequency, dtype=float)) * (height**2 / 16 / variance)
+    density: FloatArray = shape(np.asarray(frequency, dtype=float)) * (height**2 / 16 / variance)
+    return density
 
 
 def spectral_density(settings: SpectrumSettings, frequency: npt.ArrayLike) -> FloatArray:
@@ -197,16 +195,16 @@ def spectral_density(settings: SpectrumSettings, frequency: npt.ArrayLike) -> Fl
     """
     f = np.asarray(frequency, dtype=float)
     if settings.kind == "table":
-        return np.interp(f, settings.frequencies, settings.densities, left=0.0, right=0.0)
+        known = (np.asarray(settings.frequencies), np.asarray(settings.densities))
+        density: FloatArray = np.interp(f, *known, left=0.0, right=0.0)
+        return density
     height, period = settings.height or 0.0, settings.peak_period or 0.0
     if settings.kind == "jonswap":
         return jonswap(f, height, period, settings.peak_enhancement)
     return pierson_moskowitz(f, height, period)
 
 
-def irregular_sea(
-    settings: SpectrumSettings, depth: float, rng: np.random.Generator
-) -> Sea:
+def irregular_sea(settings: SpectrumSettings, depth: float, rng: np.random.Generator) -> Sea:
     """Draw the components of an irregular sea.
 
     Parameters
@@ -309,9 +307,9 @@ def sea_of_run(
         shortest, longest = (
             2 * np.pi / float(wavenumber(2 * np.pi * f, facility.water_depth)) for f in (high, low)
         )
-        received = f"{asked[0]:.3g}" if asked[0] == asked[1] else f"{asked[0]:.3g}–{asked[1]:.3g}"
+        wanted = f"{asked[0]:.3g}" if asked[0] == asked[1] else f"{asked[0]:.3g}–{asked[1]:.3g}"
         raise RequestError(
-            f"runs.{name} asks for waves of {received} Hz; the wave maker covers {low:g}–{high:g} Hz "
+            f"runs.{name} asks for waves of {wanted} Hz; the wave maker covers {low:g}–{high:g} Hz "
             f"(wavelengths of {shortest:.2f}–{longest:.1f} m). Change the wave, or "
             "facility.wave_band."
         )

@@ -7,7 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from seakeep.errors import RequestError, did_you_mean
 
@@ -31,6 +31,7 @@ __all__ = [
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Pair = tuple[Positive, Positive]
+Logger = Literal["wave_probes", "mru", "loads", "video"]
 
 
 class _Settings(BaseModel):
@@ -57,8 +58,15 @@ class PoolGeometry(_Settings):
         return self
 
 
+def _no_pool(value: object) -> object:
+    return None if value is False else value
+
+
 class HullSettings(_Settings):
-    """Dimensions of the hull and the panels of its mesh; read by the mesh builder alone."""
+    """Dimensions of the hull and the panels of its mesh; read by the mesh builder alone.
+
+    ``pool = false`` in TOML is a hull without a moon pool.
+    """
 
     mass: Positive = 60.7
     centre_of_gravity: float = 0.03
@@ -67,7 +75,7 @@ class HullSettings(_Settings):
     beam_waterline: Positive = 0.86
     waterplane_area: Positive = 0.9035
     bottom_taper: Annotated[float, Field(ge=0, lt=0.6)] = 0.3165
-    pool: PoolGeometry | None = PoolGeometry()
+    pool: Annotated[PoolGeometry | None, BeforeValidator(_no_pool)] = PoolGeometry()
     internal_lid: Annotated[float, Field(lt=0)] = -0.005
     panels_along: Annotated[int, Field(ge=4)] = 14
     panels_across: Annotated[int, Field(ge=4)] = 10
@@ -149,7 +157,11 @@ class SimulationSettings(_Settings):
 
 
 class SpectrumSettings(_Settings):
-    """A wave spectrum and how it is cut into components."""
+    """A wave spectrum and how it is cut into components.
+
+    `kind = "table"` takes `frequencies` (Hz) and `densities` (m²/Hz), or a `file` of two columns,
+    comma-separated, with or without a line of headings.
+    """
 
     kind: Literal["pierson_moskowitz", "jonswap", "table"] = "pierson_moskowitz"
     height: Positive | None = None
@@ -157,6 +169,7 @@ class SpectrumSettings(_Settings):
     peak_enhancement: Annotated[float, Field(ge=1, le=20)] = 3.3
     frequencies: tuple[Positive, ...] = ()
     densities: tuple[NotNegative, ...] = ()
+    file: str = ""
     band: Pair = (0.28, 1.13)
     components: Annotated[int, Field(ge=1, le=20000)] = 100
     spacing: Literal["equal", "jittered"] = "jittered"
@@ -238,14 +251,14 @@ class InstrumentSettings(_Settings):
     slap: dict[str, SlapSettings] = {}
     second_order: bool = True
     acceleration_noise: NotNegative = 0.03
-    rate_noise: NotNegative = 0.0026
-    angle_noise: NotNegative = 0.00087
+    rate_noise: NotNegative = 0.002618
+    angle_noise: NotNegative = 0.00087266
     heave_noise: NotNegative = 0.0008
     surge_noise: NotNegative = 0.006
     load_noise: NotNegative = 0.03
     trigger_period: Positive = 20.0
     trigger_width: Positive = 0.5
-    clocks: dict[Literal["wave_probes", "mru", "loads", "video"], ClockSettings]
+    clocks: dict[Logger, ClockSettings]
 
     @model_validator(mode="after")
     def _complete(self) -> InstrumentSettings:
@@ -376,12 +389,49 @@ def read_settings(path: Path | str) -> TankSettings:
     try:
         table = tomllib.loads(source.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
-        raise RequestError(f"the settings file {source} does not exist. Correct the path.") from error
+        raise RequestError(
+            f"the settings file {source} does not exist. Correct the path."
+        ) from error
     except tomllib.TOMLDecodeError as error:
         raise RequestError(f"{source} is not valid TOML: {error}. Correct that line.") from error
     merged = _merge(_default_table(), table, ())
+    for name, run in merged["runs"].items():
+        spectrum = run.get("spectrum") if isinstance(run, dict) else None
+        if isinstance(spectrum, dict) and spectrum.get("file"):
+            run["spectrum"] = _with_file(spectrum, source.parent, f"{source}: runs.{name}")
     merged["folder"] = str(source.parent)
     return validate_settings(merged, str(source))
+
+
+def _with_file(spectrum: dict[str, Any], folder: Path, where: str) -> dict[str, Any]:
+    """Fill a spectrum's table from its file."""
+    path = folder / str(spectrum["file"])
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except OSError as error:
+        raise RequestError(
+            f"{where}.spectrum.file: {path} cannot be read ({error.strerror}). Correct the path, "
+            "relative to the settings file."
+        ) from error
+    rows = [line.split(",") for line in lines if line.strip() and not line.startswith("#")]
+    if rows and not _is_number(rows[0][0]):
+        rows = rows[1:]
+    for number, row in enumerate(rows, 1):
+        if len(row) != 2 or not all(map(_is_number, row)):
+            raise RequestError(
+                f"{where}.spectrum.file: row {number} of {path} is {','.join(row)!r}; two numbers "
+                "are needed, frequency (Hz) and density (m²/Hz), with a comma between."
+            )
+    frequencies, densities = ([float(row[i]) for row in rows] for i in (0, 1))
+    return {"kind": "table", **spectrum, "frequencies": frequencies, "densities": densities}
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 _REPLACED = {("runs",), ("moorings",), ("instruments", "probes"), ("instruments", "slap")}

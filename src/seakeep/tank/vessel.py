@@ -57,7 +57,9 @@ class HullMesh:
         """SHA-256 of the mesh, coordinates rounded to a nanometre."""
         parts = [np.round(self.vertices, 9) + 0.0, self.faces, self.pool_lid]
         parts += [np.round(self.internal_lid[0], 9) + 0.0, self.internal_lid[1]]
-        return hashlib.sha256(b"".join(np.ascontiguousarray(p).tobytes() for p in parts)).hexdigest()
+        return hashlib.sha256(
+            b"".join(np.ascontiguousarray(p).tobytes() for p in parts)
+        ).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,8 @@ def _square(nx: int, ny: int) -> FloatArray:
 
 def _superellipse(square: FloatArray, half: tuple[float, float], exponent: float) -> FloatArray:
     radius = (np.abs(square) ** exponent).sum(axis=1) ** (1.0 / exponent)
-    return square / radius[:, None] * np.asarray(half)
+    points: FloatArray = square / radius[:, None] * np.asarray(half)
+    return points
 
 
 def _ring(rings: list[FloatArray]) -> tuple[FloatArray, IntArray]:
@@ -113,9 +116,9 @@ def _ring(rings: list[FloatArray]) -> tuple[FloatArray, IntArray]:
     return np.concatenate(rings), np.stack([c.ravel() for c in corners], axis=1)
 
 
-def _rectangle(half: tuple[float, float], centre: float, z: float, shape: tuple[int, int]) -> (
-    tuple[FloatArray, IntArray]
-):
+def _rectangle(
+    half: tuple[float, float], centre: float, z: float, shape: tuple[int, int]
+) -> tuple[FloatArray, IntArray]:
     """Quadrilaterals of a level rectangle with upward normals."""
     nx, ny = shape
     x = centre + half[0] * np.linspace(-1, 1, nx + 1)
@@ -169,8 +172,9 @@ def _patches(
         lid = _rectangle(half_high, pool.centre, pool.lid, (nx, ny))
         patches.append((lid[0], lid[1][:, ::-1]))
     inner = square * half_low + [opening.centre, 0.0]
-    centre = _rectangle(half_low, opening.centre, hull.internal_lid, (nx // 2, ny // 2))
-    ring = _ring(_between(_at(inner, hull.internal_lid), contour(hull.internal_lid), 5))
+    # As fine as the hull: a coarser one lets irregular frequencies through above 14 rad/s.
+    centre = _rectangle(half_low, opening.centre, hull.internal_lid, (nx, ny))
+    ring = _ring(_between(_at(inner, hull.internal_lid), contour(hull.internal_lid), 7))
     internal = (
         np.concatenate([ring[0], centre[0]]),
         np.concatenate([ring[1], centre[1][:, ::-1] + len(ring[0])]),

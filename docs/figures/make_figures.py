@@ -1,0 +1,232 @@
+"""Draw the figures of the documentation and of the measured examples.
+
+    python docs/figures/make_figures.py indices     # docs/figures/indices.svg and .png
+    python docs/figures/make_figures.py tank        # the virtual tank's; extras tank and video
+    python docs/figures/make_figures.py ntnu sjtu   # examples/*/figures; need SEAKEEP_DATA_DIR
+
+Figures of results are drawn small and in few colours, so that the repository stays light.
+"""
+
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+import seakeep
+from seakeep.report.overlay import overlay_figure
+from seakeep.report.style import save_figure
+from seakeep.study import compare, fit_campaign, in_degrees
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+EXAMPLES = ROOT / "examples"
+
+# --- the index picture ---------------------------------------------------------------------------
+S, Z, M, STEPS = 3, 6, 10, 7
+READ = {"facecolor": "#4D4D4D", "edgecolor": "black"}
+WRITTEN = {"facecolor": "#F6B26B", "edgecolor": "black", "hatch": "////"}
+AHEAD = {"facecolor": "#B8CBE0", "edgecolor": "black", "hatch": "..."}
+WINDOW = {"facecolor": "#DDDDDD", "edgecolor": "black"}
+ONLY_HISTORY = {"facecolor": "white", "edgecolor": "black", "hatch": "xxxx"}
+IDLE = {"facecolor": "white", "edgecolor": "#AAAAAA"}
+
+
+def cell(axes, at, row, style, text="", colour="black"):
+    """One sample of a series: a square at column `at`."""
+    axes.add_patch(Rectangle((at - 0.44, row - 0.44), 0.88, 0.88, linewidth=0.8, **style))
+    if text:
+        axes.text(at, row, text, ha="center", va="center", fontsize=9, color=colour)
+
+
+def brace(axes, first, last, row, text, above=True):
+    """A bracket over (or under) the samples `first` to `last`."""
+    sign = 1 if above else -1
+    left, right, tip = first - 0.42, last + 0.42, row + 0.18 * sign
+    axes.plot([left, left, right, right], [row, tip, tip, row], color="black", linewidth=1.0)
+    axes.text(
+        0.5 * (first + last),
+        tip + 0.1 * sign,
+        text,
+        ha="center",
+        va="bottom" if above else "top",
+        fontsize=10.5,
+    )
+
+
+def panel(axes, title, height):
+    """Prepare a panel that is 25 cells wide."""
+    axes.set_xlim(-5.5, 19.9)
+    axes.set_ylim(0.0, height)
+    axes.set_aspect("equal")
+    axes.axis("off")
+    axes.text(-5.3, height - 0.1, title, fontsize=12, fontweight="bold", va="top")
+
+
+def label(axes, row, text):
+    axes.text(-1.0, row, text, ha="right", va="center", fontsize=10.5)
+
+
+def index_name(letter, shift):
+    return f"${letter}{shift:+d}$".replace("+0", "").replace("-", "{-}") if shift else f"${letter}$"
+
+
+def draw_pair(axes):
+    """One snapshot pair of the regression."""
+    panel(axes, "1   One column of the regression:  x̂(j+1) ≈ Â x̂(j) + B̂ û(j)", 5.4)
+    j = 9
+    for at in range(1, 12):
+        shift = at - j
+        axes.text(at, 3.45, index_name("j", shift), ha="center", va="center", fontsize=9)
+        state = READ if -S <= shift <= 0 else WRITTEN if shift == 1 else IDLE
+        cell(axes, at, 2.65, state)
+        cell(axes, at, 1.55, READ if -Z <= shift <= 0 else IDLE)
+    label(axes, 2.65, "states  x")
+    label(axes, 1.55, "inputs  u")
+    brace(axes, j - S, j, 3.8, f"x̂(j): s + 1 samples  (here s = {S})")
+    brace(axes, j - Z, j, 0.95, f"û(j): z + 1 samples  (here z = {Z})", above=False)
+    axes.text(j + 3.0, 2.65, "x(j+1): the first N rows of x̂(j+1)", fontsize=10.5, va="center")
+    axes.text(j + 3.0, 1.55, "u(j+1) has no part in it", fontsize=10.5, va="center")
+
+
+def draw_window(axes):
+    """The training window with the history before it and inside it."""
+    title = f"2   Training window: the last m snapshots up to and including stop  (here m = {M})"
+    panel(axes, title, 6.1)
+    reach, first = max(S, Z), 7
+    last = first + M - 1
+    for row, place in ((3.6, "before"), (1.5, "inside")):
+        label(axes, row, f'history="{place}"')
+        start = first if place == "before" else first + reach
+        for at in range(20):
+            style = WINDOW if first <= at <= last else IDLE
+            if place == "before" and first - reach <= at < first:
+                style = ONLY_HISTORY
+            cell(axes, at, row, style)
+            if start <= at < last:
+                axes.plot(at, row, "o", color="black", markersize=7)
+        words = "m − 1" if place == "before" else "m − 1 − max(s, z)"
+        brace(axes, start, last - 1, row - 0.55, f"{words} = {last - start} columns", above=False)
+    brace(axes, first, last, 4.2, "the window: mean and SD are taken over its m samples")
+    brace(axes, first - reach, first - 1, 3.05, "max(s, z) samples", above=False)
+    axes.text(last, 2.55, "stop", ha="center", va="center", fontsize=11, fontweight="bold")
+    for ends in ((2.8, 3.1), (2.0, 2.3)):
+        axes.plot([last, last], ends, color="black", linewidth=1.4)
+
+
+def draw_forecast(axes):
+    """What a forecast reads and writes."""
+    panel(axes, f"3   Forecast from start = instant k  (here steps = {STEPS})", 6.0)
+    k = 8
+    for at in range(18):
+        shift = at - k
+        axes.text(at, 3.75, index_name("k", shift), ha="center", va="center", fontsize=9)
+        state = READ if -S <= shift <= 0 else WRITTEN if 0 < shift <= STEPS else IDLE
+        given = READ if -Z <= shift <= 0 else AHEAD if 0 < shift < STEPS else IDLE
+        cell(axes, at, 2.95, state)
+        cell(axes, at, 1.85, given)
+    label(axes, 2.95, "states  x")
+    label(axes, 1.85, "inputs  u")
+    brace(axes, k - max(S, Z), k, 4.1, "history_samples = max(s, z) + 1")
+    brace(axes, k + 1, k + STEPS, 4.1, "written: x(k+1) … x(k+steps)")
+    brace(axes, k + 1, k + STEPS - 1, 1.25, "read: u(k+1) … u(k+steps−1)", above=False)
+    axes.plot([k + 0.5] * 2, [0.55, 4.35], color="black", linewidth=1.4, linestyle=(0, (4, 2)))
+    axes.text(k + 0.35, 0.65, "start", ha="right", va="center", fontsize=11, fontweight="bold")
+
+
+def draw_key(axes):
+    """What the fills mean."""
+    panel(axes, "", 2.3)
+    entries = (
+        (-4.6, 1.7, READ, "measured, read"),
+        (2.2, 1.7, AHEAD, "measured input after the start, read"),
+        (12.8, 1.7, WRITTEN, "target, or forecast"),
+        (-4.6, 0.6, WINDOW, "training window"),
+        (2.2, 0.6, ONLY_HISTORY, "read as delays only, not in mean and SD"),
+        (12.8, 0.6, IDLE, "not read"),
+    )
+    for at, row, style, text in entries:
+        cell(axes, at, row, style)
+        axes.text(at + 0.75, row, text, fontsize=10, va="center")
+    axes.plot(16.6, 0.6, "o", color="black", markersize=7)
+    axes.text(17.1, 0.6, "a column j", fontsize=10, va="center")
+
+
+def indices():
+    """The one picture of all indices."""
+    heights = [5.4, 6.1, 6.0, 2.3]
+    with mpl.rc_context(
+        {"svg.fonttype": "path", "svg.hashsalt": "seakeep", "hatch.linewidth": 0.7}
+    ):
+        figure = Figure(figsize=(10.0, 10.0 * sum(heights) / 25.4))
+        bottom = 1.0
+        for height, draw in zip(
+            heights, (draw_pair, draw_window, draw_forecast, draw_key), strict=True
+        ):
+            part = height / sum(heights)
+            bottom -= part
+            draw(figure.add_axes((0.0, bottom, 1.0, part)))
+        figure.savefig(HERE / "indices.svg", metadata={"Date": None})
+        save(figure, HERE / "indices.png")
+
+
+# --- figures of results --------------------------------------------------------------------------
+def save(figure, path):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    save_figure(figure, path)
+    print(f"{path.relative_to(ROOT)}  {path.stat().st_size / 1000:.0f} kB")
+
+
+def overlays(campaign_file, model, runs, folder, prefix=""):
+    """Forecast over measurement of some runs, as `seakeep compare` draws it."""
+    campaign = seakeep.read_campaign(campaign_file)
+    identified = fit_campaign(campaign, model)
+    for each in compare(identified, campaign, runs):
+        save(overlay_figure(in_degrees(each)), folder / f"{prefix}{each.run}.png")
+
+
+def ntnu():
+    """Motions, sway and tensions of the ship section's test runs."""
+    folder = EXAMPLES / "ntnu_ship_section"
+    file, figures = folder / "campaign.toml", folder / "figures"
+    overlays(file, None, ["3041_2", "3061_2", "3102_3"], figures, "motions_")
+    overlays(file, "sway", ["3061_2", "3102_3"], figures, "sway_")
+    overlays(file, "tensions", ["3102_3"], figures, "tensions_")
+
+
+def sjtu():
+    """Heave of the semi-submersible."""
+    folder = EXAMPLES / "sjtu_semisub"
+    overlays(folder / "campaign.toml", None, ["Data01"], folder / "figures")
+
+
+def tank():
+    """Coefficients, spectrum, a run and a video frame of the virtual tank."""
+    from seakeep.report.tank_figures import hydrodynamics_figure, run_figure, spectrum_figure
+    from seakeep.tank.play import check_settings, play_run, truth
+    from seakeep.tank.realised import realise
+    from seakeep.tank.settings import default_settings
+    from seakeep.tank.video import check_video, side_view
+
+    settings = default_settings()
+    rig = check_settings(settings)
+    played = {name: play_run(settings, name, rig) for name in settings.runs}
+    measured = [realise(each, name) for name, each in played.items()]
+    save(hydrodynamics_figure(rig, settings), HERE / "tank_hydrodynamics.png")
+    save(spectrum_figure(settings, measured), HERE / "tank_spectrum.png")
+    channels = ["eta_kn_fwd", "surge", "heave", "pitch", "piston", "mooring_bow", "mooring_stern"]
+    run = truth(played["irregular_1"], "irregular_1", 0.05)
+    save(run_figure(run, channels), HERE / "tank_run.png")
+    cv2 = check_video()
+    frame = next(side_view(played["irregular_1"], np.random.default_rng(0), [88.8]))
+    small = cv2.resize(frame, (640, 360), interpolation=cv2.INTER_AREA)
+    cv2.imwrite(str(HERE / "tank_side_view.jpg"), small, [cv2.IMWRITE_JPEG_QUALITY, 85])
+
+
+DRAWINGS = {each.__name__: each for each in (indices, ntnu, sjtu, tank)}
+
+if __name__ == "__main__":
+    for wanted in sys.argv[1:] or ["indices"]:
+        DRAWINGS[wanted]()

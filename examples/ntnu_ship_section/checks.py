@@ -1,0 +1,158 @@
+"""The numbers of README.md that no seakeep command prints: sway, camera, record ends, periods.
+
+Run in the repository, with SEAKEEP_DATA_DIR set:
+
+    python examples/ntnu_ship_section/checks.py            # all
+    python examples/ntnu_ship_section/checks.py sway       # one of them
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import seakeep
+from seakeep import metrics, signals
+from seakeep.campaign import read_table
+
+HERE = Path(__file__).parent
+GRAVITY, ARM, BAND = 9.81, 0.0502, (0.4, 5.0)
+
+
+def sway(campaign, runs):
+    """SD of sway rebuilt in four ways over that of the springs, 0.4 to 5 Hz and unfiltered."""
+    print("SD of sway over SD of the springs' (T_SB - T_PS)/60")
+    print("        in the band 0.4 to 5 Hz             unfiltered springs      tilt/sway")
+    print("run     corrected  wrong sign   no arm    corrected  wrong sign")
+    for name, run in runs.items():
+        dt = float(run.attrs["dt"])
+        roll, second = run["roll"].values, run["roll_acceleration"].values
+        felt = run["acc_sway"].values
+        springs = run["spring_offset_in_band"].values
+        unfiltered = run["spring_offset"].values
+        ways = [
+            felt - GRAVITY * roll - ARM * second,
+            felt + GRAVITY * roll + ARM * second,
+            felt - GRAVITY * roll,
+        ]
+        twice = [signals.integrate(each, dt, BAND, times=2) for each in ways]
+        period = signals.encounter_period(run["heave"].values[500:], dt)
+        tilt = GRAVITY * roll.std() / (2 * np.pi / period) ** 2
+        print(
+            f"{name}  " + "".join(f"{each.std() / springs.std():10.3f}" for each in twice),
+            "".join(f"{each.std() / unfiltered.std():12.3f}" for each in twice[:2]),
+            f"{tilt / twice[0].std():12.1f}",
+        )
+
+
+def springs(campaign, runs):
+    """Part of the variance of each spring tension that lies below the waves."""
+    print("part of the variance of the tensions below 0.4 Hz")
+    for name, run in runs.items():
+        parts = []
+        for side in ("starboard", "port"):
+            tension = run[f"mooring_{side}"].values
+            fast = signals.band_pass(tension, float(run.attrs["dt"]), BAND)
+            parts.append(1 - fast.var() / tension.var())
+        print(f"{name}  starboard {parts[0]:.2f}  port {parts[1]:.2f}")
+
+
+def camera(campaign, runs):
+    """Lag of the camera's heave behind the accelerometers', s, in pieces of 10 s from 20 s on."""
+    print("lag of the camera's heave, s (pieces of 10 s, from 20 s on); SD of its channel, mm")
+    for name, run in runs.items():
+        dt = float(run.attrs["dt"])
+        raw = read_table(campaign.file_of(name), columns=["Heave [m]"])
+        (column,) = raw.data_vars
+        seen = np.interp(run.time.values, raw.time.values, raw[column].values)
+        if seen.std() < 1e-6:
+            print(f"{name}  constant: {seen[0]:.6f} m")
+            continue
+        seen = signals.band_pass(seen, dt, BAND)
+        lags = []
+        for first in range(500, run.sizes["time"] - 250, 250):
+            lags.append(_lag(run["heave"].values[first : first + 250], seen[first : first + 250]))
+        print(f"{name}  " + " ".join(f"{lag * dt:6.2f}" for lag in lags))
+
+
+def _lag(reference, other, reach=15):
+    """Samples by which `other` comes late, to a fraction of one by a parabola."""
+    inner = slice(reach, reference.size - reach)
+    fixed = reference[inner]
+    shifts = range(-reach, reach + 1)
+    alike = np.array(
+        [np.corrcoef(fixed, other[reach + k : other.size - reach + k])[0, 1] for k in shifts]
+    )
+    peak = int(np.clip(np.argmax(alike), 1, alike.size - 2))
+    a, b, c = alike[peak - 1 : peak + 2]
+    return peak - reach + 0.5 * (a - c) / (a - 2 * b + c)
+
+
+def means(campaign, runs):
+    """Mean of the two vertical accelerometers: body-fixed sensors lose gravity as they tilt."""
+    print("mean of (acc_starboard + acc_port)/2 and of -g phi^2/2, m/s^2")
+    for name, run in runs.items():
+        both = 0.5 * (run["acc_starboard"] + run["acc_port"])
+        tilted = -GRAVITY * float((run["roll"] ** 2).mean()) / 2
+        print(f"{name}  {float(both.mean()):7.3f}  {tilted:7.3f}")
+
+
+def ends(campaign, runs):
+    """What a record that stops in mid-wave does to the last 5 s of its double integral."""
+    print("RMS error of the last 5 s of a record cut in mid-wave, in SDs: median (90 %)")
+    print("channel                 continued by prediction   continued by zeros")
+    for channel in ("heave_acceleration", "roll_acceleration"):
+        errors = []
+        for run in runs.values():
+            dt, series = float(run.attrs["dt"]), run[channel].values
+            whole = signals.integrate(series, dt, BAND, times=2)
+            for cut in range(250, 500, 17):
+                kept = series.size - cut
+                short = signals.integrate(series[:kept], dt, BAND, times=2)
+                zeros = np.zeros(2 * kept - 1)
+                zeros[:kept] = series[:kept]
+                abrupt = signals.integrate(zeros, dt, BAND, times=2)[:kept]
+                spread = whole[kept - 500 : kept].std()
+                last = slice(kept - 125, kept)
+                errors.append(
+                    [
+                        np.sqrt(np.mean((e[last] - whole[last]) ** 2)) / spread
+                        for e in (short, abrupt)
+                    ]
+                )
+        middle, high = np.median(errors, axis=0), np.percentile(errors, 90, axis=0)
+        print(
+            f"{channel:20s}  "
+            + "".join(f"{m:16.3f} ({h:.3f})" for m, h in zip(middle, high, strict=True))
+        )
+
+
+def periods(campaign, runs):
+    """Each training run forecast by the other nine: NRMSE of the motions."""
+    settings = campaign.model()
+    stated = settings.arguments()
+    spec = seakeep.HankelDMDc(**stated)
+    print("left out   " + "  ".join(f"{name:>10s}" for name in settings.states))
+    train = campaign.training_runs
+    for name in train:
+        others = {each: runs[each] for each in train if each != name}
+        model = spec.fit(others, list(settings.states), list(settings.inputs))
+        first = float(runs[name].time[model.history_samples - 1])
+        forecast = model.forecast(runs[name], start=first)
+        judged = metrics.nrmse(predicted=forecast, measured=runs[name])
+        print(f"{name:10s} " + "  ".join(f"{float(judged[s]):10.3f}" for s in settings.states))
+
+
+CHECKS = {each.__name__: each for each in (sway, springs, camera, means, ends, periods)}
+
+
+def main(names):
+    campaign = seakeep.read_campaign(HERE / "campaign.toml")
+    runs = campaign.prepare()
+    for name in names or CHECKS:
+        CHECKS[name](campaign, runs)
+        print()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

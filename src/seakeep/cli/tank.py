@@ -1,0 +1,157 @@
+"""``seakeep tank``: the virtual campaign."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich import box
+from rich.table import Table
+
+from seakeep.cli.console import messages, progress_bar, results
+from seakeep.errors import RequestError
+from seakeep.tank.dynamics import Rig
+from seakeep.tank.play import check_settings, play, play_run, truth
+from seakeep.tank.realised import Realised, comparison, matrix_rows, realise
+from seakeep.tank.settings import TankSettings, default_settings, read_settings
+
+__all__ = ["tank"]
+
+
+def tank(
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder for raw files and campaign.toml.")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option("--seed", min=0, help="Seed of waves and noise.")
+    ] = None,
+    settings: Annotated[
+        Path | None,
+        typer.Option("--settings", help="Tank settings (TOML); by default the CK-14e's."),
+    ] = None,
+    run: Annotated[
+        list[str] | None, typer.Option("--run", help="Play this run only; may be repeated.")
+    ] = None,
+    kind: Annotated[
+        Literal["csv", "nc"], typer.Option("--format", help="Format of the raw files.")
+    ] = "csv",
+    one_logger: Annotated[
+        bool,
+        typer.Option("--one-logger", help="One file and one clock a run, for all instruments."),
+    ] = False,
+    spacing: Annotated[
+        Literal["equal", "jittered"] | None,
+        typer.Option("--spacing", help="Frequencies of irregular seas; jittered never repeat."),
+    ] = None,
+    video: Annotated[
+        list[str] | None, typer.Option("--video", help="Render this run's side view as MP4.")
+    ] = None,
+    figures: Annotated[
+        bool, typer.Option("--figures", help="Draw runs, spectrum and coefficients as well.")
+    ] = False,
+    statistics: Annotated[
+        bool,
+        typer.Option("--statistics", help="Print realised waves beside the paper's numbers."),
+    ] = False,
+) -> None:
+    """Play the virtual campaign: raw files as a tank delivers them, plus campaign.toml.
+
+    The truth lies in the folder truth, which no identification command reads.
+
+    Example: seakeep tank --out virtual --seed 0
+    """
+    if out is None and not statistics:
+        raise RequestError(
+            "nothing to do: give --out DIR for the files of a campaign, or --statistics for the "
+            "realised waves."
+        )
+    wanted = _settings(settings, seed, spacing)
+    names = run or list(wanted.runs)
+    rig = check_settings(wanted, names)
+    if out is not None:
+        with progress_bar("Playing") as progress:
+            files = play(
+                wanted, out, kind=kind, one_logger=one_logger, names=names, videos=video or (),
+                progress=progress,
+            )  # fmt: skip
+        count = sum(map(len, files.values()))
+        messages().print(f"Wrote {count} raw files and {out / 'campaign.toml'} (truth apart).")
+    if statistics or figures:
+        measured = _measured(wanted, names, rig)
+        if statistics:
+            _print(wanted, measured)
+        if figures and out is not None:
+            _draw(wanted, rig, measured, out / "figures")
+
+
+def _settings(path: Path | None, seed: int | None, spacing: str | None) -> TankSettings:
+    made = default_settings() if path is None else read_settings(path)
+    if seed is not None:
+        made = made.model_copy(update={"seed": seed})
+    if spacing is not None:
+        runs = {
+            name: run
+            if run.spectrum is None
+            else run.model_copy(
+                update={"spectrum": run.spectrum.model_copy(update={"spacing": spacing})}
+            )
+            for name, run in made.runs.items()
+        }
+        made = made.model_copy(update={"runs": runs})
+    return made
+
+
+def _measured(settings: TankSettings, names: list[str], rig: Rig) -> list[Realised]:
+    measured = []
+    with progress_bar("Measuring") as progress:
+        for done, name in enumerate(names):
+            progress(done, len(names), name)
+            measured.append(realise(play_run(settings, name, rig), name))
+        progress(len(names), len(names), "done")
+    return measured
+
+
+def _print(settings: TankSettings, measured: list[Realised]) -> None:
+    matrix = matrix_rows(settings, measured)
+    table = Table(box=box.SIMPLE_HEAD, title="Test matrix", title_justify="left")
+    for heading in matrix[0]:
+        table.add_column(heading, no_wrap=True)
+    for row in matrix:
+        table.add_row(*row.values())
+    results().print(table)
+
+    table = Table(box=box.SIMPLE_HEAD, title="Realised waves, forward probe", title_justify="left")
+    for heading in ("", "unit", "here", "paper", "tolerance", ""):
+        table.add_column(heading, no_wrap=True)
+    for line in comparison(settings, measured):
+        verdict = "within" if line.agrees else "outside"
+        numbers = (f"{line.ours:.3f}", f"{line.paper:.3f}", f"{line.tolerance:.3f}")
+        table.add_row(line.name, line.unit, *numbers, verdict)
+    results().print(table)
+
+    table = Table(box=box.SIMPLE_HEAD, title="True motions and loads", title_justify="left")
+    for heading in ("run", "channel", "mean", "SD", "slack"):
+        table.add_column(heading, no_wrap=True, justify="left" if heading == "run" else "right")
+    for each in measured:
+        for channel, spread in each.spread.items():
+            slack = each.slack.get(channel.removeprefix("mooring_"))
+            shown = "" if slack is None else f"{100 * slack:.0f} %"
+            mean = round(each.mean[channel], 4) + 0.0  # no −0.0000
+            table.add_row(each.run, channel, f"{mean:.4f}", f"{spread:.4f}", shown)
+    results().print(table)
+
+
+def _draw(settings: TankSettings, rig: Rig, measured: list[Realised], folder: Path) -> None:
+    from seakeep.report.style import save_figure
+    from seakeep.report.tank_figures import hydrodynamics_figure, run_figure, spectrum_figure
+
+    folder.mkdir(parents=True, exist_ok=True)
+    written = [save_figure(hydrodynamics_figure(rig, settings), folder / "hydrodynamics.png")]
+    if any(each.irregular for each in measured):
+        written.append(save_figure(spectrum_figure(settings, measured), folder / "spectrum.png"))
+    for each in measured:
+        data = truth(play_run(settings, each.run, rig), each.run, 0.02)
+        written.append(save_figure(run_figure(data), folder / f"run_{each.run}.png"))
+    for path in written:
+        messages().print(f"Wrote {path}")

@@ -1,0 +1,46 @@
+"""The paper map names only what exists."""
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs/paper_map.md").read_text(encoding="utf-8")
+ROWS = [
+    [each.strip() for each in line.strip("|").split("|")]
+    for line in PAGE.split("## Where the paper")[0].splitlines()
+    if line.startswith("|") and not line.startswith(("|--", "| in the"))
+]
+DEVIATIONS = [line for line in PAGE.splitlines() if re.match(r"\| \d+ \|", line)]
+
+
+def quoted(text):
+    return re.findall(r"`([^`]+)`", text)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0])
+def test_functions_and_tests_exist(row):
+    _, functions, tests = row
+    assert quoted(functions), "the row names no function"
+    for name in quoted(functions):
+        module, *path = name.split(".")
+        found = importlib.import_module(module)
+        for part in path:
+            if not hasattr(found, part):  # a module that its package does not hand on
+                found = importlib.import_module(f"{found.__name__}.{part}")
+            else:
+                found = getattr(found, part)
+    assert quoted(tests), "the row names no test"
+    for name in quoted(tests):
+        file, test = name.split("::")
+        text = (ROOT / file).read_text(encoding="utf-8")
+        assert f"def {test}(" in text, f"{file} has no {test}"
+
+
+def test_every_deviation_is_there_once_and_has_a_state():
+    numbers = [int(line.split("|")[1]) for line in DEVIATIONS]
+    assert numbers == list(range(1, 30))
+    states = [line.strip("|").split("|")[-1].strip() for line in DEVIATIONS]
+    assert all("implemented" in state or "not yet" in state or "`" in state for state in states)

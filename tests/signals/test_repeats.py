@@ -1,0 +1,70 @@
+"""Test inputs that repeat training inputs are found, up to a constant phase; others are not."""
+
+import numpy as np
+import pytest
+
+from seakeep.errors import RequestError
+from seakeep.signals import find_repeat
+
+DT = 1.64 / 32
+TIME = DT * np.arange(4096)
+HALF = 2048
+
+
+def sea(seed=0, jitter=0.0, noise=0.0):
+    """The paper's 100 components over 0.28–1.13 Hz, equally spaced or jittered within bins."""
+    rng = np.random.default_rng(seed)
+    spacing = 0.85 / 99
+    frequency = 0.28 + spacing * (np.arange(100) + jitter * rng.uniform(-0.5, 0.5, 100))
+    density = frequency**-5 * np.exp(-1.25 * (1 / (2.05 * frequency)) ** 4)
+    phase = rng.uniform(0, 2 * np.pi, 100)
+    waves = (np.sqrt(density) * np.cos(2 * np.pi * np.outer(TIME, frequency) + phase)).sum(axis=1)
+    return waves + noise * waves.std() * rng.standard_normal(TIME.size)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_equally_spaced_components_come_back_after_116_5_seconds(seed):
+    record = sea(seed, noise=0.03)
+    found = find_repeat([sea(9)[:HALF], record[:HALF]], record[HALF:], DT)
+    assert found is not None
+    assert (found.training, found.share > 0.6) == (1, True)
+    later = HALF * DT + found.test_start - found.training_start
+    assert later == pytest.approx(99 / 0.85, abs=DT)
+    # 0.28 Hz times the repetition, less whole turns: 0.28 · 116.47 = 32.61 turns, that is 220°;
+    # half a sample is 5° of the waves themselves.
+    assert np.degrees(found.phase) % 360 == pytest.approx(220, abs=6)
+    assert found.correlation > 0.99
+    # The raw record does not show it.
+    late = round(99 / 0.85 / DT)
+    assert np.corrcoef(record[:-late], record[late:])[0, 1] < -0.5
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_other_seas_do_not(seed):
+    record = sea(seed)
+    assert find_repeat([sea(seed + 10), sea(seed + 20)], record, DT) is None
+    jittered = sea(seed, jitter=1.0)
+    assert find_repeat([jittered[:HALF]], jittered[HALF:], DT) is None
+
+
+def test_regular_waves_repeat_by_their_nature():
+    wave = 0.05 * np.sin(3.0 * TIME) * (1 + 0.04 * np.sin(0.3 * TIME))
+    assert find_repeat([wave[:HALF]], wave[HALF:], DT) is None
+
+
+def test_the_same_record_is_a_plain_repeat():
+    found = find_repeat([sea()], sea()[500:2500], DT)
+    assert found is not None
+    assert found.share == 1.0
+    assert found.phase == pytest.approx(0.0, abs=0.05)  # the Hilbert transform's ends
+    assert found.training_start - found.test_start == pytest.approx(500 * DT, abs=DT)
+
+
+def test_still_water_and_short_training_repeat_nothing():
+    assert find_repeat([sea()], np.zeros(100), DT) is None
+    assert find_repeat([sea()[:100]], sea(), DT) is None
+
+
+def test_a_threshold_is_a_part_of_one():
+    with pytest.raises(RequestError, match=r"threshold must lie between 0 and 1; received 1\.5"):
+        find_repeat([sea()], sea(), DT, threshold=1.5)

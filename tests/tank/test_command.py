@@ -1,0 +1,64 @@
+"""The command, hooked onto an application of its own."""
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from seakeep.cli.tank import tank
+from seakeep.errors import RequestError
+
+pytest.importorskip("numba", reason="needs the extra tank")
+
+pytest.importorskip("matplotlib", reason="needs the extra figures")
+
+
+@pytest.fixture
+def run(tmp_path):
+    app = typer.Typer()
+    app.command()(tank)
+    short = tmp_path / "short.toml"
+    short.write_text(
+        "[runs.sea]\nstartup = 5.0\nduration = 30.0\n"
+        "spectrum = { height = 0.15, peak_period = 2.0 }\n"
+        "[runs.regular]\nstartup = 5.0\nduration = 20.0\nwavelength = 2.8\nheight = 0.1\n",
+        encoding="utf-8",
+    )
+
+    def invoke(*arguments):
+        return CliRunner().invoke(
+            app, ["--settings", str(short), *map(str, arguments)], catch_exceptions=False
+        )
+
+    return invoke
+
+
+def test_files_figures_and_statistics(run, tmp_path):
+    out = tmp_path / "out"
+    options = ("--seed", "3", "--one-logger", "--run", "sea")
+    done = run("--out", out, "--figures", "--statistics", *options)
+    assert done.exit_code == 0
+    assert {p.name for p in (out / "figures").iterdir()} == {
+        "hydrodynamics.png", "spectrum.png", "run_sea.png",
+    }  # fmt: skip
+    assert all(p.stat().st_size > 10_000 for p in (out / "figures").iterdir())
+    assert (out / "raw" / "sea" / "all.csv").is_file()
+    assert (out / "truth" / "sea.nc").is_file()
+    for text in ("Test matrix", "Realised waves", "significant height", "Pierson", "True motions"):
+        assert text in done.stdout
+
+
+def test_one_run_alone(run, tmp_path):
+    out = tmp_path / "out"
+    assert run("--out", out, "--run", "regular", "--format", "nc").exit_code == 0
+    assert [p.name for p in (out / "raw").iterdir()] == ["regular"]
+    assert (out / "raw" / "regular" / "loads.nc").is_file()
+
+
+def test_nothing_to_do_is_said(run):
+    with pytest.raises(RequestError, match="nothing to do: give --out DIR"):
+        run()
+
+
+def test_help_has_an_example(run):
+    done = run("--help")
+    assert "seakeep tank --out" in done.stdout

@@ -1,0 +1,230 @@
+import numpy as np
+import pytest
+
+from seakeep.signals import low_pass
+from seakeep.tank.instruments import (
+    clock_instants,
+    record_run,
+    record_together,
+    slap_pulses,
+    trigger,
+)
+from seakeep.tank.play import generator, play_run, truth
+from seakeep.tank.settings import ClockSettings, SlapSettings
+
+pytest.importorskip("numba", reason="needs the extra tank")
+
+
+@pytest.fixture(scope="module")
+def short(settings):
+    """One irregular and one regular run, half a minute each."""
+    runs = {
+        name: settings.runs[name].model_copy(update={"startup": 10.0, "duration": 30.0})
+        for name in ("irregular_1", "regular_2")
+    }
+    return settings.model_copy(update={"runs": runs})
+
+
+@pytest.fixture(scope="module")
+def played(short, rig):
+    return play_run(short, "irregular_1", rig)
+
+
+@pytest.fixture(scope="module")
+def records(short, played):
+    made = record_run(played, generator(short, "irregular_1", "instruments"))
+    return {record.name: record for record in made}
+
+
+def test_rates_and_columns_are_the_contract(records):
+    rates = {name: 1 / np.diff(r.time[:2])[0] for name, r in records.items()}
+    expected = {"wave_probes": 500.0, "mru": 50.0, "loads": 500.0, "video": 30.0}
+    assert rates == pytest.approx(expected)
+    assert list(records["wave_probes"].columns) == [
+        "trigger", "us_fwd", "us_hml", "us_bow", "us_cog", "kn_fwd", "kn_cog",
+    ]  # fmt: skip
+    assert list(records["mru"].columns)[1:] == [
+        "acceleration_x", "acceleration_y", "acceleration_z", "rate_x", "rate_y", "rate_z",
+        "heave", "roll", "pitch", "yaw",
+    ]  # fmt: skip
+    assert list(records["loads"].columns) == ["trigger", "mooring_bow", "mooring_stern"]
+    assert list(records["video"].columns) == ["lamp", "surge"]
+    units = {n: c.unit for r in records.values() for n, c in r.columns.items()}
+    assert units["kn_fwd"] == "mm"
+    assert units["rate_y"] == "deg/s"
+    assert units["trigger"] == "V"
+
+
+def test_every_logger_starts_at_zero_of_its_own_clock(records):
+    for record in records.values():
+        assert record.time[0] == 0.0
+        assert record.time[-1] == pytest.approx(40.0, abs=0.04)
+
+
+def test_clocks_are_off_by_what_is_stated():
+    clock = ClockSettings(rate=50.0, offset=0.370, drift=25.0)
+    readings, instants = clock_instants(clock, 1000.0)
+    assert readings[0] == 0.0
+    # c(t) = offset + (1 + drift) t
+    assert clock.offset + (1 + 25e-6) * instants == pytest.approx(readings, abs=1e-9)
+    assert instants[-1] - instants[0] == pytest.approx(1000.0 - 0.025, abs=1e-5)
+
+
+def pulse_times(time, values):
+    """Centres of the trigger pulses of one logger by its own clock."""
+    high = values > 0.3 * values.max()
+    starts = np.flatnonzero(high[1:] & ~high[:-1])
+    centres = []
+    for start in starts:
+        window = slice(max(0, start - 40), start + 400 if time[1] < 0.01 else start + 40)
+        weight = np.clip(values[window], 0.1 * values.max(), None) - 0.1 * values.max()
+        centres.append(np.average(time[window], weights=weight))
+    return np.array(centres)
+
+
+def test_triggers_tell_the_clocks(records, short):
+    reference = pulse_times(
+        records["wave_probes"].time, records["wave_probes"].columns["trigger"].values
+    )
+    assert reference == pytest.approx([10.0, 30.0], abs=2e-3)
+    for name, column in (("mru", "trigger"), ("video", "lamp"), ("loads", "trigger")):
+        record, clock = records[name], short.instruments.clocks[name]
+        found = pulse_times(record.time, record.columns[column].values)
+        expected = clock.offset + (1 + 1e-6 * clock.drift) * np.array([10.0, 30.0])
+        # The lamp's noise of 0.02 on fifteen frames a pulse: a few milliseconds.
+        assert found == pytest.approx(expected, abs=8e-3)
+
+
+def test_trigger_is_a_smooth_pulse():
+    t = np.arange(0.0, 60.0, 1e-3)
+    pulse = trigger(t, 20.0, 0.5)
+    assert pulse.max() == 1.0
+    assert np.trapezoid(pulse, t) == pytest.approx(3 * 0.25, rel=1e-6)  # raised cosines
+    assert np.abs(np.diff(pulse)).max() < 2 * np.pi / 0.5 * 0.5 * 1e-3 * 1.01
+
+
+def test_noise_is_what_is_stated(records, played, short):
+    noise = short.instruments
+    mru, clock = records["mru"], noise.clocks["mru"]
+    _, instants = clock_instants(clock, played.length)
+    q, v, a = played.states(instants)
+    n = instants.size
+    for column, true, sigma in (
+        ("heave", q[1], noise.heave_noise),
+        ("pitch", np.rad2deg(q[2]), np.rad2deg(noise.angle_noise)),
+        ("rate_y", np.rad2deg(v[2]), np.rad2deg(noise.rate_noise)),
+        ("acceleration_x", a[0], noise.acceleration_noise),
+        ("acceleration_z", a[1], noise.acceleration_noise),
+        ("roll", 0.0, np.rad2deg(noise.angle_noise)),
+    ):
+        error = mru.columns[column].values - true
+        # A sample deviation scatters by 1/√(2n); four of these.
+        assert error.std() == pytest.approx(sigma, rel=4 / np.sqrt(2 * n))
+        assert abs(error.mean()) < 4 * sigma / np.sqrt(n)
+    assert np.rad2deg(noise.rate_noise) == pytest.approx(0.15, rel=1e-4)
+    assert np.rad2deg(noise.angle_noise) == pytest.approx(0.05, rel=1e-4)
+
+
+def test_probes_see_second_order_crests(records, played, short):
+    _, t = clock_instants(short.instruments.clocks["wave_probes"], played.length)
+    measured = 1e-3 * records["wave_probes"].columns["kn_fwd"].values
+    linear, crest = played.elevation(48.42, t), played.crest(48.42, t)
+    without = (measured - linear).std()
+    # 0.6 mm is stated; a sample deviation of 20 001 samples scatters by half a per cent.
+    assert (measured - linear - crest).std() == pytest.approx(6e-4, rel=0.02)
+    assert without > 1.5 * 6e-4
+
+
+def test_second_order_crest_of_a_regular_wave(settings, rig):
+    steady = settings.runs["regular_2"].model_copy(update={"unsteadiness": 0.0})
+    played = play_run(settings.model_copy(update={"runs": {"one": steady}}), "one", rig)
+    t = np.arange(30.0, 40.0, 0.01)
+    k, a = played.sea.wavenumber[0], played.sea.amplitude[0]
+    angle = k * (50.0 - 52.09) - played.sea.omega[0] * t + played.sea.phase[0]
+    # Stokes' bound second harmonic in deep water.
+    assert played.crest(50.0, t) == pytest.approx(0.5 * k * a**2 * np.cos(2 * angle), abs=1e-12)
+
+
+def test_dropouts_take_the_stated_share(settings, rig):
+    probes = {"us": settings.instruments.probes["us_fwd"].model_copy(update={"dropouts": 0.05})}
+    instruments = settings.instruments.model_copy(update={"probes": probes})
+    made = settings.model_copy(update={"instruments": instruments})
+    record = record_run(play_run(made, "irregular_1", rig), np.random.default_rng(0))[0]
+    lost = np.isnan(record.columns["us"].values)
+    # About 120 bursts of uniform length: the share scatters by a tenth.
+    assert lost.mean() == pytest.approx(0.05, rel=0.3)
+    edges = np.flatnonzero(np.diff(lost.astype(int)))
+    assert np.median(edges[1::2] - edges[::2]) / 500.0 == pytest.approx(0.11, abs=0.04)
+
+
+def test_capacitance_probes_never_drop_out(records):
+    assert np.isfinite(records["wave_probes"].columns["kn_fwd"].values).all()
+
+
+def test_slap_is_on_the_measured_load_alone(records, played, short):
+    _, t = clock_instants(short.instruments.clocks["loads"], played.length)
+    error = records["loads"].columns["mooring_bow"].values - played.loads(t)[0]
+    assert error.std() > 1.2 * short.instruments.load_noise
+    quiet = short.model_copy(
+        update={"instruments": short.instruments.model_copy(update={"slap": {}})}
+    )
+    again = record_run(play_run(quiet, "irregular_1", played.rig), np.random.default_rng(1))[2]
+    error = again.columns["mooring_bow"].values - played.loads(t)[0]
+    assert error.std() == pytest.approx(short.instruments.load_noise, rel=0.02)
+
+
+def test_slap_pulses_start_where_the_line_is_wetted():
+    time = np.arange(0.0, 100.0, 0.002)
+    wet = (time % 5.0) > 4.0
+    slap = SlapSettings(mean=0.2)
+    pulses = slap_pulses(time, wet, slap, np.random.default_rng(0))
+    first = np.flatnonzero(pulses)[0]
+    assert time[first] == pytest.approx(4.002, abs=0.005)
+    heights = [np.abs(pulses[np.abs(time - at - 0.15) < 0.15]).max() for at in np.arange(4, 99, 5)]
+    # Exponential with mean 0.2 N, less what the decay takes before the first crest.
+    assert 0.05 < np.mean(heights) < 0.25
+    assert np.all(slap_pulses(time, wet & False, slap, np.random.default_rng(0)) == 0.0)
+
+
+def test_filter_of_the_paper_passes_and_stops(records):
+    """Gains of the 10/10.75 Hz low-pass at 500 Hz on tones at its edges."""
+    t = np.arange(0, 20, 0.002)
+    middle = slice(3000, 7000)
+    for frequency, low, high in ((10.0, 0.998, 1.002), (10.75, 0.0, 1.1e-3), (1.0, 0.999, 1.001)):
+        tone = np.sin(2 * np.pi * frequency * t)
+        gain = low_pass(tone, 0.002, 10.0, 10.75)[middle].std() / tone[middle].std()
+        assert low <= gain <= high  # 60 dB: a thousandth, in either band
+    raw = records["wave_probes"].columns["kn_fwd"].values
+    assert (raw - low_pass(raw, 0.002, 10.0, 10.75)).std() == pytest.approx(0.6, rel=0.05)
+
+
+def test_one_logger_has_one_clock(played):
+    record = record_together(played, 100.0, np.random.default_rng(0))
+    assert np.diff(record.time) == pytest.approx(0.01)
+    assert {"kn_fwd", "heave", "mooring_bow", "surge"} <= set(record.columns)
+    assert "trigger" not in record.columns
+    surge = played.states(record.time)[0][0]
+    assert (record.columns["surge"].values - surge).std() == pytest.approx(6e-3, rel=0.05)
+
+
+def test_truth_holds_what_the_chain_is_judged_against(played, short):
+    data = truth(played, "irregular_1")
+    assert {"surge", "heave_rate", "pitch_acceleration", "mooring_bow", "eta_vessel"} <= set(data)
+    assert data.attrs["clock_mru_offset"] == 0.370
+    assert data.attrs["clock_video_drift_ppm"] == -40.0
+    assert data.attrs["startup"] == 10.0
+    time = data["time"].values
+    place = 52.09 + data["surge"].values
+    assert data["eta_vessel"].values == pytest.approx(played.elevation(place, time), abs=1e-12)
+    assert data["eta_kn_fwd"].attrs["x_position"] == 48.42
+    # The state is consistent: rates are the motions' derivatives.
+    slope = np.gradient(data["heave"].values, time)
+    assert slope[5:-5] == pytest.approx(data["heave_rate"].values[5:-5], abs=1e-3)
+
+
+def test_instruments_interpolate_the_motion_exactly_at_its_steps(played):
+    at = played.motion.time[500:600]
+    q, v, a = played.states(at)
+    assert q == pytest.approx(played.motion.position[:, 500:600], abs=1e-13)
+    assert v == pytest.approx(played.motion.velocity[:, 500:600], abs=1e-12)
+    assert a == pytest.approx(played.motion.acceleration[:, 500:600], abs=1e-11)

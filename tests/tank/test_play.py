@@ -1,0 +1,163 @@
+import hashlib
+import tomllib
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+from seakeep.campaign import read_campaign
+from seakeep.errors import RequestError
+from seakeep.tank.play import check_settings, generator, noisy_truth, play, play_run, truth
+from seakeep.tank.settings import SpectrumSettings
+
+pytest.importorskip("numba", reason="needs the extra tank")
+
+
+@pytest.fixture(scope="module")
+def short(settings):
+    runs = {
+        name: settings.runs[name].model_copy(update={"startup": 10.0, "duration": 20.0})
+        for name in ("irregular_1", "regular_2")
+    }
+    return settings.model_copy(update={"runs": runs})
+
+
+def digests(folder):
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.mark.parametrize("kind", ["csv", "nc"])
+def test_same_seed_same_bytes(short, tmp_path, kind):
+    for name in ("one", "two"):
+        play(short, tmp_path / name, kind=kind, names=["regular_2"])
+    first = digests(tmp_path / "one")
+    assert first == digests(tmp_path / "two")
+    assert set(first) == {
+        "campaign.toml",
+        "truth/regular_2.nc",
+        *(f"raw/regular_2/{n}.{kind}" for n in ("wave_probes", "mru", "loads", "video")),
+    }
+
+
+def test_other_seed_other_waves_and_noise(short, rig):
+    other = short.model_copy(update={"seed": 1})
+    assert not np.array_equal(
+        play_run(short, "irregular_1", rig).sea.phase, play_run(other, "irregular_1", rig).sea.phase
+    )
+    draws = [generator(s, "irregular_1", "instruments").random() for s in (short, other)]
+    assert draws[0] != draws[1]
+
+
+def test_a_run_does_not_depend_on_its_neighbours(short, settings, rig):
+    alone = play_run(short.model_copy(update={"runs": {"regular_2": short.runs["regular_2"]}}),
+                     "regular_2", rig)  # fmt: skip
+    assert np.array_equal(alone.sea.phase, play_run(settings, "regular_2", rig).sea.phase)
+
+
+def test_raw_csv_reads_back(short, tmp_path):
+    files = play(short, tmp_path, names=["irregular_1"])["irregular_1"]
+    probes = pd.read_csv(files["wave_probes"])
+    assert list(probes.columns) == [
+        "time [s]", "trigger [V]", "us_fwd [mm]", "us_hml [mm]", "us_bow [mm]", "us_cog [mm]",
+        "kn_fwd [mm]", "kn_cog [mm]",
+    ]  # fmt: skip
+    assert probes["time [s]"].to_numpy() == pytest.approx(np.arange(15001) / 500.0, abs=1e-9)
+    video = pd.read_csv(files["video"])
+    # Six decimals hold a thirtieth of a second to half a microsecond.
+    assert video["time [s]"].to_numpy() == pytest.approx(np.arange(901) / 30.0, abs=6e-7)
+    played = play_run(short, "irregular_1")
+    true = truth(played, "irregular_1", 0.002)
+    error = 1e-3 * probes["kn_cog [mm]"].to_numpy() - true["eta_kn_cog"] - true["eta_kn_cog_crest"]
+    assert float(error.std()) == pytest.approx(6e-4, rel=0.03)
+
+
+def test_netcdf_holds_the_same_as_csv(short, tmp_path):
+    csv = play(short, tmp_path / "csv", names=["irregular_1"])["irregular_1"]
+    nc = play(short, tmp_path / "nc", kind="nc", names=["irregular_1"])["irregular_1"]
+    for name in csv:
+        table = pd.read_csv(csv[name])
+        with xr.open_dataset(nc[name], engine="h5netcdf") as data:
+            first = next(iter(data))
+            assert f"{first} [{data[first].attrs['units']}]" == table.columns[1]
+            for column, head in zip(data, table.columns[1:], strict=True):
+                np.testing.assert_allclose(data[column].values, table[head], atol=1e-9)
+
+
+def test_campaign_file_lists_all_files_clocks_and_spans(short, tmp_path):
+    play(short, tmp_path)
+    table = tomllib.loads((tmp_path / "campaign.toml").read_text(encoding="utf-8"))
+    assert table["campaign"]["scale_factor"] == 50
+    assert table["rig"]["water_depth"] == 3.6
+    assert table["rig"]["positions"]["eta_fwd"] == 48.42
+    assert table["instruments"]["reference"] == "wave_probes"
+    assert table["instruments"]["video"]["trigger"] == "lamp"
+    run = table["runs"]["irregular_1"]
+    assert (run["train"], run["test"]) == ([10, 20], [20, 30])
+    assert table["runs"]["regular_2"]["span"] == [10, 30]
+    assert table["runs"]["regular_2"]["role"] == "test"
+    for files in (r["files"] for r in table["runs"].values()):
+        assert set(files) == {"wave_probes", "mru", "loads", "video"}
+        for path in files.values():
+            assert (tmp_path / path).is_file()
+            assert not path.startswith("truth")
+    assert "offset" not in (tmp_path / "campaign.toml").read_text(encoding="utf-8")
+    assert table["derived"]["eta_fwd"] == {
+        "from": "eta_kn_fwd", "step": "low_pass", "passband": 10.0, "stopband": 10.75,
+    }  # fmt: skip
+
+
+def test_one_loggers_campaign_can_be_prepared(short, tmp_path):
+    play(short, tmp_path, one_logger=True)
+    campaign = read_campaign(tmp_path / "campaign.toml")
+    run = campaign.prepare()["irregular_1"]
+    assert {"surge", "heave_rate", "pitch_acceleration", "mooring_stern", "eta_cog"} <= set(run)
+    true = truth(play_run(short, "irregular_1"), "irregular_1")
+    heave = np.interp(run["time"], true["time"], true["heave"])
+    # Noise of 0.8 mm, most of it above the new Nyquist frequency.
+    assert float((run["heave"] - heave).std()) < 1e-3
+    rate = np.interp(run["time"], true["time"], true["heave_rate"])
+    middle = slice(100, -100)
+    assert float((run["heave_rate"] - rate)[middle].std()) < 0.15 * float(rate[middle].std())
+    assert run["eta_fwd"].attrs["x_position"] == 48.42
+
+
+def test_progress_counts_the_runs(short, tmp_path):
+    told = []
+    play(short, tmp_path, progress=lambda *each: told.append(each))
+    assert told == [(0, 2, "irregular_1"), (1, 2, "regular_2"), (2, 2, "done")]
+
+
+def test_wrong_requests_write_nothing(short, tmp_path):
+    with pytest.raises(RequestError, match=r"no run 'regular_3'\. Did you mean 'regular_2'\? The"):
+        play(short, tmp_path / "out", names=["regular_3"])
+    with pytest.raises(RequestError, match="raw files are 'csv' or 'nc'; received 'mat'"):
+        play(short, tmp_path / "out", kind="mat")
+    run = short.runs["regular_2"].model_copy(update={"wavelength": 0.4})
+    bad = short.model_copy(update={"runs": {**short.runs, "short": run}})
+    with pytest.raises(RequestError, match=r"runs\.short asks for waves of"):
+        play(bad, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_seas_beyond_the_coefficients_are_refused(short):
+    facility = short.facility.model_copy(update={"wave_band": (0.01, 5.0)})
+    spectrum = SpectrumSettings(height=0.1, peak_period=2.0, band=(0.3, 3.0))
+    run = short.runs["irregular_1"].model_copy(update={"spectrum": spectrum})
+    bad = short.model_copy(update={"facility": facility, "runs": {"wide": run}})
+    with pytest.raises(RequestError, match=r"runs\.wide: frequencies .* leave the band"):
+        check_settings(bad)
+
+
+def test_noisy_truth_has_the_papers_channels(short, rig):
+    data = noisy_truth(short, "irregular_1", 0.05, rig)
+    assert data.sizes["time"] == 601
+    clean = truth(play_run(short, "irregular_1", rig), "irregular_1", 0.05)
+    error = data["mooring_bow"] - clean["mooring_bow"]
+    assert float(error.std()) == pytest.approx(0.03, rel=0.15)  # 601 samples: 3 % a deviation
+    assert data["heave"].attrs["units"] == "m"
+    assert data.attrs["water_depth"] == 3.6

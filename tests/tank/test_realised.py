@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+
+import seakeep
+from seakeep.tank.play import noisy_truth
+from seakeep.tank.realised import comparison, matrix_rows, realise_all
+
+pytest.importorskip("numba", reason="needs the extra tank")
+
+STATES = [
+    "surge", "heave", "pitch", "surge_rate", "heave_rate", "pitch_rate",
+    "surge_acceleration", "heave_acceleration", "pitch_acceleration",
+    "mooring_bow", "mooring_stern",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def realised(settings, rig):
+    return realise_all(settings, rig)
+
+
+def test_default_seed_realises_the_papers_waves(settings, realised):
+    rows = {row.name: row for row in comparison(settings, realised)}
+    assert set(rows) == {
+        "significant height", "zero-up-crossing period", "peak period (paper's Welch)",
+        "height, wavelength 2.10 m", "height, wavelength 2.80 m", "height, wavelength 4.20 m",
+    }  # fmt: skip
+    # The tolerances are the issue's.
+    assert rows["significant height"].ours == pytest.approx(0.16, abs=0.01)
+    assert rows["zero-up-crossing period"].ours == pytest.approx(1.64, abs=0.05)
+    assert rows["peak period (paper's Welch)"].ours == pytest.approx(1.98, abs=0.15)
+    assert rows["height, wavelength 2.10 m"].ours == pytest.approx(0.105, abs=0.01)
+    assert rows["height, wavelength 2.80 m"].ours == pytest.approx(0.107, abs=0.01)
+    assert rows["height, wavelength 4.20 m"].ours == pytest.approx(0.116, abs=0.01)
+    assert all(row.agrees for row in rows.values())
+
+
+def test_motions_are_those_of_the_feasibility_study(realised):
+    for run in realised[:3]:
+        # Orientation of the design page; slow surge is a handful of swings a run.
+        assert run.spread["heave"] == pytest.approx(0.032, abs=0.003)
+        assert np.rad2deg(run.spread["pitch"]) == pytest.approx(2.9, abs=0.2)
+        assert run.spread["surge_fast"] == pytest.approx(0.033, abs=0.003)
+        assert run.mean["surge"] == pytest.approx(0.5, abs=0.1)
+        assert run.mean["mooring_bow"] == pytest.approx(1.8, abs=0.2)
+        assert 0.1 < run.slack["stern"] < 0.5
+        assert run.slack["bow"] == 0.0
+    assert {run.run: run.slack["stern"] for run in realised}["regular_1_5"] == 1.0
+
+
+def test_test_matrix_is_the_papers_first_table(settings, realised):
+    rows = matrix_rows(settings, realised)
+    assert [row["runs"] for row in rows] == ["3", "1", "1", "1"]
+    assert [row["λ/L"] for row in rows] == ["Pierson–Moskowitz spectrum", "1.5", "2", "3"]
+    assert [row["h [m]"] for row in rows] == ["0.15", "0.10", "0.10", "0.10"]
+    phase = [float(row["phase speed [m/s]"]) for row in rows[1:]]
+    group = [float(row["group speed [m/s]"]) for row in rows[1:]]
+    # One in the last digit of the paper's table.
+    assert phase == pytest.approx([1.811, 2.090, 2.560], abs=1.5e-3)
+    assert group == pytest.approx([0.905, 1.045, 1.280], abs=1.5e-3)
+    assert rows[1]["realised h [m]"].startswith("0.105 ± 0.00")
+
+
+def test_linear_model_forecasts_heave(settings, rig):
+    """The paper's deterministic model on true channels with the stated noise, no alignment."""
+    period = 1.64
+    dt = period / 32
+    spec = seakeep.HankelDMDc.paper(encounter_period=period, dt=dt)
+    errors = []
+    for name in ("irregular_1", "irregular_2", "irregular_3"):
+        run = noisy_truth(settings, name, dt, rig)
+        run = run.sel(time=slice(settings.runs[name].startup, None))
+        for stop in (115.0, 165.0):
+            model = spec.fit(run, states=STATES, inputs=["eta_kn_fwd", "eta_kn_cog"], stop=stop)
+            for start in np.linspace(175.0, 244.0, 5):
+                forecast = model.forecast(run, start=float(start), steps=480)
+                error = seakeep.metrics.nrmse(predicted=forecast, measured=run)
+                errors.append(float(error["heave"]))
+    # The issue's bound; 0.29 where this was written.
+    assert np.median(errors) <= 0.4

@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+
+from seakeep.tank.instruments import clock_instants
+from seakeep.tank.play import play_run
+from seakeep.tank.video import METRES_PER_PIXEL, PANEL, PANEL_HEIGHT, pixel_of, render_side_view
+
+cv2 = pytest.importorskip("cv2", reason="needs the extra video")
+pytest.importorskip("numba", reason="needs the extra tank")
+
+
+@pytest.fixture(scope="module")
+def played(settings, rig):
+    run = settings.runs["regular_2"].model_copy(update={"startup": 0.0, "duration": 14.0})
+    clocks = dict(settings.instruments.clocks)
+    clocks["video"] = clocks["video"].model_copy(update={"rate": 10.0})  # fewer frames to render
+    instruments = settings.instruments.model_copy(update={"clocks": clocks})
+    made = settings.model_copy(update={"runs": {"one": run}, "instruments": instruments})
+    return play_run(made, "one", rig)
+
+
+@pytest.fixture(scope="module")
+def video(played, tmp_path_factory):
+    path = tmp_path_factory.mktemp("video") / "side_view.mp4"
+    return render_side_view(played, path, np.random.default_rng(0), length=10.0)
+
+
+def frames(path, wanted):
+    reader = cv2.VideoCapture(str(path))
+    for index in range(int(reader.get(cv2.CAP_PROP_FRAME_COUNT))):
+        good, frame = reader.read()
+        assert good
+        if index in wanted:
+            yield index, frame
+    reader.release()
+
+
+def test_video_has_the_cameras_size_and_rate(video):
+    reader = cv2.VideoCapture(str(video))
+    assert reader.get(cv2.CAP_PROP_FRAME_WIDTH) == 1280
+    assert reader.get(cv2.CAP_PROP_FRAME_HEIGHT) == 720
+    assert reader.get(cv2.CAP_PROP_FPS) == pytest.approx(10.0)
+    assert reader.get(cv2.CAP_PROP_FRAME_COUNT) == 101
+    reader.release()
+
+
+def test_white_panel_is_where_the_vessel_is(video, played):
+    _, instants = clock_instants(played.settings.instruments.clocks["video"], 10.0)
+    position, _, _ = played.states(instants)
+    for index, frame in frames(video, {0, 40, 55, 70, 99}):
+        white = (frame.min(axis=2) > 150).astype(np.uint8)
+        count, _, stats, centres = cv2.connectedComponentsWithStats(white)
+        largest = 1 + np.argmax(stats[1:, cv2.CC_STAT_AREA])
+        assert count >= 2
+        surge, heave, pitch = position[:3, index]
+        centre = pixel_of(
+            surge + PANEL_HEIGHT * np.sin(pitch), 0.03 + heave + PANEL_HEIGHT * np.cos(pitch)
+        )
+        # The edge of a thresholded, compressed panel: a pixel is 2.5 mm.
+        assert centres[largest] == pytest.approx(centre, abs=1.5)
+        area = PANEL[0] * PANEL[1] / METRES_PER_PIXEL**2
+        assert stats[largest, cv2.CC_STAT_AREA] == pytest.approx(area, rel=0.08)
+
+
+def test_lamp_shows_the_trigger(video, played):
+    clock = played.settings.instruments.clocks["video"]
+    readings, _ = clock_instants(clock, 10.0)
+    lit = round((10.0 + clock.offset) * clock.rate)  # the pulse at 10 s of the reference clock
+    level = {i: f[30:50, 30:50, 2].mean() for i, f in frames(video, {lit, lit - 10, lit + 10})}
+    assert readings[lit] == pytest.approx(8.8, abs=0.05)
+    assert level[lit] > 2.5 * max(level[lit - 10], level[lit + 10])
+
+
+def test_missing_opencv_names_the_extra(monkeypatch):
+    import sys
+
+    from seakeep.errors import RequestError
+    from seakeep.tank.video import check_video
+
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    with pytest.raises(RequestError, match=r"pip install 'seakeep\[video\]'"):
+        check_video()
