@@ -80,7 +80,7 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
     labelled.check_run(run, name)
     labelled.check_step(run, name, model.dt)
     labelled.check_units(run, model.state_labels + model.input_labels, name)
-    time = np.asarray(run["time"].values, dtype=float)
+    time = np.asarray(run.variables["time"].values, dtype=float)
     at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
     needed = model.history_samples
     if at + 1 < needed:
@@ -119,7 +119,7 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
         labelled.check_finite(values[unread:], names, name, first + unread, time)
     instants = time[at + 1 : at + 1 + count]
     beyond = time[-1] + model.dt * np.arange(1, count - instants.size + 1)
-    attrs = dict(run["time"].attrs) or {"units": "s", "long_name": "time"}
+    attrs = dict(run.variables["time"].attrs) or {"units": "s", "long_name": "time"}
     return ForecastWindow(
         name=name,
         start=float(time[at]),

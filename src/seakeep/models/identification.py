@@ -127,7 +127,7 @@ def gather(
     for name, run in runs.items():
         if run is not first_run:
             labelled.check_step(run, name, dt)
-        time = np.asarray(run["time"].values, dtype=float)
+        time = np.asarray(run.variables["time"].values, dtype=float)
         last = last_sample(time, stops[name], name)
         place = training_window(last, window, state_delays, input_delays, history)
         _check_length(place, name, window, max(state_delays, input_delays), history)
