@@ -19,6 +19,7 @@ from seakeep.core import metrics
 from seakeep.core.rollout import rollout
 from seakeep.errors import DataError, SeakeepError
 from seakeep.models import HankelDMDc, HankelDMDcModel
+from seakeep.models.alignment import FittedAlignment
 from seakeep.models.fitted_ensemble import HankelEnsemble
 from seakeep.models.forecasting import cut_divergence
 from seakeep.models.summaries import STATISTICS, reduce_members
@@ -66,6 +67,8 @@ class Windows:
     ----------
     numbers : tuple of int
         Windows of the set.
+    places : tuple of (str, float)
+        Run and start of each, s.
     histories : ndarray, shape (window, history, N)
         States up to each start.
     inputs : ndarray, shape (window, history + steps − 1, Q)
@@ -75,13 +78,18 @@ class Windows:
     """
 
     numbers: tuple[int, ...]
+    places: tuple[tuple[str, float], ...]
     histories: FloatArray
     inputs: FloatArray
     measured: FloatArray
 
 
 def window_arrays(
-    plan: Plan, runs: Runs, windows: tuple[TestWindow, ...], numbers: tuple[int, ...]
+    plan: Plan,
+    runs: Runs,
+    windows: tuple[TestWindow, ...],
+    numbers: tuple[int, ...],
+    alignment: FittedAlignment | None = None,
 ) -> Windows:
     """Cut the windows of a test set out of the runs.
 
@@ -95,13 +103,15 @@ def window_arrays(
         The set.
     numbers : tuple of int
         Those of its windows that are wanted.
+    alignment : FittedAlignment, optional
+        Replaces the inputs by aligned ones; not one by predicted surge, which the forecast makes.
 
     Returns
     -------
     Windows
         In that order.
     """
-    histories, inputs, measured = [], [], []
+    histories, inputs, measured, places = [], [], [], []
     reach = plan.needs.history
     for number in numbers:
         window = windows[number]
@@ -114,9 +124,16 @@ def window_arrays(
             for names in (plan.states, plan.inputs)
         )
         histories.append(x[at - reach : at + 1])
-        inputs.append(u[at - reach : at + window.steps])
+        needed = slice(at - reach, at + window.steps)
+        if alignment is None or alignment.settings.surge == "predicted":
+            inputs.append(u[needed])
+        else:
+            inputs.append(alignment.aligned(run, list(plan.inputs), window.run, needed))
+        places.append((window.run, window.start))
         measured.append(x[at + 1 : at + 1 + window.steps])
-    return Windows(numbers, np.stack(histories), np.stack(inputs), np.stack(measured))
+    return Windows(
+        numbers, tuple(places), np.stack(histories), np.stack(inputs), np.stack(measured)
+    )
 
 
 def cell_name(model: str, training: int, test: str, window: int) -> str:
@@ -209,15 +226,15 @@ def compute(plan: Plan, runs: Runs, unit: Unit, write: Write) -> None:
         _eigenvalues(plan, fitted, unit, write)
         return
     groups = {
-        test: window_arrays(plan, runs, plan.tests[test], numbers)
+        test: window_arrays(plan, runs, plan.tests[test], numbers, fitted.alignment)
         for test in plan.tests
         if (numbers := _numbers(plan, unit.training, test))
     }
     if isinstance(fitted, HankelDMDcModel):
-        _single_cells(plan, fitted, unit, groups, write)
+        _single_cells(runs, fitted, unit, groups, write)
     else:
         spread = training_moments(plan, runs, training)[1]
-        _ensemble_cells(plan, fitted, unit, groups, spread, write)
+        _ensemble_cells(plan, runs, fitted, unit, groups, spread, write)
 
 
 def fit_training(
@@ -228,8 +245,14 @@ def fit_training(
     return plan.specs[model].fit(parts, list(plan.states), list(plan.inputs))
 
 
-def _forecast(model: HankelDMDcModel, windows: Windows) -> FloatArray:
+def _forecast(model: HankelDMDcModel, runs: Runs, windows: Windows) -> FloatArray:
     """Free runs over all windows, shape (window, steps, N), physical units."""
+    if model.alignment is not None and model.alignment.settings.surge == "predicted":
+        steps = windows.measured.shape[1]
+        forecasts = [model.forecast(runs[run], start, steps) for run, start in windows.places]
+        return np.stack(
+            [np.stack([each[n].values for n in model.states], axis=-1) for each in forecasts]
+        )
     at = windows.histories.shape[1]
     a, b = model.top
     inputs = windows.inputs[:, at - 1 - model.input_delays :]
@@ -258,10 +281,10 @@ def training_moments(plan: Plan, runs: Runs, training: TrainingSet) -> FloatArra
 
 
 def _single_cells(
-    plan: Plan, model: HankelDMDcModel, unit: Unit, groups: Mapping[str, Windows], write: Write
+    runs: Runs, model: HankelDMDcModel, unit: Unit, groups: Mapping[str, Windows], write: Write
 ) -> None:
     for test, windows in groups.items():
-        values = _forecast(model, windows)
+        values = _forecast(model, runs, windows)
         for row, number in enumerate(windows.numbers):
             name = cell_name(unit.model, unit.training, test, number)
             write(name, {"mean": values[row]})
@@ -277,6 +300,7 @@ def _batches(groups: Mapping[str, Windows]) -> list[tuple[list[str], Windows]]:
             tests,
             Windows(
                 tuple(n for test in tests for n in groups[test].numbers),
+                tuple(place for test in tests for place in groups[test].places),
                 np.concatenate([groups[test].histories for test in tests]),
                 np.concatenate([groups[test].inputs for test in tests]),
                 np.concatenate([groups[test].measured for test in tests]),
@@ -288,6 +312,7 @@ def _batches(groups: Mapping[str, Windows]) -> list[tuple[list[str], Windows]]:
 
 def _ensemble_cells(
     plan: Plan,
+    runs: Runs,
     ensemble: HankelEnsemble,
     unit: Unit,
     groups: Mapping[str, Windows],
@@ -300,7 +325,7 @@ def _ensemble_cells(
     for number in range(ensemble.n_members):
         member = ensemble.member(number)
         for tests, windows in batches:
-            values = _forecast(member, windows)
+            values = _forecast(member, runs, windows)
             edges = np.cumsum([len(groups[test].numbers) for test in tests])[:-1]
             for test, part in zip(tests, np.split(values, edges), strict=True):
                 series[test].append(part)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -154,11 +153,11 @@ def _play(folder: Path, preset: Preset, seed: int, progress: Progress | None) ->
     )
 
 
-def _telling(progress: Progress | None) -> Callable[[str, int, int], None] | None:
+def _telling(progress: Progress | None) -> Progress | None:
     if progress is None:
         return None
     tell = progress
-    return lambda name, done, total: tell(done, total, f"playing {name or 'the tank: done'}")
+    return lambda done, total, name: tell(done, total, f"playing {name}")
 
 
 def study_text(preset: Preset, size: Size, seed: int) -> str:
@@ -185,6 +184,7 @@ def study_text(preset: Preset, size: Size, seed: int) -> str:
         else ['scheme = "leave_out"', 'leave_out = "run"']
     )
     placement = "random" if paper else "apart"
+    alignment = ['alignment = { mode = "effective", surge = "measured" }'] if paper else []
     lines = [
         "# The paper's study on the virtual tank; written by `seakeep reproduce`.",
         "[study]",
@@ -201,10 +201,12 @@ def study_text(preset: Preset, size: Size, seed: int) -> str:
         "",
         "[models.deterministic]",
         'kind = "hankel_dmdc"',
+        *alignment,
         "",
         "[models.bayesian]",
         'kind = "bayesian_hankel_dmdc"',
         f"n_members = {size.members}",
+        *alignment,
         "",
     ]
     sets = {"irregular": ('waves = "irregular"', "irregular", 15)}
