@@ -143,7 +143,11 @@ class CellFolder:
             None where it is not finished, or damaged.
         """
         try:
-            with np.load(self._path(name), allow_pickle=False) as file:
+            # numpy leaves a damaged file open that it opened itself
+            with (
+                self._path(name).open("rb") as opened,
+                np.load(opened, allow_pickle=False) as file,
+            ):
                 arrays = {key: file[key] for key in file.files}
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
             return None

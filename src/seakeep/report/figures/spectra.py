@@ -39,7 +39,8 @@ def spectrum_figure(result: StudyResult) -> Figure:
         waves = {
             str(n): str(w) for n, w in zip(runs["run"].values, runs["waves"].values, strict=True)
         }
-        irregular = [name for name, kind in waves.items() if kind == "irregular"]
+        # Where no run is irregular the mean over all of them is drawn.
+        irregular = [name for name, kind in waves.items() if kind != "regular"] or list(waves)
         if "nominal" in result.groups:
             nominal = result.groups["nominal"]
             f = nominal["frequency"].values
@@ -55,7 +56,8 @@ def spectrum_figure(result: StudyResult) -> Figure:
         axes.set_xlim(0, 2.2 * peak)
         axes.set_ylim(bottom=0)
         axes.set(xlabel="frequency [Hz]", ylabel=f"{spectra.attrs['channel']} [m²/Hz]")
-        axes.legend(fontsize=8)
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(fontsize=8)
         return figure
 
 
