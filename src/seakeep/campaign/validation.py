@@ -16,7 +16,14 @@ from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.signals.expressions import parse
 
-__all__ = ["derivation_order", "read_settings", "sources_of", "validate"]
+__all__ = [
+    "derivation_order",
+    "mistakes_of",
+    "read_settings",
+    "read_toml",
+    "sources_of",
+    "validate",
+]
 
 
 def read_settings(path: Path) -> CampaignSettings:
@@ -37,29 +44,52 @@ def read_settings(path: Path) -> CampaignSettings:
     RequestError
         If the file is missing, is no TOML, or says something that a campaign cannot say.
     """
+    return validate(read_toml(path, "campaign", " Draft one with 'seakeep init FILE…'."), str(path))
+
+
+def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
+    """Read a TOML file, with a message for what people do wrong to one.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    what : str
+        What the messages call it: "campaign", "study".
+    mend : str, optional
+        A sentence with a leading space, added where the file does not exist.
+
+    Returns
+    -------
+    dict
+        What it says.
+
+    Raises
+    ------
+    RequestError
+        If the file is missing or no TOML.
+    """
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
         beside = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
         raise RequestError(
-            f"the campaign file {path} does not exist.{did_you_mean(path.name, beside)} "
-            "Draft one with 'seakeep init FILE…'."
+            f"the {what} file {path} does not exist.{did_you_mean(path.name, beside)}{mend}"
         ) from None
     except IsADirectoryError:
-        raise RequestError(f"{path} is a folder; give the campaign's TOML file in it.") from None
+        raise RequestError(f"{path} is a folder; give the {what}'s TOML file in it.") from None
     except UnicodeDecodeError as error:
         line = path.read_bytes()[: error.start].count(b"\n") + 1
         raise RequestError(
             f"{path}, line {line}: not UTF-8, which TOML asks for. Save the file as UTF-8."
         ) from None
     try:
-        received = tomllib.loads(text.replace("\r\n", "\n"))
+        return tomllib.loads(text.replace("\r\n", "\n"))
     except tomllib.TOMLDecodeError as error:
         raise RequestError(
             f"{path} is not valid TOML: {error}. Write texts in quotes, lists in [ ], "
             "one 'key = value' a line, and each table and key once."
         ) from None
-    return validate(received, str(path))
 
 
 def validate(received: Mapping[str, Any], name: str) -> CampaignSettings:
@@ -85,7 +115,7 @@ def validate(received: Mapping[str, Any], name: str) -> CampaignSettings:
     try:
         settings = CampaignSettings.model_validate(received)
     except ValidationError as error:
-        mistakes = _lines(error)
+        mistakes = mistakes_of(error, CampaignSettings)
     else:
         mistakes = list(_cross_checks(settings))
     if mistakes:
@@ -96,12 +126,26 @@ def validate(received: Mapping[str, Any], name: str) -> CampaignSettings:
     return settings
 
 
-def _lines(error: ValidationError) -> list[str]:
+def mistakes_of(error: ValidationError, root: type[BaseModel]) -> list[str]:
+    """Turn what pydantic refused into lines of our own: key, value received, mend.
+
+    Parameters
+    ----------
+    error : ValidationError
+        The refusal.
+    root : type
+        The table of the whole file.
+
+    Returns
+    -------
+    list of str
+        One line a mistake.
+    """
     lines: dict[str, None] = {}
     for item in error.errors(include_url=False):
         # Pydantic's own words in a place: '[key]' of a table, '<number>' for a branch of a union.
         place = [str(part) for part in item["loc"] if not str(part).startswith("<")]
-        table, description, depth = _place(place)
+        table, description, depth = _place(place, root)
         key = ".".join(p for p in place[:depth] if p != "[key]") or "the file"
         lines[f"{key}: {_reason(item, place, table, description)}"] = None
     return list(lines)
@@ -138,9 +182,9 @@ def _shown(value: object) -> str:
     return str(value)
 
 
-def _place(loc: list[str]) -> tuple[type[BaseModel] | None, str, int]:
+def _place(loc: list[str], root: type[BaseModel]) -> tuple[type[BaseModel] | None, str, int]:
     """Table in which the last key stands, that key's description, and how many keys count."""
-    table: type[BaseModel] | None = CampaignSettings
+    table: type[BaseModel] | None = root
     owner, description, annotation = table, "", None
     for depth, key in enumerate(loc):
         if table is not None:

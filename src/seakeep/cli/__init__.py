@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from seakeep.cli import campaigns, information, modelling, tank, tracking
+from seakeep.cli import study as studying
 from seakeep.cli.console import messages, tell_warnings
 from seakeep.errors import SeakeepError
 
@@ -54,6 +55,9 @@ app.command("prepare")(campaigns.prepare)
 app.command("fit")(modelling.fit)
 app.command("forecast")(modelling.forecast)
 app.command("compare")(modelling.compare)
+app.command("study")(studying.study)
+app.command("report")(studying.report)
+app.command("reproduce")(studying.reproduce)
 app.add_typer(campaigns.datasets, name="datasets")
 app.command("track")(tracking.track)
 app.command("info")(information.info)

@@ -7,15 +7,25 @@ from seakeep.study.comparison import (
     comparison_table,
     in_degrees,
 )
+from seakeep.study.run import run_study
+from seakeep.study.settings import Study, StudySettings, read_study
+from seakeep.study.store import StorageError, StudyResult, read_result
 from seakeep.study.workflow import build_spec, fit_campaign, training_runs
 
 __all__ = [
     "Comparison",
+    "StorageError",
+    "Study",
+    "StudyResult",
+    "StudySettings",
     "at_full_scale",
     "build_spec",
     "compare",
     "comparison_table",
     "fit_campaign",
     "in_degrees",
+    "read_result",
+    "read_study",
+    "run_study",
     "training_runs",
 ]

@@ -1,0 +1,163 @@
+"""``seakeep study``, ``reproduce`` and ``report``."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.table import Table
+
+from seakeep.campaign.prepare import Progress
+from seakeep.cli.console import messages, progress_bar, results
+from seakeep.errors import RequestError
+from seakeep.report.page import write_report
+from seakeep.report.study_tables import ReportTable, overview_table
+from seakeep.report.study_words import findings
+from seakeep.study import StudyResult, read_result, read_study, run_study
+from seakeep.study.reproduce import Size
+from seakeep.study.reproduce import reproduce as reproduce_study
+from seakeep.study.settings import Preset
+
+__all__ = ["report", "reproduce", "study"]
+
+Workers = Annotated[
+    int | None, typer.Option("--workers", help="Processes; by default one a core.", min=1)
+]
+
+
+def study(
+    study_file: Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml")],
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="Folder; by default named after the study file."),
+    ] = None,
+    workers: Workers = None,
+) -> None:
+    """Run a study: every training set, test window and model; then write its report.
+
+    A study that was stopped goes on where it stopped: run the same command again.
+
+    Example: seakeep study examples/ntnu_ship_section/study.toml -o ship-study
+    """
+    asked = read_study(study_file)
+    folder = out or study_file.parent / f"{study_file.stem}-results"
+    _run(folder, lambda tell: run_study(asked, folder, workers=_count(workers), progress=tell))
+
+
+def reproduce(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for everything.")] = Path(
+        "reproduction"
+    ),
+    quick: Annotated[
+        bool, typer.Option("--quick", help="All stages with small counts, in a minute.")
+    ] = False,
+    preset: Annotated[
+        str, typer.Option("--preset", help="paper, or recommended (our choices).")
+    ] = "paper",
+    seed: Annotated[
+        int, typer.Option("--seed", help="Of waves, noise, windows, draws.", min=0)
+    ] = 0,
+    workers: Workers = None,
+) -> None:
+    """Play the paper's whole study on the virtual tank; needs no data.
+
+    Virtual campaign, preparation, deterministic and Bayesian identification, validation in
+    irregular and regular waves, statistics, figures, tables and a report.
+
+    Example: seakeep reproduce --quick --out quick
+    """
+    if preset not in ("paper", "recommended"):
+        raise RequestError(f"--preset must be paper or recommended; received '{preset}'.")
+    chosen: Preset = "paper" if preset == "paper" else "recommended"
+    size = Size.quick() if quick else Size()
+    _run(
+        out,
+        lambda tell: reproduce_study(
+            out, chosen, size=size, seed=seed, workers=_count(workers), progress=tell
+        ),
+    )
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(help="Folder of a study's results.", metavar="DIR")],
+) -> None:
+    """Write the report of a finished study: one HTML file, figures, and tables.
+
+    Example: seakeep report reproduction
+    """
+    found = read_result(folder)
+    with _Progress("Report") as tell:
+        page = write_report(found, tell)
+    typer.echo(str(page))
+
+
+def _count(workers: int | None) -> int:
+    if workers is not None:
+        return workers
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class _Progress:
+    """Progress with the time that is left, also where it is printed line by line."""
+
+    def __init__(self, what: str) -> None:
+        self._bar = progress_bar(what)
+        self._begin: tuple[float, int] | None = None
+
+    def __enter__(self) -> Progress:
+        report = self._bar.__enter__()
+        if sys.stderr.isatty():
+            return report
+        return lambda done, total, name: report(done, total, name + self._left(done, total))
+
+    def __exit__(self, *error: object) -> None:
+        self._bar.__exit__(*error)  # type: ignore[arg-type]
+
+    def _left(self, done: int, total: int) -> str:
+        now = time.monotonic()
+        if self._begin is None or done <= self._begin[1]:
+            self._begin = (now, done)
+            return ""
+        seconds = (now - self._begin[0]) / (done - self._begin[1]) * (total - done)
+        if seconds < 1:
+            return ""
+        return (
+            f" (about {seconds:.0f} s left)"
+            if seconds < 90
+            else (f" (about {seconds / 60:.0f} min left)")
+        )
+
+
+def _run(folder: Path, work: Callable[[Progress], StudyResult]) -> None:
+    try:
+        with _Progress("Study") as tell:
+            found = work(tell)
+            page = write_report(found, tell)
+    except KeyboardInterrupt:
+        messages().print(
+            f"Stopped. All cells that were finished are kept in {folder}; the same command goes "
+            "on where it stopped.",
+            style="red",
+        )
+        raise
+    results().print(_rich(overview_table(found)))
+    for text in findings(found):
+        results().print(text, soft_wrap=True)
+    results().print(f"\nReport: {page}", soft_wrap=True)
+
+
+def _rich(table: ReportTable) -> Table:
+    out = Table(box=box.SIMPLE_HEAD, title=table.title, title_justify="left")
+    for number, heading in enumerate(table.columns):
+        out.add_column(heading, justify="right" if number in table.numeric else "left")
+    for number, row in enumerate(table.rows):
+        out.add_row(*row, style="bold" if number in table.averages else None)
+    return out

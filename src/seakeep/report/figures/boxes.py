@@ -1,0 +1,172 @@
+"""Box-violin plots of the error measures: box, whiskers to 1.5 IQR, violin, single values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.report.figures.common import (
+    HEADING,
+    model_colour,
+    model_words,
+    short_label,
+)
+from seakeep.report.style import figure_style, new_figure
+from seakeep.statistics import box_statistics
+from seakeep.study import StudyResult
+from seakeep.study.statistics import average_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["average_boxes", "channel_boxes", "draw_box_violin"]
+
+FloatArray = npt.NDArray[np.float64]
+
+JITTER = np.random.default_rng(7).uniform(-1, 1, 4096)
+"""Sideways places of the single values; the same in every figure."""
+
+
+def draw_box_violin(
+    axes: Any, values: npt.ArrayLike, place: float, width: float, colour: str
+) -> None:
+    """Draw one box-violin.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Where.
+    values : array_like
+        Numbers; those that are not finite are left out.
+    place, width : float
+        Centre and width, in the unit of the axis.
+    colour : str
+        Colour.
+    """
+    x = np.asarray(values, dtype=float).ravel()
+    x = x[np.isfinite(x)]
+    if x.size == 0:
+        return
+    if x.size > 2 and np.ptp(x) > 0:
+        violin = axes.violinplot([x], [place], widths=width, showextrema=False, points=120)
+        for body in violin["bodies"]:
+            body.set(facecolor=colour, edgecolor=colour, alpha=0.18, linewidth=0.6)
+    sideways = place + 0.16 * width * np.resize(JITTER, x.size)
+    axes.scatter(sideways, x, s=4, color=colour, alpha=0.35, linewidths=0, rasterized=True)
+    box = box_statistics(x)
+    half = 0.13 * width
+    axes.fill_between(
+        [place - half, place + half],
+        box.lower_quartile,
+        box.upper_quartile,
+        facecolor="white",
+        edgecolor=colour,
+        linewidth=1.0,
+        alpha=0.75,
+        zorder=3,
+    )
+    axes.plot([place - half, place + half], [box.median] * 2, color=colour, lw=1.8, zorder=4)
+    for quartile, whisker in (
+        (box.lower_quartile, box.lower_whisker),
+        (box.upper_quartile, box.upper_whisker),
+    ):
+        axes.plot([place, place], [quartile, whisker], color=colour, linewidth=0.9, zorder=3)
+        cap = [place - 0.6 * half, place + 0.6 * half]
+        axes.plot(cap, [whisker] * 2, color=colour, linewidth=0.9, zorder=3)
+
+
+def _cells(result: StudyResult, test: str, model: str, measure: str) -> FloatArray:
+    """Errors of all judged cells, shape (cell, channel)."""
+    data = result.tests[test]
+    cells: FloatArray = data[f"{model}_{measure}"].values[data["judged"].values]
+    return cells
+
+
+def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
+    """ANRMSE and NAMMAE of all cells of some test sets, a box-violin a model.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    tests : sequence of str
+        Test sets.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    with figure_style():
+        figure = new_figure(max(6.0, 2.0 + 1.7 * len(tests)), 3.6)
+        for axes, (measure, heading) in zip(figure.subplots(1, 2), HEADING.items(), strict=True):
+            for place, test in enumerate(tests):
+                for number, model in enumerate(result.models):
+                    values = average_of(_cells(result, test, model, measure))
+                    _draw_beside(axes, result, values, place, number, model)
+            _finish(axes, [result.label_of(test) for test in tests], heading)
+            axes.set_xlim(-0.6, len(tests) - 0.4)
+        _legend(figure, result)
+        return figure
+
+
+def channel_boxes(result: StudyResult, test: str) -> Figure:
+    """NRMSE and NAMMAE of all cells of a test set, channel by channel.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    test : str
+        The test set.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    with figure_style():
+        figure = new_figure(8.5, 5.6)
+        for axes, measure in zip(figure.subplots(2, 1, sharex=True), HEADING, strict=True):
+            tallest = 0.0
+            for number, model in enumerate(result.models):
+                cells = _cells(result, test, model, measure)
+                for place in range(cells.shape[1]):
+                    _draw_beside(axes, result, cells[:, place], place, number, model)
+                    column = cells[:, place][np.isfinite(cells[:, place])]
+                    if column.size:
+                        tallest = max(tallest, box_statistics(column).upper_whisker)
+            heading = "NRMSE" if measure == "nrmse" else "NAMMAE"
+            _finish(axes, [short_label(name) for name in result.channels], heading)
+            if tallest > 0 and axes.get_ylim()[1] > 3 * tallest:
+                axes.set_ylim(0, 1.15 * tallest)
+                axes.set_title("values above the axis are not shown", loc="right", fontsize=7)
+        axes.set_xlim(-0.6, len(result.channels) - 0.4)
+        _legend(figure, result)
+        return figure
+
+
+def _draw_beside(
+    axes: Any, result: StudyResult, values: FloatArray, place: int, number: int, model: str
+) -> None:
+    width = 0.84 / len(result.models)
+    centre = place + width * (number - 0.5 * (len(result.models) - 1))
+    draw_box_violin(axes, values, centre, 0.92 * width, model_colour(result, model))
+
+
+def _finish(axes: Any, labels: Sequence[str], heading: str) -> None:
+    axes.set_xticks(range(len(labels)), labels)
+    axes.set_ylabel(f"{heading} [measured SD]")
+    axes.set_ylim(bottom=0)
+    axes.grid(axis="x", visible=False)
+
+
+def _legend(figure: Figure, result: StudyResult) -> None:
+    from matplotlib.patches import Patch
+
+    handles = [
+        Patch(color=model_colour(result, model), label=model_words(model), alpha=0.6)
+        for model in result.models
+    ]
+    figure.legend(handles=handles, loc="outside upper right", ncols=len(handles))

@@ -1,0 +1,84 @@
+"""What the figures of a study share: colours of models, labels of channels, small helpers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.conventions import canonical_channel
+from seakeep.report.style import COLOURS, LINES
+from seakeep.study import StudyResult
+
+__all__ = ["HEADING", "grid_of_axes", "line_of", "model_colour", "model_words", "short_label"]
+
+FloatArray = npt.NDArray[np.float64]
+
+FURTHER = ("#CC79A7", "#E69F00", "#009E73", "#56B4E9")
+HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
+"""Names of the paper for the averages of the two measures over the channels."""
+
+
+def model_colour(result: StudyResult, model: str) -> str:
+    """Colour of a model: that of a forecast, of an ensemble, or one of its own beyond the first."""
+    kind = result.is_ensemble(model)
+    same = [name for name in result.models if result.is_ensemble(name) == kind]
+    place = same.index(model)
+    if place == 0:
+        return COLOURS["ensemble" if kind else "forecast"]
+    return FURTHER[(2 * (place - 1) + int(kind)) % len(FURTHER)]
+
+
+def line_of(result: StudyResult, model: str) -> dict[str, Any]:
+    """Line style of a model."""
+    key = "ensemble" if result.is_ensemble(model) else "forecast"
+    return {**LINES[key], "color": model_colour(result, model)}
+
+
+def model_words(model: str) -> str:
+    """Name of a model for legends.
+
+    Examples
+    --------
+    >>> model_words("bayesian")
+    'Bayesian'
+    """
+    return "Bayesian" if model == "bayesian" else model.replace("_", " ")
+
+
+def short_label(channel: str) -> str:
+    r"""Symbol of a channel for a crowded axis, else its name.
+
+    Examples
+    --------
+    >>> short_label("pitch_rate"), short_label("torque")
+    ('$\\dot{\\theta}$', 'torque')
+    """
+    known = canonical_channel(channel)
+    return f"${known.symbol}$" if known else channel.replace("_", " ")
+
+
+def grid_of_axes(figure: Any, count: int, columns: int) -> list[Any]:
+    """Axes in rows of `columns`, the empty places at the end taken away.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        The figure.
+    count : int
+        Axes wanted.
+    columns : int
+        Axes a row.
+
+    Returns
+    -------
+    list of matplotlib.axes.Axes
+        `count` of them.
+    """
+    rows = -(-count // columns)
+    axes: Sequence[Any] = list(figure.subplots(rows, columns, squeeze=False).ravel())
+    for spare in axes[count:]:
+        spare.remove()
+    return list(axes[:count])

@@ -1,0 +1,65 @@
+"""Eigenvalues of the models, in the complex plane and as frequency and decay."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from seakeep.report.figures.common import model_colour, model_words
+from seakeep.report.style import figure_style, new_figure
+from seakeep.study import StudyResult
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["eigenvalue_figure"]
+
+
+def eigenvalue_figure(result: StudyResult) -> Figure:
+    """Eigenvalues of each model of the first training set, of an ensemble all members'.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    with figure_style():
+        figure = new_figure(8.5, 3.9)
+        plane, decay = figure.subplots(1, 2)
+        circle = np.exp(1j * np.linspace(0, np.pi, 400))
+        plane.plot(circle.real, circle.imag, color="#56606B", linewidth=0.8)
+        order = sorted(result.models, key=lambda model: not result.is_ensemble(model))
+        for model in order:
+            data = result.groups[f"eigenvalues/{model}"]
+            values = (data["real"].values + 1j * data["imag"].values).ravel()
+            values = values[np.isfinite(values) & (values.imag >= 0)]
+            _draw(plane, decay, values, result, model)
+        plane.set_aspect("equal")
+        plane.set_ylim(0, 1.05)
+        plane.set(xlabel="real part", ylabel="imaginary part")
+        decay.axhline(1.0, color="#56606B", linewidth=0.8)
+        decay.set(xlabel="frequency [Hz]", ylabel="modulus")
+        decay.set_xlim(0, 3 / float(result.attrs["encounter_period"]))
+        decay.set_ylim(0.8, 1.01)
+        decay.legend(fontsize=7, loc="lower right", markerscale=2)
+        return figure
+
+
+def _draw(plane: Any, decay: Any, values: Any, result: StudyResult, model: str) -> None:
+    single = not result.is_ensemble(model)
+    style = {
+        "s": 9 if single else 3,
+        "color": model_colour(result, model),
+        "alpha": 0.9 if single else 0.12,
+        "linewidths": 0,
+        "rasterized": True,
+        "label": model_words(model),
+    }
+    plane.scatter(values.real, values.imag, **style)
+    frequency = np.angle(values) / (2 * np.pi * float(result.attrs["dt"]))
+    decay.scatter(frequency, np.abs(values), **style)

@@ -1,0 +1,106 @@
+"""Standardised time histories: measured, deterministic, and the ensemble's mean with its band."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from seakeep.report.figures.common import line_of, model_words, short_label
+from seakeep.report.style import LINES, figure_style, new_figure
+from seakeep.study import StudyResult
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["history_figure", "shown_cells"]
+
+
+def shown_cells(result: StudyResult) -> list[tuple[str, int, int]]:
+    """Cells that are drawn: test set, training set and window.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    list of (str, int, int)
+        Two windows of the first test set and one of each other, or as the settings say; each with
+        the first training set that may be tested on it.
+    """
+    count = int(result.settings["output"]["shown_windows"])
+    cells = []
+    for number, (name, test) in enumerate(result.tests.items()):
+        judged = test["judged"].values
+        total = judged.shape[1]
+        wanted = min(count if number == 0 else min(count, 1), total)
+        for place in np.linspace(0, total - 1, wanted).round():
+            window = int(place)
+            cells.append((name, int(np.argmax(judged[:, window])), window))
+    return cells
+
+
+def history_figure(result: StudyResult, test: str, training: int, window: int) -> Figure:
+    """All channels of one cell over time.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    test : str
+        Test set.
+    training, window : int
+        The cell.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Deviations from the training mean in training standard deviations, against time in
+        encounter periods.
+    """
+    with figure_style():
+        cell = result.tests[test].isel(training=training, window=window)
+        names = result.channels
+        figure = new_figure(7.5, 0.9 + 0.95 * len(names))
+        axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+        for each, name in zip(axes, names, strict=True):
+            _draw_channel(each, result, cell.sel(channel=name), name)
+        axes[-1].set_xlabel(r"time after the last measured state, in encounter periods")
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper right", ncols=len(handles))
+        run = str(cell["run"].values)
+        axes[0].set_title(
+            f"{run}, from {float(cell['start']):.1f} s; trained on {cell['training'].values}",
+            loc="left",
+            fontsize=8,
+        )
+        return figure
+
+
+def _draw_channel(axes: Any, result: StudyResult, cell: Any, name: str) -> None:
+    mean, spread = float(cell["training_mean"]), float(cell["training_std"])
+
+    def standard(key: str) -> Any:
+        return (cell[key].values - mean) / spread
+
+    time = cell["time"].values / float(result.attrs["encounter_period"])
+    level = 100 * float(result.settings["statistics"]["level"])
+    axes.plot(time, standard("measured"), label="measured", **LINES["measured"])
+    for model in result.models:
+        style = line_of(result, model)
+        if result.is_ensemble(model):
+            axes.fill_between(
+                time,
+                standard(f"{model}_lower"),
+                standard(f"{model}_upper"),
+                color=style["color"],
+                alpha=0.25,
+                linewidth=0,
+                label=f"{level:g} % band",
+            )
+        words = f"{model_words(model)} mean" if result.is_ensemble(model) else model_words(model)
+        axes.plot(time, standard(f"{model}_mean"), label=words, **style)
+    axes.set_ylabel(short_label(name), rotation=0, ha="right", va="center")
+    axes.margins(x=0.005)

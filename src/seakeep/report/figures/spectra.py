@@ -1,0 +1,94 @@
+"""Wave spectra: nominal, where it is known, and measured, as the paper and as recommended."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from seakeep.report.style import figure_style, new_figure
+from seakeep.study import StudyResult
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["spectrum_figure"]
+
+KINDS: dict[str, tuple[str, str, Any]] = {
+    "paper": ("measured, segments of 8.2 s (paper)", "#D55E00", (0, (4, 1.5))),
+    "recommended": ("measured, segments of 60 s", "#0072B2", "-"),
+}
+
+
+def spectrum_figure(result: StudyResult) -> Figure:
+    """Mean spectrum of the irregular runs, and the peaks of the regular ones.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study, with the group ``spectra``.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    with figure_style():
+        spectra, runs = result.groups["spectra"], result.groups["runs"]
+        figure = new_figure(6.5, 3.6)
+        axes = figure.subplots()
+        waves = {
+            str(n): str(w) for n, w in zip(runs["run"].values, runs["waves"].values, strict=True)
+        }
+        # Where no run is irregular the mean over all of them is drawn.
+        irregular = [name for name, kind in waves.items() if kind != "regular"] or list(waves)
+        if "nominal" in result.groups:
+            nominal = result.groups["nominal"]
+            f = nominal["frequency"].values
+            for name, dash in zip(nominal.data_vars, ("-", ":"), strict=False):
+                label = str(nominal[name].attrs.get("long_name", name))
+                axes.plot(f, nominal[name].values, label=label, color="black", linestyle=dash)
+        for kind, (words, colour, dash) in KINDS.items():
+            curves = _mean(spectra, irregular, kind)
+            if curves is not None:
+                axes.plot(*curves, label=words, color=colour, linestyle=dash)
+        _mark_regular(axes, spectra, [n for n, kind in waves.items() if kind == "regular"])
+        peak = max((_peak(spectra, n)[0] for n in waves), default=1.0)
+        axes.set_xlim(0, 2.2 * peak)
+        axes.set_ylim(bottom=0)
+        axes.set(xlabel="frequency [Hz]", ylabel=f"{spectra.attrs['channel']} [m²/Hz]")
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(fontsize=8)
+        return figure
+
+
+def _mean(spectra: Any, names: list[str], kind: str) -> Any:
+    known = [n for n in names if f"{n}_{kind}_density" in spectra]
+    if not known:
+        return None
+    frequency = spectra[f"{known[0]}_{kind}_frequency"].values
+    rows = [
+        np.interp(
+            frequency,
+            spectra[f"{n}_{kind}_frequency"].values,
+            spectra[f"{n}_{kind}_density"].values,
+        )
+        for n in known
+    ]
+    return frequency, np.mean(rows, axis=0)
+
+
+def _peak(spectra: Any, name: str) -> tuple[float, float]:
+    key = f"{name}_recommended"
+    if f"{key}_density" not in spectra:
+        return 0.0, 0.0
+    at = int(np.argmax(spectra[f"{key}_density"].values))
+    return float(spectra[f"{key}_frequency"].values[at]), float(
+        spectra[f"{key}_density"].values[at]
+    )
+
+
+def _mark_regular(axes: Any, spectra: Any, names: list[str]) -> None:
+    frequencies = sorted({round(_peak(spectra, name)[0], 3) for name in names} - {0.0})
+    for number, frequency in enumerate(frequencies):
+        label = "regular waves (peaks)" if number == 0 else None
+        axes.axvline(frequency, color="#009E73", linewidth=0.9, linestyle="--", label=label)

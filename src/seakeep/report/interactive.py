@@ -1,0 +1,123 @@
+"""Data of the time histories that the report shows interactively, packed small."""
+
+from __future__ import annotations
+
+import base64
+import json
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.conventions import canonical_channel, conversion
+from seakeep.report.figures.common import model_colour, model_words
+from seakeep.report.figures.histories import shown_cells
+from seakeep.study import StudyResult
+
+__all__ = ["history_data", "pack"]
+
+FloatArray = npt.NDArray[np.float64]
+
+MOST_MEMBERS = 40
+"""Members of a cell that are embedded; more cannot be told apart on a screen."""
+MISSING = 65535
+
+
+def pack(values: npt.ArrayLike) -> dict[str, Any]:
+    """Pack numbers as 16-bit integers between their bounds, base64; NaN has a code of its own.
+
+    Parameters
+    ----------
+    values : array_like
+        Numbers.
+
+    Returns
+    -------
+    dict
+        ``low``, ``high`` and ``data``; a step is 1/65534 of the range.
+
+    Examples
+    --------
+    >>> packed = pack([0.0, 1.0, float("nan")])
+    >>> packed["low"], packed["high"], packed["data"]
+    (0.0, 1.0, 'AAD+////')
+    """
+    x = np.asarray(values, dtype=float).ravel()
+    known = np.isfinite(x)
+    low, high = (float(f(x[known])) for f in (np.min, np.max)) if known.any() else (0.0, 1.0)
+    step = (high - low) / (MISSING - 1) or 1.0
+    codes = np.full(x.size, MISSING, dtype="<u2")
+    codes[known] = np.rint((x[known] - low) / step).astype("<u2")
+    return {"low": low, "high": high, "data": base64.b64encode(codes.tobytes()).decode()}
+
+
+def history_data(result: StudyResult) -> str:
+    """JSON of the cells that are shown, safe inside a script element.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    str
+        A list of cells: labels, time step, and for each channel the measurement and each model's
+        mean, band and members.
+    """
+    cells = [_cell(result, *place) for place in shown_cells(result)]
+    return json.dumps(cells, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _cell(result: StudyResult, test: str, training: int, window: int) -> dict[str, Any]:
+    data = result.tests[test]
+    cell = data.isel(training=training, window=window)
+    shown = data["shown"].values.tolist() if "shown" in data else []
+    row = shown.index(window) if window in shown else None
+    run, start = str(cell["run"].values), float(cell["start"])
+    return {
+        "label": f"{result.label_of(test)}: {run} from {start:.1f} s",
+        "note": f"Trained on {cell['training'].values}. Move over the plot for values.",
+        "step": float(result.attrs["dt"]),
+        "steps": int(cell.sizes["time"]),
+        "channels": [
+            _channel(result, cell, data, row, column, name)
+            for column, name in enumerate(result.channels)
+        ],
+    }
+
+
+def _channel(
+    result: StudyResult, cell: Any, data: Any, row: int | None, column: int, name: str
+) -> dict[str, Any]:
+    channels = result.groups["channels"].sel(name=name)
+    units = str(channels["units"].values)
+    factor, shown_units = 1.0, units
+    if units.split("/")[0] == "rad":
+        shown_units = units.replace("rad", "deg")
+        factor = conversion(units, shown_units)
+    known = canonical_channel(name)
+    models = []
+    for model in result.models:
+        ensemble = result.is_ensemble(model)
+        entry: dict[str, Any] = {
+            "name": model,
+            "label": f"{model_words(model)} mean" if ensemble else model_words(model),
+            "colour": model_colour(result, model),
+            "dash": [] if ensemble else [5, 3],
+            "mean": pack(factor * cell[f"{model}_mean"].values[:, column]),
+        }
+        if ensemble:
+            for bound in ("lower", "upper"):
+                entry[bound] = pack(factor * cell[f"{model}_{bound}"].values[:, column])
+            if row is not None and f"{model}_members" in data:
+                members = data[f"{model}_members"].values[row, :MOST_MEMBERS, :, column]
+                entry["members"] = pack(factor * members.astype(float))
+        models.append(entry)
+    return {
+        "name": name,
+        "label": known.long_name if known else name.replace("_", " "),
+        "unit": shown_units,
+        "measured": pack(factor * cell["measured"].values[:, column]),
+        "models": models,
+    }

@@ -1,0 +1,396 @@
+"""Tables of a study: as text cells, for the page, as CSV and as LaTeX."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from seakeep.conventions import canonical_channel
+from seakeep.files import replacing
+from seakeep.report.figures.common import HEADING, model_words
+from seakeep.report.published import JSD_MEAN, PUBLISHED
+from seakeep.study import StudyResult
+
+__all__ = [
+    "ReportTable",
+    "coverage_table",
+    "divergence_table",
+    "error_table",
+    "overview_table",
+    "trend_table",
+    "write_csv_table",
+    "write_latex_table",
+]
+
+MISSING = "–"
+
+
+@dataclass(frozen=True)
+class ReportTable:
+    """A table.
+
+    Parameters
+    ----------
+    name : str
+        Name of its files.
+    title : str
+        Caption.
+    columns : tuple of str
+        Headings.
+    rows : tuple of tuple of str
+        Cells.
+    note : str
+        What a reader must know about it.
+    numeric : tuple of int
+        Columns of numbers.
+    elsewhere : tuple of int
+        Columns that come from another data set.
+    averages : tuple of int
+        Rows that are averages of others.
+    """
+
+    name: str
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+    numeric: tuple[int, ...] = ()
+    elsewhere: tuple[int, ...] = ()
+    averages: tuple[int, ...] = ()
+
+
+def _number(value: float, digits: int = 3) -> str:
+    return f"{value:.{digits}f}" if np.isfinite(value) else MISSING
+
+
+def channel_words(name: str) -> str:
+    """Name of a channel for a table."""
+    known = canonical_channel(name)
+    return known.long_name if known else name.replace("_", " ")
+
+
+def error_table(result: StudyResult, test: str) -> ReportTable:
+    """Medians and inter-quartile ranges of both measures, average and per channel.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    test : str
+        Test set.
+
+    Returns
+    -------
+    ReportTable
+    """
+    boxes = result.groups[f"statistics/boxes/{test}"]
+    columns = ["channel"]
+    for measure in HEADING:
+        name = "NRMSE" if measure == "nrmse" else "NAMMAE"
+        columns += [f"{name} {model_words(model)}: median [IQR]" for model in result.models]
+    rows, left_out = [], 0
+    names = [str(name) for name in boxes["channel"].values]
+    for name in [*names[1:], names[0]]:
+        row = ["average" if name == "average" else channel_words(name)]
+        for measure in HEADING:
+            for model in result.models:
+                at = boxes.sel(model=model, measure=measure, channel=name)
+                spread = float(at["upper_quartile"] - at["lower_quartile"])
+                row.append(f"{_number(float(at['median']))} [{_number(spread)}]")
+                left_out += int(at["left_out"]) if measure == "nrmse" else 0
+        rows.append(tuple(row))
+    judged = int(result.tests[test]["judged"].sum())
+    note = (
+        f"Over {judged} cells (training set × test window). Errors in measured standard deviations "
+        "of the window, k = 1. The average row is the paper's ANRMSE and NAMMAE: the average of "
+        "each cell over its channels, then the median over the cells."
+    )
+    if left_out:
+        note += (
+            f" {left_out} values were left out: a channel whose measured SD is below 1 % of its "
+            "training SD (a slack line) is not judged, nor is a forecast that diverged."
+        )
+    return ReportTable(
+        f"errors_{test}",
+        f"ANRMSE and NAMMAE, {result.label_of(test)}",
+        tuple(columns),
+        tuple(rows),
+        note + conditional(result),
+        tuple(range(1, len(columns))),
+        averages=(len(rows) - 1,),
+    )
+
+
+def overview_table(result: StudyResult) -> ReportTable:
+    """Both measures of each model in each test set, averages over the channels.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    ReportTable
+    """
+    rows = []
+    for test in result.tests:
+        boxes = result.groups[f"statistics/boxes/{test}"].sel(channel="average")
+        for model in result.models:
+            row = [result.label_of(test), model_words(model)]
+            for measure in HEADING:
+                at = boxes.sel(model=model, measure=measure)
+                spread = float(at["upper_quartile"] - at["lower_quartile"])
+                row += [_number(float(at["median"])), _number(spread)]
+            count = boxes.sel(model=model, measure="nrmse")["count"]
+            rows.append((*row, str(int(count))))
+    heads = [f"{words} {k}" for words in HEADING.values() for k in ("median", "IQR")]
+    return ReportTable(
+        "overview",
+        "ANRMSE and NAMMAE",
+        ("test set", "model", *heads, "cells"),
+        tuple(rows),
+        "Medians and inter-quartile ranges over all cells (training set × test window) of the "
+        "average over the channels that are judged; in measured standard deviations."
+        + conditional(result),
+        (2, 3, 4, 5, 6),
+    )
+
+
+def conditional(result: StudyResult) -> str:
+    """Sentence for tables whose forecasts read a measured output after the start."""
+    words = str(result.attrs.get("conditional_on", ""))
+    return f" Conditional on measured {words}." if words else ""
+
+
+def divergence_table(result: StudyResult, model: str, variant: str) -> ReportTable:
+    """Jensen–Shannon divergence of all channels beside its noise floor and the paper's.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    model : str
+        The model.
+    variant : {"paper", "recommended"}
+        Settings of the bootstrap.
+
+    Returns
+    -------
+    ReportTable
+    """
+    data = result.groups["statistics/divergence"]
+    at = data.sel(model=model, variant=variant)
+    numbers = ("mean", "lower", "upper", "uncertainty", "noise_floor")
+    comparable = result.is_ensemble(model)
+    rows = []
+    for name in result.channels:
+        one = at.sel(channel=name)
+        row = [channel_words(name), *(_number(float(one[key]), 4) for key in numbers)]
+        row.append(str(int(one["block_length"])) if np.isfinite(one["block_length"]) else MISSING)
+        rows.append((*row, PUBLISHED.get(name, MISSING)) if comparable else tuple(row))
+    means = [_number(float(at[key].mean()), 4) for key in numbers]
+    rows.append(("average", *means, "", *((JSD_MEAN,) if comparable else ())))
+    columns = ("channel", "EV", "q0.025", "q0.975", "U", "noise floor", "block (samples)")
+    test = result.label_of(str(data.attrs["test"]))
+    how = "blocks may cross joins, block length and bandwidth as printed in the paper"
+    if variant == "recommended":
+        how = "no block crosses a join, Politis–White blocks, Silverman's bandwidth"
+    return ReportTable(
+        f"jsd_{model}_{variant}",
+        f"Divergence of the densities, {model_words(model)}, {test}: {variant} variant",
+        (*columns, "paper: EV, another data set") if comparable else columns,
+        tuple(rows),
+        f"Nats, 0 to ln 2; {how}. The noise floor is the divergence of the measurement from "
+        "itself under two independent bootstraps: what a record of this length cannot tell from "
+        "none." + conditional(result),
+        tuple(range(1, len(columns) + int(comparable))),
+        elsewhere=(len(columns),) if comparable else (),
+        averages=(len(rows) - 1,),
+    )
+
+
+def coverage_table(result: StudyResult, model: str) -> ReportTable:
+    """Coverage and width of the band of an ensemble, each test set, each channel.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    model : str
+        An ensemble.
+
+    Returns
+    -------
+    ReportTable
+    """
+    columns = ["channel"]
+    tables = {test: result.groups[f"statistics/coverage/{test}"].sel(model=model)
+              for test in result.tests}  # fmt: skip
+    for test, data in tables.items():
+        for side in data["against"].values:
+            columns.append(f"{result.label_of(test)}: inside, {side}")
+        columns.append(f"{result.label_of(test)}: width [SD]")
+    names = [*result.channels, "average"]
+    rows = []
+    for name in names:
+        row = ["average" if name == "average" else channel_words(name)]
+        for data in tables.values():
+            at = data.sel(channel=name)
+            row += [_number(float(v), 2) for v in at["inside"].values]
+            row.append(_number(float(at["relative_width"].sel(against="measured")), 2))
+        rows.append(tuple(row))
+    level = float(result.settings["statistics"]["level"])
+    note = (
+        f"Part of the instants inside the band of nominally {level:g} (quantiles of the members), "
+        "and its mean width in measured SD; means over all cells."
+    )
+    if any("truth" in data["against"].values for data in tables.values()):
+        note += " The truth is the virtual tank's, without noise or slap; rates are not filtered."
+    return ReportTable(
+        f"coverage_{model}",
+        f"Coverage of the {100 * level:g} % band, {model_words(model)}",
+        tuple(columns),
+        tuple(rows),
+        note + conditional(result),
+        tuple(range(1, len(columns))),
+        averages=(len(rows) - 1,),
+    )
+
+
+def trend_table(result: StudyResult) -> ReportTable:
+    """Trend of ε(t) for each test set and model.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    ReportTable
+    """
+    rows = []
+    for test in result.tests:
+        data: xr.Dataset = result.groups[f"statistics/trend/{test}"]
+        for model in result.models:
+            at = data.sel(model=model)
+            mean = float(at["error_mean"].mean())
+            rows.append(
+                (
+                    result.label_of(test),
+                    model_words(model),
+                    _number(mean),
+                    _number(float(at["change"])),
+                    f"{_number(float(at['slope']), 4)} [{_number(float(at['lower']), 4)}, "
+                    f"{_number(float(at['upper']), 4)}]",
+                    _number(float(at["kendall_tau"]), 2),
+                    _number(float(at["p_value"])),
+                )
+            )
+    return ReportTable(
+        "trend",
+        "Trend of ε(t)",
+        (
+            "test set", "model", "mean ε", "change over the window", "slope [1/s] with 95 %",
+            "Kendall's τ", "p",
+        ),
+        tuple(rows),
+        "Block-bootstrap Mann–Kendall test of ε(t) averaged over all cells. A p below 0.05 says "
+        "that the error changes with the age of the forecast; blocks break some of the "
+        "dependence, so slow series are called trends too often (10 to 15 %)."
+        + conditional(result),
+        (2, 3, 4, 5, 6),
+    )  # fmt: skip
+
+
+def write_csv_table(table: ReportTable, path: Path) -> Path:
+    """Write a table as CSV (UTF-8).
+
+    Parameters
+    ----------
+    table : ReportTable
+        The table.
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Path
+        The file.
+    """
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(table.columns)
+    writer.writerows(table.rows)
+    with replacing(path) as temporary:
+        temporary.write_text(buffer.getvalue(), encoding="utf-8")
+    return path
+
+
+_LATEX = {
+    "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
+    "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
+    "–": "--", "×": r"$\times$", "λ": r"$\lambda$", "ε": r"$\varepsilon$", "τ": r"$\tau$",
+    "−": r"$-$", "η": r"$\eta$", "≥": r"$\ge$", "²": r"$^2$", "±": r"$\pm$", "°": r"$^\circ$",
+    "→": r"$\to$", "σ": r"$\sigma$", "Δ": r"$\Delta$", "√": r"$\surd$", "π": r"$\pi$",
+    "T̂": r"$\hat T$", "τ̂": r"$\hat\tau$",
+}  # fmt: skip
+
+
+def latex_text(text: str) -> str:
+    r"""Text that LaTeX prints as it stands.
+
+    Examples
+    --------
+    >>> latex_text("50 % of λ_max")
+    '50 \\% of $\\lambda$\\_max'
+    """
+    text = text.replace("T̂", "\0")
+    return "".join(_LATEX.get(each, each) for each in text).replace("\0", r"$\hat T$")
+
+
+def write_latex_table(table: ReportTable, path: Path) -> Path:
+    r"""Write a table as LaTeX with booktabs rules.
+
+    Parameters
+    ----------
+    table : ReportTable
+        The table.
+    path : Path
+        The file; ``\input`` it where ``booktabs`` is loaded.
+
+    Returns
+    -------
+    Path
+        The file.
+    """
+    form = "".join("r" if k in table.numeric else "l" for k in range(len(table.columns)))
+
+    def line(cells: Sequence[str]) -> str:
+        return " & ".join(map(latex_text, cells)) + r" \\"
+
+    lines = [
+        r"\begin{table}",
+        r"\centering",
+        rf"\caption{{{latex_text(table.title)}. {latex_text(table.note)}}}",
+        rf"\label{{tab:{table.name}}}",
+        rf"\begin{{tabular}}{{{form}}}",
+        r"\toprule",
+        line(table.columns),
+        r"\midrule",
+    ]
+    for number, row in enumerate(table.rows):
+        if number in table.averages:
+            lines.append(r"\midrule")
+        lines.append(line(row))
+    lines += [r"\bottomrule", r"\end{tabular}", r"\end{table}", ""]
+    with replacing(path) as temporary:
+        temporary.write_text("\n".join(lines), encoding="utf-8")
+    return path

@@ -1,0 +1,207 @@
+"""What a study was made of: channels with their signs, runs with their quality, spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from seakeep.campaign import Campaign
+from seakeep.conventions import canonical_channel
+from seakeep.errors import RequestError
+from seakeep.signals import significant_height, wave_spectrum
+from seakeep.study.plan import Plan
+from seakeep.study.settings import Study
+
+__all__ = ["describe_study"]
+
+Runs = Mapping[str, xr.Dataset]
+
+POSITIVE = {
+    "surge": "along the waves, from the place at rest",
+    "sway": "to port, right-handed with x and z",
+    "heave": "upwards",
+    "roll": "right-handed about x",
+    "pitch": "bow up (the bow points against the waves)",
+    "yaw": "right-handed about z",
+}
+SLACK = 1e-3
+"""A load below this part of its largest value counts as slack."""
+LONGEST_SEGMENT = 60.0
+"""s, of the recommended Welch segments; half of them overlaps."""
+PAPER_SEGMENT, PAPER_OVERLAP, PAPER_PADDED = 2**12 / 500, 2**7 / 500, 2**16 / 500
+"""s, of the paper's Welch settings, which it states in samples at 500 Hz."""
+
+
+def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset]:
+    """Say what went into a study.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    plan : Plan
+        Its windows.
+    runs : mapping of str to Dataset
+        Prepared runs.
+
+    Returns
+    -------
+    dict of str to Dataset
+        ``channels``, ``training``, ``runs`` and, where there is a wave elevation among the
+        inputs, ``spectra``.
+    """
+    groups = {
+        "channels": _channels(study.campaign, plan, runs),
+        "training": _training(plan),
+        "runs": _runs(plan, runs),
+    }
+    spectra = _spectra(plan, runs)
+    return {**groups, **({"spectra": spectra} if spectra is not None else {})}
+
+
+def _channels(campaign: Campaign, plan: Plan, runs: Runs) -> xr.Dataset:
+    first = next(iter(runs.values()))
+    names = [*plan.states, *plan.inputs]
+    rows: dict[str, list[str]] = {
+        key: [] for key in ("units", "long_name", "symbol", "source", "positive", "use")
+    }
+    for name in names:
+        canonical = canonical_channel(name)
+        rows["units"].append(str(first[name].attrs.get("units", "")))
+        rows["long_name"].append(str(first[name].attrs.get("long_name", name)))
+        rows["symbol"].append(canonical.symbol if canonical else "")
+        rows["source"].append(_source(campaign, name))
+        rows["positive"].append(_positive(name))
+        rows["use"].append("state" if name in plan.states else "input")
+    variables = {key: ("name", np.array(values, dtype=object)) for key, values in rows.items()}
+    return xr.Dataset(
+        {**variables, "channel": ("channel", np.array(plan.states, dtype=object))},
+        coords={"name": names},
+        attrs={"frame": campaign.settings.rig.frame or ""},
+    )
+
+
+def _source(campaign: Campaign, name: str) -> str:
+    """Where a channel comes from, with its sign and offset."""
+    settings = campaign.settings
+    if name in settings.channels:
+        each = settings.channels[name]
+        sign = "−" if each.sign < 0 else ""
+        offset = f" + {each.offset:g}" if each.offset else ""
+        unit = f" [{each.unit}]" if each.unit else ""
+        return f"{sign}column {each.column or name}{unit}{offset}"
+    made = settings.derived.get(name)
+    if made is None:
+        return ""
+    if made.expression is not None:
+        return made.expression
+    return f"{made.step} of {made.source}".replace("_", " ")
+
+
+def _positive(name: str) -> str:
+    for motion, words in POSITIVE.items():
+        if name == motion or name.startswith(motion + "_"):
+            return words
+    if name.startswith("eta_"):
+        return "above still water"
+    return "tension" if name.startswith("mooring_") else "as measured"
+
+
+def _training(plan: Plan) -> xr.Dataset:
+    spans = [
+        ", ".join(f"{run} {begin:.4g} to {stop:.4g} s" for run, begin, stop in each.spans)
+        for each in plan.training
+    ]
+    single = all(len(each.spans) == 1 for each in plan.training)
+    out = xr.Dataset(
+        {
+            "spans": ("training", np.array(spans, dtype=object)),
+            "left_out": (
+                "training",
+                np.array([", ".join(each.left_out) for each in plan.training], dtype=object),
+            ),
+        },
+        coords={"training": [each.name for each in plan.training]},
+    )
+    if single:
+        out["run"] = ("training", np.array([e.spans[0][0] for e in plan.training], dtype=object))
+        out["stop"] = ("training", np.array([e.spans[0][2] for e in plan.training]))
+    return out
+
+
+def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
+    """Data quality, run by run and channel by channel."""
+    names = [*plan.states, *plan.inputs]
+    numbers = ("mean", "sd", "min", "max", "constant", "slack")
+    values = np.full((len(numbers), len(runs), len(names)), np.nan)
+    for r, run in enumerate(runs.values()):
+        for c, name in enumerate(names):
+            x = run[name].values
+            # A sample equal to both neighbours: a frozen sensor, or a limit that clips.
+            same = (np.diff(x)[1:] == 0) & (np.diff(x)[:-1] == 0)
+            slack = np.mean(x <= SLACK * np.max(x)) if name.startswith("mooring") else np.nan
+            spread = x.std(ddof=1)
+            values[:, r, c] = x.mean(), spread, x.min(), x.max(), same.mean(), slack
+    words: dict[str, Any] = {
+        key: ("run", np.array([str(run.attrs.get(key, "")) for run in runs.values()], dtype=object))
+        for key in ("sea_state", "waves", "role", "file_sha256")
+    }
+    spans = {
+        key: ("run", np.array([_span(run, key) for run in runs.values()], dtype=object))
+        for key in ("train_span", "test_span")
+    }
+    return xr.Dataset(
+        {
+            **{n: (("run", "name"), values[i]) for i, n in enumerate(numbers)},
+            **words,
+            **spans,
+            "duration": (
+                "run",
+                np.array(
+                    [float(r["time"].values[-1] - r["time"].values[0]) for r in runs.values()]
+                ),
+            ),
+            "samples": ("run", np.array([r.sizes["time"] for r in runs.values()])),
+        },
+        coords={"run": list(runs), "name": names},
+    )
+
+
+def _span(run: xr.Dataset, key: str) -> str:
+    span = run.attrs.get(key)
+    return "" if span is None else f"{float(span[0]):.4g} to {float(span[1]):.4g} s"
+
+
+def _spectra(plan: Plan, runs: Runs) -> xr.Dataset | None:
+    """Spectra of the first wave elevation in all runs, as the paper and as recommended."""
+    waves = [name for name in plan.inputs if name.startswith("eta_")]
+    if not waves:
+        return None
+    variables: dict[str, Any] = {}
+    heights = []
+    for run_name, run in runs.items():
+        spans = [run.attrs[k] for k in ("train_span", "test_span") if k in run.attrs]
+        begin = min((float(s[0]) for s in spans), default=float(run["time"].values[0]))
+        x = run[waves[0]].sel(time=slice(begin - 1e-6, None)).values
+        heights.append(significant_height(x))
+        for kind in ("paper", "recommended"):
+            segment, overlap, padded = _welch(kind, x.size, plan.dt)
+            try:
+                frequency, density = wave_spectrum(x, plan.dt, segment, overlap, padded)
+            except RequestError:  # a record shorter than one segment
+                continue
+            variables[f"{run_name}_{kind}_frequency"] = (f"{run_name}_{kind}", frequency)
+            variables[f"{run_name}_{kind}_density"] = (f"{run_name}_{kind}", density)
+    variables["significant_height"] = ("run", np.array(heights))
+    return xr.Dataset(variables, coords={"run": list(runs)}, attrs={"channel": waves[0]})
+
+
+def _welch(kind: str, samples: int, dt: float) -> tuple[int, int, int | None]:
+    if kind == "paper":
+        segment = round(PAPER_SEGMENT / dt)
+        return segment, round(PAPER_OVERLAP / dt), round(PAPER_PADDED / dt)
+    segment = min(samples, round(LONGEST_SEGMENT / dt))
+    return segment, segment // 2, None

@@ -1,0 +1,331 @@
+"""What a study file may say: models, training and test windows, statistics; frozen and validated.
+
+A study is a campaign and a few choices. All that it leaves out is the paper's: ten training
+windows drawn from the first halves, ten test windows of 15 encounter periods from the second, the
+deterministic model and the ensemble, all of them with the same windows and the same draws.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError, model_validator
+
+from seakeep.campaign import Campaign, read_campaign
+from seakeep.campaign.readers import checksum, expand
+from seakeep.campaign.settings import ModelSettings, Names, Positive, Table
+from seakeep.campaign.validation import mistakes_of, read_toml
+from seakeep.errors import RequestError, did_you_mean
+
+__all__ = [
+    "Study",
+    "StudyModelSettings",
+    "StudySettings",
+    "TestSetSettings",
+    "TrainingSettings",
+    "read_study",
+]
+
+FORMAT = 1
+"""Goes into the digest: raise it when the same settings begin to give other arrays."""
+
+Preset = Literal["paper", "recommended"]
+Placement = Literal["random", "apart"]
+Count = Annotated[int, Field(ge=1)]
+
+
+class GeneralStudySettings(Table):
+    """``[study]``: which campaign, which channels, which preset, which seed."""
+
+    campaign: str = Field(description="the campaign file, relative to the study file")
+    name: str = Field(default="", description="a name for titles and tables")
+    description: str = Field(default="", description="free text")
+    model: str | None = Field(
+        default=None, description="key of the campaign's [models.NAME] whose channels are used"
+    )
+    states: Names = Field(default=(), description="list of channels that the models forecast")
+    inputs: Names = Field(default=(), description="list of channels that drive the models")
+    preset: Preset = Field(
+        default="paper", description="'paper' or 'recommended', for models that state no other"
+    )
+    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="an integer, 0 or more")
+    truth: str | None = Field(
+        default=None, description="folder of RUN.nc with the true channels (the virtual tank's)"
+    )
+
+
+class StudyModelSettings(ModelSettings):
+    """``[models.NAME]`` of a study: as in a campaign, with the study's channels and preset."""
+
+    states: Names = Field(default=(), description="left out: the study's")
+    inputs: Names = Field(default=(), description="left out: the study's")
+
+
+class TrainingSettings(Table):
+    """``[training]``: what the models learn from."""
+
+    scheme: Literal["halves", "pooled", "leave_out"] = Field(
+        default="halves",
+        description="'halves' (windows of the training spans), 'pooled' (all training spans at "
+        "once) or 'leave_out' (all runs but those that test)",
+    )
+    runs: Names = Field(default=(), description="list of runs; left out, the training runs")
+    leave_out: Literal["run", "sea_state"] = Field(
+        default="run", description="'run', or 'sea_state': all runs of one sea state at once"
+    )
+    windows: Count | None = Field(
+        default=10, description="number of training windows; for 'halves' alone"
+    )
+    placement: Placement = Field(
+        default="random", description="'random' as in the paper, or 'apart': without overlap"
+    )
+
+    @model_validator(mode="after")
+    def _keys_fit_scheme(self) -> TrainingSettings:
+        stated = self.model_fields_set
+        if self.scheme != "halves" and (extra := stated & {"windows", "placement"}):
+            raise ValueError(
+                f"{sorted(extra)[0]!r} belongs to scheme = 'halves', and '{self.scheme}' takes the "
+                "whole spans; remove it"
+            )
+        if self.scheme != "leave_out" and "leave_out" in stated:
+            raise ValueError("'leave_out' belongs to scheme = 'leave_out'; remove it")
+        return self
+
+
+class TestSetSettings(Table):
+    """``[tests.NAME]``: windows that are forecast and judged."""
+
+    __test__ = False  # no class of tests, whatever pytest takes its name for
+
+    runs: Names = Field(default=(), description="list of runs; left out, the test runs")
+    waves: Literal["regular", "irregular"] | None = Field(
+        default=None, description="'regular' or 'irregular': only such runs"
+    )
+    windows: Count | None = Field(
+        default=10, description="number of test windows; with placement = 'apart' at most"
+    )
+    length: Positive = Field(default=15.0, description="length of a window in encounter periods")
+    placement: Placement = Field(
+        default="random", description="'random' as in the paper, or 'apart': without overlap"
+    )
+    startup: Annotated[float, Field(ge=0, allow_inf_nan=False)] = Field(
+        default=0.0, description="seconds cut off the beginning of each test span"
+    )
+    label: str = Field(default="", description="words for titles")
+
+
+class StatisticsSettings(Table):
+    """``[statistics]``: bootstrap and bands."""
+
+    n_series: Annotated[int, Field(ge=2)] = Field(
+        default=100, description="number of bootstrapped series"
+    )
+    level: Annotated[float, Field(gt=0, lt=1)] = Field(
+        default=0.95, description="probability of the band, such as 0.95"
+    )
+    densities_of: str | None = Field(
+        default=None, description="the test set whose densities are compared; left out, the first"
+    )
+
+
+class OutputSettings(Table):
+    """``[output]``: what is kept beside the arrays that are judged."""
+
+    shown_windows: Annotated[int, Field(ge=0)] = Field(
+        default=2, description="windows of the first test set whose members are kept for figures"
+    )
+    eigenvalues: bool = Field(default=True, description="true or false")
+
+
+def _default_models() -> dict[str, StudyModelSettings]:
+    return {
+        "deterministic": StudyModelSettings(kind="hankel_dmdc"),
+        "bayesian": StudyModelSettings(kind="bayesian_hankel_dmdc"),
+    }
+
+
+class StudySettings(Table):
+    """A whole study file."""
+
+    study: GeneralStudySettings
+    models: dict[str, StudyModelSettings] = Field(default_factory=_default_models, min_length=1)
+    training: TrainingSettings = TrainingSettings()
+    tests: dict[str, TestSetSettings] = Field(
+        default_factory=lambda: {"irregular": TestSetSettings(waves="irregular")}, min_length=1
+    )
+    statistics: StatisticsSettings = StatisticsSettings()
+    output: OutputSettings = OutputSettings()
+
+    @model_validator(mode="after")
+    def _names(self) -> StudySettings:
+        wanted = self.statistics.densities_of
+        if wanted is not None and wanted not in self.tests:
+            raise ValueError(
+                f"statistics.densities_of = {wanted!r} is no table of [tests]; choose one of "
+                f"{', '.join(self.tests)}"
+            )
+        for group in (self.models, self.tests):
+            for name in group:
+                if not name.replace("_", "").replace("-", "").isalnum() or not name.isascii():
+                    raise ValueError(
+                        f"the name {name!r} is made of more than letters, digits, '_' and '-', "
+                        "and files are named after it; rename it"
+                    )
+        return self
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study: its settings and the campaign that it is about.
+
+    Made by :func:`read_study`.
+
+    Parameters
+    ----------
+    path : Path
+        The study file; paths in it are relative to its folder.
+    settings : StudySettings
+        What it says.
+    campaign : Campaign
+        The campaign; its runs are not read yet.
+    """
+
+    path: Path
+    settings: StudySettings
+    campaign: Campaign
+
+    @property
+    def name(self) -> str:
+        """Name of the study; the campaign's where it states none."""
+        return self.settings.study.name or self.campaign.name
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Channels that the models forecast."""
+        stated = self.settings.study.states
+        return stated or self.campaign.model(self.settings.study.model).states
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Channels that drive the models."""
+        stated = self.settings.study
+        return stated.inputs if stated.states else self.campaign.model(stated.model).inputs
+
+    @property
+    def truth_folder(self) -> Path | None:
+        """Folder of the true channels, where there is one."""
+        stated = self.settings.study.truth
+        return None if stated is None else expand(stated, self.path.parent)
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all on which the results depend: settings, campaign, and the raw files."""
+        content = self.settings.model_dump(mode="json")
+        for key in ("name", "description", "campaign", "truth", "model"):
+            del content["study"][key]
+        for each in content["tests"].values():
+            del each["label"]
+        content["channels"] = [list(self.states), list(self.inputs)]
+        content["campaign"] = self.campaign.digest
+        content["files"] = {n: checksum(self.campaign.file_of(n)) for n in self.campaign.runs}
+        content["format"] = FORMAT
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def read_study(path: Path | str) -> Study:
+    """Read a study file and the campaign file that it names.
+
+    Parameters
+    ----------
+    path : Path or str
+        The TOML file.
+
+    Returns
+    -------
+    Study
+        The study; no run has been read.
+
+    Raises
+    ------
+    RequestError
+        If a file is missing or no TOML, or says what a study cannot say: one message names every
+        key at fault, the value received, and the mend.
+    """
+    path = Path(path).expanduser()
+    settings = validate_study(read_toml(path, "study"), str(path))
+    campaign = read_campaign(expand(settings.study.campaign, path.parent))
+    study = Study(path, settings, campaign)
+    mistakes = _cross_checks(study)
+    if mistakes:
+        raise _refusal(str(path), mistakes)
+    return study
+
+
+def validate_study(received: dict[str, Any], name: str) -> StudySettings:
+    """Validate the contents of a study file.
+
+    Parameters
+    ----------
+    received : dict
+        What the TOML says.
+    name : str
+        What the message calls the file.
+
+    Returns
+    -------
+    StudySettings
+        The same, checked.
+
+    Raises
+    ------
+    RequestError
+        With one line a mistake: key, value, mend.
+    """
+    try:
+        return StudySettings.model_validate(received)
+    except ValidationError as error:
+        raise _refusal(name, mistakes_of(error, StudySettings)) from None
+
+
+def _refusal(name: str, mistakes: list[str]) -> RequestError:
+    heading = "1 mistake" if len(mistakes) == 1 else f"{len(mistakes)} mistakes"
+    return RequestError(
+        f"{name}: {heading} in the study file\n" + "\n".join(f"  {each}" for each in mistakes)
+    )
+
+
+def _cross_checks(study: Study) -> list[str]:
+    """What the study says against what the campaign has."""
+    campaign, settings = study.campaign, study.settings
+    mistakes = []
+    known = campaign.settings.channel_names
+    for key, names in (("states", study.states), ("inputs", study.inputs)):
+        mistakes += [
+            f"study.{key}: received {name!r}, and the campaign has no such channel."
+            f"{did_you_mean(name, known)} Channels: {', '.join(known)}."
+            for name in names
+            if name not in known
+        ]
+    if both := set(study.states) & set(study.inputs):
+        mistakes.append(f"study.inputs: {sorted(both)[0]!r} is among the states too; choose one.")
+    tables = {f"tests.{name}": each.runs for name, each in settings.tests.items()}
+    for table, runs in {"training": settings.training.runs, **tables}.items():
+        for run in runs:
+            if run not in campaign.runs:
+                mistakes.append(
+                    f"{table}.runs: received {run!r}, and the campaign has no such run."
+                    f"{did_you_mean(run, campaign.runs)} Runs: {', '.join(campaign.runs)}."
+                )
+    for name, model in settings.models.items():
+        for key in ("states", "inputs"):
+            if getattr(model, key):
+                mistakes.append(
+                    f"models.{name}.{key}: all models of a study share their channels, so that "
+                    f"they can be compared. State {key} in [study]."
+                )
+    return mistakes

@@ -1,0 +1,324 @@
+"""Statistics of a study: boxes, divergences, coverage and trend, as the paper and as recommended.
+
+The paper joins the test windows of a model's (mean) forecast and of the measurement, bootstraps
+the joined series in blocks that may cross a join, and takes the bandwidth and the block length as
+printed. The recommended variant lets no block cross a join, and takes Silverman's bandwidth and
+the block length of Politis and White.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep import statistics
+from seakeep.errors import DataError, SeakeepWarning
+from seakeep.study.settings import StudySettings
+from seakeep.study.windows import random_stream
+
+__all__ = ["VARIANTS", "box_table", "coverage_table", "joined", "judge"]
+
+FloatArray = npt.NDArray[np.float64]
+
+VARIANTS: dict[str, dict[str, Any]] = {
+    "paper": {"block_length": "carlstein", "bandwidth": "paper", "joins": True},
+    "recommended": {"block_length": "politis_white", "bandwidth": "silverman", "joins": False},
+}
+TREND_SERIES = 500
+
+
+def judge(
+    groups: Mapping[str, xr.Dataset], settings: StudySettings, channels: Sequence[str]
+) -> dict[str, xr.Dataset]:
+    """All statistics of a study.
+
+    Parameters
+    ----------
+    groups : mapping of str to Dataset
+        ``tests/NAME`` with the arrays of every model.
+    settings : StudySettings
+        The study.
+    channels : sequence of str
+        Channels that are forecast.
+
+    Returns
+    -------
+    dict of str to Dataset
+        ``statistics/boxes/TEST`` over (model, measure, channel), ``statistics/coverage/TEST``
+        over (model, against, channel), ``statistics/trend/TEST`` over model,
+        ``statistics/divergence`` over (model, variant, channel) and ``statistics/densities`` over
+        (model, channel, grid).
+    """
+    models = list(settings.models)
+    ensembles = [m for m in models if settings.models[m].kind == "bayesian_hankel_dmdc"]
+    out: dict[str, xr.Dataset] = {}
+    for name in settings.tests:
+        test = groups[f"tests/{name}"]
+        out[f"statistics/boxes/{name}"] = box_table(test, models)
+        if ensembles:
+            out[f"statistics/coverage/{name}"] = coverage_table(test, ensembles)
+        rng = random_stream(settings.study.seed, f"trend.{name}")
+        out[f"statistics/trend/{name}"] = trend_table(test, models, rng)
+    name = settings.statistics.densities_of or next(iter(settings.tests))
+    test = groups[f"tests/{name}"]
+    found = [_divergences(test, model, channels, settings, name) for model in models]
+    divergence, densities = (
+        xr.concat([pair[k] for pair in found], dim=xr.Variable("model", models)) for k in (0, 1)
+    )
+    out["statistics/divergence"] = divergence.assign_attrs(test=name)
+    out["statistics/densities"] = densities.assign_attrs(test=name)
+    return out
+
+
+def box_table(test: xr.Dataset, models: Sequence[str]) -> xr.Dataset:
+    """Quartiles of the errors over all cells of a test set.
+
+    Parameters
+    ----------
+    test : Dataset
+        The set.
+    models : sequence of str
+        Models.
+
+    Returns
+    -------
+    Dataset
+        Over (model, measure, channel): ``median``, ``lower_quartile``, ``upper_quartile``,
+        whiskers, ``mean``, ``count`` and ``left_out``. The channel ``average`` is the paper's
+        ANRMSE and NAMMAE: the average of each cell over the channels that can be judged.
+    """
+    measures = ("nrmse", "nammae")
+    numbers = (
+        "median",
+        "lower_quartile",
+        "upper_quartile",
+        "lower_whisker",
+        "upper_whisker",
+        "mean",
+        "count",
+        "left_out",
+    )
+    names = ["average", *map(str, test["channel"].values)]
+    values = np.full((len(numbers), len(models), len(measures), len(names)), np.nan)
+    judged = test["judged"].values
+    for m, model in enumerate(models):
+        for k, measure in enumerate(measures):
+            cells = test[f"{model}_{measure}"].values[judged]
+            columns = [average_of(cells), *cells.T]
+            for c, column in enumerate(columns):
+                try:
+                    box = statistics.box_statistics(column)
+                except DataError:  # never judged: a line that is slack in all windows
+                    values[-2:, m, k, c] = 0, column.size
+                    continue
+                values[:, m, k, c] = [getattr(box, number) for number in numbers]
+    return xr.Dataset(
+        {n: (("model", "measure", "channel"), values[i]) for i, n in enumerate(numbers)},
+        coords={"model": list(models), "measure": list(measures), "channel": names},
+    )
+
+
+def average_of(cells: FloatArray) -> FloatArray:
+    """Average over the channels that are judged; NaN where a forecast diverged.
+
+    Parameters
+    ----------
+    cells : ndarray, shape (cell, channel)
+        Errors; a channel that is not judged (slack) is NaN in single cells, a diverged forecast
+        in all of its channels.
+
+    Returns
+    -------
+    ndarray, shape (cell,)
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, as wanted
+        out: FloatArray = np.nanmean(cells, axis=-1)
+    return out
+
+
+def coverage_table(test: xr.Dataset, ensembles: Sequence[str]) -> xr.Dataset:
+    """Part of the instants at which the band holds the measurement, and the truth where known.
+
+    Parameters
+    ----------
+    test : Dataset
+        A test set.
+    ensembles : sequence of str
+        Models with a band.
+
+    Returns
+    -------
+    Dataset
+        Over (model, against, channel): ``inside``, ``below``, ``above``, and ``relative_width``
+        in measured standard deviations, averages over all cells; channel ``average`` too.
+    """
+    sides = ["measured", *(["truth"] if "truth" in test else [])]
+    numbers = ("inside", "below", "above", "relative_width")
+    names = ["average", *map(str, test["channel"].values)]
+    values = np.full((len(numbers), len(ensembles), len(sides), len(names)), np.nan)
+    judged = test["judged"].values
+    for m, model in enumerate(ensembles):
+        lower, upper = (test[f"{model}_{bound}"].values[judged] for bound in ("lower", "upper"))
+        for s, side in enumerate(sides):
+            against = np.broadcast_to(test[side].values, (*judged.shape, *test[side].shape[1:]))
+            known = np.isfinite(against).all(axis=(0, 1, 2))
+            band = statistics.coverage(lower, upper, np.where(known, against, 0.0)[judged])
+            for k, number in enumerate(numbers):
+                each = np.where(known, getattr(band, number), np.nan)
+                each = np.where(np.isfinite(each), each, np.nan)
+                values[k, m, s] = [np.nanmean(average_of(each)), *average_of(each.T)]
+    return xr.Dataset(
+        {n: (("model", "against", "channel"), values[i]) for i, n in enumerate(numbers)},
+        coords={"model": list(ensembles), "against": sides, "channel": names},
+    )
+
+
+def trend_table(test: xr.Dataset, models: Sequence[str], rng: np.random.Generator) -> xr.Dataset:
+    """Test whether ε(t), averaged over all cells, grows with the age of the forecast.
+
+    Parameters
+    ----------
+    test : Dataset
+        A test set.
+    models : sequence of str
+        Models.
+    rng : numpy.random.Generator
+        Source of the redrawn series.
+
+    Returns
+    -------
+    Dataset
+        Over model: ``slope`` (1/s) with ``lower`` and ``upper``, ``change`` over the window,
+        ``kendall_tau``, ``p_value``; over (model, time): ``mean``, ``lower_quartile`` and
+        ``upper_quartile`` of ε over the cells.
+    """
+    numbers = ("slope", "lower", "upper", "change", "kendall_tau", "p_value", "block_length")
+    found = np.full((len(numbers), len(models)), np.nan)
+    time = test["time"].values
+    series = np.full((3, len(models), time.size), np.nan)
+    judged = test["judged"].values
+    for m, model in enumerate(models):
+        cells = test[f"{model}_error_over_time"].values[judged]
+        cells = cells[np.isfinite(cells).all(axis=1)]
+        if not len(cells):
+            continue
+        series[:, m] = cells.mean(axis=0), *np.quantile(cells, [0.25, 0.75], axis=0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SeakeepWarning)  # the block length is in the table
+            trend = statistics.trend_test(series[0, m], rng=rng, time=time, n_series=TREND_SERIES)
+        found[:, m] = [getattr(trend, number) for number in numbers]
+    names = ("mean", "lower_quartile", "upper_quartile")
+    return xr.Dataset(
+        {
+            **{n: ("model", found[i]) for i, n in enumerate(numbers)},
+            **{
+                f"error_{n}" if n == "mean" else n: (("model", "time"), series[i])
+                for i, n in enumerate(names)
+            },
+        },
+        coords={"model": list(models), "time": time},
+    )
+
+
+def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
+    """Forecasts of the windows of a test set joined end to end, and the measurement.
+
+    Parameters
+    ----------
+    test : Dataset
+        A test set.
+    model : str
+        The model; of an ensemble the mean counts.
+
+    Returns
+    -------
+    predicted : ndarray, shape (series, time, channel)
+        One series a training set that may test all windows; where none may (runs are left out),
+        the k-th series takes each window's k-th training set. A series in which a forecast
+        diverged is left out.
+    measured : ndarray, shape (time, channel)
+        The same windows.
+    diverged : int
+        Series left out.
+    """
+    judged = test["judged"].values
+    mean = test[f"{model}_mean"].values
+    count = int(judged.sum(axis=0).min())
+    rows = np.argsort(~judged, axis=0, kind="stable")[:count]
+    windows = np.arange(judged.shape[1])
+    picked = np.stack([mean[row, windows] for row in rows])
+    picked = picked.reshape(count, -1, mean.shape[-1])
+    whole = np.isfinite(picked).all(axis=(1, 2))
+    measured = test["measured"].values.reshape(-1, mean.shape[-1])
+    return picked[whole], measured, int(np.count_nonzero(~whole))
+
+
+def _divergences(
+    test: xr.Dataset, model: str, channels: Sequence[str], settings: StudySettings, name: str
+) -> tuple[xr.Dataset, xr.Dataset]:
+    predicted, measured, diverged = joined(test, model)
+    segments = [test.sizes["time"]] * test.sizes["window"]
+    numbers = (
+        "mean", "lower", "upper", "uncertainty", "of_series", "noise_floor",
+        "noise_floor_lower", "noise_floor_upper", "block_length",
+    )  # fmt: skip
+    table = np.full((len(numbers), len(VARIANTS), len(channels)), np.nan)
+    curves = np.full((7, len(channels), 512), np.nan)
+    for c, channel in enumerate(channels):
+        p, m = predicted[:, :, c], measured[:, c]
+        if not len(p) or np.ptp(m) == 0 or np.any(np.ptp(p, axis=1) == 0):
+            continue
+        for v, (variant, choice) in enumerate(VARIANTS.items()):
+            rng = random_stream(settings.study.seed, f"jsd.{name}.{variant}.{channel}")
+            with warnings.catch_warnings():
+                # Caps of the block length and coarse grids: the table prints the length.
+                warnings.simplefilter("ignore", SeakeepWarning)
+                found = statistics.jsd_interval(
+                    p,
+                    m,
+                    block_length=choice["block_length"],
+                    bandwidth=choice["bandwidth"],
+                    segments=None if choice["joins"] else segments,
+                    rng=rng,
+                    n_series=settings.statistics.n_series,
+                )
+            table[:, v, c] = [getattr(found, number) for number in numbers]
+        curves[:, c] = _densities(p, m, settings, f"densities.{name}.{channel}")
+    divergence = xr.Dataset(
+        {n: (("variant", "channel"), table[i]) for i, n in enumerate(numbers)},
+        coords={"variant": list(VARIANTS), "channel": list(channels)},
+    )
+    divergence["diverged_series"] = diverged
+    keys = ("value", *(f"{side}_{k}" for side in ("measured", "predicted")
+                       for k in ("mean", "lower", "upper")))  # fmt: skip
+    densities = xr.Dataset(
+        {key: (("channel", "grid"), curves[i]) for i, key in enumerate(keys)},
+        coords={"channel": list(channels)},
+    )
+    return divergence, densities
+
+
+def _densities(p: FloatArray, m: FloatArray, settings: StudySettings, stream: str) -> FloatArray:
+    """Grid, and densities with their bands of measurement and forecast (paper's settings)."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeakeepWarning)  # as above
+        grid = statistics.density_grid(p, m, bandwidth="paper")
+        rows = [grid]
+        for series in (m, p):
+            band = statistics.density_interval(
+                series,
+                block_length="carlstein",
+                rng=random_stream(settings.study.seed, stream),
+                n_series=settings.statistics.n_series,
+                grid=grid,
+                bandwidth="paper",
+                level=settings.statistics.level,
+            )
+            rows += [band.mean, band.lower, band.upper]
+    return np.stack(rows)

@@ -1,0 +1,352 @@
+"""Where models learn and where they are judged: windows drawn once, the same for all models."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.errors import RequestError
+from seakeep.study.settings import StudySettings, TestSetSettings
+
+__all__ = [
+    "Needs",
+    "TestWindow",
+    "TrainingSet",
+    "choose_tests",
+    "choose_training",
+    "random_stream",
+    "windows_overlap",
+]
+
+Runs = Mapping[str, xr.Dataset]
+
+
+@dataclass(frozen=True)
+class Needs:
+    """Samples that the greediest of all models and draws asks for.
+
+    Parameters
+    ----------
+    snapshots : int
+        Training snapshots; 1 where models take all there are.
+    history : int
+        Samples before a snapshot or a start that delays reach back.
+    inside : bool
+        Whether the delay history lies inside the training snapshots.
+    """
+
+    snapshots: int
+    history: int
+    inside: bool = False
+
+    @property
+    def training(self) -> int:
+        """Samples up to and including the stop of a training window."""
+        return max(self.snapshots, self.history + 2) + (0 if self.inside else self.history)
+
+
+@dataclass(frozen=True)
+class TrainingSet:
+    """What one model learns from: the spans of one or several runs, each up to its stop.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``t03``, or the run that is left out.
+    spans : tuple of (str, float, float)
+        Run, first instant that may be read, and stop, s.
+    left_out : tuple of str
+        Runs that only test; empty where training and test lie in different spans.
+    """
+
+    name: str
+    spans: tuple[tuple[str, float, float], ...]
+    left_out: tuple[str, ...] = ()
+
+    def may_test(self, run: str) -> bool:
+        """Whether a run may test what was learnt here."""
+        return not self.left_out or run in self.left_out or run not in self.runs
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """Names of the runs that train."""
+        return tuple(run for run, _, _ in self.spans)
+
+
+@dataclass(frozen=True)
+class TestWindow:
+    """A window that is forecast: a run, its start and its number of instants.
+
+    Parameters
+    ----------
+    run : str
+        The run.
+    start : float
+        Instant of the last measured state, s; a sample of the run.
+    steps : int
+        Instants forecast.
+    """
+
+    __test__ = False  # no class of tests, whatever pytest takes its name for
+
+    run: str
+    start: float
+    steps: int
+
+
+def random_stream(seed: int, purpose: str) -> np.random.Generator:
+    """Generator of one purpose, so that a further test set changes no other draw."""
+    return np.random.default_rng([seed, zlib.crc32(purpose.encode())])
+
+
+def _samples(run: xr.Dataset, span: tuple[float, float]) -> tuple[int, int]:
+    """First and last sample of a run inside a span."""
+    time, dt = run["time"].values, float(run.attrs["dt"])
+    first = int(np.searchsorted(time, span[0] - 1e-6 * dt))
+    last = int(np.searchsorted(time, span[1] + 1e-6 * dt)) - 1
+    return first, last
+
+
+def whole_span(run: xr.Dataset) -> tuple[float, float]:
+    """Span of a run that may be used at all: training and test spans together."""
+    spans = [run.attrs[key] for key in ("train_span", "test_span") if key in run.attrs]
+    if not spans:
+        return float(run["time"].values[0]), float(run["time"].values[-1])
+    return min(float(s[0]) for s in spans), max(float(s[1]) for s in spans)
+
+
+def choose_training(
+    settings: StudySettings, runs: Runs, names: Sequence[str], needs: Needs
+) -> tuple[TrainingSet, ...]:
+    """Choose what the models learn from.
+
+    Parameters
+    ----------
+    settings : StudySettings
+        The study.
+    runs : mapping of str to Dataset
+        Prepared runs.
+    names : sequence of str
+        Runs that train.
+    needs : Needs
+        Samples of the greediest model.
+
+    Returns
+    -------
+    tuple of TrainingSet
+        Each is long enough for all models and draws.
+
+    Raises
+    ------
+    RequestError
+        If no window is feasible; the message says what is missing.
+    """
+    training = settings.training
+    if training.scheme == "leave_out":
+        return _folds(settings, runs, names, needs)
+    if missing := [name for name in names if "train_span" not in runs[name].attrs]:
+        raise RequestError(
+            f"training: the run '{missing[0]}' has no training span in the campaign. Give it "
+            "role = 'train' or a span train = [begin, end], or use scheme = 'leave_out'."
+        )
+    spans = {name: _samples(runs[name], runs[name].attrs["train_span"]) for name in names}
+    if training.scheme == "pooled":
+        for name, (first, last) in spans.items():
+            _check_span(name, last - first + 1, needs, runs[name])
+        return (TrainingSet("pooled", tuple(_of_samples(runs, n, *s) for n, s in spans.items())),)
+    rng = random_stream(settings.study.seed, "training")
+    places = _places(spans, needs.training, needs.snapshots, training.placement, rng)
+    if not places:
+        _refuse_training(spans, needs, runs)
+    count = len(places) if training.windows is None else training.windows
+    if count > len(places) and training.placement == "random":
+        raise RequestError(
+            f"training.windows: {count} windows were asked for and {len(places)} are feasible. "
+            "Ask for fewer, or shorten the training length."
+        )
+    chosen = places[:count]
+    return tuple(
+        TrainingSet(f"t{number:02d}", (_of_samples(runs, name, spans[name][0], stop),))
+        for number, (name, stop) in enumerate(chosen)
+    )
+
+
+def _of_samples(runs: Runs, name: str, first: int, last: int) -> tuple[str, float, float]:
+    time = runs[name]["time"].values
+    return name, float(time[first]), float(time[last])
+
+
+def _places(
+    spans: Mapping[str, tuple[int, int]],
+    needed: int,
+    width: int,
+    placement: str,
+    rng: np.random.Generator,
+) -> list[tuple[str, int]]:
+    """Feasible last samples in random order; with 'apart' no two within `width` samples."""
+    if placement == "random":
+        all_of_them = [
+            (name, stop)
+            for name, (first, last) in spans.items()
+            for stop in range(first + needed - 1, last + 1)
+        ]
+    else:
+        all_of_them = [
+            (name, stop)
+            for name, (first, last) in spans.items()
+            for stop in range(last, first + needed - 2, -max(width, 1))
+        ]
+    return [all_of_them[i] for i in rng.permutation(len(all_of_them))]
+
+
+def _check_span(name: str, samples: int, needs: Needs, run: xr.Dataset) -> None:
+    if samples >= needs.training:
+        return
+    dt = float(run.attrs["dt"])
+    raise RequestError(
+        f"training: no window is feasible in '{name}'. Its span holds {samples} samples "
+        f"({samples * dt:g} s), and the largest draw of all models needs {needs.training} "
+        f"({needs.snapshots} snapshots and {needs.history} of delay history, "
+        f"{needs.training * dt:g} s). Shorten train_length or the delays, or give longer runs."
+    )
+
+
+def _refuse_training(spans: Mapping[str, tuple[int, int]], needs: Needs, runs: Runs) -> None:
+    longest = max(spans, key=lambda name: spans[name][1] - spans[name][0])
+    _check_span(longest, spans[longest][1] - spans[longest][0] + 1, needs, runs[longest])
+
+
+def _folds(
+    settings: StudySettings, runs: Runs, names: Sequence[str], needs: Needs
+) -> tuple[TrainingSet, ...]:
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        by_sea = settings.training.leave_out == "sea_state"
+        key = str(runs[name].attrs.get("sea_state") or name) if by_sea else name
+        groups.setdefault(key, []).append(name)
+    if len(groups) < 2:
+        raise RequestError(
+            f"training: leaving out a {settings.training.leave_out.replace('_', ' ')} of "
+            f"{', '.join(names)} leaves no run to learn from. Give more runs, or use scheme = "
+            "'halves'."
+        )
+    spans = {name: whole_span(runs[name]) for name in names}
+    for name in names:
+        first, last = _samples(runs[name], spans[name])
+        _check_span(name, last - first + 1, needs, runs[name])
+    return tuple(
+        TrainingSet(
+            f"without {group[0]}" + (f" (+{len(group) - 1})" if len(group) > 1 else ""),
+            tuple((name, *spans[name]) for name in names if name not in group),
+            tuple(group),
+        )
+        for group in groups.values()
+    )
+
+
+def choose_tests(
+    name: str,
+    test: TestSetSettings,
+    runs: Runs,
+    names: Sequence[str],
+    *,
+    steps: int,
+    needs: Needs,
+    whole: bool,
+    seed: int,
+) -> tuple[TestWindow, ...]:
+    """Choose the windows of a test set.
+
+    Parameters
+    ----------
+    name : str
+        Name of the set.
+    test : TestSetSettings
+        Its settings.
+    runs : mapping of str to Dataset
+        Prepared runs.
+    names : sequence of str
+        Runs that test.
+    steps : int
+        Instants of a window.
+    needs : Needs
+        Samples of the greediest model; the history may lie before the test span.
+    whole : bool
+        Whether the whole of a run tests (leaving runs out), or its test span.
+    seed : int
+        The study's seed.
+
+    Returns
+    -------
+    tuple of TestWindow
+        In the order of runs and instants.
+
+    Raises
+    ------
+    RequestError
+        If no window, or fewer than asked for, are feasible.
+    """
+    spans = {}
+    for each in names:
+        run = runs[each]
+        span = whole_span(run) if whole or "test_span" not in run.attrs else run.attrs["test_span"]
+        first, last = _samples(run, (float(span[0]) + test.startup, float(span[1])))
+        spans[each] = (max(first, needs.history), last)
+    # A window of `steps` instants after its start: steps + 1 samples.
+    places = _places(spans, steps + 1, steps, test.placement, random_stream(seed, f"tests.{name}"))
+    dt = float(runs[names[0]].attrs["dt"])
+    if not places:
+        longest = max(last - first + 1 for first, last in spans.values())
+        raise RequestError(
+            f"tests.{name}: no window is feasible. A window has {steps} instants "
+            f"({steps * dt:g} s), and the longest test span ({', '.join(names)}) holds "
+            f"{max(longest, 0)} samples after {needs.history} of delay history and the start-up. "
+            "Reduce length or startup, or give longer runs."
+        )
+    count = len(places) if test.windows is None else test.windows
+    if count > len(places) and test.placement == "random":
+        raise RequestError(
+            f"tests.{name}.windows: {count} windows were asked for and {len(places)} are feasible. "
+            "Ask for fewer, or reduce length."
+        )
+    order = {each: number for number, each in enumerate(names)}
+    chosen = sorted(places[:count], key=lambda place: (order[place[0]], place[1]))
+    return tuple(
+        TestWindow(each, float(runs[each]["time"].values[last - steps]), steps)
+        for each, last in chosen
+    )
+
+
+def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
+    """Mean part of a window that another window of the same run covers too, 0 to 1.
+
+    Parameters
+    ----------
+    spans : sequence of (str, float, float)
+        Run, begin and end of each window.
+
+    Returns
+    -------
+    float
+        0 for windows apart, 1 for windows that all lie in one another.
+
+    Examples
+    --------
+    >>> windows_overlap([("a", 0.0, 10.0), ("a", 5.0, 15.0)])
+    0.5
+    """
+    shares = []
+    for i, (run, begin, end) in enumerate(spans):
+        edges: npt.NDArray[np.float64] = np.linspace(begin, end, 201)
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        covered = np.zeros(middle.size, dtype=bool)
+        for k, (other, first, last) in enumerate(spans):
+            if k != i and other == run:
+                covered |= (middle >= first) & (middle <= last)
+        shares.append(covered.mean())
+    return float(np.mean(shares)) if shares else 0.0

@@ -1,0 +1,227 @@
+"""The report of a study: complete, self-contained, and at work in a real browser."""
+
+import base64
+import csv
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from seakeep.errors import RequestError
+from seakeep.report.interactive import pack
+from seakeep.report.published import PUBLISHED
+from seakeep.report.study_tables import latex_text
+from seakeep.study import read_result, read_study, run_study
+
+pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+
+from seakeep.report.figures.boxes import draw_box_violin
+from seakeep.report.page import write_report
+
+TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
+STUDY = """
+[study]
+campaign = "campaign.toml"
+preset = "recommended"
+[training]
+windows = 2
+[models.deterministic]
+[models.bayesian]
+kind = "bayesian_hankel_dmdc"
+n_members = 4
+train_length = { uniform = [10, 20] }
+[tests.unseen]
+runs = ["unseen"]
+windows = 3
+length = 6
+label = "a & b < c"
+[statistics]
+n_series = 8
+"""
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    for path in TUTORIAL.glob("*"):
+        if path.suffix in (".toml", ".csv"):
+            shutil.copy(path, folder)
+    (folder / "study.toml").write_text(STUDY, encoding="utf-8")
+    return write_report(run_study(read_study(folder / "study.toml"), folder / "out", workers=2))
+
+
+def test_the_page_names_nothing_outside_itself(page):
+    text = page.read_text("utf-8")
+    addresses = re.findall(r"""(?:src|href)\s*=\s*["']([^"']*)["']""", text)
+    assert addresses
+    assert all(each.startswith(("#", "data:")) for each in addresses)
+    assert "@import" not in text
+    # What is left of addresses are names of XML, which nobody fetches.
+    assert set(re.findall(r"https?://[^\s\"'<>]*", text)) <= {
+        "http://www.w3.org/2000/svg",
+        "http://www.w3.org/1999/xlink",
+    }
+
+
+def test_no_id_stands_twice(page):
+    ids = re.findall(r'\bid="([^"]+)"', page.read_text("utf-8"))
+    assert len(ids) == len(set(ids))
+
+
+def test_what_it_holds(page):
+    text = page.read_text("utf-8")
+    for section in ("summary", "deviations", "errors", "explore", "densities", "versions"):
+        assert f'<section id="{section}">' in text
+    assert "a &amp; b &lt; c" in text
+    assert "paper: EV, another data set" in text
+    assert PUBLISHED["heave"] in text
+    assert "noise floor" in text
+    assert "@media print" in text
+    digest = read_result(page.parent).attrs["digest"]
+    assert digest in text
+
+
+def test_figures_and_tables_are_files_too(page):
+    figures = {path.suffix for path in (page.parent / "figures").iterdir()}
+    assert figures == {".png", ".svg"}
+    names = {path.stem for path in (page.parent / "figures").iterdir()}
+    assert {"errors_unseen", "densities_bayesian", "error_over_time", "eigenvalues"} <= names
+    tables = page.parent / "tables"
+    with (tables / "jsd_bayesian_paper.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0][-1] == "paper: EV, another data set"
+    assert all(len(row) == len(rows[0]) for row in rows)
+    latex = (tables / "jsd_bayesian_paper.tex").read_text("utf-8")
+    assert r"\begin{tabular}" in latex
+    assert r"\toprule" in latex
+
+
+def test_letters_that_latex_reads_otherwise():
+    assert latex_text("50 % of a_b & λ") == r"50 \% of a\_b \& $\lambda$"
+
+
+def test_packing_loses_a_step_of_the_range_at_most():
+    values = np.array([-1.0, 0.123456, np.nan, 3.0])
+    packed = pack(values)
+    codes = np.frombuffer(base64.b64decode(packed["data"]), dtype="<u2")
+    step = (packed["high"] - packed["low"]) / 65534
+    found = np.where(codes == 65535, np.nan, packed["low"] + step * codes)
+    np.testing.assert_allclose(found, values, rtol=0, atol=0.5 * step)
+
+
+def test_boxes_and_whiskers_are_matplotlibs():
+    from matplotlib.cbook import boxplot_stats
+    from matplotlib.figure import Figure
+
+    values = np.random.default_rng(0).standard_t(2, size=60)
+    axes = Figure().subplots()
+    draw_box_violin(axes, values, 0.0, 1.0, "black")
+    (expected,) = boxplot_stats(values)
+    drawn = {round(float(y), 12) for line in axes.lines for y in line.get_ydata()}
+    for key in ("med", "q1", "q3", "whislo", "whishi"):
+        assert round(float(expected[key]), 12) in drawn
+
+
+def test_a_folder_without_a_study_has_no_report(tmp_path):
+    with pytest.raises(RequestError, match="holds no finished study"):
+        read_result(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A Chromium of the system, without a window, that logs all it asks for and complains of."""
+    webdriver = pytest.importorskip(
+        "selenium.webdriver", reason="selenium is not installed (group 'test')"
+    )
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+    driver = shutil.which("chromedriver")
+    if chromium is None or driver is None:
+        pytest.skip("chromium and chromedriver are not on PATH (Debian: chromium chromium-driver)")
+    from selenium.webdriver.chrome.options import Options
+    from selenium.webdriver.chrome.service import Service
+
+    options = Options()
+    options.binary_location = chromium
+    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1300,1000"):
+        options.add_argument(argument)
+    options.add_argument("--disable-dev-shm-usage")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    started = webdriver.Chrome(options=options, service=Service(driver))
+    yield started
+    started.quit()
+
+
+@pytest.fixture
+def opened(browser, page):
+    browser.get_log("browser"), browser.get_log("performance")
+    browser.get(page.as_uri())
+    return browser
+
+
+def state(browser, key):
+    return browser.execute_script(f"return document.getElementById('history').dataset.{key}")
+
+
+def test_nothing_is_asked_for_and_nothing_complained_of(opened, page):
+    import json
+
+    assert opened.get_log("browser") == []
+    messages = [json.loads(entry["message"])["message"] for entry in opened.get_log("performance")]
+    asked = {
+        each["params"]["request"]["url"].partition("#")[0]
+        for each in messages
+        if each["method"] == "Network.requestWillBeSent"
+    }
+    assert {each for each in asked if not each.startswith("data:")} == {page.as_uri()}
+
+
+def test_the_time_histories_zoom_choose_and_show_members(opened):
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.support.ui import Select
+
+    canvas = opened.find_element("id", "history")
+    whole = state(opened, "range")
+    opened.execute_script("arguments[0].scrollIntoView({block: 'center'})", canvas)
+    opened.find_element("id", "zoom-in").click()
+    low, high = map(float, state(opened, "range").split())
+    assert high - low < 0.7 * (float(whole.split()[1]) - float(whole.split()[0]))
+    opened.find_element("id", "zoom-right").click()
+    assert float(state(opened, "range").split()[0]) > low
+    opened.find_element("id", "zoom-reset").click()
+    assert state(opened, "range") == whole
+    drag = ActionChains(opened).move_to_element_with_offset(canvas, -100, 0)
+    drag.click_and_hold().move_by_offset(150, 0).release().perform()
+    assert state(opened, "range") != whole
+    ActionChains(opened).double_click(canvas).perform()
+    assert state(opened, "range") == whole
+    Select(opened.find_element("id", "pick-channel")).select_by_index(1)
+    assert state(opened, "channel") == "pitch"
+    first = state(opened, "cell")
+    Select(opened.find_element("id", "pick-cell")).select_by_index(1)
+    assert state(opened, "cell") != first
+    assert state(opened, "channel") == "pitch"
+    assert "members" not in state(opened, "drawn")
+    opened.find_element("css selector", "#history-show input[value=members]").click()
+    assert "members" in state(opened, "drawn")
+    ActionChains(opened).move_to_element(canvas).perform()
+    assert "measured" in opened.find_element("id", "history-readout").text
+    assert opened.get_log("browser") == []
+
+
+def test_a_table_is_copied_as_text_with_tabs(opened):
+    button = opened.find_element("css selector", "#table-overview button.copy")
+    opened.execute_script("arguments[0].scrollIntoView({block: 'center'})", button)
+    button.click()
+    copied = button.get_attribute("data-copied").splitlines()
+    assert copied[0].split("\t")[:3] == ["test set", "model", "ANRMSE median"]
+    assert len(copied) == 3
+    assert opened.get_log("browser") == []
+
+
+def test_it_prints(opened):
+    pdf = base64.b64decode(opened.print_page())
+    assert pdf.startswith(b"%PDF")
+    # A page without its figures would be a few ten kilobytes.
+    assert len(pdf) > 100_000

@@ -1,0 +1,196 @@
+"""A study runs, resumes after a kill, and says what is wrong with what it is given."""
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep.errors import RequestError
+from seakeep.models.labelled import nearest_sample
+from seakeep.study import StorageError, read_result, read_study, run_study, store
+from seakeep.study.plan import make_plan
+from seakeep.study.statistics import joined
+
+
+def change(folder, old, new):
+    path = folder / "study.toml"
+    text = path.read_text("utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), "utf-8")
+
+
+def same(first, second):
+    assert first.groups.keys() == second.groups.keys()
+    for name, group in first.groups.items():
+        xr.testing.assert_identical(group, second.groups[name])
+
+
+@pytest.fixture
+def finished(study_folder):
+    return run_study(read_study(study_folder / "study.toml"), study_folder / "out", workers=2)
+
+
+def test_cells_are_what_the_models_say(study_folder, finished):
+    study = read_study(study_folder / "study.toml")
+    plan, runs = make_plan(study)
+    test = finished.tests["unseen"]
+    for number, training in enumerate(plan.training):
+        (name, begin, stop) = training.spans[0]
+        part = runs[name].sel(time=slice(begin - 1e-6, stop + 1e-6))
+        single = plan.specs["deterministic"].fit(part, list(plan.states), list(plan.inputs))
+        ensemble = plan.specs["bayesian"].fit(part, list(plan.states), list(plan.inputs))
+        for k, window in enumerate(plan.tests["unseen"]):
+            run = runs[window.run]
+            alone = single.forecast(run, window.start, window.steps)
+            band = ensemble.forecast_summary(run, window.start, window.steps, level=0.95)
+            cell = test.isel(training=number, window=k)
+            at = nearest_sample(run["time"].values, window.start, window.run) + 1
+            for channel in plan.states:
+                column = cell.sel(channel=channel)
+                # Windows side by side are one product: sums in another order, about 1e-13.
+                kwargs = {"rtol": 1e-9, "atol": 1e-11}
+                np.testing.assert_allclose(column["deterministic_mean"], alone[channel], **kwargs)
+                for statistic in ("mean", "lower", "upper"):
+                    np.testing.assert_allclose(
+                        column[f"bayesian_{statistic}"],
+                        band[channel].sel(statistic=statistic),
+                        **kwargs,
+                    )
+                measured = run[channel].values[at : at + window.steps]
+                np.testing.assert_array_equal(column["measured"], measured)
+
+
+def test_arrays_do_not_depend_on_workers(study_folder, finished):
+    study = read_study(study_folder / "study.toml")
+    same(finished, run_study(study, study_folder / "alone", workers=1))
+
+
+def test_what_is_read_back_is_what_was_found(study_folder, finished):
+    found = read_result(study_folder / "out")
+    same(finished, found)
+    assert found.attrs["digest"] == read_study(study_folder / "study.toml").digest
+    assert set(json.loads(found.attrs["versions"])) >= {"seakeep", "numpy", "scipy"}
+    assert not (study_folder / "out" / "cells").exists()
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system knows no SIGKILL")
+def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished):
+    out = study_folder / "killed"
+    script = (
+        "import sys\n"
+        "from seakeep.study import read_study, run_study\n"
+        "if __name__ == '__main__':\n"
+        "    run_study(read_study(sys.argv[1]), sys.argv[2], workers=1)\n"
+    )
+    (study_folder / "go.py").write_text(script, "utf-8")
+    command = [sys.executable, "go.py", "study.toml", str(out)]
+    process = subprocess.Popen(command, cwd=study_folder)
+    deadline = time.monotonic() + 120
+    while not list((out / "cells").glob("*.npz")) and time.monotonic() < deadline:
+        assert process.poll() is None, "the study ended before it could be killed"
+        time.sleep(0.002)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    time.sleep(0.5)  # a worker whose parent is gone ends by itself
+    kept = {path: path.stat().st_mtime_ns for path in (out / "cells").glob("*.npz")}
+    assert kept
+    assert not (out / "study.nc").exists()
+    told = []
+    again = run_study(
+        read_study(study_folder / "study.toml"),
+        out,
+        progress=lambda done, total, what: told.append((done, total, what)),
+    )
+    first = next(entry for entry in told if entry[2] == "fitting and forecasting")
+    assert first[0] >= 1, "no finished unit was taken over"
+    same(finished, again)
+
+
+def test_a_finished_study_is_not_run_again(study_folder, finished):
+    told = []
+    again = run_study(
+        read_study(study_folder / "study.toml"),
+        study_folder / "out",
+        progress=lambda *words: told.append(words),
+    )
+    assert told == [(1, 1, "finished before")]
+    same(finished, again)
+
+
+def test_a_folder_of_another_study_is_refused(study_folder, finished):
+    change(study_folder, "seed = 3", "seed = 4")
+    with pytest.raises(RequestError, match=r"holds the results of another study.*-o"):
+        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
+
+
+def test_no_feasible_training_window(study_folder):
+    change(study_folder, "[10, 20]", "[1000, 2000]")
+    with pytest.raises(RequestError, match=r"no window is feasible.*Shorten train_length"):
+        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
+
+
+def test_no_feasible_test_window(study_folder):
+    change(study_folder, "length = 6", "length = 6000")
+    with pytest.raises(RequestError, match=r"tests.unseen: no window is feasible.*Reduce length"):
+        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
+
+
+def test_a_full_disk_is_told_and_what_is_finished_is_kept(study_folder, monkeypatch):
+    study = read_study(study_folder / "study.toml")
+    folder = store.CellFolder(study_folder / "out", study.digest)
+    folder.open("name")
+    folder.write("first", {"mean": np.arange(3.0)})
+
+    def full(*args, **kwargs):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(np, "savez", full)
+    with pytest.raises(StorageError, match=r"No space left.*kept.*goes on") as caught:
+        folder.write("second", {"mean": np.arange(3.0)})
+    assert caught.value.exit_status == 1
+    assert folder.has("first")
+    assert not folder.has("second")
+    assert [path.name for path in (study_folder / "out" / "cells").iterdir()] == ["first.npz"]
+
+
+def test_a_damaged_cell_is_computed_again(study_folder):
+    study = read_study(study_folder / "study.toml")
+    folder = store.CellFolder(study_folder / "out", study.digest)
+    folder.open("name")
+    folder.write("cell", {"mean": np.arange(3.0)})
+    path = study_folder / "out" / "cells" / "cell.npz"
+    path.write_bytes(path.read_bytes()[:40])
+    assert not folder.has("cell")
+
+
+def test_a_folder_without_a_study_is_told(tmp_path):
+    with pytest.raises(RequestError, match="holds no finished study"):
+        read_result(tmp_path)
+
+
+def test_leaving_runs_out_tests_no_run_that_trains(study_folder):
+    path = study_folder / "study.toml"
+    text = path.read_text("utf-8").replace("windows = 2\n", 'scheme = "leave_out"\n', 1)
+    path.write_text(text.replace('runs = ["unseen"]', 'runs = ["first", "second"]'), "utf-8")
+    plan, _ = make_plan(read_study(path))
+    assert [each.left_out for each in plan.training] == [("first",), ("second",)]
+    for window in plan.tests["unseen"]:
+        learners = [each for each in plan.training if each.may_test(window.run)]
+        assert learners
+        assert all(window.run not in each.runs for each in learners)
+
+
+def test_joined_series_are_the_windows_end_to_end(finished):
+    test = finished.tests["unseen"]
+    predicted, measured, diverged = joined(test, "bayesian")
+    assert diverged == 0
+    assert predicted.shape == (2, 3 * test.sizes["time"], test.sizes["channel"])
+    np.testing.assert_array_equal(measured[: test.sizes["time"]], test["measured"][0])
+    np.testing.assert_array_equal(predicted[1, -1], test["bayesian_mean"][1, -1, -1])
