@@ -239,3 +239,23 @@ def test_info_names_versions(run):
     assert status == 0
     assert f"seakeep {seakeep.__version__}" in out
     assert f"numpy {np.__version__}" in out
+
+
+def test_full_scale_by_froudes_law(run, place):
+    text = (place / CAMPAIGN).read_text(encoding="utf-8")
+    scaled = place / "docs/tutorial/scaled.toml"
+    scaled.write_text(re.sub(r"scale_factor.*\n", "", text), encoding="utf-8")
+    command = "forecast model.nc {} --run unseen --start 20 --steps 100 -o {}.nc"
+    status, _, err = run(command.format(scaled, "none") + " --full-scale")
+    assert status == 2
+    assert "--full-scale needs the scale factor" in err
+    scaled.write_text(
+        scaled.read_text().replace("[campaign]", "[campaign]\nscale_factor = 25.0", 1),
+        encoding="utf-8",
+    )
+    assert run(command.format(scaled, "model_scale"))[0] == 0
+    assert run(command.format(scaled, "full_scale") + " --full-scale")[0] == 0
+    small, full = (xr.load_dataset(place / f"{n}_scale.nc") for n in ("model", "full"))
+    np.testing.assert_allclose(full["heave"], 25 * small["heave"], rtol=1e-12)
+    np.testing.assert_allclose(full["time"], 5 * small["time"], rtol=1e-12)
+    np.testing.assert_allclose(full["pitch"], small["pitch"], rtol=1e-12)

@@ -77,7 +77,7 @@ def forecast(
     read = read_campaign(campaign)
     result = identified.forecast(_prepared(read, run), start=start, steps=steps)
     if full_scale:
-        result = to_full_scale(result, read.settings.campaign.scale_factor)
+        result = to_full_scale(result, _scale(read))
     with replacing(out) as temporary:
         if out.suffix == ".nc":
             result.to_netcdf(temporary, engine="h5netcdf")
@@ -138,7 +138,7 @@ def compare(
         read = read_campaign(campaign)
         comparisons = compare_runs(identified, read, run or (), start, steps, progress)
     if full_scale:
-        scale = read.settings.campaign.scale_factor
+        scale = _scale(read)
         comparisons = [at_full_scale(each, scale) for each in comparisons]
     if not radians:
         comparisons = [in_degrees(each) for each in comparisons]
@@ -158,6 +158,16 @@ def compare(
     messages().print("Wrote " + ", ".join(map(str, written)))
     if any(comparison.status != "ok" for comparison in comparisons):
         raise typer.Exit(1)
+
+
+def _scale(campaign: Campaign) -> float:
+    general = campaign.settings.campaign
+    if "scale_factor" not in general.model_fields_set:
+        raise RequestError(
+            f"--full-scale needs the scale factor, and {campaign.path} states none. Add "
+            "scale_factor (full-scale length over model length) to [campaign]."
+        )
+    return general.scale_factor
 
 
 def _prepared(campaign: Campaign, run: str) -> xr.Dataset:
