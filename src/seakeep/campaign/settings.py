@@ -22,6 +22,7 @@ from pydantic import (
 from seakeep.conventions import canonical_channel
 
 __all__ = [
+    "AlignmentSettings",
     "CampaignSettings",
     "ChannelSettings",
     "DerivedSettings",
@@ -189,6 +190,37 @@ class DerivedSettings(Table):
         return self
 
 
+class AlignmentSettings(Table):
+    """``alignment`` of a model: the keys of :class:`seakeep.ProbeAlignment`."""
+
+    mode: Literal["effective", "dispersion"] = Field(
+        default="effective", description="'effective' (one celerity) or 'dispersion'"
+    )
+    surge: Literal["measured", "predicted", "none"] = Field(
+        default="measured", description="'measured', 'predicted' or 'none'"
+    )
+    celerity: Positive | None = Field(
+        default=None, description="m/s, of mode 'effective'; left out, it is estimated"
+    )
+    offset: Finite = Field(
+        default=0.0, description="metres by which the elevation is carried, positive downstream"
+    )
+    surge_channel: str = Field(default="surge", description="the channel of the surge")
+    channels: Names | None = Field(
+        default=None, description="list of the inputs that are elevations"
+    )
+    highest_frequency: Positive | None = Field(
+        default=None, description="Hz, of mode 'dispersion'; left out, it is estimated"
+    )
+
+    @model_validator(mode="after")
+    def _keys_fit_mode(self) -> AlignmentSettings:
+        for key, mode in (("celerity", "effective"), ("highest_frequency", "dispersion")):
+            if getattr(self, key) is not None and self.mode != mode:
+                raise ValueError(f"'{key}' goes with mode = '{mode}' alone; remove it")
+        return self
+
+
 class RunSettings(Table):
     """``[runs.NAME]``: one run, its file, and what it serves for.
 
@@ -211,6 +243,13 @@ class RunSettings(Table):
     channels: dict[str, ChannelSettings] = Field(
         default_factory=dict, description="keys of [channels.NAME] that differ in this run"
     )
+    probe_offset: Finite | None = Field(
+        default=None,
+        description="metres by which this run's elevations are carried, positive downstream",
+    )
+    probe_offset_span: Span | None = Field(
+        default=None, description="[begin, end] in s, from which a model estimates the offset"
+    )
 
     @model_validator(mode="after")
     def _one_use(self) -> RunSettings:
@@ -219,6 +258,8 @@ class RunSettings(Table):
                 "'role' does not go with 'train' and 'test'; state the role and 'span', or the "
                 "two spans"
             )
+        if self.probe_offset is not None and self.probe_offset_span is not None:
+            raise ValueError("state 'probe_offset' or 'probe_offset_span', not both")
         return self
 
 
@@ -304,6 +345,9 @@ class ModelSettings(Table):
     rank: Annotated[int, Field(ge=1)] | None = Field(default=None, description="a positive integer")
     standardize: bool | None = Field(default=None, description="true or false")
     stop: Finite | None = Field(default=None, description="end of the training window, s")
+    alignment: AlignmentSettings | None = Field(
+        default=None, description="a table, such as { mode = 'dispersion', surge = 'predicted' }"
+    )
     train_length: PriorSettings | None = Field(default=None, description="a prior, in periods")
     state_delay: PriorSettings | None = Field(default=None, description="a prior, in periods")
     input_delay: PriorSettings | None = Field(default=None, description="a prior, in periods")
@@ -345,11 +389,14 @@ class ModelSettings(Table):
         {'ridge': 100.0}
         """
         apart = {"kind", "preset", "states", "inputs"}
-        return {
+        stated = {
             key: getattr(self, key)
             for key in type(self).model_fields
             if key not in apart and getattr(self, key) is not None
         }
+        if self.alignment is not None:
+            stated["alignment"] = self.alignment.model_dump()
+        return stated
 
 
 class CampaignSettings(Table):

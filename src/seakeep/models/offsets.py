@@ -188,7 +188,8 @@ def _part(model: HankelDMDcModel, run: xr.Dataset, span: tuple[float, float]) ->
             f"an offset takes at least {needed} (the model's history and {BLOCKS} more). Lengthen "
             "the span."
         )
-    part.attrs.pop("probe_offset_span", None)
+    # A new dict: a selection may share its attributes with the run.
+    part.attrs = {key: value for key, value in part.attrs.items() if key != "probe_offset_span"}
     return part
 
 

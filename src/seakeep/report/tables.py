@@ -74,8 +74,22 @@ def rich_comparison(table: xr.Dataset) -> Table:
             *mean,
             style="bold",
         )
+        for note in _notes(rows):
+            out.add_row(str(run), note, style="italic")
         out.add_section()
     return out
+
+
+def _notes(rows: xr.Dataset) -> list[str]:
+    notes = []
+    condition = str(rows["conditional_on"].values)
+    if condition:
+        notes.append(f"conditional on measured {condition}")
+    offset, spread = float(rows["probe_offset"]), float(rows["probe_offset_spread"])
+    if np.isfinite(offset):
+        known = f" ± {spread:.2g}" if np.isfinite(spread) else ""
+        notes.append(f"probe offset {offset:.3g}{known} m")
+    return notes
 
 
 def _shown(value: float, form: str) -> str:
@@ -103,7 +117,8 @@ def write_csv(table: xr.Dataset, path: Path) -> Path:
         If the file cannot be written.
     """
     frame = table[list(_HEADINGS)].to_dataframe().reset_index()
-    for name in ("start", "status", "anrmse"):
+    added = ("start", "status", "anrmse", "conditional_on", "probe_offset", "probe_offset_spread")
+    for name in added:
         frame[name] = frame["run"].map(table[name].to_series())
     front = ["run", "channel", "channel_units"]
     frame = frame[front + [name for name in frame.columns if name not in front]]

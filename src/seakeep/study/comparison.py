@@ -14,6 +14,7 @@ from seakeep.campaign.prepare import Progress
 from seakeep.conventions import conversion
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.models import HankelDMDcModel
+from seakeep.study.repeats import warn_of_repeats
 
 __all__ = ["Comparison", "compare", "comparison_table", "in_degrees"]
 
@@ -131,6 +132,11 @@ def compare(
         If a run is unknown or none tests, or `start` and `steps` do not fit.
     DataError
         If a run cannot be read or used.
+
+    Warns
+    -----
+    SeakeepWarning
+        If an input of a test run repeats what the model was trained on.
     """
     wanted = list(runs) or campaign.test_runs
     known = list(campaign.settings.runs)  # unused ones too: whoever names one wants it
@@ -146,6 +152,7 @@ def compare(
             "role = 'test' or a span test = [begin, end]."
         )
     prepared = load_prepared(campaign, names=wanted, progress=progress)
+    warn_of_repeats(model, campaign, prepared)
     return [_compare_run(model, run, name, start, steps) for name, run in prepared.items()]
 
 
@@ -190,7 +197,9 @@ def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
         over measured), ``measured_min``, ``measured_max``, ``predicted_min``, ``predicted_max``
         (in ``channel_units``); over ``run``: ``anrmse`` and ``mean_nammae`` over
         the channels that can be judged, ``slack_channels`` (how many cannot), ``status``,
-        ``start``.
+        ``start``, and ``conditional_on``: the measured output that the forecast read after its
+        start, or an empty text; ``probe_offset`` and ``probe_offset_spread`` (m), NaN where the
+        run has none.
     """
     rows = [_row(comparison) for comparison in comparisons]
     table = xr.concat(rows, dim="run")
@@ -236,6 +245,9 @@ def _row(comparison: Comparison) -> xr.Dataset:
             "mean_nammae": float(metrics.nammae(predicted=p, measured=m)),
             "slack_channels": int(metrics.is_slack(predicted=p, measured=m).to_array().sum()),
             "status": comparison.status,
+            "conditional_on": str(p.attrs.get("conditional_on", "")),
+            "probe_offset": float(p.attrs.get("probe_offset", np.nan)),
+            "probe_offset_spread": float(p.attrs.get("probe_offset_spread", np.nan)),
             "start": comparison.start,
         },
         coords={

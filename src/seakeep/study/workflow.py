@@ -10,6 +10,7 @@ from seakeep.campaign import Campaign, ModelSettings, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.models import HankelDMDc, HankelDMDcModel
+from seakeep.study.repeats import warn_of_repeats
 
 __all__ = ["build_spec", "fit_campaign", "training_runs"]
 
@@ -124,6 +125,11 @@ def fit_campaign(
         If the campaign describes no such model, or no run trains.
     DataError
         If a run cannot be read or used.
+
+    Warns
+    -----
+    SeakeepWarning
+        If the test part of a training run repeats the model's training input.
     """
     settings = campaign.model(model)
     prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
@@ -131,4 +137,7 @@ def fit_campaign(
     dt = float(next(iter(runs.values())).attrs["dt"])
     period = campaign.encounter_period() if settings.preset is not None else None
     spec = build_spec(settings, period, dt)
-    return spec.fit(runs, list(settings.states), list(settings.inputs), stop=settings.stop)
+    identified = spec.fit(runs, list(settings.states), list(settings.inputs), stop=settings.stop)
+    both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
+    warn_of_repeats(identified, campaign, both)
+    return identified

@@ -1,0 +1,377 @@
+"""Alignment of the wave input in fit and forecast: a vessel that drifts, probes that are moved."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import (
+    BayesianHankelDMDc,
+    DataError,
+    Fixed,
+    HankelDMDc,
+    ProbeAlignment,
+    RequestError,
+    Uniform,
+    estimate_probe_offset,
+    load_model,
+)
+from seakeep.waves import wavenumber
+
+DT, DEPTH = 0.1, 3.6
+POSITIONS = {"eta_fwd": 48.42, "eta_cog": 52.09}
+STATES, INPUTS = ["surge", "heave"], ["eta_fwd", "eta_cog"]
+
+
+def drifting_run(seed=0, samples=1500, moved=0.0, name="run"):
+    """Heave answers the elevation where the vessel is; surge drifts slowly over half a wavelength.
+
+    The surge is an oscillation, which a model with state delays continues; the probes may stand
+    `moved` metres downstream of their stated places.
+    """
+    rng = np.random.default_rng(seed)
+    time = DT * np.arange(samples)
+    omega = 2 * np.pi * rng.uniform(0.3, 0.9, 40)
+    amplitude = 0.02 * np.exp(-((omega / (2 * np.pi) - 0.5) ** 2) / 0.02)
+    phase, k = rng.uniform(0, 2 * np.pi, 40), wavenumber(omega, DEPTH)
+    surge = 0.6 * np.sin(2 * np.pi * time / 25 + rng.uniform(0, 6.28))
+
+    def waves(x, lag=0.0):
+        place = np.broadcast_to(x, time.shape)
+        return (amplitude * np.cos(np.outer(time - lag, omega) - np.outer(place, k) + phase)).sum(
+            axis=1
+        )
+
+    vessel = POSITIONS["eta_cog"] + surge
+    heave = 0.8 * waves(vessel, 0.2) + 0.4 * waves(vessel, 0.5)
+    noise = 1e-4
+    channels = {
+        "surge": surge + noise * rng.standard_normal(samples),
+        "heave": heave + noise * rng.standard_normal(samples),
+        **{key: waves(x + moved) for key, x in POSITIONS.items()},
+    }
+    run = xr.Dataset(
+        {key: ("time", values, {"units": "m"}) for key, values in channels.items()},
+        coords={"time": ("time", time, {"units": "s"})},
+        attrs={"water_depth": DEPTH, "run": name},
+    )
+    for key, x in POSITIONS.items():
+        run[key].attrs["x_position"] = x
+    return run
+
+
+def spec(alignment):
+    return HankelDMDc(10, 40, 1e-3, delay_rows="exact", alignment=alignment)
+
+
+def heave_error(model, run, start=60.0, steps=300):
+    forecast = model.forecast(run, start=start, steps=steps)
+    measured = run["heave"].sel(time=forecast["time"])
+    return float(np.sqrt(np.mean((forecast["heave"] - measured) ** 2)) / measured.std())
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return [drifting_run(seed, name=f"run {seed}") for seed in (1, 2)]
+
+
+@pytest.fixture(scope="module")
+def models(runs):
+    settings = {
+        "none": None,
+        "rest": ProbeAlignment(mode="dispersion", surge="none"),
+        "dispersion": ProbeAlignment(mode="dispersion", surge="measured"),
+        "effective": ProbeAlignment(mode="effective", surge="measured"),
+        "predicted": ProbeAlignment(mode="dispersion", surge="predicted"),
+    }
+    return {key: spec(each).fit(runs, STATES, INPUTS) for key, each in settings.items()}
+
+
+def test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is(models):
+    run = drifting_run(7)
+    errors = {key: heave_error(model, run) for key, model in models.items()}
+    # Heave is linear in the elevation at the vessel: dispersion leaves the noise and the ridge.
+    assert errors["dispersion"] < 0.06
+    assert errors["predicted"] < 0.12  # and what the forecast of surge is off
+    assert errors["effective"] < 0.5 * errors["none"]
+    assert errors["none"] > 0.4
+    # With no surge and no offset the elevation stays where it is, to a transform's rounding.
+    assert errors["rest"] == pytest.approx(errors["none"], rel=1e-6)
+
+
+def test_predicted_surge_reads_no_measured_surge_after_the_start(models):
+    run = drifting_run(7)
+    scrambled = run.copy(deep=True)
+    after = scrambled["time"].values > 60.0
+    for name in STATES:
+        scrambled[name].values[after] = np.random.default_rng(0).normal(size=after.sum()) * 100
+    gone = run.copy(deep=True)
+    gone["surge"].values[after] = np.nan
+    expected = models["predicted"].forecast(run, start=60.0, steps=300)
+    for other in (scrambled, gone):
+        xr.testing.assert_identical(
+            models["predicted"].forecast(other, start=60.0, steps=300), expected
+        )
+    assert "conditional_on" not in expected.attrs
+
+
+def test_measured_surge_says_that_it_was_read(models):
+    run = drifting_run(7)
+    forecast = models["dispersion"].forecast(run, start=60.0, steps=300)
+    assert forecast.attrs["conditional_on"] == "surge"
+    assert forecast.attrs["alignment_mode"] == "dispersion"
+    run["surge"].values[700:] += 0.3
+    other = models["dispersion"].forecast(run, start=60.0, steps=300)
+    assert not np.allclose(other["heave"], forecast["heave"], atol=1e-3)
+
+
+def test_a_shorter_forecast_is_the_beginning_of_a_longer_one(models):
+    run = drifting_run(7)
+    for key in ("dispersion", "predicted"):
+        long = models[key].forecast(run, start=60.0, steps=200)
+        short = models[key].forecast(run, start=60.0, steps=50)
+        # The expansion in the distance ends at 1e-9, at another term for another range of surge.
+        np.testing.assert_allclose(short["heave"], long["heave"][:50], atol=1e-7)
+
+
+def test_arrays_take_what_the_model_aligned(models):
+    run = drifting_run(7)
+    model = models["effective"]
+    forecast = model.forecast(run, start=60.0, steps=100)
+    u = model.aligned_inputs(run)
+    u = np.column_stack([u[name] for name in model.inputs])
+    x = np.column_stack([run[name] for name in model.states])
+    arrays = model.forecast_arrays(x[:601], u[:601], u[601:], 100)
+    np.testing.assert_allclose(arrays[:, 1], forecast["heave"], atol=1e-7)
+    system, state = model.to_state_space(), model.initial_state(run, 60.0)
+    state = system.A @ state + system.B @ (u[600] - model.input_mean)
+    first = system.C @ state + model.state_mean
+    np.testing.assert_allclose(first, arrays[0], atol=1e-7)
+
+
+def test_fit_estimates_and_keeps_what_the_alignment_needs(models):
+    fitted = models["effective"].alignment
+    assert fitted.positions == (48.42, 52.09)
+    assert fitted.carried == (True, True)
+    # Phase speeds of 0.3 to 0.9 Hz run from 4.4 to 1.7 m/s, 3.0 at the peak.
+    assert 2.3 < fitted.celerity < 3.3
+    assert 0 < fitted.celerity_spread < 0.3
+    assert models["dispersion"].alignment.water_depth == DEPTH
+    assert 0.5 < models["dispersion"].alignment.highest_frequency < 1.0
+    low, high = models["predicted"].alignment.surge_range
+    assert (low, high) == pytest.approx((-1.2, 1.2), abs=0.02)
+
+
+def test_a_celerity_that_is_given_is_taken(runs):
+    alignment = ProbeAlignment(mode="effective", surge="measured", celerity=2.5)
+    assert spec(alignment).fit(runs, STATES, INPUTS).alignment.celerity == 2.5
+
+
+@pytest.mark.parametrize("key", ["dispersion", "effective", "predicted"])
+def test_a_file_keeps_the_alignment(models, key, tmp_path):
+    model, run = models[key], drifting_run(7)
+    loaded = load_model(model.save(tmp_path / "rom.nc"))
+    assert loaded.alignment == model.alignment
+    assert loaded.settings == model.settings
+    xr.testing.assert_identical(
+        loaded.forecast(run, start=60.0, steps=50), model.forecast(run, start=60.0, steps=50)
+    )
+
+
+def test_a_probe_that_was_moved_and_says_so_changes_nothing(models):
+    run = drifting_run(7, moved=0.5)
+    wrong = heave_error(models["dispersion"], run)
+    for name, x in POSITIONS.items():
+        run[name].attrs["x_position"] = x + 0.5
+    right = heave_error(models["dispersion"], run)
+    assert right < 0.06 < 0.3 < wrong
+
+
+def test_an_offset_is_found_with_its_spread(models):
+    run = drifting_run(7, moved=-0.4)
+    found = estimate_probe_offset(models["dispersion"], run, (0.0, 60.0))
+    # 0.4 m upstream: carry 0.4 m downstream. 55 s of 27 waves with next to no noise.
+    assert found.offset == pytest.approx(0.4, abs=0.03)
+    assert found.interval[0] - 0.01 <= found.offset <= found.interval[1] + 0.01
+    assert 0 < found.spread < 0.05
+    assert found.nrmse < 0.25 * found.nrmse_uncorrected
+    corrected = heave_error(models["dispersion"], run.assign_attrs(probe_offset=found.offset))
+    assert corrected < 0.1
+
+
+def test_a_run_may_ask_for_its_offset(models):
+    run = drifting_run(7, moved=-0.4).assign_attrs(probe_offset_span=(0.0, 60.0))
+    forecast = models["dispersion"].forecast(run, start=60.0, steps=100)
+    assert forecast.attrs["probe_offset"] == pytest.approx(0.4, abs=0.03)
+    assert 0 < forecast.attrs["probe_offset_spread"] < 0.05
+    assert run.attrs["probe_offset_span"] == (0.0, 60.0)
+    # What lies after the stated part is not read for it.
+    late = run.copy(deep=True)
+    late["heave"].values[800:] = 0.0
+    again = models["dispersion"].forecast(late, start=60.0, steps=100)
+    assert again.attrs["probe_offset"] == forecast.attrs["probe_offset"]
+
+
+def test_the_offset_of_the_settings_moves_fit_and_forecast_alike(runs, models):
+    alignment = ProbeAlignment(mode="dispersion", surge="measured", offset=0.3)
+    model = spec(alignment).fit(runs, STATES, INPUTS)
+    # Constant in all runs, it is a constant phase, which the delays learn.
+    assert heave_error(model, drifting_run(7)) < 0.1
+    assert not np.allclose(model.B, models["dispersion"].B)
+
+
+def test_training_reads_nothing_after_its_stop(runs):
+    alignment = ProbeAlignment(mode="dispersion", surge="measured")
+    run = runs[0]
+    cut = run.sel(time=slice(None, 100.0 + 1e-6))
+    one, other = (spec(alignment).fit(r, STATES, INPUTS, stop=100.0) for r in (run, cut))
+    np.testing.assert_array_equal(one.coefficients, other.coefficients)
+    assert one.training == replace(other.training)
+
+
+def test_a_window_needs_no_more_than_window_and_history(runs):
+    alignment = ProbeAlignment(mode="dispersion", surge="measured")
+    gapped = runs[0].copy(deep=True)
+    gapped["surge"].values[:200] = np.nan
+    gapped["eta_fwd"].values[:150] = np.nan
+    windowed = replace(spec(alignment), window=1000)
+    assert windowed.fit(gapped, STATES, INPUTS).training.columns == (999,)
+    with pytest.raises(DataError, match=r"channel 'surge' of run 1 has 200 missing .* at t = 0 s"):
+        spec(alignment).fit(gapped.assign(eta_fwd=runs[0]["eta_fwd"]), ["heave"], INPUTS)
+
+
+def test_a_gap_in_the_surge_is_named_in_a_forecast(models):
+    run = drifting_run(7)
+    run["surge"].values[700] = np.nan
+    with pytest.raises(DataError, match=r"channel 'surge' of run has 1 missing .* at t = 70 s"):
+        models["dispersion"].forecast(run, start=60.0, steps=300)
+    models["dispersion"].forecast(run, start=60.0, steps=50)
+
+
+@pytest.mark.parametrize("surge", ["measured", "predicted"])
+def test_members_of_an_ensemble_are_aligned_too(runs, surge, tmp_path):
+    ensemble = BayesianHankelDMDc(
+        encounter_period=2.0,
+        train_length=None,
+        state_delay=Uniform(0.4, 0.6),
+        input_delay=Fixed(2.0),
+        ridge=Fixed(1e-3),
+        n_members=3,
+        delay_rows="exact",
+        alignment=ProbeAlignment(mode="dispersion", surge=surge),
+    ).fit(runs, STATES, INPUTS)
+    run = drifting_run(7)
+    forecast = ensemble.forecast(run, start=60.0, steps=100)
+    alone = ensemble.member(1).forecast(run, start=60.0, steps=100)
+    np.testing.assert_allclose(forecast["heave"].sel(member=1), alone["heave"], atol=1e-7)
+    assert forecast.attrs.get("conditional_on", "") == ("surge" if surge == "measured" else "")
+    loaded = load_model(ensemble.save(tmp_path / "ens.nc"))
+    xr.testing.assert_allclose(loaded.forecast(run, start=60.0, steps=100), forecast)
+    asking = run.assign_attrs(probe_offset_span=(0.0, 50.0))
+    with pytest.raises(RequestError, match=r"an ensemble does not do\. Estimate it with a mod"):
+        ensemble.forecast(asking, start=60.0, steps=100)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"mode": "linear"}, "mode must be 'effective' or 'dispersion'; received 'linear'"),
+        ({"surge": True}, "surge must be 'measured', 'predicted' or 'none'; received True"),
+        ({"celerity": -1.0}, r"celerity must be a positive number or None \(m/s\); received -1.0"),
+        ({"offset": "3 m"}, "offset must be a number .*; received '3 m'"),
+        ({"mode": "dispersion", "celerity": 2.0}, "celerity = 2.0 belongs to mode = 'effective'"),
+        ({"highest_frequency": 2.0}, "highest_frequency = 2.0 belongs to mode = 'dispersion'"),
+        ({"channels": "eta"}, r"must be a list of names; .* Write channels=\['eta'\]"),
+    ],
+)
+def test_settings_out_of_range(settings, message):
+    with pytest.raises(RequestError, match=message):
+        ProbeAlignment(**settings)
+
+
+def test_a_table_of_keys_is_taken_and_a_wrong_key_named():
+    assert spec({"surge": "none"}).alignment == ProbeAlignment(surge="none")
+    with pytest.raises(RequestError, match=r"unknown key 'modes'. Did you mean 'mode'\? Keys"):
+        spec({"modes": "effective"})
+
+
+def without(run, *names, positions=True):
+    run = run.copy(deep=True)
+    for name in names:
+        run.attrs.pop(name, None)
+    if not positions:
+        for each in run.data_vars.values():
+            each.attrs.pop("x_position", None)
+    return run
+
+
+@pytest.mark.parametrize(
+    ("alignment", "change", "states", "inputs", "message"),
+    [
+        (
+            {"mode": "dispersion"},
+            lambda run: without(run, "water_depth"),
+            STATES,
+            INPUTS,
+            "needs the water depth and run 1 has no attribute 'water_depth'. State water_depth",
+        ),
+        (
+            {"mode": "effective"},
+            lambda run: without(run, positions=False),
+            STATES,
+            INPUTS,
+            r"celerity cannot be estimated from run 1: .* \(positions stated: 0\). State celerity",
+        ),
+        (
+            {"surge": "predicted"},
+            lambda run: run,
+            ["heave"],
+            INPUTS,
+            "surge = 'predicted' needs 'surge' among the states; received heave. Add it, or choose",
+        ),
+        (
+            {"channels": ["eta_bow"]},
+            lambda run: run,
+            STATES,
+            INPUTS,
+            r"channels names 'eta_bow', which is not among the inputs \(eta_fwd, eta_cog\)",
+        ),
+        (
+            {},
+            lambda run: run,
+            STATES,
+            [],
+            r"none of the inputs \(none\) is known as a wave elevation. Give the channels an attr",
+        ),
+        (
+            {},
+            lambda run: run.drop_vars("surge"),
+            ["heave"],
+            INPUTS,
+            "run 1 has no channel 'surge'. .*It has: heave, eta_fwd, eta_cog",
+        ),
+        (
+            {},
+            lambda run: run.assign_attrs(probe_offset_span=(0.0, 9.0)),
+            STATES,
+            INPUTS,
+            "run 1 asks for its probe offset to be estimated, which takes a model, so it cannot tr",
+        ),
+    ],
+)
+def test_runs_that_lack_what_the_alignment_needs(runs, alignment, change, states, inputs, message):
+    with pytest.raises(RequestError, match=message):
+        spec(alignment).fit(change(runs[0]), states, inputs)
+
+
+def test_offsets_that_cannot_be_estimated(runs, models):
+    with pytest.raises(RequestError, match=r"this one has no alignment\. Fit it with alignment="):
+        estimate_probe_offset(models["none"], runs[0], (0.0, 60.0))
+    with pytest.raises(RequestError, match=r"the span \[0, 4\] s holds 41 samples of run 1; .* 51"):
+        estimate_probe_offset(models["dispersion"], runs[0], (0.0, 4.0))
+    with pytest.raises(RequestError, match=re.escape("bounds must rise; received (1.0, 0.0) (m)")):
+        estimate_probe_offset(models["dispersion"], runs[0], (0.0, 60.0), bounds=(1.0, 0.0))
+    with pytest.warns(UserWarning, match="lies at the end of the distances tried, 0.2 to 0.3 m"):
+        estimate_probe_offset(models["dispersion"], runs[0], (0.0, 60.0), bounds=(0.2, 0.3))
