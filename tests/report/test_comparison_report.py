@@ -137,3 +137,18 @@ def test_without_matplotlib_the_message_names_the_extra(monkeypatch):
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(RequestError, match=r"pip install 'seakeep\[figures\]'"), figure_style():
         pass
+
+
+def test_tables_say_what_a_forecast_was_conditional_on(tmp_path):
+    judged = comparison()
+    notes = {"conditional_on": "surge", "probe_offset": 38.8, "probe_offset_spread": 1.2}
+    judged.forecast.attrs.update(notes)
+    table = comparison_table([judged])
+    cells = [cell for column in rich_comparison(table).columns for cell in column.cells]
+    assert "conditional on measured surge" in cells
+    assert "probe offset 38.8 ± 1.2 m" in cells
+    rows = list(csv.DictReader(write_csv(table, tmp_path / "t.csv").read_text().splitlines()))
+    assert {row["conditional_on"] for row in rows} == {"surge"}
+    assert float(rows[0]["probe_offset_spread"]) == 1.2
+    plain = rich_comparison(comparison_table([comparison()]))
+    assert not any("conditional" in cell for column in plain.columns for cell in column.cells)

@@ -8,7 +8,13 @@ import pytest
 import seakeep
 from seakeep.campaign import ModelSettings
 from seakeep.errors import RequestError
-from seakeep.study import build_spec, compare, fit_campaign, training_runs
+from seakeep.study import (
+    build_spec,
+    compare,
+    comparison_table,
+    fit_campaign,
+    training_runs,
+)
 
 RATE = 10.0
 
@@ -115,3 +121,94 @@ def test_a_campaign_without_test_run_is_told_to_name_one(halves):
     whole = campaign(halves, EXACT, '[runs.a]\nfile = "run.csv"\nrole = "train"\n')
     with pytest.raises(RequestError, match="no run of the campaign tests a model"):
         compare(fit_campaign(whole), whole)
+
+
+@pytest.fixture
+def repeating(tmp_path):
+    """A sea of equally spaced components that comes back, turned, after 100 s of 200."""
+    rng = np.random.default_rng(4)
+    time = np.arange(2001) / RATE
+    frequency, phase = 0.303 + 0.01 * np.arange(40), rng.uniform(0, 2 * np.pi, 40)
+    eta = np.cos(2 * np.pi * np.outer(time, frequency) + phase).sum(axis=1)
+    surge = 0.5 * np.sin(time / 5) + 0.01 * rng.standard_normal(time.size)
+    table = np.column_stack([time, eta, np.roll(eta, 5), surge])
+    header = "t [s],eta [m],z [m],x [m]"
+    np.savetxt(tmp_path / "run.csv", table, delimiter=",", header=header, comments="")
+    return tmp_path
+
+
+REPEATS = (
+    r"the input 'eta_fwd' of all repeats training input: .* % of it, such as from t = .* s on, is "
+    r"what all holds from t = .* turned by .* memory, not skill: test on another run"
+)
+
+
+def test_a_test_that_repeats_its_training_is_warned_of(repeating):
+    whole = campaign(repeating, EXACT)
+    with pytest.warns(seakeep.SeakeepWarning, match=REPEATS):
+        model = fit_campaign(whole)
+    with pytest.warns(seakeep.SeakeepWarning, match=REPEATS):
+        compare(model, whole)
+
+
+def test_what_another_run_trained_on_is_looked_at_too(repeating):
+    runs = (
+        '[runs.all]\nfile = "run.csv"\nspan = [100.0, 200.0]\nrole = "test"\n'
+        '[runs.first]\nfile = "run.csv"\nspan = [0.0, 100.0]\nrole = "train"\n'
+    )
+    whole = campaign(repeating, EXACT, runs)
+    model = fit_campaign(whole)
+    with pytest.warns(seakeep.SeakeepWarning, match="is what first holds from"):
+        compare(model, whole)
+
+
+def test_regular_waves_are_not_warned_of(repeating):
+    runs = '[runs.all]\nfile = "run.csv"\nwaves = "regular"\ntrain = [0, 100]\ntest = [100, 200]\n'
+    whole = campaign(repeating, EXACT, runs)
+    compare(fit_campaign(whole), whole)  # warnings are errors
+
+
+def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halves):
+    path = halves / "run.csv"
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    surge = 0.3 * np.sin(table[:, 0] / 5)
+    header = "t [s],eta [m],z [m],x [m]"
+    np.savetxt(path, np.column_stack([table, surge]), delimiter=",", header=header, comments="")
+    aligned = EXACT + '\nalignment = { mode = "dispersion", surge = "measured" }'
+    text = campaign(halves, aligned).path.read_text()
+    (halves / "campaign.toml").write_text(
+        '[rig]\nwater_depth = 3.6\npositions = { eta_fwd = 1.0 }\n[channels.surge]\ncolumn = "x"\n'
+        + text.replace("test = [100.0, 200.0]", "test = [100.0, 200.0]\nprobe_offset = 0.1")
+    )
+    whole = seakeep.read_campaign(halves / "campaign.toml")
+    model = fit_campaign(whole)
+    assert model.alignment.settings == seakeep.ProbeAlignment(mode="dispersion", surge="measured")
+    found = comparison_table(compare(model, whole)).isel(run=0)
+    assert str(found["conditional_on"].values) == "surge"
+    assert float(found["probe_offset"]) == 0.1
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            'alignment = { mode = "dispersive" }',
+            r"model.alignment.mode: received 'dispersive', .*'effective'",
+        ),
+        (
+            'alignment = { mode = "dispersion", celerity = 2.0 }',
+            "model.alignment: 'celerity' goes with mode = 'effective' alone; remove it",
+        ),
+        ("alignment = { sruge = 'none' }", "model.alignment.sruge: unknown key.*mean 'surge'"),
+        (
+            "[runs.all]\nprobe_offset = 1.0\nprobe_offset_span = [0, 9]",
+            "runs.all: state 'probe_offset' or 'probe_offset_span', not both",
+        ),
+    ],
+)
+def test_wrong_alignments_in_the_file_are_named(halves, text, message):
+    runs = None
+    if text.startswith("[runs"):
+        text, runs = "", text + '\nfile = "run.csv"\n'
+    with pytest.raises(RequestError, match=message):
+        campaign(halves, EXACT + "\n" + text, runs)
