@@ -43,7 +43,9 @@ def test_celerities_are_those_of_the_sea_that_was_played(sampled, settings, rig)
         assert found.celerity == pytest.approx(apart / lags[np.argmax(truth)], rel=0.03)
         peak = 1 / peak_period(upstream, run.attrs["dt"])
         phase = phase_celerity(upstream, downstream, run.attrs["dt"], apart, depth)
-        assert phase.at(peak) == pytest.approx(float(phase_speed(2 * np.pi * peak, depth)), rel=0.03)
+        assert phase.at(peak) == pytest.approx(
+            float(phase_speed(2 * np.pi * peak, depth)), rel=0.03
+        )
 
 
 @pytest.mark.filterwarnings("ignore::seakeep.SeakeepWarning")
@@ -58,7 +60,9 @@ def test_alignment_with_measured_surge_lowers_the_error_of_unseen_windows(script
     # Over all three runs: −0.21 with an interval of −0.23 to −0.18 (the script's table).
     assert middle < -0.1
     assert high < 0
-    medians = dict(zip(script.STATES, np.median(errors["measured, effective"], axis=0), strict=True))
+    medians = dict(
+        zip(script.STATES, np.median(errors["measured, effective"], axis=0), strict=True)
+    )
     assert medians["heave"] <= 0.4
     assert medians["pitch"] <= 0.4
 
