@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,49 @@ def one_model(history: str, with_peers: bool):
     return contenders, problem
 
 
+def members(count: int, windows: int, workers: tuple[int, ...] = (1,)):
+    """Contenders of an ensemble: the same draws, forecast from one or several starts."""
+    problem = linear_system(samples=4608)
+    run = as_run(problem)
+    states, inputs = names()
+    stop = problem.stop * DT
+    first = problem.stop + 400
+    starts = np.linspace(first, len(problem.states) - STEPS - 2, windows).astype(int)
+    paper = seakeep.BayesianHankelDMDc.paper(encounter_period=32 * DT, dt=DT, n_members=count)
+    draws = paper.fit(run, states, inputs, stop=stop).draws
+
+    def plain():
+        for k in range(count):
+            model = reference.fit(
+                problem.states,
+                problem.inputs,
+                problem.stop,
+                m=int(draws.train_length_samples[k]),
+                s=int(draws.state_delay_samples[k]),
+                z=int(draws.input_delay_samples[k]),
+                ridge=float(draws.ridge[k]),
+            )
+            for start in starts:
+                reference.forecast(model, problem.states, problem.inputs, start, STEPS)
+
+    def package(delay_rows, number):
+        spec = dataclasses.replace(paper, delay_rows=delay_rows)
+
+        def call():
+            ensemble = spec.fit(run, states, inputs, stop=stop)
+            return ensemble.summarize_windows(run, starts * DT, STEPS, workers=number)
+
+        return call
+
+    contenders = {"plain NumPy, loops over the same cells": plain}
+    for delay_rows in ("ridge", "exact"):
+        for number in workers:
+            text = f"seakeep, delay_rows='{delay_rows}'"
+            text += "" if number == 1 else f", {number} workers"
+            contenders[text] = package(delay_rows, number)
+    return contenders
+
+
 def accuracy(contenders, problem) -> dict[str, float]:
     """ANRMSE of each contender over the forecast."""
     measured = problem.states[problem.stop + 1 : problem.stop + 1 + STEPS]
@@ -87,16 +131,36 @@ def accuracy(contenders, problem) -> dict[str, float]:
 def main() -> None:
     """Run what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=31, help="repetitions (default 31)")
+    parser.add_argument("--rounds", type=int, default=31, help="repetitions of one model")
+    parser.add_argument("--many-rounds", type=int, default=7, help="repetitions of ensembles")
+    parser.add_argument("--members", type=int, default=100, help="members of the ensemble")
+    parser.add_argument(
+        "--study-members",
+        type=int,
+        default=10,
+        help="draws of the study's cells timed (one training window, ten test windows)",
+    )
+    parser.add_argument("--workers", type=int, default=2, help="workers compared with one")
     parser.add_argument("--out", type=Path, default=Path("benchmarks/results"))
     parser.add_argument("--no-peers", action="store_true", help="leave other packages out")
+    parser.add_argument("--only", choices=["one", "ensemble", "study"], help="one part alone")
     arguments = parser.parse_args()
     sections, notes = {}, {}
-    for history in ("inside", "before"):
-        contenders, problem = one_model(history, not arguments.no_peers)
-        title = f"Fit and forecast of {STEPS} steps, history {history}"
-        sections[title] = timing.interleave(contenders, arguments.rounds)
-        notes[f"ANRMSE, history {history}"] = accuracy(contenders, problem)
+    if arguments.only in (None, "one"):
+        for history in ("inside", "before"):
+            contenders, problem = one_model(history, not arguments.no_peers)
+            title = f"Fit and forecast of {STEPS} steps, history {history}"
+            sections[title] = timing.interleave(contenders, arguments.rounds)
+            notes[f"ANRMSE, history {history}"] = accuracy(contenders, problem)
+    numbers = (1,) if arguments.workers == 1 else (1, arguments.workers)
+    if arguments.only in (None, "ensemble"):
+        title = f"Ensemble of {arguments.members}, one forecast each"
+        contenders = members(arguments.members, 1, numbers)
+        sections[title] = timing.interleave(contenders, arguments.many_rounds)
+    if arguments.only in (None, "study"):
+        title = f"Study: {arguments.study_members} draws, ten test windows each"
+        contenders = members(arguments.study_members, 10, numbers)
+        sections[title] = timing.interleave(contenders, arguments.many_rounds)
     print(timing.write(arguments.out, sections, notes))
 
 

@@ -98,15 +98,6 @@ def test_matlab_cut_off(tmp_path, part, compressed):
         read_table(path)
 
 
-def test_matlab_73(tmp_path):
-    path = tmp_path / "run.mat"
-    path.write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512) + b"\x89HDF\r\n\x1a\n")
-    with pytest.raises(
-        DataError, match=r"of version 7\.3, which is not read yet\. In MATLAB, write it with save"
-    ):
-        read_table(path)
-
-
 def dataset():
     return xr.Dataset(
         {"heave": ("time", HEAVE, {"units": "mm"}), "wave": ("time", WAVE), "depth": ((), 3.6)},

@@ -10,6 +10,7 @@ from seakeep.core.embedding import TrainingWindow
 from seakeep.core.gram import Piece, gram_trace, primal_system, snapshot_gram
 from seakeep.core.lagged import lagged_response, lagged_sums
 from seakeep.core.propagation import doublings, mirrored, shifting_propagator, square_propagator
+from seakeep.core.scratch import Scratch
 
 # Sums of at most a few hundred products of order one: 1e-12 is a thousand roundings.
 TIGHT = 1e-12
@@ -63,7 +64,8 @@ def test_the_displaced_gram_is_the_gram(problem):
     N, extended = states[0].shape[1], states[0].shape[1] * (s + 1)
     # Inputs stand first.
     turned = np.concatenate([regressors[extended:], regressors[:extended]])
-    gram, right = primal_system(pieces_of(problem), s, z)
+    system = primal_system(pieces_of(problem), s, z, Scratch())
+    gram, right = system.gram, system.right
     np.testing.assert_allclose(np.triu(gram), np.triu(turned @ turned.T), atol=TIGHT, rtol=TIGHT)
     np.testing.assert_allclose(right, targets[:N] @ turned.T, atol=TIGHT, rtol=TIGHT)
 
@@ -73,7 +75,7 @@ def test_the_displaced_gram_is_the_gram(problem):
 def test_the_diagonal_sums_are_the_gram_of_the_snapshots(problem):
     *_, s, z = problem
     regressors, _ = built(problem)
-    gram = snapshot_gram(pieces_of(problem), s, z)
+    gram = snapshot_gram(pieces_of(problem), s, z, Scratch())
     np.testing.assert_allclose(
         np.triu(gram), np.triu(regressors.T @ regressors), atol=TIGHT, rtol=TIGHT
     )
@@ -128,7 +130,7 @@ def test_lagged_sums_are_products_with_a_hankel_matrix(seed, count, channels, la
         ]
     )
     np.testing.assert_allclose(
-        lagged_sums(left, series, first, lags), left.T @ hankel.T, atol=TIGHT
+        lagged_sums(left, series, first, lags, Scratch()), left.T @ hankel.T, atol=TIGHT
     )
     weights = rng.normal(size=lags * channels)
     np.testing.assert_allclose(
@@ -190,7 +192,7 @@ def test_a_propagator_is_as_many_steps_as_it_says(case, times):
     channels = inputs.shape[2]
     shifting = shifting_propagator(a[:N], b[:N], channels, 2**times)
     state = histories[0][::-1].ravel()
-    for propagator in (square_propagator(a, b, N, channels, times), shifting):
+    for propagator in (square_propagator(a, b, N, channels, times, Scratch()), shifting):
         if propagator is shifting and not np.array_equal(a[N:], np.eye(len(a) - N, len(a))):
             continue
         K = propagator.steps
@@ -206,12 +208,12 @@ def test_half_of_a_mirrored_matrix_is_taken_for_one_window_alone():
     rng = np.random.default_rng(3)
     N, size = 2, 40
     a = rng.normal(size=(size, size))
-    assert mirrored(a, 10, N, 1) is None
+    assert mirrored(a, 10, N, 1, Scratch()) is None
     a[N:, : size - N] += a[N:, : size - N].T.copy()
-    half = mirrored(a, 10, N, 1)
+    half = mirrored(a, 10, N, 1, Scratch())
     np.testing.assert_array_equal(half[: size - N], a[N:])
     a[N + 20, 5] += 1e-15
-    assert mirrored(a, 10, N, 1) is None
+    assert mirrored(a, 10, N, 1, Scratch()) is None
 
 
 def test_a_free_run_with_half_of_the_matrix_is_the_loop():
@@ -221,7 +223,7 @@ def test_a_free_run_with_half_of_the_matrix_is_the_loop():
     a, b = rng.normal(size=(size, size)) / (2 * size), rng.normal(size=(size, 2 * (z + 1)))
     half = rng.normal(size=(size - N, size - N)) / (4 * size)
     a[N:, : size - N] = 0.5 * np.eye(size - N) + half + half.T
-    assert mirrored(a, b.shape[1], N, steps) is not None
+    assert mirrored(a, b.shape[1], N, steps, Scratch()) is not None
     history, inputs = rng.normal(size=(1, s + 1, N)), rng.normal(size=(1, z + steps, 2))
     expected = stepwise(a, b, history[0, ::-1].ravel(), inputs[0], z, steps, N)
     np.testing.assert_allclose(rollout(a, b, history, inputs)[0], expected, atol=RESULT)
@@ -232,7 +234,7 @@ def test_a_ridge_model_is_mirrored_to_the_last_bit():
     x, u = rng.normal(size=(400, 2)), rng.normal(size=(400, 1))
     window = TrainingWindow(20, 399, 20)
     g = identify([x], [u], [window], state_delays=5, input_delays=7, ridge=10.0).coefficients
-    assert mirrored(g[:, :12], 8, 2, 1) is not None
+    assert mirrored(g[:, :12], 8, 2, 1, Scratch()) is not None
 
 
 def test_more_windows_and_steps_ask_for_longer_propagators():

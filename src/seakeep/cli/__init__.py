@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from seakeep.cli import campaigns, information, modelling, tank
+from seakeep.cli import campaigns, information, modelling, tank, tracking
 from seakeep.cli.console import messages, tell_warnings
 from seakeep.errors import SeakeepError
 
@@ -55,6 +55,7 @@ app.command("fit")(modelling.fit)
 app.command("forecast")(modelling.forecast)
 app.command("compare")(modelling.compare)
 app.add_typer(campaigns.datasets, name="datasets")
+app.command("track")(tracking.track)
 app.command("info")(information.info)
 
 

@@ -12,7 +12,7 @@ import xarray as xr
 from seakeep.campaign import Campaign, load_prepared, read_campaign
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.files import replacing
+from seakeep.files import check_place, make_folder, replacing
 from seakeep.models import HankelDMDcModel, load_model
 from seakeep.report.overlay import overlay_figure
 from seakeep.report.style import save_figure
@@ -40,8 +40,7 @@ def fit(
 
     Example: seakeep fit docs/tutorial/campaign.toml -o model.nc
     """
-    if not out.parent.is_dir():
-        raise RequestError(f"the folder {out.parent} does not exist. Create it first.")
+    check_place(out)
     with progress_bar("Preparing") as progress:
         identified = fit_campaign(read_campaign(campaign), model, progress)
     typer.echo(identified.summary())
@@ -132,12 +131,7 @@ def compare(
         comparisons = [in_degrees(each) for each in comparisons]
     table = comparison_table(comparisons)
     results().print(rich_comparison(table))
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RequestError(
-            f"cannot make the folder {out}: {error.strerror or error}. Choose another with -o."
-        ) from error
+    make_folder(out)
     written = [write_csv(table, out / "comparison.csv")]
     if find_spec("matplotlib") is None:
         messages().print(

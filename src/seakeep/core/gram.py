@@ -25,15 +25,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from seakeep.core.lagged import lagged_response, lagged_sums, recent
+from seakeep.core.scratch import Scratch
 
-__all__ = ["Piece", "gram_trace", "primal_system", "snapshot_gram"]
+__all__ = ["Piece", "PrimalSystem", "gram_trace", "primal_system", "snapshot_gram"]
 
 FloatArray = npt.NDArray[np.float64]
+
+PANELS = 4
+"""Pieces in which the upper triangle of a product is made."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +64,34 @@ class Piece:
     def targets(self) -> FloatArray:
         """Newest blocks of the next snapshots, shape (count, N)."""
         return self.states[self.first + 1 : self.first + 1 + self.count]
+
+
+@dataclass(frozen=True, eq=False)
+class PrimalSystem:
+    """Normal equations of delayed series; inputs stand before states, newest lags first.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (p, p)
+        Upper triangle of C, p = Q(z+1) + N(s+1).
+    right : ndarray, shape (N, p)
+        Products of the next states (the newest block alone) with the regressors.
+    heads : ndarray, shape (Q + N, p)
+        Rows of C of the newest inputs and states.
+    edges : ndarray, shape (2 runs, p)
+        What enters at the begin (even rows) and leaves at the end (odd rows) of a run where a
+        block moves by a lag.
+    states, channels, inputs : int
+        N, Q and Q(z+1).
+    """
+
+    gram: FloatArray
+    right: FloatArray
+    heads: FloatArray
+    edges: FloatArray
+    states: int
+    channels: int
+    inputs: int
 
 
 def gram_trace(pieces: Sequence[Piece], state_delays: int, input_delays: int) -> float:
@@ -88,11 +121,9 @@ def gram_trace(pieces: Sequence[Piece], state_delays: int, input_delays: int) ->
 
 
 def primal_system(
-    pieces: Sequence[Piece], state_delays: int, input_delays: int
-) -> tuple[FloatArray, FloatArray]:
+    pieces: Sequence[Piece], state_delays: int, input_delays: int, scratch: Scratch
+) -> PrimalSystem:
     r"""Gram matrix :math:`\hat Y \hat Y^T` and right-hand side :math:`X' \hat Y^T`.
-
-    Rows and columns stand in the order extended inputs, extended states.
 
     Parameters
     ----------
@@ -100,13 +131,13 @@ def primal_system(
         Runs.
     state_delays, input_delays : int
         s and z.
+    scratch : Scratch
+        Memory.
 
     Returns
     -------
-    gram : ndarray, shape (p, p)
-        Its upper triangle, p = Q(z+1) + N(s+1).
-    right : ndarray, shape (N, p)
-        Products of the next states (the newest block alone) with the regressors.
+    PrimalSystem
+        Its Gram matrix is part of `scratch`.
     """
     s, z = state_delays, input_delays
     N, Q = pieces[0].states.shape[1], pieces[0].inputs.shape[1]
@@ -121,8 +152,8 @@ def primal_system(
         # One more lag and one column less than the heads need: the sums of the next states are
         # the same sums one lag later, up to one product at either end.
         newest = np.concatenate([u[start + 1 : end + 1], x[start + 1 : end + 1]], axis=1)
-        sums_u = lagged_sums(newest, u, start + 1, z + 2)
-        sums_x = lagged_sums(newest, x, start + 1, s + 2)
+        sums_u = lagged_sums(newest, u, start + 1, z + 2, scratch)
+        sums_x = lagged_sums(newest, x, start + 1, s + 2, scratch)
         snapshot = np.concatenate([recent(u, start, z + 1), recent(x, start, s + 1)])
         heads += np.concatenate([u[start], x[start]])[:, None] * snapshot
         heads[:, :inputs] += sums_u[:, : Q * (z + 1)]
@@ -136,9 +167,10 @@ def primal_system(
             row[inputs + N :] = recent(x, at, s)
     signed = edges.copy()
     signed[1::2] *= -1.0
-    gram = edges.T @ signed
+    gram = scratch.take((size, size))
+    _upper_product(edges.T, signed, gram)
     _fill_primal(gram, heads, N, Q, inputs)
-    return gram, right
+    return PrimalSystem(gram, right, heads, edges, N, Q, inputs)
 
 
 def _fill_primal(gram: FloatArray, heads: FloatArray, N: int, Q: int, inputs: int) -> None:
@@ -156,7 +188,9 @@ def _fill_primal(gram: FloatArray, heads: FloatArray, N: int, Q: int, inputs: in
         gram[at : at + N, at:] += gram[at - N : at, at - N : size - N]
 
 
-def snapshot_gram(pieces: Sequence[Piece], state_delays: int, input_delays: int) -> FloatArray:
+def snapshot_gram(
+    pieces: Sequence[Piece], state_delays: int, input_delays: int, scratch: Scratch
+) -> FloatArray:
     r"""Gram matrix :math:`\hat Y^T \hat Y` of the snapshots of all runs.
 
     Parameters
@@ -165,6 +199,8 @@ def snapshot_gram(pieces: Sequence[Piece], state_delays: int, input_delays: int)
         Runs.
     state_delays, input_delays : int
         s and z.
+    scratch : Scratch
+        Memory; the result is part of it.
 
     Returns
     -------
@@ -184,7 +220,8 @@ def snapshot_gram(pieces: Sequence[Piece], state_delays: int, input_delays: int)
         rows[1:, 2 * N + Q :] = piece.inputs[first - z : first - z + count - 1]
     signed = steps.copy()
     signed[:, N + Q :] *= -1.0
-    gram = steps @ signed.T
+    gram = scratch.take((len(steps), len(steps)))
+    _upper_product(steps, signed.T, gram)
     for i, piece in enumerate(pieces):
         own_x = recent(piece.states, piece.first, s + 1)
         own_u = recent(piece.inputs, piece.first, z + 1)
@@ -197,8 +234,16 @@ def snapshot_gram(pieces: Sequence[Piece], state_delays: int, input_delays: int)
                 gram[ends[j] : ends[j + 1], ends[i]] = head
     for i in range(len(pieces)):
         for at in range(ends[i] + 1, ends[i + 1]):
-            gram[at, at : ends[i + 1]] += gram[at - 1, at - 1 : ends[i + 1] - 1]
+            row = gram[at, at : ends[i + 1]]
+            row += gram[at - 1, at - 1 : ends[i + 1] - 1]
             for j in range(i + 1, len(pieces)):
-                block = slice(ends[j] + 1, ends[j + 1])
-                gram[at, block] += gram[at - 1, ends[j] : ends[j + 1] - 1]
+                row = gram[at, ends[j] + 1 : ends[j + 1]]
+                row += gram[at - 1, ends[j] : ends[j + 1] - 1]
     return gram
+
+
+def _upper_product(left: FloatArray, right: FloatArray, out: FloatArray) -> None:
+    # In panels of rows, each from its diagonal on: a little more than half of the product.
+    edges = [len(out) * panel // PANELS for panel in range(PANELS + 1)]
+    for begin, stop in pairwise(edges):
+        np.matmul(left[begin:stop], right[:, begin:], out=out[begin:stop, begin:])

@@ -26,6 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.core.scratch import Scratch
+
 __all__ = ["Propagator", "doublings", "mirrored", "shifting_propagator", "square_propagator"]
 
 FloatArray = npt.NDArray[np.float64]
@@ -40,6 +42,8 @@ SKINNY_COST = (4000.0, 0.1, 0.055)
 MIRRORED_COST = (2000.0, 0.065)
 """Nanoseconds of a step with half of Â: fixed, per entry."""
 MOST_DOUBLINGS = 6
+TILE = 96
+"""Side of the squares in which a matrix is compared with its mirror image."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +140,9 @@ def doublings(size: int, inputs: int, windows: int, steps: int) -> tuple[int, fl
     return best, least
 
 
-def mirrored(a: FloatArray, inputs: int, count: int, steps: int) -> FloatArray | None:
+def mirrored(
+    a: FloatArray, inputs: int, count: int, steps: int, scratch: Scratch
+) -> FloatArray | None:
     """Rows of Â for the delayed states as the upper triangle of a symmetric matrix.
 
     Parameters
@@ -145,6 +151,8 @@ def mirrored(a: FloatArray, inputs: int, count: int, steps: int) -> FloatArray |
         Â.
     inputs, count, steps : int
         Columns of B̂, N, and the steps of the one window.
+    scratch : Scratch
+        Memory; the result is part of it.
 
     Returns
     -------
@@ -158,16 +166,20 @@ def mirrored(a: FloatArray, inputs: int, count: int, steps: int) -> FloatArray |
     block = a[count:, :kept]
     if kept == 0 or cost > doublings(size, inputs, 1, steps)[1]:
         return None
-    # A corner tells most other matrices apart before all of it is read.
-    if not np.array_equal(block[:8, :8], block[:8, :8].T) or not np.array_equal(block, block.T):
-        return None
-    out = np.zeros((size, size))
+    # Square by square, so that a block and its mirror image lie in cache together.
+    for row in range(0, kept, TILE):
+        for column in range(0, row + 1, TILE):
+            tile = block[row : row + TILE, column : column + TILE]
+            if not np.array_equal(tile, block[column : column + TILE, row : row + TILE].T):
+                return None
+    out = scratch.take((size, size))
     out[:kept] = a[count:]
+    out[kept:] = 0.0
     return out
 
 
 def square_propagator(
-    a: FloatArray, b: FloatArray, count: int, channels: int, times: int
+    a: FloatArray, b: FloatArray, count: int, channels: int, times: int, scratch: Scratch
 ) -> Propagator:
     """Propagator of a model with a full Â, of two to the power of `times` steps.
 
@@ -179,6 +191,8 @@ def square_propagator(
         N and Q.
     times : int
         Number of doublings.
+    scratch : Scratch
+        Memory; the result is part of it.
 
     Returns
     -------
@@ -197,8 +211,10 @@ def square_propagator(
         wider_output[half:, pad:] = output_input
         output_state = np.concatenate([output_state @ a, output_state])
         output_input = wider_output
-        wider = np.zeros((len(b), width + pad))
+        wider, squared = scratch.take((len(b), width + pad)), scratch.take(a.shape)
+        wider[:, :pad] = 0.0
         np.matmul(a, b, out=wider[:, pad:])
         wider[:, :width] += b
-        a, b, K = a @ a, wider, 2 * K
+        np.matmul(a, a, out=squared)
+        a, b, K = squared, wider, 2 * K
     return Propagator(K, output_state, output_input, a, b)

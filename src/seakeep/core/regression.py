@@ -22,7 +22,9 @@ from scipy.linalg import blas, lapack
 
 from seakeep.core.embedding import TrainingWindow, snapshot_matrices
 from seakeep.core.gram import Piece, gram_trace, primal_system, snapshot_gram
+from seakeep.core.inverse import ridge_rows
 from seakeep.core.lagged import lagged_sums
+from seakeep.core.scratch import Scratch
 
 __all__ = ["Method", "Solution", "identify", "solve"]
 
@@ -162,13 +164,6 @@ def _apply(factor: FloatArray, right: FloatArray) -> FloatArray:
     return np.asarray(solved).T
 
 
-def _symmetric_inverse(factor: FloatArray) -> FloatArray:
-    """Inverse of L L^T, both triangles of it; the factor, in Fortran order, is overwritten."""
-    lower, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
-    lower = np.tril(lower)
-    return np.asarray(lower + np.tril(lower, -1).T)
-
-
 def _by_singular_values(
     regressors: FloatArray, targets: FloatArray, ridge: float, rank: int | None
 ) -> Solution:
@@ -196,6 +191,7 @@ def identify(
     rank: int | None = None,
     all_rows: bool = True,
     method: Method | None = None,
+    scratch: Scratch | None = None,
 ) -> Solution:
     r"""Identify :math:`[\hat A\; \hat B]` from one or several runs.
 
@@ -222,6 +218,8 @@ def identify(
         alone.
     method : {"primal", "dual", "svd"}, optional
         As in :func:`solve`.
+    scratch : Scratch, optional
+        Memory of an earlier call to use again.
 
     Returns
     -------
@@ -234,7 +232,7 @@ def identify(
     ]
     columns = sum(piece.count for piece in pieces)
     effective = ridge * columns if per_snapshot else ridge
-    problem = _Delayed(pieces, state_delays, input_delays, all_rows)
+    problem = _Delayed(pieces, state_delays, input_delays, all_rows, scratch or Scratch())
     chosen = "svd" if rank is not None else method or problem.choose(effective)
     full_rank = min(problem.rows, columns)
     if chosen == "primal":
@@ -255,6 +253,12 @@ class _Delayed:
     state_delays: int
     input_delays: int
     all_rows: bool
+    scratch: Scratch
+
+    @property
+    def shape(self) -> tuple[Sequence[Piece], int, int]:
+        """Pieces and delays."""
+        return self.pieces, self.state_delays, self.input_delays
 
     @property
     def states(self) -> int:
@@ -277,7 +281,9 @@ class _Delayed:
         if not self.all_rows:
             return "primal" if p <= n else "dual"
         b = p - a
-        primal = p**3 / 3 + 2 * a**3 / 3 + a * b * b + 2 * a * a * b
+        first = self.pieces[0]
+        rank = 2 * (first.states.shape[1] + first.inputs.shape[1] + len(self.pieces))
+        primal = p**3 / 3 + 2 * rank * p * (p + a)
         dual = n**3 / 3 + n * n * p + n * a * (a + 2 * b)
         return "primal" if primal <= dual else "dual"
 
@@ -292,8 +298,8 @@ class _Delayed:
     def gram(self) -> FloatArray:
         """The smaller Gram matrix, its upper triangle."""
         if self.rows <= self.columns:
-            return primal_system(self.pieces, self.state_delays, self.input_delays)[0]
-        return snapshot_gram(self.pieces, self.state_delays, self.input_delays)
+            return primal_system(*self.shape, self.scratch).gram
+        return snapshot_gram(*self.shape, self.scratch)
 
     def matrices(self) -> tuple[FloatArray, FloatArray]:
         """Hankel matrices of regressors and targets, built."""
@@ -314,39 +320,13 @@ class _Delayed:
         return np.concatenate(regressors, axis=1), np.concatenate(targets, axis=1)
 
     def primal(self, ridge: float) -> FloatArray:
-        r"""Coefficients from :math:`C = \hat Y \hat Y^T`.
-
-        The rows that shift the delayed states need no right-hand side. With P the rows of
-        the identity that select the lags 0 … s−1 of the states, their targets are
-        :math:`P \hat Y`, and :math:`P C (C + \lambda I)^{-1} = P - \lambda P (C+\lambda I)^{-1}`:
-        a block of rows of the inverse. With the inputs first and the states last in
-        :math:`C + \lambda I = L L^T`, it is
-
-        .. math:: [-H T \;\; H], \quad H = (L_{22} L_{22}^T)^{-1}, \; T = L_{21} L_{11}^{-1}.
-        """
-        gram, right = primal_system(self.pieces, self.state_delays, self.input_delays)
-        factor = _factor(gram, ridge)
-        top = _apply(factor, right)
-        inputs, N = self.rows - self.states, len(top)
-        if not self.all_rows:
-            return np.concatenate([top[:, inputs:], top[:, :inputs]], axis=1)
-        out = np.empty((self.states, self.rows))
-        out[:N, : self.states] = top[:, inputs:]
-        out[:N, self.states :] = top[:, :inputs]
-        shifted = self.states - N
-        if shifted == 0:
-            return out
-        inverse = _symmetric_inverse(np.asfortranarray(factor[inputs:, inputs:]))[:shifted]
-        inverse *= ridge
-        np.negative(inverse, out=out[N:, : self.states])
-        out[N:].reshape(-1)[: shifted * self.rows : self.rows + 1] += 1.0
-        if inputs:
-            # f2py copies a block of a matrix element by element; asfortranarray does it by rows.
-            corner = np.asfortranarray(factor[:inputs, :inputs])
-            below = np.asfortranarray(factor[inputs:, :inputs])
-            ratio = blas.dtrsm(1.0, corner, below, side=1, lower=1, overwrite_b=1)
-            np.matmul(inverse, ratio, out=out[N:, self.states :])
-        return out
+        r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
+        system = primal_system(*self.shape, self.scratch)
+        factor = _factor(system.gram, ridge)
+        if self.all_rows:
+            return ridge_rows(system, factor, ridge, self.scratch)
+        top = _apply(factor, system.right)
+        return np.concatenate([top[:, system.inputs :], top[:, : system.inputs]], axis=1)
 
     def dual(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`K = \hat Y^T \hat Y`.
@@ -355,7 +335,7 @@ class _Delayed:
         summed against the lagged series; all rows are :math:`\hat X' L^{-T} Z` with
         :math:`Z = L^{-1} \hat Y^T`, and those of the delayed states are :math:`P Z^T Z`.
         """
-        factor = _factor(snapshot_gram(self.pieces, self.state_delays, self.input_delays), ridge)
+        factor = _factor(snapshot_gram(*self.shape, self.scratch), ridge)
         targets = np.concatenate([piece.targets for piece in self.pieces])
         if not self.all_rows:
             weights = _apply(factor, targets.T.copy()).T
@@ -363,8 +343,8 @@ class _Delayed:
             for piece in self.pieces:
                 own = weights[at : at + piece.count]
                 at += piece.count
-                x = lagged_sums(own, piece.states, piece.first, self.state_delays + 1)
-                u = lagged_sums(own, piece.inputs, piece.first, self.input_delays + 1)
+                x = lagged_sums(own, piece.states, piece.first, self.state_delays + 1, self.scratch)
+                u = lagged_sums(own, piece.inputs, piece.first, self.input_delays + 1, self.scratch)
                 top[:, : self.states] += x
                 top[:, self.states :] += u
             return top

@@ -18,6 +18,7 @@ from seakeep.core.propagation import (
     shifting_propagator,
     square_propagator,
 )
+from seakeep.core.scratch import Scratch
 from seakeep.errors import RequestError
 
 __all__ = ["rollout"]
@@ -36,6 +37,7 @@ def rollout(
     *,
     n_states: int | None = None,
     limit: float = np.inf,
+    scratch: Scratch | None = None,
 ) -> FloatArray:
     r"""Free run of one model over several windows side by side.
 
@@ -58,6 +60,8 @@ def rollout(
         is returned.
     limit : float, optional
         A window is given up where a value exceeds this or is not finite: NaN from there on.
+    scratch : Scratch, optional
+        Memory of an earlier call to use again.
 
     Returns
     -------
@@ -95,8 +99,9 @@ def rollout(
         a, b = a[:count], b[:count]
     channels, steps = _input_steps(b, driving)
     with np.errstate(over="ignore", invalid="ignore"):
-        symmetric, propagator = _prepare(a, b, count, channels, len(start), steps)
-        out = _run(propagator, symmetric, start, driving, steps, count)
+        memory = scratch or Scratch()
+        symmetric, propagator = _prepare(a, b, count, channels, len(start), steps, memory)
+        out = _run(propagator, symmetric, start, driving, steps, count, memory)
         lost = ~(np.abs(out) <= min(limit, np.finfo(float).max)).all(axis=2)
     if lost.any():
         out[np.logical_or.accumulate(lost, axis=1)] = np.nan
@@ -104,7 +109,13 @@ def rollout(
 
 
 def _prepare(
-    a: FloatArray, b: FloatArray, count: int, channels: int, windows: int, steps: int
+    a: FloatArray,
+    b: FloatArray,
+    count: int,
+    channels: int,
+    windows: int,
+    steps: int,
+    scratch: Scratch,
 ) -> tuple[FloatArray | None, Propagator]:
     """Symmetric half of Â, where it is used, and the propagator."""
     if a.shape[0] == count and a.shape[1] > count:
@@ -112,15 +123,15 @@ def _prepare(
         if not np.isfinite(propagator.output_state).all():
             propagator = shifting_propagator(a, b, channels, 1)
         return None, propagator
-    symmetric = mirrored(a, b.shape[1], count, steps) if windows == 1 else None
+    symmetric = mirrored(a, b.shape[1], count, steps, scratch) if windows == 1 else None
     times = 0
     if symmetric is None:
         times, _ = doublings(a.shape[1], b.shape[1], windows, steps)
-    propagator = square_propagator(a, b, count, channels, times)
+    propagator = square_propagator(a, b, count, channels, times, scratch)
     assert propagator.state is not None
     # A model that grows without bound overflows sooner in powers of Â than in single steps.
     if times and not np.isfinite(propagator.state).all():
-        propagator = square_propagator(a, b, count, channels, 0)
+        propagator = square_propagator(a, b, count, channels, 0, scratch)
     return symmetric, propagator
 
 
@@ -145,7 +156,10 @@ def _count_states(a: FloatArray, b: FloatArray, start: FloatArray, given: int | 
 
 def _shifts_exactly(a: FloatArray, b: FloatArray, count: int) -> bool:
     kept = a.shape[1] - count
-    lower = a[count:]
+    lower, moved = a[count:], np.eye(min(kept, 1), kept)
+    # The first of these rows tells most other matrices apart.
+    if kept and (np.any(b[count]) or not np.array_equal(lower[:1, :kept], moved)):
+        return False
     return (
         not np.any(b[count:])
         and not np.any(lower[:, kept:])
@@ -179,6 +193,7 @@ def _run(
     inputs: FloatArray,
     steps: int,
     count: int,
+    scratch: Scratch,
 ) -> FloatArray:
     # In pieces of whole blocks of K steps; the state is handed on.
     windows, size = start.shape
@@ -191,19 +206,24 @@ def _run(
     state = start
     for first in range(0, blocks, most):
         number = min(most, blocks - first)
-        rows = _input_rows(propagator, inputs, first, number)
+        memory = scratch.mark()
+        rows = _input_rows(propagator, inputs, first, number, scratch)
         if propagator.state is None:
-            newest_first, state = _run_shifting(propagator, state, rows)
+            newest_first, state = _run_shifting(propagator, state, rows, scratch)
         elif symmetric is not None:
-            newest_first, state = _run_mirrored(propagator, symmetric, state, rows)
+            newest_first, state = _run_mirrored(propagator, symmetric, state, rows, scratch)
         else:
-            newest_first, state = _run_square(propagator, state, rows)
+            newest_first, state = _run_square(propagator, state, rows, scratch)
         piece = out[:, first * K : (first + number) * K]
         piece[:] = newest_first.reshape(windows, number * K, count)[:, ::-1]
+        state = state.copy()
+        scratch.release(memory)
     return out[:, :steps]
 
 
-def _input_rows(propagator: Propagator, inputs: FloatArray, first: int, number: int) -> FloatArray:
+def _input_rows(
+    propagator: Propagator, inputs: FloatArray, first: int, number: int, scratch: Scratch
+) -> FloatArray:
     """Inputs of each block, newest first: shape (number * window, Q(z+K)); the last block first.
 
     Zeros stand where the last block reaches beyond the inputs; no output that is asked for sees
@@ -225,19 +245,23 @@ def _input_rows(propagator: Propagator, inputs: FloatArray, first: int, number: 
         strides=(K * step, window, channel),
         writeable=False,
     )
-    return np.ascontiguousarray(blocks).reshape(number * windows, width)
+    out = scratch.take((number, windows, width))
+    out[:] = blocks
+    return out.reshape(number * windows, width)
 
 
 def _run_shifting(
-    propagator: Propagator, start: FloatArray, rows: FloatArray
+    propagator: Propagator, start: FloatArray, rows: FloatArray, scratch: Scratch
 ) -> tuple[FloatArray, FloatArray]:
     # Samples lie newest first in one long row a window, so the extended state of every block is a
     # contiguous piece of it and nothing is ever moved. Rows come with the last block first too.
     windows = len(start)
     width, size = propagator.output_state.shape
     number = len(rows) // windows
-    forcing = (rows @ propagator.output_input.T).reshape(number, windows, width)
-    samples = np.empty((windows, number * width + size))
+    forcing = scratch.take((len(rows), width))
+    np.matmul(rows, propagator.output_input.T, out=forcing)
+    forcing = forcing.reshape(number, windows, width)
+    samples = scratch.take((windows, number * width + size))
     samples[:, number * width :] = start
     if windows == 1:
         line, output = samples[0], propagator.output_state
@@ -251,16 +275,20 @@ def _run_shifting(
             at = block * width
             state = samples[:, at + width : at + width + size]
             samples[:, at : at + width] = state @ transposed + forcing[block]
-    return samples[:, : number * width], samples[:, :size].copy()
+    return samples[:, : number * width], samples[:, :size]
 
 
 def _run_mirrored(
-    propagator: Propagator, symmetric: FloatArray, start: FloatArray, rows: FloatArray
+    propagator: Propagator,
+    symmetric: FloatArray,
+    start: FloatArray,
+    rows: FloatArray,
+    scratch: Scratch,
 ) -> tuple[FloatArray, FloatArray]:
     assert propagator.state_input is not None
     number, size, N = len(rows), start.shape[1], len(propagator.output_state)
     # A row holds a state and, after it, what the symmetric product says beyond the oldest delay.
-    states = np.zeros((number + 1, size + N))
+    states = scratch.zeros((number + 1, size + N))
     states[number, :size] = start[0]
     np.matmul(rows, propagator.state_input.T, out=states[:number, :size])
     half, newest = symmetric.T, np.ascontiguousarray(propagator.output_state).T
@@ -275,14 +303,14 @@ def _run_mirrored(
 
 
 def _run_square(
-    propagator: Propagator, start: FloatArray, rows: FloatArray
+    propagator: Propagator, start: FloatArray, rows: FloatArray, scratch: Scratch
 ) -> tuple[FloatArray, FloatArray]:
     windows, size = start.shape
     number = len(rows) // windows
     assert propagator.state is not None
     assert propagator.state_input is not None
     # states[block + 1] starts block; states[0] is what the piece ends with.
-    states = np.empty((number + 1, windows, size))
+    states = scratch.take((number + 1, windows, size))
     states[number] = start
     np.matmul(rows, propagator.state_input.T, out=states[:number].reshape(-1, size))
     if windows == 1:

@@ -21,7 +21,7 @@ __all__ = ["ForecastWindow", "label_forecast", "modes", "read_window", "summary"
 FloatArray = npt.NDArray[np.float64]
 
 DIVERGED = 1e6
-"""A free run is given up where a state is this many training SDs from its mean."""
+"""A free run is given up where a state is this many training SDs from where it began."""
 
 
 class Reader(Protocol):
@@ -80,7 +80,7 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
     labelled.check_run(run, name)
     labelled.check_step(run, name, model.dt)
     labelled.check_units(run, model.state_labels + model.input_labels, name)
-    time = np.asarray(run["time"].values, dtype=float)
+    time = np.asarray(run.variables["time"].values, dtype=float)
     at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
     needed = model.history_samples
     if at + 1 < needed:
@@ -119,7 +119,7 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
         labelled.check_finite(values[unread:], names, name, first + unread, time)
     instants = time[at + 1 : at + 1 + count]
     beyond = time[-1] + model.dt * np.arange(1, count - instants.size + 1)
-    attrs = dict(run["time"].attrs) or {"units": "s", "long_name": "time"}
+    attrs = dict(run.variables["time"].attrs) or {"units": "s", "long_name": "time"}
     return ForecastWindow(
         name=name,
         start=float(time[at]),
@@ -174,11 +174,26 @@ def _finite(name: str, needed: FloatArray) -> FloatArray:
     return needed
 
 
-def cut_divergence(values: FloatArray, scale: Scale) -> FloatArray:
-    """NaN from the instant on at which a state is lost; values are (…, time, channel)."""
+def cut_divergence(values: FloatArray, scale: Scale, begun: FloatArray) -> FloatArray:
+    """NaN from the instant on at which a state is lost.
+
+    Parameters
+    ----------
+    values : ndarray, shape (…, time, channel)
+        Free runs, physical units; changed in place.
+    scale : Scale
+        Moments of the channels in training.
+    begun : ndarray, shape (…, 1, channel) or (channel,)
+        The measured states from which the runs began: distance is counted from them, because
+        without standardisation a mean far from zero is no divergence.
+
+    Returns
+    -------
+    ndarray
+        `values`.
+    """
     spread = np.where(scale.spread > 0, scale.spread, np.inf)
-    centre = scale.mean
-    kept = np.isfinite(values) & (np.abs(values - centre) <= DIVERGED * spread)
+    kept = np.isfinite(values) & (np.abs(values - begun) <= DIVERGED * spread)
     lost = ~np.all(kept, axis=-1)
     if np.any(lost):
         values[np.logical_or.accumulate(lost, axis=-1)] = np.nan

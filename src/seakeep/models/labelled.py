@@ -97,7 +97,7 @@ def run_step(run: xr.Dataset, name: str) -> float:
     DataError
         If the times are unsorted, repeated or not uniform.
     """
-    time = run["time"].values
+    time = run.variables["time"].values
     if time.dtype.kind not in "iuf":
         raise DataError(
             f"the times of {name} are of type {time.dtype}; seconds as numbers are expected. "

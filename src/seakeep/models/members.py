@@ -11,6 +11,7 @@ import numpy.typing as npt
 from seakeep.core.embedding import TrainingWindow, training_window
 from seakeep.core.regression import Solution, identify
 from seakeep.core.rollout import rollout
+from seakeep.core.scratch import Scratch
 from seakeep.models.draws import Draw
 from seakeep.models.forecasting import cut_divergence
 from seakeep.models.identification import Scale, moments
@@ -94,7 +95,12 @@ class Task:
     steps: int
 
 
-def identify_member(arrays: TrainingArrays, settings: HankelSettings, draw: Draw) -> Member:
+def identify_member(
+    arrays: TrainingArrays,
+    settings: HankelSettings,
+    draw: Draw,
+    scratch: Scratch | None = None,
+) -> Member:
     """Identify one member, as :meth:`HankelDMDc.fit` does with its settings.
 
     Parameters
@@ -105,6 +111,8 @@ def identify_member(arrays: TrainingArrays, settings: HankelSettings, draw: Draw
         What all members share.
     draw : Draw
         What is the member's own.
+    scratch : Scratch, optional
+        Memory of an earlier member to use again.
 
     Returns
     -------
@@ -138,11 +146,12 @@ def identify_member(arrays: TrainingArrays, settings: HankelSettings, draw: Draw
         per_snapshot=settings.ridge_scale == "per_snapshot",
         rank=settings.rank,
         all_rows=settings.delay_rows == "ridge",
+        scratch=scratch,
     )
     return Member(solution, tuple(chosen), tuple(windows), state_scale, input_scale)
 
 
-def forecast_member(task: Task, draw: Draw) -> FloatArray:
+def forecast_member(task: Task, draw: Draw, scratch: Scratch) -> FloatArray:
     """Identify one member and run it freely over all windows side by side.
 
     Parameters
@@ -151,13 +160,17 @@ def forecast_member(task: Task, draw: Draw) -> FloatArray:
         Training data and what a forecast reads.
     draw : Draw
         The member.
+    scratch : Scratch
+        Memory that the member alone uses while it is at work.
 
     Returns
     -------
     ndarray, shape (window, steps, N)
         States in physical units; NaN from where a window diverges on.
     """
-    member = identify_member(task.arrays, task.settings, draw)
+    scratch.reset()
+    member = identify_member(task.arrays, task.settings, draw, scratch)
+    scratch.reset()
     coefficients = member.solution.coefficients
     N = task.histories.shape[2]
     size = N * (draw.state_delays + 1)
@@ -171,10 +184,11 @@ def forecast_member(task: Task, draw: Draw) -> FloatArray:
         member.state_scale.deviations(task.histories[:, at - 1 - draw.state_delays :]),
         member.input_scale.deviations(inputs),
         n_states=N,
+        scratch=scratch,
     )
     with np.errstate(over="ignore"):  # a run that is lost is cut just below
         values = member.state_scale.physical(deviations)
-    return cut_divergence(values, member.state_scale)
+    return cut_divergence(values, member.state_scale, task.histories[:, -1:])
 
 
 def reach(draws: Sequence[Draw], samples: Sequence[int], inside: bool) -> list[int]:

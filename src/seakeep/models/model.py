@@ -317,7 +317,7 @@ class HankelDMDcModel:
         )[0]
         with np.errstate(over="ignore"):  # a run that is lost is cut just below
             values = self.state_scale.physical(deviations)
-        return forecasting.cut_divergence(values, self.state_scale)
+        return forecasting.cut_divergence(values, self.state_scale, x[-1])
 
     def to_state_space(self) -> signal.StateSpace:
         """Discrete state-space system in physical deviations from the means.

@@ -12,6 +12,7 @@ from typing import Any, Literal, TypeVar
 
 import threadpoolctl
 
+from seakeep.core.scratch import Scratch
 from seakeep.errors import RequestError
 
 __all__ = ["Backend", "check_workers", "one_blas_thread", "side_by_side"]
@@ -37,7 +38,7 @@ def check_workers(workers: object, backend: object) -> None:
 
 
 def side_by_side(
-    function: Callable[[Data, Item], Result],
+    function: Callable[[Data, Item, Scratch], Result],
     data: Data,
     items: Sequence[Item],
     workers: int,
@@ -48,7 +49,8 @@ def side_by_side(
     Parameters
     ----------
     function : callable
-        Takes `data` and one item; a function of a module where `backend` is "processes".
+        Takes `data`, one item, and memory for its work; a function of a module where `backend` is
+        "processes".
     data : object
         What all items need; sent to each process once.
     items : sequence
@@ -65,13 +67,31 @@ def side_by_side(
     """
     with one_blas_thread():
         if workers == 1:
+            scratch = Scratch()
             for item in items:
-                yield function(data, item)
+                yield function(data, item, scratch)
             return
         with _executor(workers, backend, data) as pool:
             call: Callable[[Item], Result]
-            call = partial(function, data) if backend == "threads" else partial(_call, function)
+            if backend == "threads":
+                call = partial(_call_with, function, data, [Scratch() for _ in range(workers)])
+            else:
+                call = partial(_call, function)
             yield from _in_order(pool, call, items, 3 * workers)
+
+
+def _call_with(
+    function: Callable[[Data, Item, Scratch], Result],
+    data: Data,
+    idle: list[Scratch],
+    item: Item,
+) -> Result:
+    # No more calls run at a time than there are blocks of memory; pop and append are atomic.
+    scratch = idle.pop()
+    try:
+        return function(data, item, scratch)
+    finally:
+        idle.append(scratch)
 
 
 @contextmanager
@@ -105,13 +125,14 @@ class _Received:
     """What a worker process was sent when it started."""
 
     data: object = None
+    scratch: Scratch
     limits: object = None
 
 
 def _receive(data: object) -> None:
-    _Received.data = data
+    _Received.data, _Received.scratch = data, Scratch()
     _Received.limits = threadpoolctl.threadpool_limits(1, user_api="blas")
 
 
-def _call(function: Callable[[Any, Item], Result], item: Item) -> Result:
-    return function(_Received.data, item)
+def _call(function: Callable[[Any, Item, Scratch], Result], item: Item) -> Result:
+    return function(_Received.data, item, _Received.scratch)

@@ -89,10 +89,16 @@ def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
     >>> uniform_step([0.0, 0.1, 0.2, 0.3])
     0.1
     """
-    t = check_order(time, name)
+    t = np.asarray(time, dtype=float)
+    if t.ndim != 1 or t.size < 2:
+        check_order(t, name)
     step = float((t[-1] - t[0]) / (t.size - 1))
     off = np.abs(t - (t[0] + step * np.arange(t.size)))
-    if np.max(off) > max(STEP_TOLERANCE * step, _printed_tolerance(t, step)):
+    # Times this close to a rising grid are finite and sorted; else the order is looked at.
+    close = step > 0 and np.max(off) <= STEP_TOLERANCE * step
+    if not close:
+        check_order(t, name)
+    if not close and np.max(off) > max(STEP_TOLERANCE * step, _printed_tolerance(t, step)):
         raise DataError(_irregularity(t, name))
     # A decimal step such as 0.04 that was summed or printed comes back as what was meant.
     rounded = float(f"{step:.10g}")

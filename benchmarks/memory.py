@@ -1,0 +1,95 @@
+"""Peak memory of long forecasts and of many members: ``python benchmarks/memory.py``.
+
+Each case runs in a process of its own; what it held before the call (the run, the imports) and the
+size of its result are printed beside the growth of the peak.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import multiprocessing
+import resource
+import time
+
+import numpy as np
+from problem import DT, Problem, as_run, linear_system, names
+
+import seakeep
+from seakeep.models.workers import one_blas_thread
+
+MIB = 2**20
+
+
+def long_forecast(steps: int, delay_rows: str) -> dict:
+    """One model of the paper's size, a free run of many steps."""
+    base = linear_system()
+    repeats = -(-(steps + base.stop + 2) // len(base.inputs))
+    states, inputs = (np.tile(series, (repeats, 1)) for series in (base.states, base.inputs))
+    run = as_run(Problem(states, inputs, base.stop))
+    del states, inputs
+    paper = seakeep.HankelDMDc.paper(encounter_period=32 * DT, dt=DT)
+    spec = dataclasses.replace(paper, delay_rows=delay_rows)
+    model = spec.fit(run, *names(), stop=base.stop * DT)
+    before, begin = _peak(), time.perf_counter()
+    result = model.forecast(run, start=base.stop * DT, steps=steps)
+    return _report(before, begin, result, f"{steps} steps, delay_rows='{delay_rows}'")
+
+
+def many_members(members: int, delay_rows: str, small: bool) -> dict:
+    """An ensemble's summary over 480 steps."""
+    base = linear_system(states=3 if small else 11, inputs=1 if small else 2)
+    run = as_run(base)
+    paper = seakeep.BayesianHankelDMDc.paper(encounter_period=32 * DT, dt=DT, n_members=members)
+    if small:
+        delays = {"state_delay": seakeep.Uniform(0.1, 0.4), "input_delay": seakeep.Uniform(0.2, 1)}
+        paper = dataclasses.replace(paper, train_length=seakeep.Uniform(5, 10), **delays)
+    spec = dataclasses.replace(paper, delay_rows=delay_rows)
+    channels = names(base.states.shape[1], base.inputs.shape[1])
+    ensemble = spec.fit(run, *channels, stop=base.stop * DT)
+    before, begin = _peak(), time.perf_counter()
+    result = ensemble.forecast_summary(run, start=base.stop * DT, steps=480)
+    size = "3 states, short delays" if small else "11 states, the paper's priors"
+    return _report(before, begin, result, f"{members} members, {size}, '{delay_rows}'")
+
+
+def _peak() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def _report(before: float, begin: float, result: object, name: str) -> dict:
+    return {
+        "case": name,
+        "seconds": round(time.perf_counter() - begin, 1),
+        "held before, MiB": round(before, 1),
+        "growth of the peak, MiB": round(_peak() - before, 1),
+        "result, MiB": round(result.nbytes / MIB, 1),
+    }
+
+
+def _work(call) -> dict:
+    function, *arguments = call
+    with one_blas_thread():
+        return function(*arguments)
+
+
+def main() -> None:
+    """Run the cases one after the other."""
+    cases = [
+        (long_forecast, 10_000, "exact"),
+        (long_forecast, 1_000_000, "exact"),
+        (long_forecast, 100_000, "ridge"),
+        (long_forecast, 1_000_000, "ridge"),
+        (many_members, 100, "exact", True),
+        (many_members, 10_000, "exact", True),
+        (many_members, 100, "exact", False),
+        (many_members, 1_000, "exact", False),
+    ]
+    context = multiprocessing.get_context("spawn")
+    for case in cases:
+        with context.Pool(1) as pool:
+            print(json.dumps(pool.apply(_work, (case,))), flush=True)
+
+
+if __name__ == "__main__":
+    main()
