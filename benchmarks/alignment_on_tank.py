@@ -39,7 +39,7 @@ ALIGNMENTS["none"] = None
 
 
 def irregular_runs():
-    """Mean encounter period, and irregular runs of the virtual tank at 32 samples a period."""
+    """Mean encounter period, and the irregular runs of the tank sampled 32 times a period."""
     settings = default_settings()
     rig = check_settings(settings)
     names = [name for name, run in settings.runs.items() if run.spectrum is not None]
