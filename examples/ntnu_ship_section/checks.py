@@ -62,7 +62,7 @@ def camera(campaign, runs):
     print("lag of the camera's heave, s (pieces of 10 s, from 20 s on); SD of its channel, mm")
     for name, run in runs.items():
         dt = float(run.attrs["dt"])
-        raw = read_table(campaign.file_of(name), columns=["Heave [m]"])
+        raw = read_table(campaign.files_of(name)[""], columns=["Heave [m]"])
         (column,) = raw.data_vars
         seen = np.interp(run.time.values, raw.time.values, raw[column].values)
         if seen.std() < 1e-6:
