@@ -39,7 +39,7 @@ ALIGNMENTS["none"] = None
 
 
 def irregular_runs():
-    """Mean encounter period, and the irregular runs of the tank sampled 32 times a period."""
+    """Mean encounter period, and irregular runs of the virtual tank at 32 samples a period."""
     settings = default_settings()
     rig = check_settings(settings)
     names = [name for name, run in settings.runs.items() if run.spectrum is not None]
@@ -64,8 +64,8 @@ def irregular_runs():
     return period, runs
 
 
-def window_errors(runs, period, preset, alignment):
-    """NRMSE a channel and ANRMSE of every window of every run, from models of the others."""
+def window_errors(runs, period, preset, alignment, forecast_runs=None):
+    """NRMSE a channel of every window of the runs forecast, from models of the others."""
     dt = next(iter(runs.values())).attrs["dt"]
     make = getattr(seakeep.HankelDMDc, preset)
     base = make(encounter_period=period, dt=dt)
@@ -73,7 +73,8 @@ def window_errors(runs, period, preset, alignment):
     spec = seakeep.HankelDMDc(**{**fields, "alignment": alignment})
     steps = periods_to_samples(PERIODS, period, dt)
     rows = []
-    for name, run in runs.items():
+    for name in runs if forecast_runs is None else forecast_runs:
+        run = runs[name]
         model = spec.fit([other for key, other in runs.items() if key != name], STATES, INPUTS)
         time = run["time"].values
         for at in range(model.history_samples - 1, time.size - steps, steps):

@@ -60,3 +60,28 @@ def test_permissions_follow_the_umask(tmp_path):
     finally:
         os.umask(before)
     assert Path(tmp_path / "a.txt").stat().st_mode & 0o777 == 0o640
+
+
+def test_a_folder_in_the_place_of_the_file_is_named(tmp_path):
+    with (
+        pytest.raises(RequestError, match=r"it is a folder\. Name a file in it"),
+        replacing(tmp_path),
+    ):
+        pass
+
+
+def test_a_file_in_the_place_of_the_folder_is_named(tmp_path):
+    (tmp_path / "a").write_text("")
+    with (
+        pytest.raises(RequestError, match=r"a is a file, not a folder\. Choose another place"),
+        replacing(tmp_path / "a" / "b"),
+    ):
+        pass
+
+
+def test_a_lack_of_permission_gets_its_own_mend(tmp_path):
+    with (
+        pytest.raises(RequestError, match=r"Permission denied\. .* folder that you may write to"),
+        replacing(tmp_path / "a.txt"),
+    ):
+        raise PermissionError(13, os.strerror(13))

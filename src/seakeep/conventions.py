@@ -16,7 +16,14 @@ import pint
 
 from seakeep.errors import RequestError, did_you_mean
 
-__all__ = ["Channel", "canonical_channel", "canonical_names", "conversion", "si_unit"]
+__all__ = [
+    "Channel",
+    "base_powers",
+    "canonical_channel",
+    "canonical_names",
+    "conversion",
+    "si_unit",
+]
 
 
 @dataclass(frozen=True)
@@ -248,6 +255,35 @@ def si_unit(unit: str) -> str:
             return "N m" if name == "N*m" else name
     text = f"{base:~C}".replace("**", "^").replace("*", " ")
     return text or "1"
+
+
+def base_powers(unit: str) -> tuple[float, float, float, bool]:
+    """Powers of length, time and mass in a unit, and whether it has others besides angles.
+
+    Parameters
+    ----------
+    unit : str
+        Any unit we understand.
+
+    Returns
+    -------
+    (float, float, float, bool)
+        The powers of metre, second and kilogram; True if the unit also holds volts or kelvins.
+
+    Raises
+    ------
+    RequestError
+        If the unit is not known.
+
+    Examples
+    --------
+    >>> base_powers("N"), base_powers("rad/s")
+    ((1.0, -2.0, 1.0, False), (0.0, -1.0, 0.0, False))
+    """
+    powers = {str(k): float(v) for k, v in _parsed(unit).dimensionality.items()}
+    known = [powers.pop(f"[{name}]", 0.0) for name in ("length", "time", "mass")]
+    powers.pop("[angle]", None)
+    return known[0], known[1], known[2], bool(powers)
 
 
 def conversion(unit: str, target: str, channel: str = "the channel") -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -10,7 +11,7 @@ from pathlib import Path
 
 from seakeep.errors import RequestError
 
-__all__ = ["replacing"]
+__all__ = ["check_place", "make_folder", "replacing"]
 
 
 @contextmanager
@@ -33,10 +34,7 @@ def replacing(path: Path) -> Iterator[Path]:
         If the folder does not exist or cannot be written, or the disk is full. What was at `path`
         before stays as it was.
     """
-    if not path.parent.is_dir():
-        raise RequestError(
-            f"cannot write {path}: the folder {path.parent} does not exist. Create it first."
-        )
+    check_place(path)
     try:
         # Opened and not made by tempfile, so that the file gets the permissions the user's umask
         # gives to any other.
@@ -48,7 +46,64 @@ def replacing(path: Path) -> Iterator[Path]:
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:
+        mend = "Free space on the disk or choose another place."
+        if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+            mend = "Choose a folder that you may write to, or change its permissions."
         raise RequestError(
             f"cannot write {path}: {error.strerror or error}. The file that was there before, if "
-            "any, is untouched. Free space on the disk or choose another place."
+            f"any, is untouched. {mend}"
         ) from error
+
+
+def check_place(path: Path) -> None:
+    """Refuse a path at which no file can be written, before the work and not after it.
+
+    Parameters
+    ----------
+    path : Path
+        The file wanted.
+
+    Raises
+    ------
+    RequestError
+        If it is a folder, or its own folder does not exist.
+    """
+    if path.is_dir():
+        raise RequestError(
+            f"cannot write {path}: it is a folder. Name a file in it, such as {path / 'model.nc'}."
+        )
+    if path.parent.exists() and not path.parent.is_dir():
+        raise RequestError(
+            f"cannot write {path}: {path.parent} is a file, not a folder. Choose another place."
+        )
+    if not path.parent.is_dir():
+        raise RequestError(
+            f"cannot write {path}: the folder {path.parent} does not exist. Create it first."
+        )
+
+
+def make_folder(path: Path) -> Path:
+    """Make a folder and those above it, if they do not exist.
+
+    Parameters
+    ----------
+    path : Path
+        The folder wanted.
+
+    Returns
+    -------
+    Path
+        `path`.
+
+    Raises
+    ------
+    RequestError
+        If it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RequestError(
+            f"cannot make the folder {path}: {error.strerror or error}. Choose another place."
+        ) from error
+    return path

@@ -40,14 +40,14 @@ MISTAKES = [
         'column = "Heave"',
         'colum = "Heave"',
         "channels.heave.colum: unknown key, received 'Heave'. Did you mean 'column'? "
-        "Keys here: column, unit, sign, offset, long_name.",
+        "Keys here: column, instrument, unit, sign, offset, long_name.",
     ),
     (
         "[preparation]",
         "[preperation]",
         "preperation: unknown key, received a table with sampling_rate. Did you mean "
-        "'preparation'? Keys here: campaign, rig, files, channels, derived, runs, preparation, "
-        "model, models.",
+        "'preparation'? Keys here: campaign, rig, files, channels, derived, instruments, "
+        "redundant, runs, preparation, model, models.",
     ),
     (
         'role = "test"',
@@ -58,7 +58,8 @@ MISTAKES = [
     (
         'file = "second.csv"\n',
         "",
-        "runs.second.file: missing. Add it: the file, relative to the campaign file.",
+        "runs.second: a run needs either 'file', relative to the campaign file, or 'files', a "
+        "table of one file an instrument; received a table with role, span.",
     ),
     (
         "sampling_rate = 10",
@@ -164,7 +165,8 @@ MISTAKES = [
         'step = "differentiate"',
         'step = "derive"',
         "derived.pitch_rate.step: received 'derive', which should be 'integrate', "
-        "'differentiate', 'band_pass', 'low_pass' or 'envelope_squared'.",
+        "'differentiate', 'band_pass', 'low_pass', 'envelope_squared', 'blend', 'transfer' or "
+        "'remove_gravity'.",
     ),
     (
         'step = "differentiate"',

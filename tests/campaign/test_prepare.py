@@ -471,7 +471,7 @@ class TestFiles:
             raise OSError("disk full")
 
         monkeypatch.setattr(xr.Dataset, "to_netcdf", fail)
-        with pytest.raises(OSError, match="disk full"):
+        with pytest.raises(RequestError, match=r"cannot write .*first\.nc: disk full"):
             write_prepared(campaign)
         assert [p.name for p in (tank / "prepared").iterdir()] == ["half"]
 

@@ -98,15 +98,6 @@ def test_matlab_cut_off(tmp_path, part, compressed):
         read_table(path)
 
 
-def test_matlab_73(tmp_path):
-    path = tmp_path / "run.mat"
-    path.write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512) + b"\x89HDF\r\n\x1a\n")
-    with pytest.raises(
-        DataError, match=r"of version 7\.3, which is not read yet\. In MATLAB, write it with save"
-    ):
-        read_table(path)
-
-
 def dataset():
     return xr.Dataset(
         {"heave": ("time", HEAVE, {"units": "mm"}), "wave": ("time", WAVE), "depth": ((), 3.6)},
@@ -191,3 +182,12 @@ def test_netcdf_that_is_none(tmp_path):
     path.write_text("not a NetCDF file")
     with pytest.raises(DataError, match="cannot be read as NetCDF or HDF5"):
         read_table(path)
+
+
+def test_a_struct_with_its_rate_and_a_note_beside_it(tmp_path):
+    path = tmp_path / "run.mat"
+    heave = np.sin(np.arange(20.0))
+    io.savemat(path, {"data": {"heave": heave, "eta": 2 * heave}, "fs": 10.0, "note": "run 7"})
+    table = read_table(path)
+    np.testing.assert_array_equal(table["heave"].values, heave)
+    assert float(table["time"][1]) == pytest.approx(0.1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep import DataError, HankelDMDc, RequestError
+from seakeep import DataError, HankelDMDc, RequestError, SeakeepWarning
 
 DT = 0.05
 SPEC = HankelDMDc(3, 8, 1.0)
@@ -207,10 +207,24 @@ def test_a_constant_channel_cannot_be_standardised(run, channels, name, value):
     assert np.all(np.isfinite(model.forecast(run, start=5.0, steps=20).heave))
 
 
-def test_a_channel_constant_in_one_run_alone_is_standardised_over_all(make_run, channels):
+def test_a_channel_constant_in_one_run_alone_is_told_and_standardised_over_all(make_run, channels):
     slack = make_run(seed=1)
     slack.pitch[:] = 0.1
-    assert np.all(SPEC.fit([make_run(), slack], **channels).state_std > 0)
+    message = r"channel 'pitch' of run 2 is constant \(0\.1\) .* If its sensor was dead, leave"
+    with pytest.warns(SeakeepWarning, match=message):
+        model = SPEC.fit([make_run(), slack], **channels)
+    assert np.all(model.state_std > 0)
+
+
+def test_names_may_be_an_array(make_run, channels):
+    arrays = {key: np.array(names) for key, names in channels.items()}
+    model = SPEC.fit(make_run(), **arrays)
+    assert model.states == channels["states"]
+
+
+def test_one_of_several_stops_may_be_left_open(make_run, channels):
+    model = SPEC.fit([make_run(), make_run(seed=1)], **channels, stop=[None, 10.0])
+    assert model.training.stop == pytest.approx((19.95, 10.0))
 
 
 def test_a_start_before_the_history_is_full_says_how_many_samples_are_missing(model, run):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from seakeep import HankelDMDc, SeakeepWarning
+from seakeep.models.forecasting import modes
 
 
 @pytest.fixture
@@ -129,3 +130,17 @@ def test_a_forecast_that_was_lost_does_not_come_back(make_dataset):
     wild = np.array([[0.0], [1e9], [0.0]])
     out = model.forecast_arrays([[1.0]], [[1.0]], wild, steps=4)
     np.testing.assert_array_equal(np.isnan(out[:, 0]), [False, False, True, True])
+
+
+def test_a_mean_far_from_zero_is_no_divergence_without_standardisation(oscillator):
+    # A heave of 1e7 SDs: counted from zero, its first step would read as lost.
+    run = oscillator.run()
+    run["heave"] = run["heave"] + 1e7 * float(run["heave"].std())
+    model = HankelDMDc(2, 2, 0.0, standardize=False).fit(run, ["heave"], ["eta_fwd"])
+    forecast = model.forecast(run, start=float(run.time[10]), steps=5)
+    assert forecast.attrs["status"] == "ok"
+
+
+def test_a_dead_mode_is_overdamped_and_not_undefined():
+    table = modes(np.array([0.5 + 0j, 0j]), 0.1)
+    assert list(table["damping_ratio"].values) == [1.0, 1.0]

@@ -63,7 +63,7 @@ def test_a_slack_line_is_left_out_and_shown_as_such():
     assert float(table["anrmse"]) == pytest.approx(judged, rel=1e-12)
     assert int(table["slack_channels"]) == 1
     shown = rich_comparison(comparison_table([comparison(slack=True)]))
-    assert "average (1 slack channel left out)" in [c for col in shown.columns for c in col.cells]
+    assert "average (1 still channel left out)" in [c for col in shown.columns for c in col.cells]
 
 
 def test_csv_has_a_row_a_channel_and_all_digits(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 
 import seakeep
 from seakeep.campaign import ModelSettings
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.study import (
     build_spec,
     compare,
@@ -62,6 +62,24 @@ def test_the_test_starts_in_the_test_span_with_history_from_before_it(halves):
     # state, and a model of deviations has no constant term (the ends of the window over its
     # length, some 1e-4 here).
     assert judged.anrmse < 1e-3
+
+
+def test_the_history_of_a_window_may_come_from_before_the_training_span(halves):
+    runs = '[runs.all]\nfile = "run.csv"\ntrain = [100.0, 150.0]\ntest = [150.0, 200.0]\n'
+    given = "state_delays = 2\ninput_delays = 60\nridge = 1e-9\nwindow = 501"
+    assert fit_campaign(campaign(halves, given, runs)).training.columns == (500,)
+    without = given.replace("\nwindow = 501", "")
+    assert fit_campaign(campaign(halves, without, runs)).training.columns == (440,)
+
+
+def test_a_dead_probe_in_a_test_run_is_told(halves):
+    whole = campaign(halves, EXACT)
+    model = fit_campaign(whole)
+    table = np.loadtxt(halves / "run.csv", delimiter=",", skiprows=1)
+    table[1001:, 1] = 0.0
+    np.savetxt(halves / "run.csv", table, delimiter=",", header="t [s],eta [m],z [m]", comments="")
+    with pytest.warns(SeakeepWarning, match=r"channel 'eta_fwd' of all is constant \(0\) over the"):
+        compare(model, whole)
 
 
 def test_a_run_that_only_tests_starts_when_its_history_is_full(halves):

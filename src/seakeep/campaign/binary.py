@@ -1,4 +1,4 @@
-"""Tables in binary files: MATLAB version 5 to 7.2, NetCDF and HDF5."""
+"""Tables in binary files: MATLAB version 5 to 7.3, NetCDF and HDF5."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import xarray as xr
 from scipy import io
 
 from seakeep.campaign.columns import Columns, unique_names
+from seakeep.campaign.hdf5_mat import is_version_73, load_version_73
 from seakeep.campaign.settings import FileSettings
 from seakeep.errors import DataError
 
@@ -33,7 +34,7 @@ def read_matlab(path: Path, options: FileSettings) -> Columns:
     Parameters
     ----------
     path : Path
-        The file, of version 5 to 7.2 (what ``save -v7`` writes).
+        The file, of version 5 to 7.3 (what ``save -v7`` and ``save -v7.3`` write).
     options : FileSettings
         Not used: the file tells all.
 
@@ -45,24 +46,11 @@ def read_matlab(path: Path, options: FileSettings) -> Columns:
     Raises
     ------
     DataError
-        If the file is damaged, of version 7.3, or its channels differ in length.
+        If the file is damaged, or its channels differ in length.
     """
-    if path.read_bytes()[:19] == b"MATLAB 7.3 MAT-file":
-        raise DataError(
-            f"{path} is a MATLAB file of version 7.3, which is not read yet. In MATLAB, write it "
-            "with save(…, '-v7'), or export to HDF5, NetCDF or CSV."
-        )
-    try:
-        content = io.loadmat(path, simplify_cells=True)
-    except (ValueError, TypeError, OSError, EOFError, NotImplementedError, KeyError, IndexError,
-            zlib.error, struct.error, MemoryError) as error:  # fmt: skip
-        raise DataError(
-            f"{path} cannot be read as a MATLAB file: cut off or damaged ({error}). Save it again "
-            "with save(…, '-v7')."
-        ) from None
+    content = load_version_73(path) if is_version_73(path) else _load_older(path)
     found = {key: value for key, value in content.items() if not key.startswith("__")}
-    while len(found) == 1 and isinstance(only := next(iter(found.values())), dict):
-        found = only
+    found = _unwrapped(found)
     rate = _rate(found)
     named, units = _named_matrix(path, found), _units(found)
     vectors = named or _vectors(path, found)
@@ -78,6 +66,29 @@ def read_matlab(path: Path, options: FileSettings) -> Columns:
         headers=dict(zip(names, vectors, strict=True)),
         sampling_rate=rate,
     )
+
+
+def _unwrapped(found: dict[str, Any]) -> dict[str, Any]:
+    """What the only struct of a file holds, with the numbers and texts that stand beside it."""
+    while True:
+        structs = [key for key, value in found.items() if isinstance(value, dict)]
+        beside = {key: value for key, value in found.items() if not isinstance(value, dict)}
+        plain = all(isinstance(value, str) or np.size(value) == 1 for value in beside.values())
+        if len(structs) != 1 or structs[0] in _UNIT_KEYS or not plain:
+            return found
+        found = {**beside, **found[structs[0]]}
+
+
+def _load_older(path: Path) -> dict[str, Any]:
+    try:
+        content: dict[str, Any] = io.loadmat(path, simplify_cells=True)
+    except (ValueError, TypeError, OSError, EOFError, NotImplementedError, KeyError, IndexError,
+            zlib.error, struct.error, MemoryError) as error:  # fmt: skip
+        raise DataError(
+            f"{path} cannot be read as a MATLAB file: cut off or damaged ({error}). Save it again "
+            "with save(…, '-v7')."
+        ) from None
+    return content
 
 
 def _rate(found: Mapping[str, Any]) -> float | None:

@@ -1,89 +1,203 @@
-"""From a file's columns to channels: names, SI units, signs, and what is derived from them."""
+"""From the columns of a run's files to channels: names, SI units, signs, and what is derived."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.campaign.readers import read_table
+from seakeep.campaign.checks import check_samples
+from seakeep.campaign.derivation import derive
+from seakeep.campaign.instruments import Logger, channels_of, homes
+from seakeep.campaign.readers import labelled_table
 from seakeep.campaign.settings import (
     CampaignSettings,
     ChannelSettings,
-    DerivedSettings,
+    PreparationSettings,
     RunSettings,
     long_name_of,
 )
-from seakeep.campaign.validation import derivation_order
+from seakeep.campaign.validation import derivation_order, sources_of
 from seakeep.conventions import canonical_channel, conversion, si_unit
-from seakeep.errors import DataError, RequestError, SeakeepError
-from seakeep.signals import (
-    band_pass,
-    differentiate,
-    envelope_squared,
-    integrate,
-    low_pass,
-    uniform_step,
-)
-from seakeep.signals.expressions import parse
+from seakeep.errors import DataError, RequestError
+from seakeep.signals import Clock, bridge, inspect_times, onto_uniform, uniform_step
+from seakeep.signals.quality import BRIDGED, MISSING, flag_attributes
 
-__all__ = ["read_channels"]
+__all__ = ["Group", "needed_channels", "read_groups"]
 
 FloatArray = npt.NDArray[np.float64]
 
+COMMON = "the common step"
+"""Group of derived channels whose sources come from several loggers."""
 
-def read_channels(path: Path, settings: CampaignSettings, run: str) -> xr.Dataset:
-    """Read the mapped channels of a run and derive the others, at the file's own rate.
+
+class Group(dict[str, xr.Dataset]):
+    """Channels of a run by logger, each at its own rate and on the reference's time.
+
+    `late` names the derived channels that need several loggers, in the order in which they are
+    to be made once all stand on one axis.
+    """
+
+    late: tuple[str, ...] = ()
+
+
+def needed_channels(settings: CampaignSettings, wanted: Collection[str]) -> set[str]:
+    """Names of channels and of all that they are derived from."""
+    needed: set[str] = set()
+    ahead = list(wanted)
+    while ahead:
+        name = ahead.pop()
+        if name not in needed:
+            needed.add(name)
+            if name in settings.derived:
+                ahead += sources_of(name, settings.derived[name], settings.channel_names)
+    return needed
+
+
+def read_groups(
+    loggers: Mapping[str, Logger],
+    clocks: Mapping[str, Clock],
+    settings: CampaignSettings,
+    run: str,
+    wanted: Collection[str] | None = None,
+) -> Group:
+    """Read the mapped channels of a run and derive the others, each at its logger's rate.
 
     Parameters
     ----------
-    path : Path
-        The run's file.
+    loggers : mapping of str to Logger
+        The run's files, the reference first.
+    clocks : mapping of str to Clock
+        Their clocks.
     settings : CampaignSettings
         The campaign.
     run : str
         Name of the run.
+    wanted : collection of str, optional
+        The channels wanted, with what they need; the default is all.
 
     Returns
     -------
-    xarray.Dataset
-        Dimension ``time`` (s); every channel of the campaign in SI units and radians.
+    Group
+        Dataset by logger: dimension ``time`` (s, of the reference), channels in SI units and
+        radians without gaps; where samples are missing or bridged, a coordinate ``NAME_flags``
+        says so.
 
     Raises
     ------
     RequestError
-        If the file or a column does not exist, or a unit is missing or does not fit.
+        If a file or a column does not exist, or a unit is missing or does not fit.
     DataError
-        If the file is damaged, its times are not uniform, or a channel has gaps.
+        If a file is damaged, its times are not uniform, or a channel has gaps, and
+        ``[preparation]`` does not say what to do about it.
     """
-    chosen = _channels_of(settings, settings.runs[run])
-    columns = [each.column or name for name, each in chosen.items()]
-    table = _cut(read_table(path, settings.files, columns), settings.runs[run], run)
-    variables = {name: ("time", *_mapped(table, name, each, path)) for name, each in chosen.items()}
+    needed = needed_channels(settings, settings.channel_names if wanted is None else wanted)
+    chosen = {
+        n: each for n, each in channels_of(settings, settings.runs[run]).items() if n in needed
+    }
+    home = homes(loggers, chosen, run)
+    groups = Group()
+    for key, logger in loggers.items():
+        own = {name: each for name, each in chosen.items() if home[name] == key}
+        if own:
+            groups[key] = _channels(logger, clocks[key], settings, run, own)
+    late = []
+    for name in derivation_order(settings.derived, settings.channel_names):
+        if name not in needed:
+            continue
+        sources = sources_of(name, settings.derived[name], settings.channel_names)
+        places = {home[source] for source in sources}
+        home[name] = places.pop() if len(places) == 1 else COMMON
+        if home[name] == COMMON:
+            late.append(name)
+        else:
+            dataset = groups[home[name]]
+            step = uniform_step(dataset["time"].to_numpy(), f"run '{run}'")
+            groups[home[name]] = derive(dataset, name, settings, step, run)
+    groups.late = tuple(late)
+    return groups
+
+
+def _channels(
+    logger: Logger,
+    clock: Clock,
+    settings: CampaignSettings,
+    run: str,
+    channels: Mapping[str, ChannelSettings],
+) -> xr.Dataset:
+    """Mapped channels of one logger, gaps and jitter treated as the campaign says."""
+    path, preparation = logger.path, settings.preparation
+    columns = [each.column or name for name, each in channels.items()]
+    table = labelled_table(path, logger.columns, logger.options, columns)
+    time = table["time"].copy(data=clock.reference(table["time"].to_numpy()))
+    table = _cut(table.assign_coords(time=time), settings.runs[run], run)
+    variables = {
+        name: ("time", *_mapped(table, name, each, path)) for name, each in channels.items()
+    }
     dataset = xr.Dataset(variables, {"time": table["time"]})
-    _refuse_gaps(dataset, run, path)
-    dt = uniform_step(dataset["time"].to_numpy(), f"run '{run}' ({path})")
-    for name in derivation_order(settings.derived):
-        try:
-            dataset[name] = _derived(dataset, name, settings.derived[name], dt)
-        except SeakeepError as error:
-            raise type(error)(f"run '{run}', derived channel '{name}': {error}") from None
-    dataset = dataset[list(settings.channel_names)]
+    if preparation.gaps == "refuse":
+        _refuse_gaps(dataset, run, path)
+    dataset = _bridged(_regular(dataset, preparation, f"run '{run}' ({path})"), preparation)
+    dataset = check_samples(dataset, preparation.outliers == "replace")
     for name, position in settings.rig.positions.items():
-        dataset[name].attrs["x_position"] = float(position)
+        if name in dataset:
+            dataset[name].attrs["x_position"] = float(position)
     return dataset
 
 
-def _channels_of(settings: CampaignSettings, run: RunSettings) -> dict[str, ChannelSettings]:
-    """Channel map of a run: the campaign's, with the keys that the run states in their place."""
-    chosen = dict(settings.channels)
-    for name, own in run.channels.items():
-        stated = {key: getattr(own, key) for key in own.model_fields_set}
-        chosen[name] = chosen[name].model_copy(update=stated)
-    return chosen
+def _regular(dataset: xr.Dataset, preparation: PreparationSettings, name: str) -> xr.Dataset:
+    """Put the channels on a uniform axis, where that is allowed."""
+    time = dataset["time"].to_numpy()
+    try:
+        uniform_step(time, name)
+    except DataError as error:
+        report = inspect_times(time, name)
+        if report.gaps and preparation.gaps == "refuse":
+            raise DataError(
+                f"{error} Or state gaps = 'mask' or 'bridge' in [preparation]."
+            ) from None
+        if report.jittered and preparation.jitter == "refuse":
+            raise DataError(f"{error} Or state jitter = 'interpolate' in [preparation].") from None
+        series = np.column_stack([each.to_numpy() for each in dataset.values()])
+        new, values = onto_uniform(time, series, name)
+        told = {
+            "time_gaps": len(report.gaps),
+            "time_missing": report.missing,
+            "time_jitter_rms": report.jitter_rms if report.jittered else 0.0,
+        }
+        return xr.Dataset(
+            {
+                str(n): ("time", values[:, i], each.attrs)
+                for i, (n, each) in enumerate(dataset.items())
+            },
+            {"time": ("time", new, dataset["time"].attrs)},
+            told,
+        )
+    return dataset
+
+
+def _bridged(dataset: xr.Dataset, preparation: PreparationSettings) -> xr.Dataset:
+    """Fill gaps so that filters can run, and flag each sample that was filled."""
+    step = float(np.median(np.diff(dataset["time"].to_numpy())))
+    longest = preparation.longest_gap if preparation.gaps == "bridge" else 0.0
+    for name in list(dataset.data_vars):
+        values = dataset[name].to_numpy()
+        if np.isfinite(values).all():
+            continue
+        filled = bridge(values, step, longest)
+        flags = (MISSING * filled.long + BRIDGED * filled.short).astype(np.int16)
+        dataset[name] = dataset[name].copy(data=filled.values)
+        dataset.coords[f"{name}_flags"] = ("time", flags, flag_attributes(str(name)))
+        if filled.short.any():
+            dataset[name].attrs["repaired"] = (
+                f"{int(filled.short.sum())} samples "
+                f"({filled.short.sum() * step:.3g} s of {filled.short.size * step:.4g} s) "
+                "bridged by monotone cubics"
+            )
+    return dataset
 
 
 def _cut(table: xr.Dataset, settings: RunSettings, run: str) -> xr.Dataset:
@@ -138,50 +252,5 @@ def _refuse_gaps(dataset: xr.Dataset, run: str, path: Path) -> None:
         f"({lengths[0]} samples, {lengths[0] * step:g} s), the longest at t = "
         f"{time[begins[longest]]:g} s ({lengths[longest]} samples, {lengths[longest] * step:g} s)"
         f"{others}. Repair the file, leave the channel out, or cut the gap off with record = "
-        f"[begin, end] in [runs.{run}]."
+        f"[begin, end] in [runs.{run}]; or state gaps = 'mask' or 'bridge' in [preparation]."
     )
-
-
-def _derived(dataset: xr.Dataset, name: str, settings: DerivedSettings, dt: float) -> xr.DataArray:
-    canonical = canonical_channel(name)
-    label = f"the derived channel '{name}'"
-    if settings.expression is not None:
-        arrays: Mapping[str, FloatArray] = {str(n): each.to_numpy() for n, each in dataset.items()}
-        values = parse(settings.expression).evaluate(arrays)
-        unit = settings.unit or (canonical.units if canonical else "-")
-        origin = settings.expression
-    else:
-        source = dataset[str(settings.source)]
-        values, unit, origin = _step(source, settings, dt)
-        if settings.unit is not None:
-            conversion(unit, settings.unit, label)
-    target = canonical.units if canonical else si_unit(unit)
-    values = values * conversion(unit, target, label)
-    attributes = {
-        "units": target,
-        "long_name": long_name_of(name, settings.long_name),
-        "derived_from": origin,
-    }
-    return xr.DataArray(values, dims="time", attrs=attributes)
-
-
-def _step(
-    source: xr.DataArray, settings: DerivedSettings, dt: float
-) -> tuple[FloatArray, str, str]:
-    """Values, unit and description of a named step."""
-    series, unit, name = source.to_numpy(), source.attrs["units"], settings.source
-    if settings.step == "integrate":
-        times, band = settings.times or 1, settings.band or (0.0, 0.0)
-        described = f"{name}, integrated {times} time(s) in {band[0]:g} to {band[1]:g} Hz"
-        return integrate(series, dt, band, times), si_unit(f"({unit}) * s^{times}"), described
-    if settings.step == "differentiate":
-        return differentiate(series, dt), si_unit(f"({unit}) / s"), f"{name}, differentiated"
-    if settings.step == "band_pass":
-        band = settings.band or (0.0, 0.0)
-        return band_pass(series, dt, band), unit, f"{name}, {band[0]:g} to {band[1]:g} Hz"
-    if settings.step == "low_pass":
-        passband = settings.passband or 0.0
-        described = f"{name}, low-passed at {passband:g} Hz"
-        return low_pass(series, dt, passband, settings.stopband), unit, described
-    squared = envelope_squared(series, dt)
-    return squared, si_unit(f"({unit})^2"), f"squared envelope of {name}"

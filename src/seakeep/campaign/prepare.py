@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -13,19 +13,23 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.campaign.channels import read_channels
+from seakeep.campaign.channels import Group, read_groups
+from seakeep.campaign.checks import checked
+from seakeep.campaign.instruments import open_loggers
 from seakeep.campaign.readers import checksum, expand
+from seakeep.campaign.resampling import inside, on_one_axis, strays
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
+from seakeep.campaign.survey import Survey, survey
 from seakeep.campaign.validation import read_settings
-from seakeep.errors import DataError, RequestError, did_you_mean
-from seakeep.signals import encounter_period, resample, uniform_step
+from seakeep.errors import RequestError, did_you_mean
+from seakeep.signals import Clock, uniform_step
 
 __all__ = ["Campaign", "Progress", "read_campaign"]
 
 Progress = Callable[[int, int, str], None]
 """Called after each run with how many are done, how many there are, and the run's name."""
 
-FORMAT = 1
+FORMAT = 2
 """Goes into the digest: raise it when the same settings begin to give other arrays."""
 
 
@@ -122,8 +126,8 @@ class Campaign:
         asked = settings.preparation.steps_per_period is not None
         return asked and settings.campaign.encounter_period is None
 
-    def file_of(self, name: str) -> Path:
-        """Path of a run's file.
+    def files_of(self, name: str) -> dict[str, Path]:
+        """Paths of a run's files.
 
         Parameters
         ----------
@@ -132,15 +136,29 @@ class Campaign:
 
         Returns
         -------
-        Path
-            The path, environment variables expanded.
+        dict of str to Path
+            Path by instrument, environment variables expanded; one file alone has the name "".
 
         Raises
         ------
         RequestError
             If there is no such run, or an environment variable is not set.
         """
-        return expand(self._run(name).file, self.path.parent)
+        run = self._run(name)
+        files = {"": run.file} if run.file is not None else run.files
+        return {key: expand(file, self.path.parent) for key, file in files.items()}
+
+    def checksum_of(self, name: str) -> str:
+        """SHA-256 of a run's file; of the list of them where there are several."""
+        sums = [checksum(path) for path in self.files_of(name).values()]
+        return sums[0] if len(sums) == 1 else hashlib.sha256(" ".join(sums).encode()).hexdigest()
+
+    def basis_of(self, name: str) -> str:
+        """SHA-256 of all files on which a prepared run depends, through period and clocks too."""
+        settings = self.settings
+        pooled = settings.instruments.pool_drift and bool(settings.runs[name].files)
+        names = dict.fromkeys([name, *(self.runs if pooled or self._measures_period else [])])
+        return hashlib.sha256(" ".join(map(self.checksum_of, names)).encode()).hexdigest()
 
     def _run(self, name: str) -> RunSettings:
         runs = self.settings.runs
@@ -172,10 +190,50 @@ class Campaign:
         DataError
             If the file is damaged, has gaps, or its times are not uniform.
         """
-        path = self.file_of(name)
-        dataset = read_channels(path, self.settings, name)
-        step = uniform_step(dataset["time"].to_numpy(), f"run '{name}' ({path})")
-        return dataset.assign_attrs(self._attributes(name, dataset, step, path))
+        found = self._survey([name], periods=False)
+        groups = self._groups(name, found)
+        dt = uniform_step(_reference_time(groups), f"run '{name}'")
+        dataset = on_one_axis(groups, dt, self.settings, name)
+        return dataset.assign_attrs(self._attributes(name, dataset, dt, found.clocks[name]))
+
+    def _groups(self, name: str, found: Survey) -> Group:
+        loggers = open_loggers(self.files_of(name), self.settings)
+        return read_groups(loggers, found.clocks[name], self.settings, name)
+
+    def clocks(self, names: Iterable[str] | None = None) -> dict[str, dict[str, Clock]]:
+        """Clocks of the loggers of each run against the reference.
+
+        Parameters
+        ----------
+        names : iterable of str, optional
+            The runs wanted; the default is all that are used.
+
+        Returns
+        -------
+        dict of str to dict of str to Clock
+            By run and logger, the reference first. Drifts are pooled over all used runs whose
+            clocks agree, unless ``pool_drift = false`` in ``[instruments]``.
+
+        Raises
+        ------
+        RequestError, DataError
+            If a file cannot be read or a clock not found.
+        """
+        wanted = list(self.runs if names is None else names)
+        found = self._survey(wanted, periods=False)
+        return {name: dict(found.clocks[name]) for name in wanted}
+
+    def _survey(self, wanted: list[str], periods: bool, progress: Progress | None = None) -> Survey:
+        """Clocks of the wanted runs and, if asked for, periods of the irregular ones."""
+        several = [n for n in dict.fromkeys([*wanted, *self.runs]) if self._run(n).files]
+        pooled = self.settings.instruments.pool_drift and set(wanted) & set(several)
+        timed = several if pooled else [n for n in wanted if n in several]
+        irregular = [n for n in self.runs if self.settings.runs[n].waves == "irregular"]
+        waves = (irregular or self.runs) if periods else []
+        channel = self.period_channel() if periods else ""
+        found = survey(self.settings, self.files_of, timed, waves, channel, progress)
+        one = {n: {"": Clock()} for n in wanted if n not in several}
+        return Survey({**one, **found.clocks}, found.periods)
 
     def period_channel(self) -> str:
         """Name of the wave channel that defines the encounter period.
@@ -223,18 +281,12 @@ class Campaign:
         stated = self.settings.campaign.encounter_period
         if stated is not None:
             return stated
-        channel = self.period_channel()
-        irregular = [n for n in self.runs if self.settings.runs[n].waves == "irregular"]
-        periods = []
-        for name in irregular or self.runs:
-            raw = self._cropped(self.read_run(name), name)
-            try:
-                periods.append(encounter_period(raw[channel].to_numpy(), raw.attrs["dt"]))
-            except DataError as error:
-                raise DataError(f"run '{name}', channel '{channel}': {error}") from None
-        if not periods:
+        return self._mean_period(self._survey([], periods=True))
+
+    def _mean_period(self, found: Survey) -> float:
+        if not found.periods:
             raise RequestError(f"{self.path} has no run in use. Give a run another role.")
-        return float(np.mean(periods))
+        return float(np.mean(list(found.periods.values())))
 
     def prepare(
         self, names: Iterable[str] | None = None, progress: Progress | None = None
@@ -266,65 +318,70 @@ class Campaign:
         DataError
             As :meth:`read_run`.
         """
+        return dict(self.each_prepared(names, progress))
+
+    def each_prepared(
+        self, names: Iterable[str] | None = None, progress: Progress | None = None
+    ) -> Iterator[tuple[str, xr.Dataset]]:
+        """Prepare runs one after the other, as :meth:`prepare` does; only one is held at a time.
+
+        Parameters
+        ----------
+        names, progress
+            As in :meth:`prepare`.
+
+        Yields
+        ------
+        (str, xarray.Dataset)
+            Name and run.
+
+        Raises
+        ------
+        RequestError, DataError
+            As :meth:`prepare`.
+        """
         wanted = list(self.runs if names is None else names)
         for name in wanted:
             self._run(name)
-        period, dt = self._period_and_step()
-        prepared: dict[str, xr.Dataset] = {}
+        found, period, dt = self._period_and_step(wanted, progress)
         for done, name in enumerate(wanted, 1):
-            raw = self.read_run(name)
-            if dt is None:
-                dt = float(raw.attrs["dt"])
+            groups = self._groups(name, found)
+            reference = _reference_time(groups)
+            own = uniform_step(reference, f"run '{name}'")
+            dt = own if dt is None else dt
             stated = self.settings.preparation.model_fields_set & {"sampling_rate", "dt"}
-            if not stated and period is None and _strays(raw, dt):
+            if not stated and period is None and strays(own, reference.size, dt):
                 raise RequestError(
                     f"the runs differ in rate: '{wanted[0]}' has a step of {dt:g} s and '{name}' "
-                    f"one of {raw.attrs['dt']:g} s. State sampling_rate (Hz) or dt (s) in "
-                    "[preparation]."
+                    f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                 )
-            run = self._cropped(self._resampled(raw, dt), name)
-            run.attrs.update(self._attributes(name, run, dt, self.file_of(name)))
+            whole = on_one_axis(groups, dt, self.settings, name)
+            findings = checked(groups, whole, found.clocks[name], self.settings)
+            run = self._cropped(whole, name, (float(reference[0]), float(reference[-1])))
+            run.attrs.update(self._attributes(name, run, dt, found.clocks[name]))
+            run.attrs["quality"] = findings
             if period is not None:
                 run.attrs["encounter_period"] = period
-            prepared[name] = run
             if progress is not None:
                 progress(done, len(wanted), name)
-        return prepared
+            yield name, run
 
-    def _period_and_step(self) -> tuple[float | None, float | None]:
-        """Encounter period, if it is stated or needed, and the common step, if there is one."""
-        preparation = self.settings.preparation
+    def _period_and_step(
+        self, wanted: list[str], progress: Progress | None
+    ) -> tuple[Survey, float | None, float | None]:
+        """Clocks, encounter period if it is needed, and the common step if there is one."""
+        preparation, stated = self.settings.preparation, self.settings.campaign.encounter_period
+        counted = preparation.steps_per_period is not None
+        found = self._survey(wanted, counted and stated is None, progress)
         if preparation.steps_per_period is not None:
-            period = self.encounter_period()
-            return period, period / preparation.steps_per_period
+            period = self._mean_period(found) if stated is None else stated
+            return found, period, period / preparation.steps_per_period
         if preparation.sampling_rate is not None:
-            return None, 1.0 / preparation.sampling_rate
-        return None, preparation.dt
+            return found, None, 1.0 / preparation.sampling_rate
+        return found, None, preparation.dt
 
-    def _resampled(self, raw: xr.Dataset, dt: float) -> xr.Dataset:
-        time = raw["time"].to_numpy()
-        count = int(np.floor((time[-1] - time[0]) / dt * (1 + 1e-9) + 1e-6)) + 1
-        new_time = time[0] + dt * np.arange(count)
-        names = list(raw.data_vars)
-        series = np.column_stack([raw[name].to_numpy() for name in names])
-        if _strays(raw, dt):
-            if count < 2:
-                raise RequestError(
-                    f"run '{raw.attrs['run']}' of {time[-1] - time[0]:g} s is shorter than two "
-                    f"steps of {dt:g} s. Correct [preparation]."
-                )
-            # The last instant may lie a rounding beyond the record.
-            inside = np.minimum(new_time, time[-1]) if new_time[-1] > time[-1] else new_time
-            series = resample(series, time, inside, self.settings.preparation.attenuation)
-        else:
-            series = series[:count]
-        variables = {
-            name: ("time", series[:, i].copy(), raw[name].attrs) for i, name in enumerate(names)
-        }
-        coordinates = {"time": ("time", new_time, raw["time"].attrs)}
-        return xr.Dataset(variables, coordinates, raw.attrs)
-
-    def _cropped(self, run: xr.Dataset, name: str) -> xr.Dataset:
+    def _cropped(self, run: xr.Dataset, name: str, record: tuple[float, float]) -> xr.Dataset:
+        """Part of a run that is used; spans lie inside the record of the reference."""
         settings = self._run(name)
         time, dt = run["time"].to_numpy(), float(np.median(np.diff(run["time"].to_numpy())))
         for key in ("span", "train", "test"):
@@ -332,15 +389,15 @@ class Campaign:
             if span is None:
                 continue
             finite = [edge for edge in span if np.isfinite(edge)]
-            if any(not time[0] - dt < edge < time[-1] + dt for edge in finite):
+            if any(not record[0] - dt < edge < record[1] + dt for edge in finite):
                 raise RequestError(
                     f"runs.{name}.{key}: received [{span[0]:g}, {span[1]:g}] s, and the record "
-                    f"runs from {time[0]:g} to {time[-1]:g} s. Correct the span; 'inf' stands for "
-                    "the end."
+                    f"runs from {record[0]:g} to {record[1]:g} s. Correct the span; 'inf' stands "
+                    "for the end."
                 )
         if settings.span is None:
             return run
-        kept = _inside(time, settings.span, dt)
+        kept = inside(time, settings.span, dt)
         if kept.sum() < 2:
             raise RequestError(
                 f"runs.{name}.span: [{settings.span[0]:g}, {settings.span[1]:g}] s holds "
@@ -348,7 +405,9 @@ class Campaign:
             )
         return run.isel(time=kept)
 
-    def _attributes(self, name: str, run: xr.Dataset, dt: float, path: Path) -> dict[str, Any]:
+    def _attributes(
+        self, name: str, run: xr.Dataset, dt: float, clocks: Mapping[str, Clock]
+    ) -> dict[str, Any]:
         settings, rig, general = self._run(name), self.settings.rig, self.settings.campaign
         time = run["time"].to_numpy()
         attributes: dict[str, Any] = {
@@ -356,8 +415,10 @@ class Campaign:
             "campaign": self.name,
             "campaign_digest": self.digest,
             "seakeep_version": version(),
-            "file": settings.file,
-            "file_sha256": checksum(path),
+            "file": settings.file or ", ".join(settings.files.values()),
+            "file_sha256": self.checksum_of(name),
+            "basis_sha256": self.basis_of(name),
+            "preparation_preset": self.settings.preparation.preset,
             "dt": float(dt),
             "scale_factor": general.scale_factor,
             "sea_state": settings.sea_state,
@@ -376,10 +437,22 @@ class Campaign:
             if span is None and _role(settings) == use:
                 span = whole
             if span is not None:
-                kept = time[_inside(time, span, dt)]
+                kept = time[inside(time, span, dt)]
                 if kept.size:
                     attributes[f"{use}_span"] = (float(kept[0]), float(kept[-1]))
+        for logger, clock in list(clocks.items())[1:]:
+            attributes |= {
+                f"clock_{logger}": clock.describe(),
+                f"clock_{logger}_offset": clock.offset,
+                f"clock_{logger}_offset_error": clock.offset_error,
+                f"clock_{logger}_drift_ppm": 1e6 * clock.drift,
+                f"clock_{logger}_drift_error_ppm": 1e6 * clock.drift_error,
+            }
         return {key: value for key, value in attributes.items() if value is not None}
+
+
+def _reference_time(groups: Group) -> Any:
+    return next(iter(groups.values()))["time"].to_numpy()
 
 
 def _role(settings: RunSettings) -> str:
@@ -388,19 +461,6 @@ def _role(settings: RunSettings) -> str:
     if settings.train or settings.test:
         return "train" if settings.train else "test"
     return settings.role or "train"
-
-
-def _strays(raw: xr.Dataset, dt: float) -> bool:
-    """Whether a record's own step leads it away from a grid of `dt` by more than rounding.
-
-    Times written with few decimals give a step that is off by a part of a sample over the record.
-    """
-    return bool(abs(raw.attrs["dt"] - dt) * raw.sizes["time"] > 0.05 * dt)
-
-
-def _inside(time: Any, span: tuple[float, float], dt: float) -> Any:
-    slack = 1e-6 * dt
-    return (time >= span[0] - slack) & (time <= span[1] + slack)
 
 
 def version() -> str:

@@ -14,7 +14,9 @@ import xarray as xr
 
 from seakeep.campaign.binary import read_matlab, read_netcdf
 from seakeep.campaign.columns import Columns
+from seakeep.campaign.rosbag import is_recording, read_recording
 from seakeep.campaign.settings import FileSettings
+from seakeep.campaign.tdms import read_tdms
 from seakeep.campaign.text import read_text
 from seakeep.conventions import conversion
 from seakeep.errors import DataError, RequestError, did_you_mean
@@ -62,13 +64,18 @@ def expand(file: str, folder: Path) -> Path:
 
 
 def checksum(path: Path) -> str:
-    """SHA-256 of a file."""
+    """SHA-256 of a file, or of the names and contents of the files in a bag's folder."""
     _check_there(path)
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    if not path.is_dir():
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    digest = hashlib.sha256()
+    for part in sorted(each for each in path.iterdir() if each.is_file()):
+        digest.update(part.name.encode() + b"\0" + hashlib.sha256(part.read_bytes()).digest())
+    return digest.hexdigest()
 
 
 def _check_there(path: Path) -> None:
-    if path.is_dir():
+    if path.is_dir() and not is_recording(path, b""):
         raise RequestError(f"{path} is a folder; give the file in it.")
     if path.exists():
         return
@@ -109,6 +116,8 @@ def read_columns(path: Path, options: FileSettings | None = None) -> Columns:
     """
     options = options or FileSettings()
     _check_there(path)
+    if path.is_dir():
+        return read_recording(path, options)
     with path.open("rb") as file:
         head = file.read(600)
     if not head:
@@ -118,6 +127,10 @@ def read_columns(path: Path, options: FileSettings | None = None) -> Columns:
         return read_matlab(path, options)
     if head.startswith((b"\x89HDF", b"CDF")) or suffix in (".nc", ".nc4", ".h5", ".hdf5", ".hdf"):
         return read_netcdf(path, options)
+    if head.startswith(b"TDSm") or suffix == ".tdms":
+        return read_tdms(path, options)
+    if is_recording(path, head):
+        return read_recording(path, options)
     return read_text(path, options)
 
 
@@ -129,7 +142,8 @@ def read_table(
     Parameters
     ----------
     path : Path or str
-        CSV or text (plain or gzip), MATLAB .mat of version 5 to 7.2, NetCDF or HDF5.
+        CSV or text (plain or gzip), MATLAB .mat of version 5 to 7.3, NetCDF or HDF5; TDMS with
+        the extra ``tdms``; a ROS 2 bag (its folder) or an MCAP file with the extra ``ros``.
     options : FileSettings, optional
         What is known about the file: time column, delimiter, decimal mark and so on; what is left
         out is recognised.
@@ -152,12 +166,25 @@ def read_table(
         If the file is damaged, a cell is no number, or times are missing, repeated or unsorted.
     """
     path, options = Path(path), options or FileSettings()
-    table = read_columns(path, options)
-    time_name, time = _time(path, table, options)
-    wanted = [name for name in table.names if name != time_name] if columns is None else columns
+    return labelled_table(path, read_columns(path, options), options, columns)
+
+
+def labelled_table(
+    path: Path, table: Columns, options: FileSettings, columns: Iterable[str] | None
+) -> xr.Dataset:
+    """Columns of a file as :func:`read_table` gives them."""
+    time_name, time = times_of(path, table, options)
+    # A run has one `time`: a column of that name beside the stated one is left out.
+    others = [name for name in table.names if name not in (time_name, "time")]
+    wanted = others if columns is None else columns
     variables = {}
     for each in wanted:
         name = find_column(path, table, each)
+        if name == "time":
+            raise RequestError(
+                f"{path}: the column 'time' cannot be a channel, since a run's instants are called "
+                "so. Leave it out, or rename it in the file."
+            )
         attributes = {"long_name": table.headers.get(name, name)}
         if name in table.units:
             attributes["units"] = table.units[name]
@@ -191,7 +218,8 @@ def time_column(table: Columns, stated: str | None = None) -> str | None:
     return None
 
 
-def _time(path: Path, table: Columns, options: FileSettings) -> tuple[str | None, FloatArray]:
+def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | None, FloatArray]:
+    """Name of the time column, if there is one, and the instants, s, checked for their order."""
     name = time_column(table, options.time)
     rate = options.sampling_rate or table.sampling_rate
     if name is None and options.time is not None:

@@ -6,19 +6,18 @@ turns what does not fit into messages. A field's description is the mend that a 
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Discriminator,
-    Field,
-    Tag,
-    model_validator,
-)
+from pydantic import Discriminator, Field, Tag, model_validator
 
+from seakeep.campaign.chain_settings import (
+    DerivedSettings,
+    InstrumentSettings,
+    InstrumentsSettings,
+    PreparationSettings,
+    RedundantSettings,
+)
+from seakeep.campaign.tables import Finite, Names, Positive, RunName, Span, Table
 from seakeep.conventions import canonical_channel
 
 __all__ = [
@@ -28,34 +27,15 @@ __all__ = [
     "DerivedSettings",
     "FileSettings",
     "GeneralSettings",
+    "InstrumentSettings",
+    "InstrumentsSettings",
     "ModelSettings",
     "PreparationSettings",
     "PriorSettings",
+    "RedundantSettings",
     "RigSettings",
     "RunSettings",
 ]
-
-
-def _rising(span: tuple[float, float]) -> tuple[float, float]:
-    if math.isnan(span[0]) or math.isnan(span[1]) or not span[0] < span[1]:
-        raise ValueError(
-            "a span is [begin, end] in seconds of the file's clock, begin before end; "
-            "'inf' stands for the end of the record"
-        )
-    return span
-
-
-Span = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_rising)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-RunName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$")]
-Names = Annotated[tuple[str, ...], Field(strict=False)]
-
-
-class Table(BaseModel):
-    """A frozen table that refuses keys it does not know."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, populate_by_name=True)
 
 
 class GeneralSettings(Table):
@@ -122,6 +102,9 @@ class ChannelSettings(Table):
     column: str | None = Field(
         default=None, description="the column in the file; left out, the channel's own name"
     )
+    instrument: str | None = Field(
+        default=None, description="whose file holds it, where several files have such a column"
+    )
     unit: str | None = Field(
         default=None, description="unit of the column, such as 'mm'; left out, the file's header"
     )
@@ -130,64 +113,6 @@ class ChannelSettings(Table):
         default=0.0, description="added to the reading, in the file's unit, before the sign"
     )
     long_name: str | None = Field(default=None, description="name for labels")
-
-
-_STEP_KEYS = {
-    "band_pass": {"band"},
-    "integrate": {"times", "band"},
-    "differentiate": set(),
-    "low_pass": {"passband", "stopband"},
-    "envelope_squared": set(),
-}
-
-
-class DerivedSettings(Table):
-    """``[derived.NAME]``: a channel made from others, by an expression or by a named step."""
-
-    expression: str | None = Field(
-        default=None, description="such as '0.5*(acc_sb + acc_ps)', on SI values"
-    )
-    source: str | None = Field(
-        default=None, alias="from", description="the channel that the step works on"
-    )
-    step: (
-        Literal["integrate", "differentiate", "band_pass", "low_pass", "envelope_squared"] | None
-    ) = Field(default=None, description="what to do with the channel named by 'from'")
-    times: Literal[1, 2] | None = Field(default=None, description="integrate once or twice")
-    band: Span | None = Field(
-        default=None, description="[low, high] in Hz, kept by 'integrate' and 'band_pass'"
-    )
-    passband: Positive | None = Field(default=None, description="edge of the pass band, Hz")
-    stopband: Positive | None = Field(default=None, description="edge of the stop band, Hz")
-    unit: str | None = Field(
-        default=None, description="unit of the result; needed by expressions for free names"
-    )
-    long_name: str | None = Field(default=None, description="name for labels")
-
-    @model_validator(mode="after")
-    def _one_way(self) -> DerivedSettings:
-        if (self.expression is None) == (self.step is None):
-            raise ValueError("a derived channel needs either 'expression', or 'from' and 'step'")
-        given = {key for key in ("times", "band", "passband", "stopband") if getattr(self, key)}
-        if self.step is None:
-            if self.source is not None or given:
-                raise ValueError("'from' and the keys of steps do not go with 'expression'")
-            return self
-        if self.source is None:
-            raise ValueError(f"step '{self.step}' needs 'from', the channel it works on")
-        if extra := given - _STEP_KEYS[self.step]:
-            raise ValueError(f"step '{self.step}' has no key {sorted(extra)[0]!r}; remove it")
-        for key, step in (
-            ("band", "integrate"),
-            ("band", "band_pass"),
-            ("passband", "low_pass"),
-        ):
-            if self.step == step and getattr(self, key) is None:
-                raise ValueError(
-                    f"step '{step}' needs '{key}' (Hz)"
-                    + (", such as band = [0.3, 5.0]" if key == "band" else "")
-                )
-        return self
 
 
 class AlignmentSettings(Table):
@@ -222,13 +147,17 @@ class AlignmentSettings(Table):
 
 
 class RunSettings(Table):
-    """``[runs.NAME]``: one run, its file, and what it serves for.
+    """``[runs.NAME]``: one run, its file or files, and what it serves for.
 
-    Either `role` (with an optional `span`, the part that is used), or `train` and `test`, spans of
-    one run that is used for both. `record` cuts the file before anything else is done with it.
+    `file` where one file holds all channels, else `files`, one an instrument. Either `role` (with
+    an optional `span`, the part that is used), or `train` and `test`, spans of one run that is
+    used for both. `record` cuts the files before anything else is done with them.
     """
 
-    file: str = Field(description="the file, relative to the campaign file")
+    file: str | None = Field(default=None, description="the file, relative to the campaign file")
+    files: dict[str, str] = Field(
+        default_factory=dict, description="instrument = its file, relative to the campaign file"
+    )
     sea_state: str = Field(default="", description="a name for the sea state")
     waves: Literal["regular", "irregular"] | None = Field(
         default=None, description="'regular' or 'irregular'"
@@ -253,6 +182,11 @@ class RunSettings(Table):
 
     @model_validator(mode="after")
     def _one_use(self) -> RunSettings:
+        if (self.file is None) == (not self.files):
+            raise ValueError(
+                "a run needs either 'file', relative to the campaign file, or 'files', a table of "
+                "one file an instrument"
+            )
         if self.role is not None and (self.train or self.test):
             raise ValueError(
                 "'role' does not go with 'train' and 'test'; state the role and 'span', or the "
@@ -260,29 +194,6 @@ class RunSettings(Table):
             )
         if self.probe_offset is not None and self.probe_offset_span is not None:
             raise ValueError("state 'probe_offset' or 'probe_offset_span', not both")
-        return self
-
-
-class PreparationSettings(Table):
-    """``[preparation]``: the common time step and how it is reached."""
-
-    sampling_rate: Positive | None = Field(default=None, description="samples a second, Hz")
-    dt: Positive | None = Field(default=None, description="time step in seconds")
-    steps_per_period: Annotated[int, Field(ge=4)] | None = Field(
-        default=None, description="samples a mean encounter period; 32 is the paper's"
-    )
-    attenuation: Annotated[float, Field(ge=50, le=200)] = Field(
-        default=60.0, description="attenuation above the new Nyquist frequency, dB, at least 50"
-    )
-    gaps: Literal["refuse"] = Field(
-        default="refuse", description="'refuse': a run with gaps is an error"
-    )
-
-    @model_validator(mode="after")
-    def _one_rate(self) -> PreparationSettings:
-        given = [k for k in ("sampling_rate", "dt", "steps_per_period") if getattr(self, k)]
-        if len(given) > 1:
-            raise ValueError(f"state only one of {', '.join(given)}")
         return self
 
 
@@ -409,6 +320,8 @@ class CampaignSettings(Table):
         min_length=1, description="at least one table [channels.NAME]"
     )
     derived: dict[str, DerivedSettings] = Field(default_factory=dict)
+    instruments: InstrumentsSettings = InstrumentsSettings()
+    redundant: dict[str, RedundantSettings] = Field(default_factory=dict)
     runs: dict[RunName, RunSettings] = Field(
         min_length=1, description="at least one table [runs.NAME] with a file"
     )

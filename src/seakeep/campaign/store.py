@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -12,8 +11,8 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.prepare import Campaign, Progress, version
-from seakeep.campaign.readers import checksum
 from seakeep.errors import SeakeepWarning
+from seakeep.files import replacing
 
 __all__ = ["load_prepared", "write_prepared"]
 
@@ -23,8 +22,11 @@ def write_prepared(
     out_dir: Path | str | None = None,
     names: Iterable[str] | None = None,
     progress: Progress | None = None,
+    anew: bool = False,
 ) -> dict[str, Path]:
-    """Prepare runs and write each to a NetCDF file.
+    """Prepare runs and write each to a NetCDF file as soon as it is done.
+
+    Files that are fresh stay: interrupted half-way, a second call continues.
 
     Parameters
     ----------
@@ -34,6 +36,8 @@ def write_prepared(
         Folder for the files; the default is ``prepared`` beside the campaign file.
     names, progress
         As in :meth:`Campaign.prepare`.
+    anew : bool, optional
+        Prepare fresh files again too.
 
     Returns
     -------
@@ -47,16 +51,34 @@ def write_prepared(
     """
     folder = _folder(campaign, out_dir)
     folder.mkdir(parents=True, exist_ok=True)
-    files = {}
-    for name, run in campaign.prepare(names, progress).items():
-        files[name] = folder / f"{name}.nc"
-        temporary = folder / f".{name}.{os.getpid()}.tmp"
-        try:
-            run.to_netcdf(temporary, engine="h5netcdf")
-            temporary.replace(files[name])
-        finally:
-            temporary.unlink(missing_ok=True)
+    wanted = list(campaign.runs if names is None else names)
+    files = {name: folder / f"{name}.nc" for name in wanted}
+    fresh = {name: _fresh_step(campaign, name, files[name]) for name in wanted}
+    missing = [name for name in wanted if fresh[name] is None or anew]
+    steps = {step for name, step in fresh.items() if step is not None and name not in missing}
+    done = len(wanted) - len(missing)
+
+    def told(count: int, total: int, name: str) -> None:
+        if progress is not None:
+            progress(done + count if count else 0, done + total, name)
+
+    for name, run in campaign.each_prepared(missing, told):
+        _write(run, files[name])
+        steps.add(float(run.attrs["dt"]))
+    if len(steps) > 1:  # runs that were fresh by themselves had another step: only the whole tells
+        for name, run in campaign.each_prepared(wanted, progress):
+            _write(run, files[name])
     return files
+
+
+def _write(run: xr.Dataset, path: Path) -> None:
+    with replacing(path) as temporary:
+        run.to_netcdf(temporary, engine="h5netcdf")
+
+
+def _fresh_step(campaign: Campaign, name: str, file: Path) -> float | None:
+    run = _fresh(campaign, name, file)
+    return None if run is None else float(run.attrs["dt"])
 
 
 def load_prepared(
@@ -104,7 +126,6 @@ def _folder(campaign: Campaign, out_dir: Path | str | None) -> Path:
 
 
 def _fresh(campaign: Campaign, name: str, file: Path) -> xr.Dataset | None:
-    raw = campaign.file_of(name)
     if not file.exists():
         return None
     try:
@@ -120,7 +141,7 @@ def _fresh(campaign: Campaign, name: str, file: Path) -> xr.Dataset | None:
         return None
     expected: Mapping[str, object] = {
         "campaign_digest": campaign.digest,
-        "file_sha256": checksum(raw),
+        "basis_sha256": campaign.basis_of(name),
         "seakeep_version": version(),
         "campaign": campaign.name,
     }
@@ -137,5 +158,5 @@ def _fresh(campaign: Campaign, name: str, file: Path) -> xr.Dataset | None:
 def _plain(value: Any) -> Any:
     """Turn an attribute, as NetCDF gives it, into what was written."""
     if isinstance(value, np.ndarray):
-        return tuple(float(each) for each in value)
+        return tuple(value.tolist())
     return value.item() if isinstance(value, np.generic) else value

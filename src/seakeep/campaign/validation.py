@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import tomllib
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from seakeep.campaign.chain_settings import InstrumentSettings, InstrumentsSettings
 from seakeep.campaign.settings import CampaignSettings, ChannelSettings, DerivedSettings
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.signals.expressions import parse
 
-__all__ = ["derivation_order", "mistakes_of", "read_settings", "read_toml", "validate"]
+__all__ = [
+    "derivation_order",
+    "mistakes_of",
+    "read_settings",
+    "read_toml",
+    "sources_of",
+    "validate",
+]
 
 
 def read_settings(path: Path) -> CampaignSettings:
@@ -182,6 +190,9 @@ def _place(loc: list[str], root: type[BaseModel]) -> tuple[type[BaseModel] | Non
         if table is not None:
             owner = table
             fields = {field.alias or name: field for name, field in table.model_fields.items()}
+            if key not in fields and table is InstrumentsSettings:
+                table = InstrumentSettings
+                continue
             if key not in fields:
                 return owner, "", depth + 1
             annotation, description = fields[key].annotation, fields[key].description or ""
@@ -203,13 +214,17 @@ def _table_of(annotation: Any) -> type[BaseModel] | None:
     return next((table for table in found if table is not None), None)
 
 
-def derivation_order(derived: Mapping[str, DerivedSettings]) -> list[str]:
+def derivation_order(
+    derived: Mapping[str, DerivedSettings], channels: Collection[str] = ()
+) -> list[str]:
     """Order derived channels so that each finds what it needs.
 
     Parameters
     ----------
     derived : mapping of str to DerivedSettings
         The tables ``[derived.NAME]``.
+    channels : collection of str, optional
+        All channels there are.
 
     Returns
     -------
@@ -232,7 +247,7 @@ def derivation_order(derived: Mapping[str, DerivedSettings]) -> list[str]:
             )
         if name in order or name not in derived:
             return
-        for source in _sources(derived[name]):
+        for source in sources_of(name, derived[name], channels):
             visit(source, (*trail, name))
         order.append(name)
 
@@ -241,10 +256,40 @@ def derivation_order(derived: Mapping[str, DerivedSettings]) -> list[str]:
     return order
 
 
-def _sources(settings: DerivedSettings) -> tuple[str, ...]:
+_TURNS = ("roll", "pitch", "yaw")
+
+
+def sources_of(name: str, settings: DerivedSettings, channels: Collection[str]) -> tuple[str, ...]:
+    """Channels that a derived channel needs.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    settings : DerivedSettings
+        Its table.
+    channels : collection of str
+        All channels there are: a step of the rigid body takes the angles it finds among them.
+
+    Returns
+    -------
+    tuple of str
+        Names, each once.
+    """
     if settings.expression is not None:
         return parse(settings.expression).channels
-    return (str(settings.source),)
+    sources = [str(settings.source)]
+    if settings.position is not None:
+        sources.append(settings.position)
+    sources += settings.components or ()
+    if settings.step in ("transfer", "remove_gravity"):
+        turning = ["", "_rate", "_acceleration"]
+        if settings.step == "remove_gravity":
+            turning = [""]
+        elif (known := canonical_channel(sources[0]) or canonical_channel(name)) is not None:
+            turning = turning[: {"m": 1, "m/s": 2}.get(known.units, 3)]
+        sources += [turn + kind for kind in turning for turn in _TURNS if turn + kind in channels]
+    return tuple(dict.fromkeys(each for each in sources if each != name))
 
 
 def _cross_checks(settings: CampaignSettings) -> Iterable[str]:
@@ -261,6 +306,7 @@ def _cross_checks(settings: CampaignSettings) -> Iterable[str]:
             f"{did_you_mean(wave, names)} {listed}"
         )
     yield from _model_mistakes(settings)
+    yield from _instrument_mistakes(settings)
     for run, each in settings.runs.items():
         for name in each.channels:
             if name not in settings.channels:
@@ -269,6 +315,28 @@ def _cross_checks(settings: CampaignSettings) -> Iterable[str]:
                     f"runs.{run}.channels.{name}: no table [channels.{name}] to change.{near} "
                     "Add it there first."
                 )
+
+
+def _instrument_mistakes(settings: CampaignSettings) -> Iterable[str]:
+    known = list(settings.instruments.loggers)
+    used = {logger for run in settings.runs.values() for logger in run.files}
+    reference = settings.instruments.reference
+    if reference is not None and reference not in {*known, *used}:
+        near = did_you_mean(reference, sorted(used))
+        yield f"instruments.reference: received {reference!r}, which no run has a file of.{near}"
+    for run, each in settings.runs.items():
+        for logger in each.files:
+            if known and logger not in known:
+                yield (
+                    f"runs.{run}.files.{logger}: no table [instruments.{logger}]."
+                    f"{did_you_mean(logger, known)} Instruments: {', '.join(known)}."
+                )
+    names = settings.channel_names
+    for key, pair in settings.redundant.items():
+        for name in pair.channels:
+            if name not in names:
+                near = did_you_mean(name, names)
+                yield f"redundant.{key}.channels: received {name!r}, no such channel.{near}"
 
 
 def _model_mistakes(settings: CampaignSettings) -> Iterable[str]:
@@ -314,7 +382,7 @@ def _derived_mistakes(settings: CampaignSettings) -> Iterable[str]:
         except RequestError as error:
             yield f"derived.{name}.unit: {error}"
         try:
-            sources = _sources(each)
+            sources = sources_of(name, each, settings.channel_names)
         except RequestError as error:
             sound = False
             yield f"derived.{name}.expression: {error}"
@@ -334,6 +402,6 @@ def _derived_mistakes(settings: CampaignSettings) -> Iterable[str]:
             )
     if sound:
         try:
-            derivation_order(settings.derived)
+            derivation_order(settings.derived, settings.channel_names)
         except RequestError as error:
             yield f"derived: {error}"

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from seakeep.cli import campaigns, information, modelling, tank
+from seakeep.cli import campaigns, information, modelling, tank, tracking
 from seakeep.cli import study as studying
 from seakeep.cli.console import messages, tell_warnings
 from seakeep.errors import SeakeepError
@@ -23,7 +23,7 @@ app = typer.Typer(
     name="seakeep",
     help=(
         "Data-driven models of vessels in waves: from measured runs to judged forecasts.\n\n"
-        "Example: seakeep fit campaign.toml -o model.nc && seakeep compare model.nc campaign.toml"
+        "Example: seakeep fit docs/tutorial/campaign.toml -o model.nc"
     ),
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -59,6 +59,7 @@ app.command("study")(studying.study)
 app.command("report")(studying.report)
 app.command("reproduce")(studying.reproduce)
 app.add_typer(campaigns.datasets, name="datasets")
+app.command("track")(tracking.track)
 app.command("info")(information.info)
 
 

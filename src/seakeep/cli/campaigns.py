@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 from rich import box
-from rich.markup import escape
 from rich.table import Table
 
-from seakeep.campaign import draft_campaign, read_campaign, write_prepared
+from seakeep.campaign import draft_campaign, load_prepared, read_campaign, write_prepared
 from seakeep.campaign.datasets import DATASETS, data_folder, fetch, find_dataset, state_of
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.errors import RequestError
 from seakeep.files import replacing
+from seakeep.report.quality_sheet import write_quality_sheet
 
 __all__ = ["datasets", "init", "prepare"]
 
@@ -31,7 +31,7 @@ def init(
 
     Columns, units and canonical names are guessed: read the draft before you use it.
 
-    Example: seakeep init run1.csv run2.csv run3.csv -o campaign.toml
+    Example: seakeep init docs/tutorial/run1.csv docs/tutorial/run2.csv -o campaign.toml
     """
     folder = Path() if out is None else out.parent
     text = draft_campaign(files, folder)
@@ -51,18 +51,37 @@ def prepare(
         Path | None,
         typer.Option("-o", "--out", help="Folder; by default 'prepared' beside the campaign."),
     ] = None,
+    anew: Annotated[
+        bool, typer.Option("--anew", help="Prepare again what is fresh already.")
+    ] = False,
+    sheet: Annotated[
+        bool, typer.Option("--sheet/--no-sheet", help="Write the data-quality sheet.")
+    ] = True,
 ) -> None:
-    """Turn raw files into analysis-ready runs, one NetCDF file each.
+    """Turn raw files into analysis-ready runs, one NetCDF file each, and a data-quality sheet.
+
+    Each run is written as soon as it is done: interrupted, a second call continues.
 
     fit, forecast and compare use these files while they are fresh (same settings, same raw
     files), and prepare in memory what is missing.
 
     Example: seakeep prepare docs/tutorial/campaign.toml
     """
+    read = read_campaign(campaign)
     with progress_bar("Preparing") as progress:
-        files = write_prepared(read_campaign(campaign), out, progress=progress)
+        files = write_prepared(read, out, progress=progress, anew=anew)
     for path in files.values():
         typer.echo(str(path))
+    if not sheet:
+        return
+    try:
+        pages = write_quality_sheet(
+            load_prepared(read, out), read.settings, read.name, next(iter(files.values())).parent
+        )
+    except RequestError as error:
+        messages().print(f"Note: no data-quality sheet: {error}", style="yellow")
+        return
+    messages().print(f"Wrote {pages[0]}: look at it before you use the runs.")
 
 
 datasets = typer.Typer(
@@ -89,10 +108,10 @@ def _list(context: typer.Context) -> None:
         table.add_row("cite", each.reference)
         table.add_row("here", state_of(each, folder))
         if each.note:
-            table.add_row("note", escape(each.note))
+            table.add_row("note", each.note)
         table.add_row("files", "with their SHA-256")
         for name, checksum in each.files:
-            table.add_row("", escape(f"{name}  {checksum}"))
+            table.add_row("", f"{name}  {checksum}")
         table.add_section()
     results().print(table)
 

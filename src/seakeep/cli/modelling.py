@@ -12,17 +12,24 @@ import xarray as xr
 from seakeep.campaign import Campaign, load_prepared, read_campaign
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.files import replacing
+from seakeep.files import check_place, make_folder, replacing
 from seakeep.models import HankelDMDcModel, load_model
 from seakeep.report.overlay import overlay_figure
 from seakeep.report.style import save_figure
 from seakeep.report.tables import rich_comparison, write_csv
+from seakeep.signals import to_full_scale
+from seakeep.study import at_full_scale, comparison_table, fit_campaign, in_degrees
 from seakeep.study import compare as compare_runs
-from seakeep.study import comparison_table, fit_campaign, in_degrees
 
 __all__ = ["compare", "fit", "forecast"]
 
 CampaignFile = Annotated[Path, typer.Argument(help="Campaign file.", metavar="CAMPAIGN.toml")]
+FullScale = Annotated[
+    bool,
+    typer.Option(
+        "--full-scale", help="Convert results by Froude's law with the campaign's scale factor."
+    ),
+]
 ModelFile = Annotated[
     Path, typer.Argument(help="Model file written by seakeep fit.", metavar="MODEL.nc")
 ]
@@ -40,8 +47,7 @@ def fit(
 
     Example: seakeep fit docs/tutorial/campaign.toml -o model.nc
     """
-    if not out.parent.is_dir():
-        raise RequestError(f"the folder {out.parent} does not exist. Create it first.")
+    check_place(out)
     with progress_bar("Preparing") as progress:
         identified = fit_campaign(read_campaign(campaign), model, progress)
     typer.echo(identified.summary())
@@ -58,6 +64,7 @@ def forecast(
     steps: Annotated[
         int | None, typer.Option("--steps", help="Number of instants; by default to the end.")
     ] = None,
+    full_scale: FullScale = False,
 ) -> None:
     """Forecast a run: the model runs freely after START, driven by the measured waves.
 
@@ -67,8 +74,10 @@ def forecast(
     if out.suffix not in (".nc", ".csv"):
         raise RequestError(f"{out} ends in '{out.suffix}'; a forecast is written as .nc or .csv.")
     identified = load_model(model)
-    prepared = _prepared(read_campaign(campaign), run)
-    result = identified.forecast(prepared, start=start, steps=steps)
+    read = read_campaign(campaign)
+    result = identified.forecast(_prepared(read, run), start=start, steps=steps)
+    if full_scale:
+        result = to_full_scale(result, read.settings.campaign.scale_factor)
     with replacing(out) as temporary:
         if out.suffix == ".nc":
             result.to_netcdf(temporary, engine="h5netcdf")
@@ -109,6 +118,7 @@ def compare(
     radians: Annotated[
         bool, typer.Option("--radians", help="Show angles in radians instead of degrees.")
     ] = False,
+    full_scale: FullScale = False,
 ) -> None:
     """Forecast test runs and judge the forecasts against the measurement.
 
@@ -125,19 +135,16 @@ def compare(
             "`seakeep forecast`, or save one member with ensemble.member(0).save(...)."
         )
     with progress_bar("Preparing") as progress:
-        comparisons = compare_runs(
-            identified, read_campaign(campaign), run or (), start, steps, progress
-        )
+        read = read_campaign(campaign)
+        comparisons = compare_runs(identified, read, run or (), start, steps, progress)
+    if full_scale:
+        scale = read.settings.campaign.scale_factor
+        comparisons = [at_full_scale(each, scale) for each in comparisons]
     if not radians:
         comparisons = [in_degrees(each) for each in comparisons]
     table = comparison_table(comparisons)
     results().print(rich_comparison(table))
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RequestError(
-            f"cannot make the folder {out}: {error.strerror or error}. Choose another with -o."
-        ) from error
+    make_folder(out)
     written = [write_csv(table, out / "comparison.csv")]
     if find_spec("matplotlib") is None:
         messages().print(

@@ -225,7 +225,7 @@ def closed_loop(model: HankelDMDcModel, run: xr.Dataset, window: ForecastWindow)
     )
     with np.errstate(over="ignore", invalid="ignore"):
         values = model.state_scale.physical(deviations)
-    return forecasting.cut_divergence(values, model.state_scale)
+    return forecasting.cut_divergence(values, model.state_scale, window.state_history[-1])
 
 
 def aligned_inputs(model: HankelDMDcModel, run: xr.Dataset) -> xr.Dataset:

@@ -21,7 +21,7 @@ __all__ = ["ForecastWindow", "label_forecast", "modes", "read_window", "summary"
 FloatArray = npt.NDArray[np.float64]
 
 DIVERGED = 1e6
-"""A free run is given up where a state is this many training SDs from its mean."""
+"""A free run is given up where a state is this many training SDs from where it began."""
 
 
 class Reader(Protocol):
@@ -84,10 +84,12 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
     at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
     needed = model.history_samples
     if at + 1 < needed:
+        near = abs(float(start) - time[at]) <= 1e-6 * model.dt
+        snapped = "" if near else f" (nearest sample {time[at]:.10g} s)"
         raise RequestError(
-            f"start = {time[at]:.10g} s leaves {at + 1} samples of history in {name} and the model "
-            f"needs {needed} (the start included): {needed - at - 1} are missing. Start at "
-            f"{time[0] + (needed - 1) * model.dt:.10g} s or later."
+            f"start = {float(start):.10g} s{snapped} leaves {at + 1} samples of history in "
+            f"{name} and the model needs {needed} (the start included): {needed - at - 1} are "
+            f"missing. Start at {time[0] + (needed - 1) * model.dt:.10g} s or later."
         )
     available = time.size - 1 - at
     count = available if steps is None else steps
@@ -174,11 +176,26 @@ def _finite(name: str, needed: FloatArray) -> FloatArray:
     return needed
 
 
-def cut_divergence(values: FloatArray, scale: Scale) -> FloatArray:
-    """NaN from the instant on at which a state is lost; values are (…, time, channel)."""
+def cut_divergence(values: FloatArray, scale: Scale, begun: FloatArray) -> FloatArray:
+    """NaN from the instant on at which a state is lost.
+
+    Parameters
+    ----------
+    values : ndarray, shape (…, time, channel)
+        Free runs, physical units; changed in place.
+    scale : Scale
+        Moments of the channels in training.
+    begun : ndarray, shape (…, 1, channel) or (channel,)
+        The measured states from which the runs began: distance is counted from them, because
+        without standardisation a mean far from zero is no divergence.
+
+    Returns
+    -------
+    ndarray
+        `values`.
+    """
     spread = np.where(scale.spread > 0, scale.spread, np.inf)
-    centre = scale.mean
-    kept = np.isfinite(values) & (np.abs(values - centre) <= DIVERGED * spread)
+    kept = np.isfinite(values) & (np.abs(values - begun) <= DIVERGED * spread)
     lost = ~np.all(kept, axis=-1)
     if np.any(lost):
         values[np.logical_or.accumulate(lost, axis=-1)] = np.nan
@@ -239,12 +256,18 @@ def modes(eigenvalues: npt.NDArray[np.complex128], dt: float) -> xr.Dataset:
     )
 
 
+def counted(number: int, thing: str) -> str:
+    """A number and a word, in the plural where it must be."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
 def summary(model: HankelDMDcModel) -> str:
     """Text of ``HankelDMDcModel.summary``."""
     settings, training = model.settings, model.training
     states, inputs = len(model.states), len(model.inputs)
     lines = [
-        f"Hankel DMD with control: {states} states, {inputs} inputs, dt {model.dt:g} s",
+        f"Hankel DMD with control: {counted(states, 'state')}, "
+        f"{counted(inputs, 'input')}, dt {model.dt:g} s",
         f"  states        {', '.join(_with_units(model.state_labels))}",
         f"  inputs        {', '.join(_with_units(model.input_labels)) or 'none (autonomous)'}",
         f"  delays        {model.state_delays} of the states ({model.state_delays * model.dt:g} s),"
@@ -252,7 +275,8 @@ def summary(model: HankelDMDcModel) -> str:
         f"  history       {model.history_samples} samples up to the start of a forecast",
         f"  regression    {_regression(model)}; delay rows "
         f"{'exact' if settings.delay_rows == 'exact' else 'regressed'}",
-        f"  training      {sum(training.columns)} snapshot pairs of {len(training.runs)} run(s)",
+        f"  training      {sum(training.columns)} snapshot pairs of "
+        f"{counted(len(training.runs), 'run')}",
     ]
     lines += [
         f"    {name}: {columns} pairs, {first:.10g} to {stop:.10g} s"

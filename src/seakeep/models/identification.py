@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+import reprlib
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
 from seakeep.core.embedding import History, TrainingWindow, training_window
-from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.labelled import ChannelLabel
 
-__all__ = ["Scale", "TrainingData", "gather", "last_sample", "moments", "stop_instants"]
+__all__ = [
+    "Scale",
+    "TrainingData",
+    "gather",
+    "is_constant",
+    "last_sample",
+    "moments",
+    "stop_instants",
+]
 
 FloatArray = npt.NDArray[np.float64]
 Stop = float | Sequence[float] | Mapping[str, float] | None
@@ -119,6 +129,7 @@ def gather(
         If a run is too short, has gaps, another time step, other units, or a constant channel.
     """
     check_names(states, inputs)
+    states, inputs = list(states), list(inputs)  # arrays of names are welcome too
     stops = stop_instants(stop, list(runs))
     first_name, first_run = next(iter(runs.items()))
     dt = labelled.run_step(first_run, first_name)
@@ -154,6 +165,9 @@ def gather(
     names, x, u, windows, first, final = zip(*pieces, strict=True)
     state_scale = moments(x, windows, states, standardize)
     input_scale = moments(u, windows, inputs, standardize)
+    if len(names) > 1:
+        _warn_of_dead(names, x, windows, state_scale, states)
+        _warn_of_dead(names, u, windows, input_scale, inputs)
     return TrainingData(
         names=names,
         states=tuple(state_scale.deviations(values) for values in x),
@@ -211,15 +225,15 @@ def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
         listed = isinstance(cast("object", names), Iterable)
         if not listed or not all(isinstance(cast("object", name), str) for name in names):
             raise RequestError(
-                f"{what} must be a list of channel names; received {names!r}. A model without "
-                "input takes inputs=[]."
+                f"{what} must be a list of channel names; received {reprlib.repr(names)}. A "
+                "model without input takes inputs=[]."
             )
         double = {name for name in names if list(names).count(name) > 1}
         if double:
             raise RequestError(
                 f"{what} names {', '.join(sorted(double))} more than once. Name each channel once."
             )
-    if not states:
+    if len(states) == 0:
         raise RequestError("states is empty: name at least one channel to forecast.")
     both = set(states) & set(inputs)
     if both:
@@ -242,7 +256,7 @@ def stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
             )
         return {name: stop.get(name) for name in names}
     if np.ndim(stop) > 0:  # a scalar array, such as an instant of a run, is one for all
-        values = [float(value) for value in np.asarray(stop, dtype=float)]
+        values = [None if value is None else float(value) for value in cast("list[Any]", stop)]
         if len(values) != len(names):
             raise RequestError(
                 f"stop has {len(values)} instants for {len(names)} runs; give one for all, or "
@@ -260,6 +274,34 @@ def last_sample(time: FloatArray, stop: float | None, name: str) -> int:
     step = (time[-1] - time[0]) / (time.size - 1)
     # "up to and including": a sample later than the stop by more than rounding is not included.
     return nearest if time[nearest] <= stop + 1e-3 * step else max(nearest - 1, 0)
+
+
+def _warn_of_dead(
+    runs: Sequence[str],
+    series: Sequence[FloatArray],
+    windows: Sequence[TrainingWindow],
+    scale: Scale,
+    names: Sequence[str],
+) -> None:
+    """Warn of channels that move in some runs and stand still in others."""
+    for run, values, window in zip(runs, series, windows, strict=True):
+        seen = values[window.samples]
+        for column in np.flatnonzero(is_constant(seen) & (scale.spread > 0)).tolist():
+            warnings.warn(
+                f"channel '{names[column]}' of {run} is constant ({seen[0, column]:.6g}) over its "
+                "training window, and moves in other runs. If its sensor was dead, leave this run "
+                "out: the model would learn that nothing moves.",
+                SeakeepWarning,
+                stacklevel=4,
+            )
+
+
+def is_constant(values: FloatArray) -> npt.NDArray[np.bool_]:
+    """Channels, shape (channel,), that do not move; values are (time, channel)."""
+    # A constant that is not a binary fraction has a spread of rounding, not of zero.
+    largest = np.abs(values).max(axis=0, initial=0.0)
+    still: npt.NDArray[np.bool_] = np.ptp(values, axis=0) <= 1e-12 * largest
+    return still
 
 
 def _check_length(

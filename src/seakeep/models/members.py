@@ -188,7 +188,7 @@ def forecast_member(task: Task, draw: Draw, scratch: Scratch) -> FloatArray:
     )
     with np.errstate(over="ignore"):  # a run that is lost is cut just below
         values = member.state_scale.physical(deviations)
-    return cut_divergence(values, member.state_scale)
+    return cut_divergence(values, member.state_scale, task.histories[:, -1:])
 
 
 def reach(draws: Sequence[Draw], samples: Sequence[int], inside: bool) -> list[int]:

@@ -97,6 +97,13 @@ class HankelDMDcModel:
         for array in (self.coefficients, *(a for s in scales for a in (s.mean, s.std, s.spread))):
             array.flags.writeable = False
 
+    def __repr__(self) -> str:
+        return (
+            f"{type(self).__name__}(states={self.states}, inputs={self.inputs}, "
+            f"state_delays={self.state_delays}, input_delays={self.input_delays}, "
+            f"dt={self.dt:g}; print(model.summary()) says more)"
+        )
+
     @property
     def states(self) -> list[str]:
         """Names of the states, in the order of the model."""
@@ -183,7 +190,7 @@ class HankelDMDcModel:
                 "it is long. Raise ridge, train on more data, use fewer state delays, or look for "
                 "transients at the ends of the training runs.",
                 SeakeepWarning,
-                stacklevel=2,
+                stacklevel=3,  # past the cached property
             )
         return values
 
@@ -317,7 +324,7 @@ class HankelDMDcModel:
         )[0]
         with np.errstate(over="ignore"):  # a run that is lost is cut just below
             values = self.state_scale.physical(deviations)
-        return forecasting.cut_divergence(values, self.state_scale)
+        return forecasting.cut_divergence(values, self.state_scale, x[-1])
 
     def to_state_space(self) -> signal.StateSpace:
         """Discrete state-space system in physical deviations from the means.

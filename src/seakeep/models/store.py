@@ -170,6 +170,13 @@ def read(path: str | Path) -> xr.Dataset:
         If it is damaged, not a model, or of a newer layout.
     """
     source = Path(path)
+    if source.is_dir():
+        raise RequestError(f"{source} is a folder. Name the model file in it.")
+    if source.suffix.lower() == ".toml":
+        raise RequestError(
+            f"{source} is a campaign file, and a model file is expected here. The model comes "
+            "first: seakeep compare MODEL.nc CAMPAIGN.toml."
+        )
     if not source.is_file():
         raise RequestError(
             f"there is no model file {source}. Make one with `seakeep fit` or model.save(...)."
@@ -187,7 +194,13 @@ def read(path: str | Path) -> xr.Dataset:
             f"{', '.join(map(str, dataset.variables)) or 'none'}). Name a file written by "
             "model.save or `seakeep fit`."
         )
-    version = int(dataset.attrs.get("seakeep_format", 0))
+    try:
+        version = int(dataset.attrs.get("seakeep_format", 0))
+    except (TypeError, ValueError):
+        raise DataError(
+            f"{source} states the layout {dataset.attrs['seakeep_format']!r}, which is no number: "
+            "the file was altered. Save the model again."
+        ) from None
     if version > FORMAT_VERSION:
         raise DataError(
             f"{source} has layout {version}, written by seakeep "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -33,6 +34,9 @@ LINES: dict[str, dict[str, Any]] = {
     "input": {"color": COLOURS["input"], "linewidth": 0.9, "linestyle": "-"},
 }
 """Lines differ in dash and width as well as in colour."""
+
+WIDEST = 18
+"""Letters of a label on one line: what the height of a panel holds."""
 
 _RC: Any = {
     "font.size": 9,
@@ -112,4 +116,5 @@ def axis_label(name: str, units: str) -> str:
     channel = canonical_channel(name)
     words = channel.long_name if channel else name.replace("_", " ")
     symbol = f"${channel.symbol}$ " if channel else ""
-    return f"{words}\n{symbol}[{units or '?'}]"
+    lines = "\n".join(textwrap.wrap(words, WIDEST))
+    return f"{lines}\n{symbol}[{units or '?'}]"

@@ -60,7 +60,7 @@ def rich_comparison(table: xr.Dataset) -> Table:
                 *(_shown(float(at[name]), form) for name, (_, form) in _HEADINGS.items()),
             )
         slack = int(rows["slack_channels"])
-        left_out = f" ({slack} slack channel{'s' * (slack > 1)} left out)" if slack else ""
+        left_out = f" ({slack} still channel{'s' * (slack > 1)} left out)" if slack else ""
         status = str(rows["status"].values)
         mean = [
             _shown(float(rows["anrmse"]), "{:.3f}"),

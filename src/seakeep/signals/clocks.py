@@ -98,14 +98,14 @@ def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
     close = step > 0 and np.max(off) <= STEP_TOLERANCE * step
     if not close:
         check_order(t, name)
-    if not close and np.max(off) > max(STEP_TOLERANCE * step, _printed_tolerance(t, step)):
+    if not close and np.max(off) > max(STEP_TOLERANCE * step, printed_tolerance(t, step)):
         raise DataError(_irregularity(t, name))
     # A decimal step such as 0.04 that was summed or printed comes back as what was meant.
     rounded = float(f"{step:.10g}")
     return rounded if abs(rounded - step) * t.size < 1e-6 * step else step
 
 
-def _printed_tolerance(t: FloatArray, step: float) -> float:
+def printed_tolerance(t: FloatArray, step: float) -> float:
     """How far rounding to the decimals that the times were written with may move an instant."""
     for decimals in range(7):
         unit = 10.0**-decimals
@@ -143,6 +143,7 @@ def resample(
     new_time: npt.ArrayLike,
     attenuation: float = 60.0,
     passband: float = 0.8,
+    anti_alias: bool = True,
 ) -> FloatArray:
     """Band-limited resampling of a uniform series onto another uniform time axis.
 
@@ -162,6 +163,9 @@ def resample(
         Attenuation above the new Nyquist frequency, dB; less than 50 is taken as 50.
     passband : float, optional
         Edge of the pass band as a part of the lower Nyquist frequency.
+    anti_alias : bool, optional
+        False cuts at the old Nyquist frequency: samples are taken as they are, and what lies
+        above the new one is folded into the result, as in the paper's chain.
 
     Returns
     -------
@@ -204,7 +208,8 @@ def resample(
         same: FloatArray = array[nearest.astype(int)]
         return same
 
-    nyquist = 0.5 * min(1.0, dt / new_dt)  # the lower one, in cycles an old sample
+    # The lower one, in cycles an old sample.
+    nyquist = 0.5 * min(1.0, dt / new_dt if anti_alias else 1.0)
     return _sinc_sums(array, position, (passband * nyquist, nyquist), attenuation)
 
 

@@ -1,6 +1,12 @@
 """From campaign to judgement: which runs train which model, and how forecasts are compared."""
 
-from seakeep.study.comparison import Comparison, compare, comparison_table, in_degrees
+from seakeep.study.comparison import (
+    Comparison,
+    at_full_scale,
+    compare,
+    comparison_table,
+    in_degrees,
+)
 from seakeep.study.run import run_study
 from seakeep.study.settings import Study, StudySettings, read_study
 from seakeep.study.store import StorageError, StudyResult, read_result
@@ -12,6 +18,7 @@ __all__ = [
     "Study",
     "StudyResult",
     "StudySettings",
+    "at_full_scale",
     "build_spec",
     "compare",
     "comparison_table",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -12,11 +13,13 @@ from seakeep import metrics
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.conventions import conversion
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import HankelDMDcModel
+from seakeep.models.identification import is_constant
+from seakeep.signals import to_full_scale
 from seakeep.study.repeats import warn_of_repeats
 
-__all__ = ["Comparison", "compare", "comparison_table", "in_degrees"]
+__all__ = ["Comparison", "at_full_scale", "compare", "comparison_table", "in_degrees"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +80,34 @@ def in_degrees(comparison: Comparison) -> Comparison:
         forecast=_degrees(comparison.forecast),
         measured=_degrees(comparison.measured),
         inputs=_degrees(comparison.inputs),
+    )
+
+
+def at_full_scale(comparison: Comparison, scale: float) -> Comparison:
+    """Convert a comparison to full scale by Froude's law.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        At model scale, in SI units.
+    scale : float
+        Scale factor, full-scale length over model length.
+
+    Returns
+    -------
+    Comparison
+        Times and values at full scale; error measures do not change by it.
+
+    Raises
+    ------
+    RequestError
+        If the unit of a channel does not scale.
+    """
+    return replace(
+        comparison,
+        forecast=to_full_scale(comparison.forecast, scale),
+        measured=to_full_scale(comparison.measured, scale),
+        inputs=to_full_scale(comparison.inputs, scale),
     )
 
 
@@ -173,6 +204,7 @@ def _compare_run(
     if inside.sizes["time"] < forecast.sizes["time"]:
         inside.attrs = forecast.attrs
     instants = {"time": inside["time"]}
+    _warn_of_dead(run[[*model.states, *model.inputs]].sel(instants), name)
     return Comparison(
         run=name,
         sea_state=str(run.attrs.get("sea_state", "")),
@@ -180,6 +212,19 @@ def _compare_run(
         measured=run[model.states].sel(instants),
         inputs=run[model.inputs].sel(instants),
     )
+
+
+def _warn_of_dead(run: xr.Dataset, name: str) -> None:
+    names = [str(channel) for channel in run.data_vars]
+    values = np.stack([run[channel].values for channel in names], axis=-1)
+    for column in np.flatnonzero(is_constant(values)):
+        warnings.warn(
+            f"channel '{names[column]}' of {name} is constant ({values[0, column]:.6g}) over the "
+            "forecast. Look for a dead sensor: a state that stands still is not judged, and an "
+            "input that does gives a forecast without waves.",
+            SeakeepWarning,
+            stacklevel=4,
+        )
 
 
 def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
@@ -223,8 +268,10 @@ _COLUMNS = {
 def _row(comparison: Comparison) -> xr.Dataset:
     p, m = comparison.forecast, comparison.measured
     names = [str(name) for name in p.data_vars]
+    slack = metrics.is_slack(predicted=p, measured=m)
     with np.errstate(divide="ignore", invalid="ignore"):
-        sd_ratio = p.std("time", ddof=1, skipna=False) / m.std("time", ddof=1)
+        spread = m.std("time", ddof=1)
+        sd_ratio = p.std("time", ddof=1, skipna=False) / spread.where(~slack)
     each = {
         "nrmse": metrics.nrmse(predicted=p, measured=m),
         "fit": metrics.fit_percent(predicted=p, measured=m),
@@ -243,7 +290,7 @@ def _row(comparison: Comparison) -> xr.Dataset:
         | {
             "anrmse": comparison.anrmse,
             "mean_nammae": float(metrics.nammae(predicted=p, measured=m)),
-            "slack_channels": int(metrics.is_slack(predicted=p, measured=m).to_array().sum()),
+            "slack_channels": int(slack.to_array().sum()),
             "status": comparison.status,
             "conditional_on": str(p.attrs.get("conditional_on", "")),
             "probe_offset": float(p.attrs.get("probe_offset", np.nan)),

@@ -15,6 +15,12 @@ from seakeep.study.repeats import warn_of_repeats
 __all__ = ["build_spec", "fit_campaign", "training_runs"]
 
 
+NOTHING_TRAINS = (
+    "no run of the campaign trains a model. Give one role = 'train', or a span "
+    "train = [begin, end]."
+)
+
+
 def build_spec(settings: ModelSettings, encounter_period: float | None, dt: float) -> HankelDMDc:
     """Turn the ``[model]`` table of a campaign into the settings of a model.
 
@@ -63,34 +69,40 @@ def build_spec(settings: ModelSettings, encounter_period: float | None, dt: floa
     return HankelDMDc(**stated)
 
 
-def training_runs(prepared: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+def training_runs(
+    prepared: Mapping[str, xr.Dataset], window: int | None = None
+) -> dict[str, xr.Dataset]:
     """Parts of prepared runs that train.
 
     Parameters
     ----------
     prepared : mapping of str to Dataset
         Runs of a campaign, as ``campaign.prepare()`` gives them.
+    window : int, optional
+        Snapshots that a model takes from the end of the span. Where the span holds them, what
+        lies before the span is kept, so that the delay history may come from there. Without it
+        the whole span is the window, and the history lies inside it.
 
     Returns
     -------
     dict of str to Dataset
-        Each cut to its ``train_span``.
+        Each cut at the end of its ``train_span``.
 
     Raises
     ------
     RequestError
         If no run trains.
     """
-    runs = {
-        name: between(run, run.attrs["train_span"])
-        for name, run in prepared.items()
-        if "train_span" in run.attrs
-    }
+    runs = {}
+    for name, run in prepared.items():
+        if "train_span" not in run.attrs:
+            continue
+        runs[name] = between(run, run.attrs["train_span"])
+        if window is not None and runs[name].sizes["time"] >= window:
+            begin = float(run["time"][0])
+            runs[name] = between(run, (begin, run.attrs["train_span"][1]))
     if not runs:
-        raise RequestError(
-            "no run of the campaign trains a model. Give one role = 'train', or a span "
-            "train = [begin, end]."
-        )
+        raise RequestError(NOTHING_TRAINS)
     return runs
 
 
@@ -133,10 +145,12 @@ def fit_campaign(
     """
     settings = campaign.model(model)
     prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
-    runs = training_runs(prepared)
-    dt = float(next(iter(runs.values())).attrs["dt"])
+    if not prepared:
+        raise RequestError(NOTHING_TRAINS)
+    dt = float(next(iter(prepared.values())).attrs["dt"])
     period = campaign.encounter_period() if settings.preset is not None else None
     spec = build_spec(settings, period, dt)
+    runs = training_runs(prepared, spec.window if spec.history == "before" else None)
     identified = spec.fit(runs, list(settings.states), list(settings.inputs), stop=settings.stop)
     both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
     warn_of_repeats(identified, campaign, both)

@@ -23,6 +23,7 @@ STATES = (
 )  # fmt: skip
 EDGES = (10.0, 10.75)  # Hz, of the paper's low-pass filter
 BAND = (0.2, 5.0)  # Hz, of the accelerations that are integrated
+CROSSOVER = 0.15  # Hz, between slow drift and waves
 
 
 def _quoted(value: str) -> str:
@@ -116,14 +117,20 @@ def _channels(settings: TankSettings, kind: str, lost: bool) -> list[str]:
             f"stopband = {EDGES[1]}",
             "",
         ]
-    for rate, source in (("surge_rate", "surge"), ("heave_rate", "heave")):
-        lines += [
-            f"[derived.{rate}]",
-            f'from = "{source}_acceleration"',
-            'step = "integrate"',
-            f"band = [{BAND[0]}, {BAND[1]}]",
-            "",
-        ]
+    # Surge drifts slowly: its rate keeps what the video sees of that.
+    lines += [
+        "[derived.surge_rate]",
+        'from = "surge_acceleration"',
+        'step = "blend"',
+        'position = "surge"',
+        f"crossover = {CROSSOVER}",
+        "",
+        "[derived.heave_rate]",
+        'from = "heave_acceleration"',
+        'step = "integrate"',
+        f"band = [{BAND[0]}, {BAND[1]}]",
+        "",
+    ]
     return [
         *lines,
         "[derived.pitch_acceleration]",
@@ -201,6 +208,7 @@ def campaign_text(
             *lines,
             "[preparation]",
             "steps_per_period = 32",
+            *(['gaps = "mask"'] if lost else []),
             "",
             "[model]",
             'kind = "hankel_dmdc"',

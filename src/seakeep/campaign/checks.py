@@ -1,0 +1,261 @@
+"""Quality checks of a run: samples flagged channel by channel, redundant sensors compared."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.campaign.settings import CampaignSettings
+from seakeep.signals import Clock, bridge
+from seakeep.signals.gaps import stretches
+from seakeep.signals.quality import (
+    BRIDGED,
+    FLAGS,
+    MISSING,
+    OUTLIER,
+    REPLACED,
+    SATURATED,
+    STUCK,
+    Agreement,
+    compare_sensors,
+    dominant_period,
+    find_outliers,
+    find_saturation,
+    find_stuck,
+    flag_attributes,
+    level_drift,
+)
+
+__all__ = ["Finding", "check_clocks", "check_levels", "check_pairs", "check_samples", "findings_of"]
+
+FloatArray = npt.NDArray[np.float64]
+
+NO_SLOW_MOTION = ("heave", "roll", "pitch")
+"""Besides wave elevations, channels whose level has no reason to change within a run."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that a check found.
+
+    Parameters
+    ----------
+    channel : str
+        Channel, or the logger for a clock.
+    kind : str
+        ``constant``, ``missing``, ``outliers``, ``saturated``, ``stuck``, ``drift``, ``lag``,
+        ``agreement`` or ``clock``.
+    text : str
+        What, how much, and what was done about it.
+    """
+
+    channel: str
+    kind: str
+    text: str
+
+
+def findings_of(run: xr.Dataset) -> list[Finding]:
+    """Read what the checks found in a prepared run from its attributes."""
+    return [Finding(**each) for each in json.loads(str(run.attrs.get("quality", "[]")))]
+
+
+def as_attribute(findings: list[Finding]) -> str:
+    """Findings as a text that an attribute can hold."""
+    return json.dumps([asdict(each) for each in findings], ensure_ascii=False)
+
+
+def check_samples(dataset: xr.Dataset, replace: bool) -> xr.Dataset:
+    """Flag samples of a logger's channels; outliers are replaced only if that is asked for.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Channels at the logger's rate; samples that were missing are filled and flagged.
+    replace : bool
+        Whether outliers are replaced by what a monotone cubic puts there.
+
+    Returns
+    -------
+    Dataset
+        The same with ``NAME_flags`` where there is something to flag.
+    """
+    time = dataset["time"].to_numpy()
+    dt = float(time[1] - time[0])
+    for name in list(dataset.data_vars):
+        x = dataset[name].to_numpy()
+        key = f"{name}_flags"
+        flags = (
+            dataset[key].to_numpy().copy()
+            if key in dataset.coords
+            else np.zeros(x.size, dtype=np.int16)
+        )
+        if x.size < 16 or not np.ptp(x):
+            continue
+        there = (flags & (MISSING | BRIDGED)) == 0
+        outlier = find_outliers(x) & there
+        stuck = find_stuck(x, dt, max(dominant_period(x, dt), 5 * dt)) & there
+        flags[outlier] |= OUTLIER
+        flags[find_saturation(x) & there & ~stuck] |= SATURATED
+        flags[stuck] |= STUCK
+        if replace and outlier.any():
+            filled = bridge(np.where(outlier, np.nan, x), dt, np.inf).values
+            dataset[name] = dataset[name].copy(data=filled)
+            flags[outlier] |= REPLACED
+            _repaired(dataset[name], f"{int(outlier.sum())} outliers replaced by monotone cubics")
+        if flags.any():
+            dataset.coords[key] = ("time", flags, flag_attributes(str(name)))
+    return dataset
+
+
+def _repaired(channel: xr.DataArray, words: str) -> None:
+    before = channel.attrs.get("repaired")
+    channel.attrs["repaired"] = f"{before}; {words}" if before else words
+
+
+def checked(
+    groups: Mapping[str, xr.Dataset],
+    whole: xr.Dataset,
+    clocks: Mapping[str, Clock],
+    settings: CampaignSettings,
+) -> str:
+    """All findings of a run, as the attribute ``quality`` holds them."""
+    pairs, _ = check_pairs(whole, settings)
+    every = told_samples(groups) + check_levels(whole) + pairs
+    return as_attribute(every + check_clocks(clocks, groups, settings))
+
+
+_KINDS = {MISSING: "missing", OUTLIER: "outliers", SATURATED: "saturated", STUCK: "stuck",
+          BRIDGED: "missing"}  # fmt: skip
+
+
+def told_samples(groups: Mapping[str, xr.Dataset]) -> list[Finding]:
+    """Put flagged samples, and channels that are constant, into words."""
+    out = []
+    for group in groups.values():
+        time = group["time"].to_numpy()
+        dt = float(time[1] - time[0])
+        for name in group.data_vars:
+            if "derived_from" in group[name].attrs:
+                continue
+            if not np.ptp(group[name].to_numpy()):
+                value = float(group[name][0])
+                out.append(Finding(str(name), "constant", f"constant at {value:g}"))
+            if f"{name}_flags" not in group.coords:
+                continue
+            flags = group[f"{name}_flags"].to_numpy()
+            for word, bit in FLAGS.items():
+                hit = (flags & bit) > 0
+                if not hit.any() or bit == REPLACED:
+                    continue
+                parts = stretches(hit)
+                longest = max(end - begin for begin, end in parts) * dt
+                text = (
+                    f"{word}: {int(hit.sum())} samples in {len(parts)} place(s), "
+                    f"{100 * hit.mean():.3g} % of the record, the longest {longest:.3g} s, the "
+                    f"first at {time[parts[0][0]]:.4g} s"
+                )
+                if bit == OUTLIER and (flags & REPLACED).any():
+                    text += "; replaced by interpolation"
+                out.append(Finding(str(name), _KINDS[bit], text))
+    return out
+
+
+def check_levels(run: xr.Dataset) -> list[Finding]:
+    """Drift of the level of channels that have no slow motion of their own."""
+    out = []
+    dt = float(run["time"][1] - run["time"][0])
+    for name in map(str, run.data_vars):
+        if not (name.startswith("eta_") or name in NO_SLOW_MOTION):
+            continue
+        x = _filled(run[name])
+        if x.size < 16 or not np.ptp(x):
+            continue
+        change, sure = level_drift(x, dt, dominant_period(x, dt))
+        # A level that moves by half the waves' spread shifts means and standardisation visibly.
+        if abs(change) > 0.5 * x.std() and sure > 5:
+            units = run[name].attrs["units"]
+            text = f"level drifts by {change:+.3g} {units} over the record"
+            out.append(Finding(name, "drift", text))
+    return out
+
+
+def _filled(channel: xr.DataArray) -> FloatArray:
+    x = channel.to_numpy()
+    there = np.isfinite(x)
+    if there.all() or not there.any():
+        return np.where(there, x, 0.0)
+    at = np.arange(x.size)
+    filled: FloatArray = np.interp(at, at[there], x[there])
+    return filled
+
+
+def check_pairs(
+    run: xr.Dataset, settings: CampaignSettings
+) -> tuple[list[Finding], dict[str, Agreement]]:
+    """Compare the channels of ``[redundant]`` with the first of each, which is trusted.
+
+    Parameters
+    ----------
+    run : Dataset
+        All channels on one axis, the whole record.
+    settings : CampaignSettings
+        The campaign.
+
+    Returns
+    -------
+    (list of Finding, dict of str to Agreement)
+        What speaks against a channel, and the comparison by channel.
+    """
+    out, compared = [], {}
+    dt = float(run["time"][1] - run["time"][0])
+    for pair in settings.redundant.values() if run.sizes["time"] >= 16 else ():
+        trusted = _filled(run[pair.channels[0]])
+        for name in pair.channels[1:]:
+            x = _filled(run[name])
+            agreement = compare_sensors(x, trusted, dt, pair.window)
+            compared[name] = agreement
+            for fault in agreement.faults():
+                kind = "lag" if fault.startswith("lag") else "agreement"
+                kind = "constant" if fault.startswith("constant") else kind
+                out.append(Finding(name, kind, f"against {pair.channels[0]}: {fault}"))
+            if not np.isfinite(agreement.period):
+                continue
+            stuck = find_stuck(x, dt, agreement.period, trusted)
+            if stuck.any() and np.ptp(x):
+                text = (
+                    f"holds still for {stuck.sum() * dt:.3g} s while {pair.channels[0]} moves, "
+                    f"from {float(run['time'][int(np.argmax(stuck))]):.4g} s"
+                )
+                out.append(Finding(name, "stuck", text))
+    return out, compared
+
+
+def check_clocks(
+    clocks: Mapping[str, Clock], groups: Mapping[str, xr.Dataset], settings: CampaignSettings
+) -> list[Finding]:
+    """Trouble of clocks: gaps, jitter, wrong rates, offsets that are not certain."""
+    out = []
+    for name, group in groups.items():
+        label = name or "time"
+        clock = clocks[name]
+        step = float(group["time"][1] - group["time"][0])
+        if (gaps := int(group.attrs.get("time_gaps", 0))) > 0:
+            missing = int(group.attrs["time_missing"])
+            out.append(Finding(label, "clock", f"{gaps} gap(s): {missing} samples are missing"))
+        if (jitter := float(group.attrs.get("time_jitter_rms", 0.0))) > 0:
+            text = f"jitter of {1e3 * jitter:.3g} ms RMS; interpolated onto a uniform step"
+            out.append(Finding(label, "clock", text))
+        nominal = settings.instruments[name].sampling_rate if name else None
+        if nominal is not None and abs(step * nominal - 1) > 0.01:
+            text = f"samples at {1 / step:.5g} Hz; {nominal:g} Hz are stated"
+            out.append(Finding(label, "clock", text))
+        if clock.offset_error > 0.25 * step or clock.residual > 0.5 * step:
+            out.append(Finding(label, "clock", f"poorly known: {clock.describe()}"))
+        if abs(clock.drift) > 2e-4:
+            out.append(Finding(label, "clock", f"drifts by {1e6 * clock.drift:+.0f} ppm"))
+    return out

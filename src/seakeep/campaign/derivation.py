@@ -1,0 +1,204 @@
+"""Derived channels: expressions and named steps, from ``[derived]`` to arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.campaign.settings import CampaignSettings, DerivedSettings, long_name_of
+from seakeep.campaign.validation import sources_of
+from seakeep.conventions import canonical_channel, conversion, si_unit
+from seakeep.errors import RequestError, SeakeepError
+from seakeep.signals import (
+    band_pass,
+    blend,
+    differentiate,
+    envelope_squared,
+    integrate,
+    low_pass,
+    remove_gravity,
+    rotation_matrix,
+    transfer_acceleration,
+    transfer_position,
+    transfer_velocity,
+)
+from seakeep.signals.expressions import parse
+from seakeep.signals.quality import BRIDGED, MISSING, flag_attributes
+from seakeep.signals.rigid_body import GRAVITY
+
+__all__ = ["derive"]
+
+FloatArray = npt.NDArray[np.float64]
+
+ANGLES = ("roll", "pitch", "yaw")
+AXES = {"surge": 0, "sway": 1, "heave": 2, "x": 0, "y": 1, "z": 2}
+
+
+def derive(
+    dataset: xr.Dataset, name: str, settings: CampaignSettings, dt: float, run: str
+) -> xr.Dataset:
+    """Add a derived channel to channels on one axis.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Channels in SI units, uniform in time, without gaps.
+    name : str
+        Name of the channel.
+    settings : CampaignSettings
+        The campaign.
+    dt : float
+        Time step, s.
+    run : str
+        Name of the run, for messages.
+
+    Returns
+    -------
+    Dataset
+        The same with the channel; samples that rest on missing or bridged ones are flagged.
+
+    Raises
+    ------
+    RequestError, DataError
+        What the step raises, with run and channel named.
+    """
+    own = settings.derived[name]
+    try:
+        channel = _derived(dataset, name, own, dt)
+    except SeakeepError as error:
+        raise type(error)(f"run '{run}', derived channel '{name}': {error}") from None
+    if name in settings.rig.positions:
+        channel.attrs["x_position"] = float(settings.rig.positions[name])
+    out = dataset.assign({name: channel})
+    flags = np.zeros(channel.size, dtype=np.int16)
+    for source in sources_of(name, own, [str(n) for n in dataset.data_vars]):
+        if f"{source}_flags" in dataset.coords:
+            flags |= dataset[f"{source}_flags"].to_numpy() & (MISSING | BRIDGED)
+    if flags.any():
+        out.coords[f"{name}_flags"] = ("time", flags, flag_attributes(name))
+    return out
+
+
+def _derived(dataset: xr.Dataset, name: str, settings: DerivedSettings, dt: float) -> xr.DataArray:
+    canonical = canonical_channel(name)
+    label = f"the derived channel '{name}'"
+    if settings.expression is not None:
+        arrays: Mapping[str, FloatArray] = {str(n): each.to_numpy() for n, each in dataset.items()}
+        values = parse(settings.expression).evaluate(arrays)
+        unit = settings.unit or (canonical.units if canonical else "-")
+        origin = settings.expression
+    else:
+        if settings.step in ("transfer", "remove_gravity", "blend"):
+            values, unit, origin = _body_step(dataset, name, settings, dt)
+        else:
+            values, unit, origin = _step(dataset[str(settings.source)], settings, dt)
+        if settings.unit is not None:
+            conversion(unit, settings.unit, label)
+    target = canonical.units if canonical else si_unit(unit)
+    values = values * conversion(unit, target, label)
+    attributes = {
+        "units": target,
+        "long_name": long_name_of(name, settings.long_name),
+        "derived_from": origin,
+    }
+    return xr.DataArray(values, dims="time", attrs=attributes)
+
+
+def _step(
+    source: xr.DataArray, settings: DerivedSettings, dt: float
+) -> tuple[FloatArray, str, str]:
+    """Values, unit and description of a named step."""
+    series, unit, name = source.to_numpy(), source.attrs["units"], settings.source
+    if settings.step == "integrate":
+        times, band = settings.times or 1, settings.band or (0.0, 0.0)
+        described = f"{name}, integrated {times} time(s) in {band[0]:g} to {band[1]:g} Hz"
+        return integrate(series, dt, band, times), si_unit(f"({unit}) * s^{times}"), described
+    if settings.step == "differentiate":
+        return differentiate(series, dt), si_unit(f"({unit}) / s"), f"{name}, differentiated"
+    if settings.step == "band_pass":
+        band = settings.band or (0.0, 0.0)
+        return band_pass(series, dt, band), unit, f"{name}, {band[0]:g} to {band[1]:g} Hz"
+    if settings.step == "low_pass":
+        passband = settings.passband or 0.0
+        described = f"{name}, low-passed at {passband:g} Hz"
+        return low_pass(series, dt, passband, settings.stopband), unit, described
+    squared = envelope_squared(series, dt)
+    return squared, si_unit(f"({unit})^2"), f"squared envelope of {name}"
+
+
+def _body_step(
+    dataset: xr.Dataset, name: str, settings: DerivedSettings, dt: float
+) -> tuple[FloatArray, str, str]:
+    """Values, unit and description of a step that needs several channels."""
+    source = dataset[str(settings.source)]
+    series, unit = source.to_numpy(), str(source.attrs["units"])
+    if settings.step == "blend":
+        times, crossover = settings.times or 1, settings.crossover or 0.0
+        slow = dataset[str(settings.position)].to_numpy()
+        described = (
+            f"{settings.source}, integrated {times} time(s) above {crossover:g} Hz, "
+            f"{settings.position} below"
+        )
+        return (
+            blend(slow, series, dt, crossover, times),
+            si_unit(f"({unit}) * s^{times}"),
+            described,
+        )
+    axis = _axis(name, settings)
+    angles = _three(dataset, ANGLES)
+    if settings.step == "remove_gravity":
+        described = f"{settings.source}, gravity removed by {', '.join(_present(dataset, ANGLES))}"
+        if settings.components is not None:
+            force = np.column_stack([dataset[each].to_numpy() for each in settings.components])
+            moved = remove_gravity(force, angles, zeroed=bool(settings.zeroed))
+            return moved[:, axis], unit, described
+        # One accelerometer alone: what gravity adds along its axis; that it turns is left out.
+        felt = GRAVITY * rotation_matrix(angles)[:, 2, axis]
+        at_rest = GRAVITY if settings.zeroed and axis == 2 else 0.0
+        return series + at_rest - felt, unit, described
+    offset = settings.offset or (0.0, 0.0, 0.0)
+    described = f"{settings.source}, {offset} m from where it was measured"
+    vector = np.zeros((series.size, 3))
+    vector[:, axis] = series
+    if unit == "m":
+        return transfer_position(vector, angles, offset)[:, axis], unit, described
+    rates = _three(dataset, [f"{each}_rate" for each in ANGLES])
+    if unit == "m/s":
+        return transfer_velocity(vector, angles, rates, offset)[:, axis], unit, described
+    if unit != "m/s^2":
+        raise RequestError(
+            f"'{settings.source}' is measured in '{unit}'; positions (m), velocities (m/s) and "
+            "accelerations (m/s^2) are transferred. Choose another channel."
+        )
+    turning = _three(dataset, [f"{each}_acceleration" for each in ANGLES])
+    moved = transfer_acceleration(vector, angles, rates, turning, offset)
+    return moved[:, axis], unit, described
+
+
+def _axis(name: str, settings: DerivedSettings) -> int:
+    for word in (settings.axis, str(settings.source).split("_")[0], name.split("_")[0]):
+        if word in AXES:
+            return AXES[word]
+    raise RequestError(
+        f"neither '{settings.source}' nor '{name}' says along which axis it is measured. State "
+        "axis = 'x', 'y' or 'z'."
+    )
+
+
+def _present(dataset: xr.Dataset, names: tuple[str, ...] | list[str]) -> list[str]:
+    return [name for name in names if name in dataset]
+
+
+def _three(dataset: xr.Dataset, names: tuple[str, ...] | list[str]) -> FloatArray:
+    """Three channels side by side, zeros where one is not measured; one at least must be."""
+    if not _present(dataset, names):
+        raise RequestError(
+            f"none of the channels {', '.join(names)} is measured. Map or derive those in which "
+            "the body turns."
+        )
+    size = dataset.sizes["time"]
+    zero = np.zeros(size)
+    return np.column_stack([dataset[n].to_numpy() if n in dataset else zero for n in names])

@@ -1,0 +1,233 @@
+"""Tables in recordings of ROS 2: bags (a folder, or its file) and MCAP.
+
+A topic is a table: a row a message, a column a number in it. Needs rosbags, the extra ``ros``;
+no installation of ROS.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.campaign.columns import Columns
+from seakeep.campaign.settings import FileSettings
+from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+
+__all__ = ["is_recording", "read_recording"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_MCAP, _SQLITE = b"\x89MCAP0\r\n", b"SQLite format 3\x00"
+_STANDARD = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/")
+_UNITS = {
+    "angular_velocity": "rad/s", "linear_acceleration": "m/s^2", "force": "N", "torque": "N m",
+    "position": "m", "linear": "m/s", "angular": "rad/s", "translation": "m", "point": "m",
+    "fluid_pressure": "Pa", "range": "m", "min_range": "m", "max_range": "m",
+}  # fmt: skip
+"""Units of fields of the standard messages (ROS Enhancement Proposal 103: SI)."""
+_ACCELERATION = {"linear": "m/s^2", "angular": "rad/s^2"}
+LARGEST_ARRAY = 64
+"""Elements of an array field beyond which it is a picture or a cloud, not channels."""
+
+
+def is_recording(path: Path, head: bytes) -> bool:
+    """Whether a path is a ROS 2 bag's folder, one of its files, or an MCAP file."""
+    if path.is_dir():
+        return (path / "metadata.yaml").is_file()
+    return head.startswith((_MCAP, _SQLITE)) or path.suffix.lower() in (".mcap", ".db3")
+
+
+def read_recording(path: Path, options: FileSettings) -> Columns:
+    """Read one topic of a ROS 2 bag or an MCAP file.
+
+    Parameters
+    ----------
+    path : Path
+        The bag's folder, its ``.db3`` file, or an ``.mcap`` file.
+    options : FileSettings
+        `group` is the topic; it may be left out where only one holds numbers.
+
+    Returns
+    -------
+    Columns
+        A column a number, named by its place in the message: ``angular_velocity.y``,
+        ``data[0]``. Units where the message is a standard one, whose units are fixed. ``time``:
+        the header's stamps where the message has a header that is stamped, else the times of
+        reception; ``receive_time`` beside it in the first case. Both count seconds from the
+        recording's first message, whatever its topic.
+
+    Raises
+    ------
+    RequestError
+        If rosbags is not installed, or the topic does not exist or must be chosen.
+    DataError
+        If the recording is empty, cut off, or of a kind that is not read.
+    """
+    try:
+        from rosbags import highlevel, typesys
+    except ImportError as error:
+        raise RequestError(
+            f"{path} is a recording of ROS 2; reading it needs rosbags, which is not installed. "
+            "Install the extra: pip install 'seakeep[ros]'."
+        ) from error
+    beside = path.parent / "metadata.yaml"
+    place = path.parent if path.suffix.lower() == ".db3" and beside.is_file() else path
+    store = typesys.get_typestore(typesys.Stores.LATEST)
+    try:
+        with highlevel.AnyReader([place], default_typestore=store) as reader:
+            begin = int(reader.start_time)
+            rows = _read_topic(path, reader, options.group)
+    except (RequestError, DataError):
+        raise
+    # On a damaged file rosbags raises whatever its parts do: SQLite, YAML, decompression, assert.
+    except Exception as error:
+        said = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise DataError(
+            f"{path} cannot be read as a recording of ROS 2: cut off, damaged or of another kind "
+            f"({said}). Copy it again; `ros2 bag reindex` mends a bag that was not closed."
+        ) from None
+    return _columns(path, rows, begin)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Messages of a topic: times of reception and header stamps (ns), and their numbers."""
+
+    topic: str
+    kind: str
+    received: list[int]
+    stamps: list[int | None]
+    numbers: list[dict[str, float]]
+
+
+def _read_topic(path: Path, reader: Any, wanted: str | None) -> _Rows:
+    connections = list(reader.connections)
+    topics = {connection.topic for connection in connections}
+    if wanted is not None and wanted not in topics:
+        raise RequestError(
+            f"{path} has no topic '{wanted}'.{did_you_mean(wanted, sorted(topics))} Its topics: "
+            f"{', '.join(sorted(topics)) or 'none'}. Correct 'group' in [files]."
+        )
+    if wanted is None:
+        wanted = _only_topic(path, reader, connections)
+    chosen = [connection for connection in connections if connection.topic == wanted]
+    received, stamps, numbers = [], [], []
+    for connection, instant, raw in reader.messages(chosen):
+        message = reader.deserialize(raw, connection.msgtype)
+        received.append(int(instant))
+        stamps.append(_stamp(message))
+        numbers.append(dict(_flat(message, "")))
+    announced = sum(int(connection.msgcount) for connection in chosen)
+    if len(received) < announced:
+        raise DataError(
+            f"{path} announces {announced} messages of the topic '{wanted}' and holds "
+            f"{len(received)}: it was cut off. Copy it again; `ros2 bag reindex` mends a bag that "
+            "was not closed."
+        )
+    if not any(numbers):
+        raise DataError(
+            f"{path}: the topic '{wanted}' ({chosen[0].msgtype}, {len(received)} messages) holds "
+            "no numbers. State another topic with group = 'NAME' in [files]."
+        )
+    return _Rows(wanted, chosen[0].msgtype, received, stamps, numbers)
+
+
+def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:
+    """The one topic whose messages hold numbers; an error that lists them if there are more."""
+    found: dict[str, str] = {}
+    for connection in connections:
+        first = next(iter(reader.messages([connection])), None)
+        if first is None:
+            continue
+        message = reader.deserialize(first[2], connection.msgtype)
+        if next(iter(_flat(message, "")), None) is not None:
+            found[connection.topic] = f"{connection.msgtype}, {connection.msgcount}"
+    if not found:
+        topics = ", ".join(sorted({connection.topic for connection in connections})) or "none"
+        raise DataError(f"{path} holds no messages with numbers (topics: {topics}). Record again.")
+    if len(found) > 1:
+        listed = ", ".join(f"'{topic}' ({what} messages)" for topic, what in sorted(found.items()))
+        raise RequestError(
+            f"{path} holds several topics, each with times of its own: {listed}. State which one "
+            "with group = 'TOPIC' in [files]."
+        )
+    return next(iter(found))
+
+
+def _stamp(message: Any) -> int | None:
+    """Stamp of the message's header, ns; None where it has none or was not stamped."""
+    stamp = getattr(getattr(message, "header", None), "stamp", None)
+    if stamp is None:
+        return None
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec) or None
+
+
+def _flat(value: Any, name: str) -> Iterator[tuple[str, float]]:
+    """Numbers of a message with their places in it; headers and covariances are left out."""
+    if isinstance(value, bool | int | float | np.number | np.bool_):
+        yield name, float(value)
+    elif isinstance(value, np.ndarray):
+        if value.dtype.kind in "fiub" and value.size <= LARGEST_ARRAY:
+            for i, each in enumerate(value.ravel()):
+                yield f"{name}[{i}]", float(each)
+    elif hasattr(value, "__dataclass_fields__"):
+        for field in value.__dataclass_fields__:
+            if field in ("header", "__msgtype__") or "covariance" in field:
+                continue
+            yield from _flat(getattr(value, field), f"{name}.{field}" if name else field)
+
+
+def _columns(path: Path, rows: _Rows, begin: int) -> Columns:
+    names = dict.fromkeys(key for row in rows.numbers for key in row)
+    values, faults = {}, {}
+    for name in names:
+        if all(name in row for row in rows.numbers):
+            values[name] = np.array([row[name] for row in rows.numbers])
+        else:
+            count = sum(name in row for row in rows.numbers)
+            faults[name] = (
+                f"{path}: '{name}' of the topic '{rows.topic}' is in {count} of "
+                f"{len(rows.numbers)} messages, since the array varies in length. Map another "
+                "column."
+            )
+    received = _seconds(rows.received, begin)
+    stamps = [stamp for stamp in rows.stamps if stamp is not None]
+    times = {"time": received}
+    if len(stamps) == len(rows.stamps):
+        times = {"time": _seconds(stamps, begin), "receive_time": received}
+    elif stamps:
+        raise DataError(
+            f"{path}: {len(rows.stamps) - len(stamps)} of {len(rows.stamps)} messages of the topic "
+            f"'{rows.topic}' have no stamp in their header. Mend the node that publishes them."
+        )
+    elif rows.kind.endswith("Stamped") or rows.kind.startswith("sensor_msgs/"):
+        warnings.warn(
+            f"{path}: the headers of the topic '{rows.topic}' are not stamped; the times are those "
+            "of reception, late by what the transport took.",
+            SeakeepWarning,
+            stacklevel=2,
+        )
+    units = {name: unit for name in values if (unit := _unit(rows.kind, name)) is not None}
+    units |= dict.fromkeys(times, "s")
+    values = {**times, **values}
+    headers = {name: name for name in [*values, *faults]}
+    return Columns(values=values, units=units, faults=faults, headers=headers)
+
+
+def _seconds(instants: list[int], begin: int) -> FloatArray:
+    # Subtracted as integers: a count of nanoseconds since 1970 has more digits than a float.
+    return 1e-9 * np.array([instant - begin for instant in instants], dtype=float)
+
+
+def _unit(kind: str, name: str) -> str | None:
+    """Unit of a field of a standard message; None where the message does not fix it."""
+    if not kind.startswith(_STANDARD) or kind.endswith("JointState"):
+        return None
+    table = {**_UNITS, **(_ACCELERATION if "Accel" in kind else {})}
+    return next((table[part] for part in reversed(name.split(".")) if part in table), None)

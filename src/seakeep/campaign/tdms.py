@@ -1,0 +1,189 @@
+"""Tables in TDMS files, as LabVIEW and loggers of National Instruments write them.
+
+Needs nptdms, the extra ``tdms`` (its licence is the LGPL, so it is never installed unasked).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.campaign.columns import Columns
+from seakeep.campaign.settings import FileSettings
+from seakeep.errors import DataError, RequestError, did_you_mean
+
+__all__ = ["read_tdms"]
+
+FloatArray = npt.NDArray[np.float64]
+
+LEAD_IN = 28
+_UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
+
+
+def read_tdms(path: Path, options: FileSettings) -> Columns:
+    """Read the channels of one group of a TDMS file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    options : FileSettings
+        Only `group` is used; it may be left out where the file has one group with channels, or
+        where the channels of all groups are sampled alike.
+
+    Returns
+    -------
+    Columns
+        Its channels, scaled as the file says, with the units of their properties; a column
+        ``time`` (s) from the waveform properties ``wf_start_offset`` and ``wf_increment`` where
+        there are such. Instants (channels of time stamps) are seconds after their first.
+
+    Raises
+    ------
+    RequestError
+        If nptdms is not installed, or the group does not exist or must be chosen.
+    DataError
+        If the file is empty, cut off or damaged, or channels differ in length or increment.
+    """
+    try:
+        import nptdms
+    except ImportError as error:
+        raise RequestError(
+            f"{path} is a TDMS file; reading it needs nptdms, which is not installed. "
+            "Install the extra: pip install 'seakeep[tdms]'."
+        ) from error
+    _check_whole(path)
+    try:
+        # Opened here, since nptdms leaves a file open whose head it cannot read.
+        with path.open("rb") as raw, nptdms.TdmsFile.open(raw) as file:
+            channels = [
+                channel
+                for channel in _chosen(path, file, options.group)
+                if len(channel) > 1 and np.dtype(channel.dtype or object).kind in "fiubM"
+            ]
+            data = [np.asarray(channel[:]) for channel in channels]
+    except (ValueError, TypeError, OSError, EOFError, KeyError, IndexError, AttributeError,
+            struct.error, MemoryError, OverflowError, UnicodeDecodeError) as error:  # fmt: skip
+        if isinstance(error, RequestError):
+            raise
+        raise _damaged(path, str(error) or type(error).__name__) from None
+    return _columns(path, channels, data)
+
+
+def _check_whole(path: Path) -> None:
+    """Refuse a file whose segments do not end where it ends.
+
+    Each segment begins with 28 bytes: ``TDSm``, two numbers of four bytes, and the lengths of what
+    follows. nptdms leaves an incomplete last segment out, with a line in a log.
+    """
+    size, at = path.stat().st_size, 0
+    with path.open("rb") as raw:
+        while at < size:
+            raw.seek(at)
+            head = raw.read(LEAD_IN)
+            if len(head) < LEAD_IN or head[:4] != b"TDSm":
+                raise _damaged(path, f"no segment begins at byte {at}")
+            at += LEAD_IN + int.from_bytes(head[12:20], "little")
+    if at > size:
+        raise _damaged(path, f"its last segment is not complete, the file ends at byte {size}")
+
+
+def _damaged(path: Path, said: str) -> DataError:
+    return DataError(
+        f"{path} cannot be read as a TDMS file: cut off or damaged ({said}). Copy it again, or "
+        "export it from LabVIEW or DIAdem."
+    )
+
+
+def _chosen(path: Path, file: Any, wanted: str | None) -> Sequence[Any]:
+    groups: dict[str, Sequence[Any]] = {group.name: group.channels() for group in file.groups()}
+    if wanted is not None:
+        if wanted not in groups:
+            raise RequestError(
+                f"{path} has no group '{wanted}'.{did_you_mean(wanted, groups)} Its groups: "
+                f"{', '.join(groups) or 'none'}. Correct 'group' in [files]."
+            )
+        return groups[wanted]
+    filled = {name: channels for name, channels in groups.items() if channels}
+    sampled = {
+        (len(channel), channel.properties.get("wf_increment"))
+        for channels in filled.values()
+        for channel in channels
+    }
+    if len(filled) > 1 and len(sampled) > 1:
+        listed = ", ".join(
+            f"'{name}' ({len(channels)} channels of {len(channels[0])})"
+            for name, channels in filled.items()
+        )
+        raise RequestError(
+            f"{path} holds several groups that are sampled differently: {listed}. State which one "
+            "with group = 'NAME' in [files]."
+        )
+    return [channel for channels in filled.values() for channel in channels]
+
+
+def _columns(path: Path, channels: list[Any], data: list[npt.NDArray[Any]]) -> Columns:
+    if not channels:
+        raise DataError(
+            f"{path} holds no channels of numbers with at least two samples. Export the run again."
+        )
+    lengths = {channel.name: values.size for channel, values in zip(channels, data, strict=True)}
+    if len(set(lengths.values())) > 1:
+        listed = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise DataError(
+            f"{path}: the channels differ in length ({listed}). Put channels of one clock into one "
+            "group, and state it with group = 'NAME' in [files]."
+        )
+    bare = [channel.name for channel in channels]
+    names = [
+        channel.name if bare.count(channel.name) == 1 else f"{channel.group_name}/{channel.name}"
+        for channel in channels
+    ]
+    values, units = {}, {}
+    for name, channel, numbers in zip(names, channels, data, strict=True):
+        if numbers.dtype.kind == "M":
+            values[name], units[name] = _seconds(numbers), "s"
+            continue
+        values[name] = numbers.astype(float)
+        unit = next((channel.properties[key] for key in _UNITS if key in channel.properties), "")
+        if str(unit).strip():
+            units[name] = str(unit).strip()
+    time = _waveform_time(path, channels, data[0].size)
+    if time is not None and not any(name.lower() == "time" for name in names):
+        values = {"time": time, **values}
+        units["time"] = "s"
+    return Columns(values=values, units=units, headers={name: name for name in values})
+
+
+def _seconds(instants: npt.NDArray[Any]) -> FloatArray:
+    """Seconds after the first instant; a missing one is NaN."""
+    elapsed: FloatArray = (instants - instants[0]) / np.timedelta64(1, "ns") * 1e-9
+    return elapsed
+
+
+def _waveform_time(path: Path, channels: list[Any], count: int) -> FloatArray | None:
+    axes = {
+        channel.name: (
+            float(channel.properties["wf_increment"]),
+            float(channel.properties.get("wf_start_offset", 0.0)),
+        )
+        for channel in channels
+        if float(channel.properties.get("wf_increment", 0.0)) > 0
+    }
+    if not axes:
+        return None
+    if len(set(axes.values())) > 1:
+        listed = ", ".join(f"{name} {step:g} s from {first:g} s" for name, (step, first)
+                           in axes.items())  # fmt: skip
+        raise DataError(
+            f"{path}: the channels are sampled differently ({listed}). Put channels of one clock "
+            "into one group, and state it with group = 'NAME' in [files]."
+        )
+    step, first = next(iter(axes.values()))
+    time: FloatArray = first + step * np.arange(count, dtype=float)
+    return time

@@ -1,0 +1,176 @@
+"""``seakeep track``: surge, heave and pitch from a video."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import typer
+import xarray as xr
+
+from seakeep.campaign import read_table
+from seakeep.cli.console import messages, progress_bar
+from seakeep.errors import RequestError
+from seakeep.files import replacing
+from seakeep.signals.agreement import compare_motion
+from seakeep.signals.sightings import FLAGS
+from seakeep.signals.tracking import TrackingSettings, track_video
+from seakeep.signals.tracking_pictures import contact_sheet, overlay_video, write_picture
+
+__all__ = ["track"]
+
+DECIMALS = {"s": 6, "m": 6, "deg": 5, "pixel": 3, "pixel^2": 1, "1": 4}
+DEFAULT = TrackingSettings()
+
+
+def track(
+    video: Annotated[Path, typer.Argument(help="Video of the vessel.", metavar="VIDEO.mp4")],
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="Result, .csv or .nc; by default CSV on standard output."),
+    ] = None,
+    sheet: Annotated[
+        Path | None,
+        typer.Option("--contact-sheet", help="PNG: frames with what was tracked, the worst too."),
+    ] = None,
+    overlay: Annotated[
+        Path | None, typer.Option("--overlay", help="MP4: the video with what was tracked.")
+    ] = None,
+    metres_per_pixel: Annotated[
+        float | None,
+        typer.Option(help="Calibration; by default from the panel's size as seen."),
+    ] = None,
+    panel: Annotated[
+        tuple[float, float], typer.Option(help="Length and height of the panel, m.")
+    ] = DEFAULT.panel,
+    panel_place: Annotated[
+        tuple[float, float],
+        typer.Option(help="Panel's centre from the centre of gravity: downstream, up, m."),
+    ] = DEFAULT.panel_place,
+    downstream: Annotated[
+        Literal["right", "left"], typer.Option(help="Side of the picture to which waves run.")
+    ] = DEFAULT.downstream,
+    level: Annotated[
+        float, typer.Option(help="Pitch that the picture shows of a level vessel, deg.")
+    ] = 0.0,
+    origin: Annotated[
+        tuple[float, float] | None,
+        typer.Option(help="Pixel of the panel's centre at rest; by default from the first second."),
+    ] = None,
+    threshold: Annotated[
+        tuple[int, int, int], typer.Option(help="Least red, green and blue of the panel.")
+    ] = DEFAULT.lower,
+    region: Annotated[
+        tuple[int, int, int, int] | None,
+        typer.Option(help="Part of the picture searched: left, top, width, height, pixels."),
+    ] = None,
+    lamp: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(help="Lamp that shows the trigger: x, y, radius, pixels."),
+    ] = None,
+    tolerance: Annotated[
+        float, typer.Option(help="Part of its length by which the panel seen may differ.")
+    ] = DEFAULT.tolerance,
+    bridge: Annotated[
+        float, typer.Option(help="Bridge gaps up to this long, s; by default none.")
+    ] = 0.0,
+    passband: Annotated[
+        float, typer.Option(help="Edge of the low-pass filter, Hz; 0 filters nothing.")
+    ] = 4.0,
+    mru: Annotated[
+        Path | None,
+        typer.Option("--mru", help="Record with heave and pitch to compare with."),
+    ] = None,
+    max_lag: Annotated[
+        float, typer.Option("--max-lag", help="Longest lag searched against --mru, s.")
+    ] = 1.0,
+) -> None:
+    """Track a white panel on the vessel: surge, heave and pitch, with a quality a frame.
+
+    x points downstream, z up, pitch is positive bow up. Flagged frames (occluded, overexposed,
+    lost …) give no motion unless --bridge is asked for. Needs the extra 'video'.
+
+    Example: seakeep track side_view.mp4 -o track.csv --contact-sheet sheet.png
+    """
+    if out is not None and out.suffix not in (".nc", ".csv"):
+        raise RequestError(f"{out} ends in '{out.suffix}'; a track is written as .csv or .nc.")
+    settings = TrackingSettings(
+        metres_per_pixel=metres_per_pixel,
+        panel=panel,
+        panel_place=panel_place,
+        downstream=downstream,
+        level=float(np.deg2rad(level)),
+        origin=origin,
+        lower=threshold,
+        region=region,
+        lamp=lamp,
+        tolerance=tolerance,
+        bridge=bridge,
+        passband=passband or None,
+    )
+    reference = None if mru is None else read_table(mru, columns=("heave", "pitch"))
+    with progress_bar("Tracking") as progress:
+        tracked = track_video(video, settings, progress)
+        if overlay is not None:
+            overlay_video(video, tracked, overlay, progress)
+    if sheet is not None:
+        write_picture(contact_sheet(video, tracked), sheet)
+    _write(tracked, out)
+    _summary(tracked, [path for path in (out, sheet, overlay) if path is not None])
+    if reference is not None:
+        _agreement(tracked, reference, max_lag)
+
+
+def _write(tracked: xr.Dataset, out: Path | None) -> None:
+    if out is None:
+        typer.echo(_as_csv(tracked), nl=False)
+        return
+    with replacing(out) as temporary:
+        if out.suffix == ".nc":
+            tracked.to_netcdf(temporary, engine="h5netcdf")
+        else:
+            temporary.write_text(_as_csv(tracked), encoding="utf-8", newline="\n")
+
+
+def _as_csv(tracked: xr.Dataset) -> str:
+    """Columns with units in brackets; angles in degrees, as loggers write them; NaN is empty."""
+    columns = {}
+    for name, values in {"time": tracked["time"], **tracked.data_vars}.items():
+        unit, numbers = str(values.attrs["units"]), values.to_numpy()
+        if unit == "rad":
+            unit, numbers = "deg", np.rad2deg(numbers)
+        if np.issubdtype(numbers.dtype, np.floating):
+            numbers = np.round(numbers, DECIMALS[unit]) + 0.0
+        columns[f"{name} [{'-' if unit == '1' else unit}]"] = ("row", numbers)
+    text: str = xr.Dataset(columns).to_dataframe().to_csv(index=False, lineterminator="\n")
+    return text
+
+
+def _summary(tracked: xr.Dataset, written: list[Path]) -> None:
+    flag, total = tracked["flag"].to_numpy(), tracked.sizes["time"]
+    flagged = [
+        f"{count} {name}"
+        for name, code in FLAGS.items()
+        if name != "good" and (count := int(np.sum(flag == code)))
+    ]
+    scale, how = 1e3 * tracked.attrs["metres_per_pixel"], tracked.attrs["calibration"]
+    bridged = int(tracked["bridged"].sum())
+    messages().print(
+        f"{total} frames at {tracked.attrs['frame_rate']:g} Hz; flagged: "
+        f"{', '.join(flagged) or 'none'} ({bridged} bridged); {scale:.4g} mm a pixel ({how}); "
+        f"{tracked.attrs['camera']}."
+    )
+    if written:
+        messages().print("Wrote " + ", ".join(map(str, written)))
+
+
+def _agreement(tracked: xr.Dataset, reference: xr.Dataset, max_lag: float) -> None:
+    for name, found in compare_motion(tracked, reference, max_lag=max_lag).items():
+        factor, unit = (np.rad2deg(1.0), "deg") if found.units == "rad" else (1e3, "mm")
+        limit = " (the longest searched: raise --max-lag)" if found.at_limit else ""
+        messages().print(
+            f"{name} against the MRU: correlation {found.correlation:.4f}, video late by "
+            f"{found.lag:+.3f} s{limit}, RMS difference {factor * found.rms:.3g} {unit}, "
+            f"{found.samples} samples"
+        )

@@ -1,0 +1,252 @@
+"""The data-quality sheet: one page with a picture a channel and a table a run."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from seakeep.campaign.checks import Finding, check_pairs, findings_of
+from seakeep.campaign.settings import CampaignSettings
+from seakeep.files import replacing
+from seakeep.report.style import COLOURS, axis_label, figure_style, new_figure
+from seakeep.signals.quality import FLAGS, Agreement
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["channel_rows", "quality_figure", "write_quality_sheet"]
+
+_MARKS = {
+    "missing": ("#D55E00", "missing"),
+    "bridged": ("#E69F00", "bridged"),
+    "outlier": ("#CC79A7", "outlier"),
+    "saturated": ("#0072B2", "saturated"),
+    "stuck": ("#009E73", "stuck"),
+    "replaced": ("#56B4E9", "replaced"),
+}
+_STYLE = """
+body { font: 15px/1.45 system-ui, sans-serif; color: #1b2430; max-width: 1080px;
+       margin: 2em auto; padding: 0 1em; }
+h1 { font-size: 1.5em; } h2 { margin-top: 2em; border-top: 1px solid #ccd; padding-top: 1em; }
+table { border-collapse: collapse; font-size: 13px; width: 100%; }
+th, td { text-align: left; padding: 3px 8px; border-bottom: 1px solid #e4e7ec;
+         vertical-align: top; }
+td.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.bad { background: #fdeee4; } .ok { color: #5b6770; } img { width: 100%; height: auto; }
+.scroll { overflow-x: auto; } li { margin: 2px 0; }
+"""
+
+
+def _flags(run: xr.Dataset, name: str) -> Any:
+    key = f"{name}_flags"
+    if key in run.coords:
+        return run[key].to_numpy().astype(int)
+    return np.zeros(run.sizes["time"], dtype=int)
+
+
+def channel_rows(run: xr.Dataset) -> list[dict[str, Any]]:
+    """Rows of a run's table: statistics, flagged shares and findings of each channel.
+
+    Parameters
+    ----------
+    run : Dataset
+        A prepared run.
+
+    Returns
+    -------
+    list of dict
+        One a channel, in the run's order.
+    """
+    found = findings_of(run)
+    rows = []
+    for name in map(str, run.data_vars):
+        x, flags = run[name].to_numpy(), _flags(run, name)
+        some = bool(np.isfinite(x).any())
+        numbers = [np.nanmin(x), np.nanmax(x), np.nanmean(x), np.nanstd(x, ddof=1)] if some else []
+        shares = [
+            f"{word} {100 * np.mean((flags & bit) > 0):.2g} %"
+            for word, bit in FLAGS.items()
+            if (flags & bit).any()
+        ]
+        rows.append(
+            {
+                "channel": name,
+                "units": str(run[name].attrs.get("units", "")),
+                "numbers": [float(each) for each in numbers] or [float("nan")] * 4,
+                "flagged": ", ".join(shares),
+                "repaired": str(run[name].attrs.get("repaired", "")),
+                "findings": [each for each in found if each.channel == name],
+            }
+        )
+    return rows
+
+
+def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figure:
+    """Draw every channel of a run, flagged samples marked; lags of redundant sensors below.
+
+    Parameters
+    ----------
+    run : Dataset
+        A prepared run.
+    agreements : mapping of str to Agreement
+        Comparison with a trusted sensor, by channel.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel a channel, and one a compared channel.
+    """
+    names = [str(name) for name in run.data_vars]
+    lagging = [name for name in agreements if agreements[name].lags.size]
+    rows = len(names) + len(lagging)
+    found = {each.channel for each in findings_of(run)}
+    with figure_style():
+        figure = new_figure(9.5, 0.5 + 1.15 * rows)
+        axes = figure.subplots(rows, 1, squeeze=False, sharex=True)[:, 0]
+        time = run["time"].to_numpy()
+        for at, name in zip(axes, names, strict=False):
+            x, flags = run[name].to_numpy(), _flags(run, name)
+            colour = COLOURS["forecast"] if name in found else COLOURS["measured"]
+            at.plot(time, x, color=colour, linewidth=0.6)
+            _mark(at, time, x, flags)
+            at.set_ylabel(axis_label(name, str(run[name].attrs.get("units", ""))), fontsize=7)
+            at.margins(x=0.005)
+        for at, name in zip(axes[len(names) :], lagging, strict=True):
+            each = agreements[name]
+            at.axhspan(-each.period / 8, each.period / 8, color="#009E73", alpha=0.12)
+            instants = each.centre + time[0]
+            at.plot(instants, each.lags, "o-", color=COLOURS["ensemble"], markersize=3)
+            at.set_ylim(-0.55 * each.period, 0.55 * each.period)
+            at.set_ylabel(f"lag of\n{name.replace('_', ' ')} [s]", fontsize=7)
+        axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def _mark(at: Any, time: Any, x: Any, flags: Any) -> None:
+    seen = False
+    level = np.nanmean(x) if np.isfinite(x).any() else 0.0
+    for word, bit in FLAGS.items():
+        hit = (flags & bit) > 0
+        if hit.any():
+            colour, label = _MARKS[word]
+            height = np.where(np.isfinite(x[hit]), x[hit], level)
+            at.plot(time[hit], height, ".", color=colour, markersize=4, label=label)
+            seen = True
+    if seen:
+        at.legend(loc="upper right", fontsize=6, ncols=6, borderpad=0.1)
+
+
+def write_quality_sheet(
+    runs: Mapping[str, xr.Dataset], settings: CampaignSettings, title: str, folder: Path
+) -> list[Path]:
+    """Write the sheet of prepared runs: one self-contained page, and a PNG a run.
+
+    Parameters
+    ----------
+    runs : mapping of str to Dataset
+        Prepared runs by name.
+    settings : CampaignSettings
+        The campaign.
+    title : str
+        Name of the campaign.
+    folder : Path
+        Where to; it exists.
+
+    Returns
+    -------
+    list of Path
+        ``quality.html`` and ``quality_RUN.png``.
+
+    Raises
+    ------
+    RequestError
+        If matplotlib is not installed, or a file cannot be written.
+    """
+    parts, written = [], []
+    for name, run in runs.items():
+        _, agreements = check_pairs(run, settings)
+        picture = _png(quality_figure(run, agreements))
+        path = folder / f"quality_{name}.png"
+        with replacing(path) as temporary:
+            temporary.write_bytes(picture)
+        written.append(path)
+        parts.append(_section(name, run, picture))
+    page = folder / "quality.html"
+    with replacing(page) as temporary:
+        temporary.write_text(_page(title, runs, parts), encoding="utf-8")
+    return [page, *written]
+
+
+def _png(figure: Figure) -> bytes:
+    buffer = io.BytesIO()
+    with figure_style():
+        figure.savefig(buffer, format="png", dpi=100, pil_kwargs={"optimize": True})
+    return buffer.getvalue()
+
+
+def _page(title: str, runs: Mapping[str, xr.Dataset], parts: Sequence[str]) -> str:
+    lines = []
+    for name, run in runs.items():
+        found = findings_of(run)
+        words = ", ".join(dict.fromkeys(f"{each.channel} ({each.kind})" for each in found))
+        mark = "bad" if found else "ok"
+        lines.append(
+            f'<tr class="{mark}"><td><a href="#{html.escape(name)}">{html.escape(name)}</a></td>'
+            f'<td class="n">{float(run["time"][0]):.2f} to {float(run["time"][-1]):.2f} s</td>'
+            f'<td class="n">{len(found)}</td><td>{html.escape(words) or "nothing found"}</td></tr>'
+        )
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        f"<title>Data quality: {html.escape(title)}</title><style>{_STYLE}</style></head><body>"
+        f"<h1>Data quality: {html.escape(title)}</h1>"
+        "<p>Checks flag and tell; nothing is repaired unless the campaign asks for it, and what "
+        "was repaired is listed. A lag is positive where a sensor is late against the trusted one "
+        "of its group; the green band is an eighth of the period.</p>"
+        '<div class="scroll"><table><tr><th>run</th><th>record used</th><th>findings</th>'
+        f"<th>channels</th></tr>{''.join(lines)}</table></div>{''.join(parts)}</body></html>"
+    )
+
+
+def _section(name: str, run: xr.Dataset, picture: bytes) -> str:
+    rows = channel_rows(run)
+    known = {row["channel"] for row in rows}
+    others = [each for each in findings_of(run) if each.channel not in known]
+    clocks = [
+        f"<li>clock of {html.escape(key.removeprefix('clock_'))}: {html.escape(value)}</li>"
+        for key, value in run.attrs.items()
+        if key.startswith("clock_") and isinstance(value, str)
+    ]
+    items = "".join(clocks + [_item(each) for each in others])
+    body = "".join(_row(row) for row in rows)
+    encoded = base64.b64encode(picture).decode("ascii")
+    return (
+        f'<h2 id="{html.escape(name)}">{html.escape(name)}</h2>'
+        + (f"<ul>{items}</ul>" if items else "")
+        + '<div class="scroll"><table><tr><th>channel</th><th>unit</th><th>min</th><th>max</th>'
+        "<th>mean</th><th>SD</th><th>flagged</th><th>found, and done about it</th></tr>"
+        f'{body}</table></div><img alt="channels of {html.escape(name)}" '
+        f'src="data:image/png;base64,{encoded}">'
+    )
+
+
+def _item(finding: Finding) -> str:
+    return f"<li>{html.escape(finding.channel)}: {html.escape(finding.text)}</li>"
+
+
+def _row(row: Mapping[str, Any]) -> str:
+    numbers = "".join(f'<td class="n">{value:.4g}</td>' for value in row["numbers"])
+    words = [html.escape(each.text) for each in row["findings"]]
+    if row["repaired"]:
+        words.append(f"repaired: {html.escape(row['repaired'])}")
+    mark = ' class="bad"' if row["findings"] else ""
+    return (
+        f"<tr{mark}><td>{html.escape(row['channel'])}</td><td>{html.escape(row['units'])}</td>"
+        f"{numbers}<td>{html.escape(row['flagged'])}</td><td>{'<br>'.join(words)}</td></tr>"
+    )

@@ -1,0 +1,178 @@
+"""Agreement of two measurements of one motion: the video against the motion reference unit.
+
+Source: the paper's section "Motion measurements", which validates the video by its heave and
+pitch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from scipy import interpolate, optimize
+
+from seakeep.conventions import conversion
+from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.signals.clocks import check_order
+from seakeep.signals.filters import positive
+
+__all__ = ["Agreement", "compare_motion"]
+
+FloatArray = npt.NDArray[np.float64]
+
+SHORTEST = 16
+"""Samples in common below which a correlation says nothing."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well a channel of one record agrees with the same channel of another.
+
+    Parameters
+    ----------
+    channel : str
+        The channel.
+    units : str
+        Unit of `rms` and `offset`.
+    correlation : float
+        Greatest correlation, at `lag`.
+    correlation_at_zero : float
+        Correlation with no lag.
+    lag : float
+        s by which the first record is late behind the second; sub-sample.
+    rms : float
+        Root mean square of the difference at `lag`, means removed.
+    offset : float
+        Mean of the first record less that of the second.
+    samples : int
+        Samples compared.
+    at_limit : bool
+        Whether `lag` is the longest searched, so that the true one may be longer.
+    """
+
+    channel: str
+    units: str
+    correlation: float
+    correlation_at_zero: float
+    lag: float
+    rms: float
+    offset: float
+    samples: int
+    at_limit: bool
+
+
+def compare_motion(
+    tracked: xr.Dataset,
+    reference: xr.Dataset,
+    channels: Iterable[str] = ("heave", "pitch"),
+    max_lag: float = 1.0,
+) -> dict[str, Agreement]:
+    """Compare a video's motions with those of a motion reference unit.
+
+    Parameters
+    ----------
+    tracked : Dataset
+        From :func:`seakeep.signals.tracking.track_video`; samples that are NaN are left out.
+    reference : Dataset
+        The same channels over ``time`` (s), in any unit that its attribute ``units`` states;
+        interpolated by cubics, so its step should resolve the motion.
+    channels : iterable of str, optional
+        Channels.
+    max_lag : float, optional
+        Longest lag searched, s. In regular waves a lag is known only up to a whole period: search
+        less than half a period.
+
+    Returns
+    -------
+    dict of str to Agreement
+
+    Raises
+    ------
+    RequestError
+        If a channel is missing.
+    DataError
+        If the records have too few samples in common, or a channel is constant.
+
+    Examples
+    --------
+    >>> t = np.arange(0, 30, 0.02)
+    >>> def record(late):
+    ...     heave = ("time", np.sin(4 * (t - late)), {"units": "m"})
+    ...     return xr.Dataset({"heave": heave}, {"time": t})
+    >>> found = compare_motion(record(0.1), record(0.0), ["heave"], max_lag=0.5)["heave"]
+    >>> round(found.lag, 3), round(found.correlation, 3)
+    (0.1, 1.0)
+    """
+    positive("max_lag", max_lag, "s")
+    names = list(channels)
+    for name in names:
+        for which, data in (("tracked", tracked), ("reference", reference)):
+            if name not in data:
+                raise RequestError(
+                    f"the {which} record has no channel '{name}'."
+                    f"{did_you_mean(name, map(str, data.data_vars))} It holds "
+                    f"{', '.join(map(str, data.data_vars))}."
+                )
+    return {name: _compare(tracked[name], reference[name], max_lag) for name in names}
+
+
+def _compare(first: xr.DataArray, second: xr.DataArray, max_lag: float) -> Agreement:
+    name = str(first.name)
+    unit = str(first.attrs.get("units", "1"))
+    factor = conversion(str(second.attrs.get("units", unit)), unit, f"'{name}'")
+    t1, y1 = _finite(first, f"tracked '{name}'")
+    t2, y2 = _finite(second, f"reference '{name}'")
+    # Only instants whose partner lies inside the other record at every lag searched.
+    common = (t1 >= t2[0] + max_lag) & (t1 <= t2[-1] - max_lag)
+    t1, y1 = t1[common], y1[common]
+    if t1.size < SHORTEST:
+        raise DataError(
+            f"'{name}': the records have {t1.size} samples in common once lags of up to "
+            f"{max_lag:g} s are allowed for, fewer than {SHORTEST}. Bring them onto one clock, or "
+            "search shorter lags."
+        )
+    spline = interpolate.CubicSpline(t2, factor * y2)
+    if np.ptp(y1) == 0 or np.ptp(y2) == 0:
+        which = "tracked" if np.ptp(y1) == 0 else "reference"
+        raise DataError(f"the {which} '{name}' is constant: nothing to compare. Check the sensor.")
+
+    def correlation(lag: float) -> float:
+        return float(np.corrcoef(y1, spline(t1 - lag))[0, 1])
+
+    step = min(float(np.median(np.diff(t1))), float(np.median(np.diff(t2))))
+    lags = np.linspace(-max_lag, max_lag, 2 * int(np.ceil(max_lag / step)) + 1)
+    values = np.array([correlation(lag) for lag in lags])
+    best = int(np.argmax(values))
+    lag = float(lags[best])
+    at_limit = best in (0, lags.size - 1)
+    if not at_limit:
+        lag = float(
+            optimize.minimize_scalar(
+                lambda shift: -correlation(shift),
+                bounds=(lags[best - 1], lags[best + 1]),
+                method="bounded",
+                options={"xatol": 1e-4 * step},
+            ).x
+        )
+    difference = y1 - spline(t1 - lag)
+    return Agreement(
+        channel=name,
+        units=unit,
+        correlation=correlation(lag),
+        correlation_at_zero=correlation(0.0),
+        lag=lag,
+        rms=float(np.std(difference)),
+        offset=float(np.mean(difference)),
+        samples=int(t1.size),
+        at_limit=at_limit,
+    )
+
+
+def _finite(series: xr.DataArray, name: str) -> tuple[FloatArray, FloatArray]:
+    time = series["time"].to_numpy().astype(float)
+    values = series.to_numpy().astype(float)
+    there = np.isfinite(values)
+    return check_order(time[there], name), values[there]

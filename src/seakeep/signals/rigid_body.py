@@ -1,0 +1,230 @@
+r"""Motions of points of a rigid body, and what accelerometers on it feel.
+
+Axes: x along the waves, y, z up; roll, pitch and yaw are right-handed about them. With
+:math:`R = R_z(\psi) R_y(\theta) R_x(\phi)` a vector r fixed in the body is :math:`R r` in space.
+Angular velocities and accelerations are those a gyroscope fixed in the body gives.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.errors import RequestError
+
+__all__ = [
+    "remove_gravity",
+    "rotation_matrix",
+    "transfer_acceleration",
+    "transfer_position",
+    "transfer_velocity",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+GRAVITY = 9.81
+
+
+def _vectors(name: str, values: npt.ArrayLike) -> FloatArray:
+    array = np.asarray(values, dtype=float)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise RequestError(
+            f"{name} must have the shape (time, 3), one column for each of x, y and z; received "
+            f"{array.shape}. Put zeros in the place of what was not measured."
+        )
+    return array
+
+
+def _offset(offset: npt.ArrayLike) -> FloatArray:
+    array = np.asarray(offset, dtype=float)
+    if array.shape != (3,) or not np.all(np.isfinite(array)):
+        raise RequestError(
+            f"the offset between two points is (x, y, z) in metres; received {offset!r}."
+        )
+    return array
+
+
+def rotation_matrix(angles: npt.ArrayLike) -> FloatArray:
+    """Rotation from the body's axes to those of space.
+
+    Parameters
+    ----------
+    angles : array_like, shape (time, 3)
+        Roll, pitch and yaw, rad.
+
+    Returns
+    -------
+    ndarray, shape (time, 3, 3)
+        Yaw after pitch after roll.
+
+    Raises
+    ------
+    RequestError
+        If the shape is another.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> bow = rotation_matrix([[0.0, 0.1, 0.0]])[0] @ [-1.0, 0.0, 0.0]
+    >>> bool(bow[2] > 0)  # a positive pitch lifts the bow, which points against the waves
+    True
+    """
+    roll, pitch, yaw = _vectors("the angles", angles).T
+    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
+    cy, sy = np.cos(yaw), np.sin(yaw)
+    rows = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def transfer_position(
+    position: npt.ArrayLike, angles: npt.ArrayLike, offset: npt.ArrayLike
+) -> FloatArray:
+    """Displacement of one point of a body from that of another.
+
+    Parameters
+    ----------
+    position : array_like, shape (time, 3)
+        Displacement of the measured point from its place at rest, m.
+    angles : array_like, shape (time, 3)
+        Roll, pitch and yaw, rad.
+    offset : array_like, shape (3,)
+        From the measured point to the wanted one, in the body's axes, m.
+
+    Returns
+    -------
+    ndarray, shape (time, 3)
+        Displacement of the wanted point from its place at rest, m.
+
+    Raises
+    ------
+    RequestError
+        If a shape is wrong.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> moved = transfer_position([[0.025, 0, 0]], [[0, 0.1, 0]], [0, 0, -0.25])
+    >>> bool(abs(moved[0, 0]) < 1e-4)  # the mast leans back, the centre stays
+    True
+    """
+    r = _offset(offset)
+    turned: FloatArray = _vectors("the position", position) + rotation_matrix(angles) @ r - r
+    return turned
+
+
+def transfer_velocity(
+    velocity: npt.ArrayLike,
+    angles: npt.ArrayLike,
+    rates: npt.ArrayLike,
+    offset: npt.ArrayLike,
+) -> FloatArray:
+    """Velocity of one point of a body from that of another.
+
+    Parameters
+    ----------
+    velocity : array_like, shape (time, 3)
+        Of the measured point, in the axes of space, m/s.
+    angles, rates : array_like, shape (time, 3)
+        Roll, pitch and yaw, rad; angular velocity about the body's axes, rad/s.
+    offset : array_like, shape (3,)
+        From the measured point to the wanted one, in the body's axes, m.
+
+    Returns
+    -------
+    ndarray, shape (time, 3)
+        Of the wanted point, m/s.
+
+    Raises
+    ------
+    RequestError
+        If a shape is wrong.
+    """
+    turn = np.cross(_vectors("the rates", rates), _offset(offset))
+    moved: FloatArray = _vectors("the velocity", velocity) + np.einsum(
+        "tij,tj->ti", rotation_matrix(angles), turn
+    )
+    return moved
+
+
+def transfer_acceleration(
+    acceleration: npt.ArrayLike,
+    angles: npt.ArrayLike,
+    rates: npt.ArrayLike,
+    angular_acceleration: npt.ArrayLike,
+    offset: npt.ArrayLike,
+) -> FloatArray:
+    r"""Acceleration of one point of a body from that of another.
+
+    Parameters
+    ----------
+    acceleration : array_like, shape (time, 3)
+        Of the measured point, in the axes of space, without gravity, m/s².
+    angles, rates, angular_acceleration : array_like, shape (time, 3)
+        Roll, pitch and yaw, rad; angular velocity, rad/s, and acceleration, rad/s², about the
+        body's axes.
+    offset : array_like, shape (3,)
+        From the measured point to the wanted one, in the body's axes, m.
+
+    Returns
+    -------
+    ndarray, shape (time, 3)
+        :math:`a + R(\alpha \times r + \omega \times (\omega \times r))`, m/s².
+
+    Raises
+    ------
+    RequestError
+        If a shape is wrong.
+    """
+    r, omega = _offset(offset), _vectors("the rates", rates)
+    alpha = _vectors("the angular acceleration", angular_acceleration)
+    turn = np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
+    moved: FloatArray = _vectors("the acceleration", acceleration) + np.einsum(
+        "tij,tj->ti", rotation_matrix(angles), turn
+    )
+    return moved
+
+
+def remove_gravity(
+    specific_force: npt.ArrayLike,
+    angles: npt.ArrayLike,
+    gravity: float = GRAVITY,
+    zeroed: bool = False,
+) -> FloatArray:
+    r"""Acceleration in space from what three accelerometers on the body read.
+
+    Parameters
+    ----------
+    specific_force : array_like, shape (time, 3)
+        Readings along the body's axes, m/s²: :math:`f = R^T (a + g \hat z)`, (0, 0, g) at rest.
+    angles : array_like, shape (time, 3)
+        Roll, pitch and yaw, rad.
+    gravity : float, optional
+        g, m/s².
+    zeroed : bool, optional
+        Whether the readings were set to zero at rest, upright: g is then added to z first.
+
+    Returns
+    -------
+    ndarray, shape (time, 3)
+        Acceleration of the place of the accelerometers, in the axes of space, m/s².
+
+    Raises
+    ------
+    RequestError
+        If a shape is wrong.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> at_rest = remove_gravity([[-9.81 * np.sin(0.1), 0, 9.81 * np.cos(0.1)]], [[0, 0.1, 0]])
+    >>> bool(np.allclose(at_rest, 0.0))  # tilted, and not moving
+    True
+    """
+    upward = np.array([0.0, 0.0, gravity])
+    force = _vectors("the specific force", specific_force) + (upward if zeroed else 0.0)
+    turned: FloatArray = np.einsum("tij,tj->ti", rotation_matrix(angles), force) - upward
+    return turned

@@ -1,0 +1,413 @@
+r"""Clocks of loggers against one another: offset and drift, with their uncertainty.
+
+A clock reads :math:`c(t) = \text{offset} + (1 + \text{drift})\,t` at the reference time t. It is
+found from pulses that both loggers record, from a signal that both record, or from the lag
+between two related signals, window by window.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+from scipy.interpolate import CubicSpline
+
+from seakeep.errors import DataError, RequestError
+from seakeep.signals.clocks import uniform_step
+from seakeep.signals.lags import windowed_lags
+from seakeep.signals.pulses import find_pulses, match_pulses, pulse_template, time_pulses
+
+__all__ = [
+    "Clock",
+    "clock_from_correlation",
+    "clock_from_pulses",
+    "clock_from_shared",
+    "pool_drift",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+LARGEST_DRIFT = 1e-3
+"""Drift allowed for when pulses are matched and lags are searched: a thousand ppm."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A logger's clock against the reference, and how well it is known.
+
+    Parameters
+    ----------
+    offset : float
+        What the clock reads at reference time 0, s.
+    drift : float
+        How much faster than the reference it runs, a pure number (25e-6 is 25 ppm).
+    offset_error, drift_error : float
+        Standard errors of the two; NaN where the data cannot tell.
+    method : str
+        How it was found.
+    count : int
+        Pulses, windows or samples that it rests on.
+    residual : float
+        RMS of what a straight line of clock over clock leaves, s.
+    modulus : float
+        The offset is known only up to multiples of this (s): a train of equal pulses fits again
+        after each period. ``inf`` where it is unique.
+    centre : float
+        Reference time at which the errors of reading and drift are independent, s.
+
+    Examples
+    --------
+    >>> clock = Clock(offset=0.37, drift=25e-6)
+    >>> float(clock.reference(clock.reading(100.0)))
+    100.0
+    """
+
+    offset: float = 0.0
+    drift: float = 0.0
+    offset_error: float = 0.0
+    drift_error: float = 0.0
+    method: str = "the same clock"
+    count: int = 0
+    residual: float = 0.0
+    modulus: float = float("inf")
+    centre: float = 0.0
+
+    def reference(self, readings: npt.ArrayLike) -> FloatArray:
+        """Reference time of readings of this clock, s."""
+        out: FloatArray = (np.asarray(readings, dtype=float) - self.offset) / (1.0 + self.drift)
+        return out
+
+    def reading(self, time: npt.ArrayLike) -> FloatArray:
+        """What this clock reads at reference times, s."""
+        out: FloatArray = self.offset + (1.0 + self.drift) * np.asarray(time, dtype=float)
+        return out
+
+    def describe(self) -> str:
+        """One line for people: offset and drift with their errors, and where they come from."""
+        if self.method == Clock.method:
+            return self.method
+        errors = (
+            f"{1e3 * self.offset:+.2f} ± {1e3 * self.offset_error:.2f} ms, "
+            f"{1e6 * self.drift:+.1f} ± {1e6 * self.drift_error:.1f} ppm"
+        )
+        return f"{errors} ({self.method}, {self.count})"
+
+
+def _line(own: FloatArray, reference: FloatArray, errors: FloatArray | None) -> Clock:
+    """Straight line of one clock over another, outliers left out."""
+    kept = np.ones(own.size, dtype=bool)
+    for _ in range(5):
+        centre = float(reference[kept].mean())
+        x = reference[kept] - centre
+        y = own[kept] - reference[kept]
+        spread = float(x @ x)
+        drift = float(x @ y) / spread if x.size > 1 and spread > 0 else 0.0
+        level = float(y.mean())
+        residual = (own - reference) - level - drift * (reference - centre)
+        scale = 1.4826 * float(np.median(np.abs(residual[kept]))) + 1e-9
+        updated = np.abs(residual) <= 5.0 * scale
+        if kept.sum() < 5 or updated.sum() < 3 or np.array_equal(updated, kept):
+            break
+        kept = updated
+    count = int(kept.sum())
+    rms = float(np.sqrt(np.mean(residual[kept] ** 2)))
+    formal = 0.0 if errors is None else float(np.sqrt(np.mean(errors[kept] ** 2)))
+    sigma = max(rms * np.sqrt(count / (count - 2)) if count > 2 else 0.0, formal)
+    drift_error = sigma / np.sqrt(spread) if spread > 0 else float("nan")
+    offset_error = float(np.hypot(sigma / np.sqrt(count), centre * drift_error))
+    return Clock(
+        level - drift * centre, drift, offset_error, drift_error, "", count, rms, centre=centre
+    )
+
+
+def clock_from_pulses(
+    trigger: npt.ArrayLike,
+    time: npt.ArrayLike,
+    reference_trigger: npt.ArrayLike,
+    reference_time: npt.ArrayLike,
+    expected_offset: float = 0.0,
+) -> Clock:
+    """Clock of a logger from a trigger that it and the reference record.
+
+    Each pulse is timed to a part of a sample by fitting the mean pulse of the faster logger to it
+    (height, level and instant); a straight line through the instants, outliers left out, gives
+    offset and drift.
+
+    Parameters
+    ----------
+    trigger : array_like, shape (time,)
+        The trigger as the logger recorded it, in any unit, pulses up or down.
+    time : array_like, shape (time,)
+        Readings of the logger's clock, s.
+    reference_trigger, reference_time : array_like
+        The same of the reference.
+    expected_offset : float, optional
+        Of all offsets that fit a periodic train, the one nearest to this is taken, s.
+
+    Returns
+    -------
+    Clock
+        The clock.
+
+    Raises
+    ------
+    DataError
+        If a record has no pulses, or none of one fits those of the other.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> def pulses(t):
+    ...     phase = (t + 5) % 10 - 5
+    ...     return np.where(abs(phase) < 0.25, np.cos(2 * np.pi * phase) ** 2, 0.0)
+    >>> t, c = np.arange(0, 60, 0.002), np.arange(0, 60, 0.02)
+    >>> clock = clock_from_pulses(pulses((c - 0.3) / 1.00002), c, pulses(t), t)
+    >>> round(clock.offset, 4), round(1e6 * clock.drift, 1), clock.count
+    (0.3, 20.0, 5)
+    """
+    sides = [
+        (np.asarray(trigger, float), np.asarray(time, float), "the logger's trigger"),
+        (
+            np.asarray(reference_trigger, float),
+            np.asarray(reference_time, float),
+            "the reference's trigger",
+        ),
+    ]
+    found = [find_pulses(values, times, name) for values, times, name in sides]
+    own, other, modulus = match_pulses(
+        found[0].centres, found[1].centres, expected_offset, LARGEST_DRIFT
+    )
+    fast = int(np.median(np.diff(sides[1][1])) <= np.median(np.diff(sides[0][1])))
+    chosen = (own, other)
+    template = pulse_template(
+        sides[fast][0], sides[fast][1], found[fast], found[fast].centres[chosen[fast]]
+    )
+    timed = [
+        time_pulses(values, times, found[i].centres[chosen[i]], template)
+        for i, (values, times, _) in enumerate(sides)
+    ]
+    errors = np.hypot(timed[0][1], timed[1][1])
+    sound = np.isfinite(errors) & np.isfinite(timed[0][0]) & np.isfinite(timed[1][0])
+    if not sound.any():
+        raise DataError(
+            "no pulse of the trigger could be timed: the pulses of the two loggers differ in "
+            "shape. Check that both columns hold the same trigger."
+        )
+    clock = _line(timed[0][0][sound], timed[1][0][sound], errors[sound])
+    return replace(clock, method="trigger pulses", modulus=modulus)
+
+
+def clock_from_correlation(
+    series: npt.ArrayLike,
+    time: npt.ArrayLike,
+    reference: npt.ArrayLike,
+    reference_time: npt.ArrayLike,
+    window: float,
+    largest_lag: float,
+    least_correlation: float = 0.6,
+) -> Clock:
+    """Clock of a logger from the lag of its signal behind a related one, window by window.
+
+    Parameters
+    ----------
+    series, time : array_like, shape (time,)
+        A signal of the logger and the readings of its clock, s, uniform.
+    reference, reference_time : array_like
+        A signal of the reference that goes up and down with it.
+    window : float
+        Length of a window, s: several periods of the slowest wave.
+    largest_lag : float
+        Lags searched on either side, s. In regular waves a lag is known only up to a period.
+    least_correlation : float, optional
+        Windows whose peak correlation is lower are left out.
+
+    Returns
+    -------
+    Clock
+        The clock: a straight line through the lags, outliers left out.
+
+    Raises
+    ------
+    DataError
+        If fewer than two windows correlate.
+    RequestError
+        If a record is shorter than the window.
+    """
+    a, c = np.asarray(series, float), np.asarray(time, float)
+    b, t = np.asarray(reference, float), np.asarray(reference_time, float)
+    step = min(uniform_step(c, "the logger"), uniform_step(t, "the reference"))
+    begin, end = max(c[0], t[0]), min(c[-1], t[-1])
+    if end - begin < window + 2 * largest_lag:
+        raise RequestError(
+            f"the records share {end - begin:g} s, and a window of {window:g} s with lags of "
+            f"±{largest_lag:g} s needs {window + 2 * largest_lag:g} s. Shorten the window or the "
+            "lags."
+        )
+    grid = begin + step * np.arange(int((end - begin) / step + 1e-9) + 1)
+    lags = windowed_lags(
+        CubicSpline(c, a)(grid), CubicSpline(t, b)(grid), step, window, largest_lag
+    )
+    good = lags.correlation >= least_correlation
+    if good.sum() < 2:
+        raise DataError(
+            f"{int(good.sum())} of {good.size} windows correlate by {least_correlation:g} or more: "
+            "the two signals do not go together. Choose other channels, another window, or a "
+            "larger lag."
+        )
+    instants = begin + lags.centre[good]
+    clock = _line(instants + lags.lag[good], instants, None)
+    return replace(clock, method="correlation of windows")
+
+
+def clock_from_shared(
+    series: npt.ArrayLike,
+    time: npt.ArrayLike,
+    reference: npt.ArrayLike,
+    reference_time: npt.ArrayLike,
+    window: float = 20.0,
+    largest_lag: float = 5.0,
+) -> Clock:
+    """Clock of a logger from one signal that it and the reference both record.
+
+    The lags of windows give a first value; least squares over all samples, in which offset and
+    drift of the clock and gain and level of the signal are free, refine it.
+
+    Parameters
+    ----------
+    series, time, reference, reference_time, window, largest_lag
+        As in :func:`clock_from_correlation`; the signals agree up to gain, level and noise.
+
+    Returns
+    -------
+    Clock
+        The clock.
+
+    Raises
+    ------
+    DataError, RequestError
+        As :func:`clock_from_correlation`.
+    """
+    first = clock_from_correlation(series, time, reference, reference_time, window, largest_lag)
+    a, c = np.asarray(series, float), np.asarray(time, float)
+    b, t = np.asarray(reference, float), np.asarray(reference_time, float)
+    if np.median(np.diff(c)) < np.median(np.diff(t)):  # the spline goes through the faster one
+        inverse = _refined(
+            b, t, CubicSpline(c, a), (c[0], c[-1]),
+            (-first.offset / (1 + first.drift), 1 / (1 + first.drift) - 1),
+        )  # fmt: skip
+        (level, drift), (level_error, drift_error), rms, count = inverse
+        offset, slope = -level / (1 + drift), 1 / (1 + drift) - 1
+        return Clock(
+            offset,
+            slope,
+            level_error,
+            drift_error,
+            "shared channel",
+            count,
+            rms,
+            centre=float(t.mean()),
+        )
+    (offset, drift), (offset_error, drift_error), rms, count = _refined(
+        a, c, CubicSpline(t, b), (t[0], t[-1]), (first.offset, first.drift)
+    )
+    return Clock(
+        offset,
+        drift,
+        offset_error,
+        drift_error,
+        "shared channel",
+        count,
+        rms,
+        centre=float(c.mean()),
+    )
+
+
+def _refined(
+    values: FloatArray,
+    readings: FloatArray,
+    other: Callable[..., FloatArray],
+    span: tuple[float, float],
+    start: tuple[float, float],
+) -> tuple[tuple[float, float], tuple[float, float], float, int]:
+    """Least squares of ``values ≈ g · other((c − offset) / (1 + drift)) + level``."""
+    offset, drift = start
+    centre = float(readings.mean())
+    for _ in range(6):
+        instants = (readings - offset) / (1 + drift)
+        inside = (instants >= span[0]) & (instants <= span[1])
+        t, y = instants[inside], values[inside]
+        shape, slope = other(t), other(t, 1)
+        away = readings[inside] - centre
+        design = np.column_stack([shape, np.ones(t.size), -slope, -slope * away])
+        solution, *_ = np.linalg.lstsq(design, y, rcond=None)
+        gain = solution[0] if solution[0] != 0 else 1.0
+        shift, stretch = solution[2] / gain, solution[3] / gain
+        offset, drift = offset + shift - stretch * centre, drift + stretch
+        if abs(shift) < 1e-9 and abs(stretch) < 1e-12:
+            break
+    residual = y - design @ solution
+    # Samples of a residual that is itself a wave count less than once each.
+    whiteness = float(residual[1:] @ residual[:-1] / max(residual @ residual, 1e-300))
+    inflation = np.sqrt((1 + max(whiteness, 0.0)) / max(1 - whiteness, 1e-3))
+    sigma = float(np.sqrt(residual @ residual / max(t.size - 4, 1))) * inflation
+    covariance = np.linalg.pinv(design.T @ design) * (sigma / gain) ** 2
+    drift_error = float(np.sqrt(covariance[3, 3]))
+    offset_error = float(np.hypot(np.sqrt(covariance[2, 2]), centre * drift_error))
+    rms = float(np.sqrt(np.mean(residual**2)) / (abs(gain) * float(np.std(slope)) + 1e-300))
+    return (float(offset), float(drift)), (offset_error, drift_error), rms, int(t.size)
+
+
+def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
+    r"""Clocks of one logger in several runs, with one drift where the runs agree.
+
+    A quartz keeps its rate from run to run, and the drift of a short run is poorly known. The
+    weighted mean is taken if :math:`\chi^2` does not speak against it at 1 in 1000; each offset
+    then follows from its own run.
+
+    Parameters
+    ----------
+    clocks : sequence of Clock
+        The same logger's in each run.
+
+    Returns
+    -------
+    list of Clock
+        In the same order; unchanged where the runs differ, or where fewer than two are known.
+
+    Examples
+    --------
+    >>> one = Clock(0.1, 20e-6, 1e-3, 4e-6, "trigger pulses", 13, 1e-3, centre=100.0)
+    >>> other = Clock(0.3, 30e-6, 1e-3, 4e-6, "trigger pulses", 13, 1e-3, centre=100.0)
+    >>> [f"{1e6 * clock.drift:.0f} {clock.offset:.4f}" for clock in pool_drift([one, other])]
+    ['25 0.0995', '25 0.3005']
+    """
+    known = [c for c in clocks if np.isfinite(c.drift_error) and c.drift_error > 0]
+    if len(known) < 2:
+        return list(clocks)
+    weights = np.array([c.drift_error**-2 for c in known])
+    drifts = np.array([c.drift for c in known])
+    mean = float(weights @ drifts / weights.sum())
+    error = float(weights.sum() ** -0.5)
+    if float(weights @ (drifts - mean) ** 2) > stats.chi2.ppf(0.999, len(known) - 1):
+        return list(clocks)
+    pooled = []
+    for clock in clocks:
+        if clock.method == Clock.method:
+            pooled.append(clock)
+            continue
+        own = clock.drift_error if np.isfinite(clock.drift_error) else 0.0
+        level = max(clock.offset_error**2 - (clock.centre * own) ** 2, 0.0)
+        pooled.append(
+            replace(
+                clock,
+                offset=clock.offset + (clock.drift - mean) * clock.centre,
+                drift=mean,
+                offset_error=float(np.sqrt(level + (clock.centre * error) ** 2)),
+                drift_error=error,
+                method=f"{clock.method}, drift of {len(known)} runs",
+            )
+        )
+    return pooled

@@ -1,0 +1,241 @@
+"""ROS 2 bags and MCAP, written by rosbags."""
+
+import builtins
+import shutil
+import sqlite3
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+from seakeep.campaign import read_table
+from seakeep.campaign.readers import checksum
+from seakeep.campaign.settings import FileSettings
+from seakeep.errors import DataError, RequestError, SeakeepWarning
+
+pytest.importorskip("rosbags")
+
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+STORE = get_typestore(Stores.ROS2_HUMBLE)
+STORE.register(
+    get_types_from_msg(
+        "std_msgs/Header header\nfloat64 surge\nfloat32[2] loads\nfloat64[] cells\nstring remark\n",
+        "tank_msgs/msg/Rig",
+    )
+)
+TYPES = STORE.types
+BEGIN = 1_700_000_000_000_000_000  # ns
+STEP = 20_000_000  # ns
+COUNT = 100
+T = 1e-9 * STEP * np.arange(COUNT)
+RATE = np.sin(T)
+
+
+def header(instant):
+    stamp = TYPES["builtin_interfaces/msg/Time"](*divmod(instant, 1_000_000_000))
+    return TYPES["std_msgs/msg/Header"](stamp=stamp, frame_id="cog")
+
+
+def imu(i, stamped=True):
+    vector, covariance = TYPES["geometry_msgs/msg/Vector3"], np.zeros(9)
+    return TYPES["sensor_msgs/msg/Imu"](
+        header=header(BEGIN + i * STEP if stamped else 0),
+        orientation=TYPES["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
+        orientation_covariance=covariance,
+        angular_velocity=vector(x=0.0, y=RATE[i], z=0.0),
+        angular_velocity_covariance=covariance,
+        linear_acceleration=vector(x=0.1, y=0.0, z=9.81),
+        linear_acceleration_covariance=covariance,
+    )
+
+
+def rig(i, cells=2, stamped=True):
+    return TYPES["tank_msgs/msg/Rig"](
+        header=header(BEGIN + i * STEP if stamped else 0),
+        surge=float(i),
+        loads=np.array([i, -i], dtype=np.float32),
+        cells=np.arange(float(cells)),
+        remark="x",
+    )
+
+
+def number(i):
+    return TYPES["std_msgs/msg/Float64"](data=float(i))
+
+
+def text(i):
+    return TYPES["std_msgs/msg/String"](data="x")
+
+
+def save(path, plugin=StoragePlugin.MCAP, late=3_000_000, **topics):
+    """Write topics, each a maker of messages; received `late` ns after they are stamped."""
+    with Writer(path, version=9, storage_plugin=plugin) as writer:
+        for topic, make in topics.items():
+            kind = make(0).__msgtype__
+            connection = writer.add_connection(f"/{topic}", kind, typestore=STORE)
+            for i in range(COUNT):
+                data = STORE.serialize_cdr(make(i), kind)
+                writer.write(connection, BEGIN + i * STEP + late, data)
+    return path
+
+
+@pytest.mark.parametrize("plugin", list(StoragePlugin), ids=lambda plugin: plugin.name)
+@pytest.mark.parametrize("what", ["folder", "file"])
+def test_a_standard_message(tmp_path, plugin, what):
+    path = save(tmp_path / "bag", plugin, mru=imu, note=text)
+    if what == "file":
+        path = next(each for each in path.iterdir() if each.suffix in (".mcap", ".db3"))
+    run = read_table(path)
+    # Seconds from the first reception: header stamps are 3 ms earlier; a float of ns is exact here.
+    np.testing.assert_allclose(run["time"], T - 0.003, atol=1e-12)
+    np.testing.assert_allclose(run["receive_time"], T, atol=1e-12)
+    np.testing.assert_array_equal(run["angular_velocity.y"], RATE)
+    units = {name: run[name].attrs.get("units") for name in run.data_vars}
+    assert units["angular_velocity.y"] == "rad/s"
+    assert units["linear_acceleration.z"] == "m/s^2"
+    assert units["orientation.w"] is None
+    assert not any("covariance" in name for name in units)
+
+
+def test_an_mcap_file_alone(tmp_path):
+    """Without the folder's metadata."""
+    made = save(tmp_path / "bag", mru=imu)
+    alone = tmp_path / "run.mcap"
+    shutil.copy(next(made.glob("*.mcap")), alone)
+    np.testing.assert_array_equal(read_table(alone)["angular_velocity.y"], RATE)
+
+
+def test_the_times_of_reception_on_request(tmp_path):
+    run = read_table(save(tmp_path / "bag", mru=imu), FileSettings(time="receive_time"))
+    np.testing.assert_allclose(run["time"], T, atol=1e-12)
+    with pytest.raises(RequestError, match="the column 'time' cannot be a channel"):
+        read_table(tmp_path / "bag", FileSettings(time="receive_time"), columns=["time"])
+
+
+def test_a_message_of_ones_own(tmp_path):
+    run = read_table(save(tmp_path / "bag", rig=rig))
+    np.testing.assert_array_equal(run["surge"], np.arange(COUNT))
+    np.testing.assert_array_equal(run["loads[1]"], -np.arange(COUNT))
+    assert "units" not in run["surge"].attrs
+    assert "remark" not in run
+
+
+def test_a_message_without_header_has_times_of_reception(tmp_path):
+    run = read_table(save(tmp_path / "bag", load=number))
+    np.testing.assert_allclose(run["time"], T, atol=1e-12)
+    assert list(run.data_vars) == ["data"]
+
+
+def test_topics(tmp_path):
+    path = save(tmp_path / "bag", mru=imu, load=number, note=text)
+    with pytest.raises(
+        RequestError,
+        match=r"several topics, each with times of its own: '/load' \(std_msgs/msg/Float64, 100 "
+        r"messages\), '/mru' .*State which one with group = 'TOPIC'",
+    ):
+        read_table(path)
+    assert list(read_table(path, FileSettings(group="/load")).data_vars) == ["data"]
+    with pytest.raises(RequestError, match=r"no topic '/lod'\. Did you mean '/load'\? Its topics"):
+        read_table(path, FileSettings(group="/lod"))
+    with pytest.raises(DataError, match=r"the topic '/note' .* holds no numbers"):
+        read_table(path, FileSettings(group="/note"))
+
+
+def test_topics_count_from_one_instant(tmp_path):
+    """The recording's first message, so that channels of two topics fit together."""
+    path = save(tmp_path / "bag", early=number, mru=imu)
+    first = read_table(path, FileSettings(group="/early"))["time"]
+    second = read_table(path, FileSettings(group="/mru"))["receive_time"]
+    np.testing.assert_array_equal(first, second)
+
+
+def test_an_array_that_varies_in_length(tmp_path):
+    path = save(tmp_path / "bag", rig=lambda i: rig(i, cells=2 + i % 2))
+    assert "cells[1]" in read_table(path, columns=["surge", "cells[1]"])
+    with pytest.raises(DataError, match=r"'cells\[2\]' of the topic '/rig' is in 50 of 100 mess"):
+        read_table(path, columns=["cells[2]"])
+
+
+def test_headers_that_are_not_stamped(tmp_path):
+    path = save(tmp_path / "bag", mru=lambda i: imu(i, stamped=False))
+    with pytest.warns(SeakeepWarning, match="the headers of the topic '/mru' are not stamped"):
+        run = read_table(path)
+    np.testing.assert_allclose(run["time"], T, atol=1e-12)
+    path = save(tmp_path / "some", rig=lambda i: rig(i, stamped=i > 4))
+    with pytest.raises(DataError, match="5 of 100 messages of the topic '/rig' have no stamp"):
+        read_table(path)
+
+
+def test_nothing_recorded(tmp_path):
+    path = save(tmp_path / "bag", note=text)
+    with pytest.raises(DataError, match=r"holds no messages with numbers \(topics: /note\)"):
+        read_table(path)
+    with Writer(tmp_path / "none", version=9, storage_plugin=StoragePlugin.MCAP):
+        pass
+    with pytest.raises(DataError, match=r"holds no messages with numbers \(topics: none\)"):
+        read_table(tmp_path / "none")
+
+
+@pytest.mark.parametrize("part", [0.02, 0.3, 0.7, 0.9])
+@pytest.mark.parametrize("plugin", list(StoragePlugin), ids=lambda plugin: plugin.name)
+def test_cut_off(tmp_path, plugin, part):
+    path = save(tmp_path / "bag", plugin, mru=imu)
+    file = next(each for each in path.iterdir() if each.suffix in (".mcap", ".db3"))
+    whole = file.read_bytes()
+    file.write_bytes(whole[: int(part * len(whole))])
+    with pytest.raises(DataError, match="cannot be read as a recording of ROS 2: cut off, damaged"):
+        read_table(path)
+
+
+def test_messages_that_are_missing(tmp_path):
+    """The folder's metadata count more messages than its file holds."""
+    path = save(tmp_path / "bag", StoragePlugin.SQLITE3, mru=imu)
+    with closing(sqlite3.connect(next(path.glob("*.db3")))) as database:
+        database.execute("DELETE FROM messages WHERE id > 60")
+        database.commit()
+    with pytest.raises(DataError, match="announces 100 messages of the topic '/mru' and holds 60"):
+        read_table(path)
+
+
+@pytest.mark.parametrize("name", ["run.mcap", "run.db3"])
+def test_foreign_and_empty(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes("tid;hiv é\n1;2\n".encode("latin-1"))
+    with pytest.raises(DataError, match="cannot be read as a recording of ROS 2"):
+        read_table(path)
+    path.write_bytes(b"")
+    with pytest.raises(DataError, match=r"is empty \(0 bytes\)"):
+        read_table(path)
+
+
+def test_a_folder_that_is_no_bag(tmp_path):
+    with pytest.raises(RequestError, match="is a folder; give the file in it"):
+        read_table(tmp_path)
+    (tmp_path / "metadata.yaml").write_text("a: [", encoding="utf-8")
+    with pytest.raises(DataError, match="cannot be read as a recording of ROS 2"):
+        read_table(tmp_path)
+
+
+def test_the_checksum_of_a_bag_follows_its_files(tmp_path):
+    path = save(tmp_path / "bag", mru=imu)
+    before = checksum(path)
+    assert checksum(path) == before
+    file = next(path.glob("*.mcap"))
+    file.write_bytes(file.read_bytes() + b"x")
+    assert checksum(path) != before
+
+
+def test_without_rosbags_the_extra_is_named(tmp_path, monkeypatch):
+    path = save(tmp_path / "bag", mru=imu)
+    real = builtins.__import__
+
+    def refuse(name, *rest):
+        if name.startswith("rosbags"):
+            raise ImportError(name)
+        return real(name, *rest)
+
+    monkeypatch.setattr(builtins, "__import__", refuse)
+    with pytest.raises(RequestError, match=r"pip install 'seakeep\[ros\]'"):
+        read_table(path)

@@ -1,0 +1,177 @@
+"""TDMS files, written by nptdms."""
+
+import builtins
+
+import numpy as np
+import pytest
+
+from seakeep.campaign import read_table
+from seakeep.campaign.settings import FileSettings
+from seakeep.errors import DataError, RequestError
+
+nptdms = pytest.importorskip("nptdms")
+
+STEP = 0.05
+T = np.arange(200) * STEP
+HEAVE, WAVE = np.sin(T), np.cos(T)
+WAVEFORM = {"wf_increment": STEP, "wf_start_offset": 0.0, "unit_string": "mm"}
+
+
+def channel(name, values, group="run", **properties):
+    return nptdms.ChannelObject(group, name, values, properties=properties)
+
+
+def save(path, *channels):
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment([nptdms.RootObject(), *channels])
+    return path
+
+
+def test_waveforms(tmp_path):
+    path = save(
+        tmp_path / "run.tdms",
+        channel("heave", HEAVE, **WAVEFORM),
+        channel("wave", WAVE, **{**WAVEFORM, "unit_string": "m"}),
+    )
+    run = read_table(path)
+    # The file holds a step, not times: both are its multiples up to rounding.
+    np.testing.assert_allclose(run["time"], T, rtol=1e-15)
+    np.testing.assert_array_equal(run["heave"], HEAVE)
+    assert set(run.data_vars) == {"heave", "wave"}
+    assert (run["heave"].attrs["units"], run["wave"].attrs["units"]) == ("mm", "m")
+
+
+def test_the_waveform_may_begin_late(tmp_path):
+    path = save(
+        tmp_path / "run.tdms", channel("heave", HEAVE, wf_increment=STEP, wf_start_offset=2.5)
+    )
+    np.testing.assert_allclose(read_table(path)["time"], 2.5 + T, rtol=1e-15)
+
+
+def test_a_time_channel_and_integers(tmp_path):
+    path = save(
+        tmp_path / "run.tdms",
+        channel("Time", 1e3 * T, unit_string="ms"),
+        channel("count", np.arange(200, dtype=np.int16)),
+        channel("remark", ["x"] * 200),
+    )
+    run = read_table(path)
+    np.testing.assert_allclose(run["time"], T, rtol=1e-12)
+    np.testing.assert_array_equal(run["count"], np.arange(200.0))
+    assert set(run.data_vars) == {"count"}
+
+
+def test_time_stamps_count_from_the_first(tmp_path):
+    start = np.datetime64("2024-05-06T07:08:09.000000")
+    stamps = start + (1e6 * T).round().astype("timedelta64[us]")
+    path = save(tmp_path / "run.tdms", channel("Time", stamps), channel("heave", HEAVE))
+    # Time stamps are written in microseconds here.
+    np.testing.assert_allclose(read_table(path)["time"], T, atol=1e-6)
+
+
+def test_scaled_channels(tmp_path):
+    """Counts with a linear scale in the properties are read in the scale's unit."""
+    scale = {
+        "NI_Number_Of_Scales": 1,
+        "NI_Scale[0]_Scale_Type": "Linear",
+        "NI_Scale[0]_Linear_Slope": 0.5,
+        "NI_Scale[0]_Linear_Y_Intercept": 10.0,
+        "NI_Scale[0]_Linear_Input_Source": 0xFFFFFFFF,
+        "wf_increment": STEP,
+    }
+    path = save(tmp_path / "run.tdms", channel("load", np.arange(200, dtype=np.int32), **scale))
+    np.testing.assert_array_equal(read_table(path)["load"], 10 + 0.5 * np.arange(200))
+
+
+def test_groups(tmp_path):
+    path = save(
+        tmp_path / "run.tdms",
+        channel("heave", HEAVE, **WAVEFORM),
+        channel("load", np.arange(2000.0), "loads", wf_increment=0.005),
+    )
+    with pytest.raises(
+        RequestError,
+        match=r"several groups that are sampled differently: 'loads' \(1 channels of 2000\), 'run' "
+        r"\(1 channels of 200\)\. State which one with group = 'NAME'",
+    ):
+        read_table(path)
+    assert read_table(path, FileSettings(group="loads")).sizes["time"] == 2000
+    with pytest.raises(RequestError, match=r"no group 'load'\. Did you mean 'loads'\? Its groups"):
+        read_table(path, FileSettings(group="load"))
+
+
+def test_one_name_in_two_groups(tmp_path):
+    path = save(
+        tmp_path / "run.tdms",
+        channel("z", HEAVE, "bow", wf_increment=STEP),
+        channel("z", WAVE, "stern", wf_increment=STEP),
+    )
+    assert set(read_table(path).data_vars) == {"bow/z", "stern/z"}
+
+
+@pytest.mark.parametrize(
+    ("channels", "error", "message"),
+    [
+        ([], DataError, "holds no channels of numbers with at least two samples"),
+        (
+            [channel("heave", HEAVE), channel("wave", WAVE[:-3])],
+            DataError,
+            r"differ in length \(heave 200, wave 197\)\. Put channels of one clock into one group",
+        ),
+        (
+            [channel("a", HEAVE, wf_increment=0.1), channel("b", WAVE, wf_increment=0.2)],
+            DataError,
+            r"the channels are sampled differently \(a 0\.1 s from 0 s, b 0\.2 s from 0 s\)",
+        ),
+        ([channel("heave", HEAVE)], RequestError, "has no column that is called as a time is"),
+    ],
+)
+def test_what_is_no_run(tmp_path, channels, error, message):
+    path = save(tmp_path / "run.tdms", *channels)
+    with pytest.raises(error, match=message):
+        read_table(path)
+
+
+@pytest.mark.parametrize("left", [3, 20, 60, 200, 1000, -100, -1])
+def test_cut_off(tmp_path, left):
+    path = save(tmp_path / "run.tdms", channel("heave", HEAVE, **WAVEFORM))
+    path.write_bytes(path.read_bytes()[:left])
+    with pytest.raises(DataError, match=r"cannot be read as a TDMS file: cut off or damaged \("):
+        read_table(path)
+
+
+@pytest.mark.parametrize("more", [10, 40, 200])
+def test_a_second_segment_cut_off(tmp_path, more):
+    """What the first segment holds is not passed off as the run."""
+    path = save(tmp_path / "run.tdms", channel("heave", HEAVE, **WAVEFORM))
+    whole = path.stat().st_size
+    with nptdms.TdmsWriter(path, mode="a") as writer:
+        writer.write_segment([channel("heave", WAVE, **WAVEFORM)])
+    assert read_table(path).sizes["time"] == 400
+    path.write_bytes(path.read_bytes()[: whole + more])
+    with pytest.raises(DataError, match=r"cut off or damaged \((its last|no) segment"):
+        read_table(path)
+
+
+def test_foreign_and_empty(tmp_path):
+    path = tmp_path / "run.tdms"
+    path.write_bytes("temps;pilonnement é\n".encode("latin-1") * 40)
+    with pytest.raises(DataError, match="cannot be read as a TDMS file: cut off or damaged"):
+        read_table(path)
+    path.write_bytes(b"")
+    with pytest.raises(DataError, match=r"run\.tdms is empty \(0 bytes\)"):
+        read_table(path)
+
+
+def test_without_nptdms_the_extra_is_named(tmp_path, monkeypatch):
+    path = save(tmp_path / "run.tdms", channel("heave", HEAVE, **WAVEFORM))
+    real = builtins.__import__
+
+    def refuse(name, *rest):
+        if name == "nptdms":
+            raise ImportError(name)
+        return real(name, *rest)
+
+    monkeypatch.setattr(builtins, "__import__", refuse)
+    with pytest.raises(RequestError, match=r"pip install 'seakeep\[tdms\]'"):
+        read_table(path)

@@ -1,0 +1,118 @@
+"""The data-quality sheet, and what it says of the measured ship section."""
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from seakeep import cli
+from seakeep.campaign import read_campaign
+from seakeep.campaign.checks import findings_of
+
+pytest.importorskip("matplotlib", reason="needs the extra figures")
+
+DATA = Path(os.environ.get("SEAKEEP_DATA_DIR", "/nowhere")) / "ntnu_ship_section"
+GOOD = ("3101_3", "3101_4", "3102_1", "3102_2", "3111_2", "3041_2", "3061_2")
+MAY = ("3102_3", "3012_1")
+BAD = ("3102_4", "3061_1", "3142_1", "3031_2")
+CAMPAIGN = """
+[channels.acc_sb]
+column = "ACC_Heave_SB"
+[channels.acc_ps]
+column = "ACC_HEAVE_PS"
+[channels.heave_of_the_camera]
+column = "Heave"
+[derived.heave_acceleration]
+expression = "mean(acc_sb, acc_ps)"
+[derived.heave]
+from = "heave_acceleration"
+step = "integrate"
+times = 2
+band = [0.4, 5.0]
+[redundant.heave]
+channels = ["heave", "heave_of_the_camera"]
+[preparation]
+sampling_rate = 25
+"""
+needs_data = [
+    pytest.mark.data,
+    pytest.mark.skipif(
+        not DATA.is_dir(),
+        reason="SEAKEEP_DATA_DIR is not set: the measured ship section is not here",
+    ),
+]
+
+
+@pytest.fixture(scope="module")
+def section(tmp_path_factory):
+    path = tmp_path_factory.mktemp("section") / "campaign.toml"
+    runs = [
+        f'[runs.{n}]\nfile = "${{SEAKEEP_DATA_DIR}}/ntnu_ship_section/{n}.csv"\n'
+        for n in (*GOOD, *MAY, *BAD)
+    ]
+    path.write_text(CAMPAIGN + "".join(runs))
+    return read_campaign(path).prepare()
+
+
+def of_camera(run):
+    return [each for each in findings_of(run) if each.channel == "heave_of_the_camera"]
+
+
+class TestShipSection:
+    pytestmark = needs_data
+
+    def test_good_cameras_are_not_flagged(self, section):
+        assert {name: of_camera(section[name]) for name in GOOD} == {name: [] for name in GOOD}
+
+    def test_constant(self, section):
+        assert "constant" in {each.kind for each in of_camera(section["3102_4"])}
+
+    def test_lag(self, section):
+        (found,) = of_camera(section["3061_1"])
+        lag = float(re.search(r"lag ([+-]\d\.\d+) ", found.text)[1])
+        assert lag == pytest.approx(-0.38, abs=0.03)  # negative: the camera is early
+
+    def test_poor_agreement(self, section):
+        assert "agreement" in {each.kind for each in of_camera(section["3142_1"])}
+
+    def test_runs_away(self, section):
+        texts = [each.text for each in of_camera(section["3031_2"]) if each.kind == "lag"]
+        growth = float(re.search(r"runs away by ([+-]\d\.\d+) s", texts[0])[1])
+        assert growth == pytest.approx(0.7, abs=0.2)  # means of two windows at either end
+
+    def test_unflagged_runs_correlate(self, section):
+        for name, run in section.items():
+            if of_camera(run):
+                continue
+            camera, heave = run["heave_of_the_camera"].values, run["heave"].values
+            at = np.arange(camera.size)
+            near = [
+                np.corrcoef(np.interp(at + 25 * lag, at, camera), heave)[0, 1]
+                for lag in np.linspace(-0.05, 0.05, 11)
+            ]
+            assert max(near) >= 0.80, name
+
+
+def test_prepare_writes_a_page_that_needs_nothing_else(tmp_path, monkeypatch):
+    from small_tank import CAMPAIGN as SMALL
+    from small_tank import tank_columns, write_csv
+
+    for seed, name in enumerate(("first", "second")):
+        columns = tank_columns(seed)
+        columns["Heave [mm]"][400] += 500.0
+        write_csv(tmp_path / f"{name}.csv", columns)
+    (tmp_path / "campaign.toml").write_text(SMALL)
+    assert cli.main(["prepare", str(tmp_path / "campaign.toml")]) == 0
+    folder = tmp_path / "prepared"
+    names = {p.name for p in folder.iterdir()}
+    assert names == {"first.nc", "second.nc", "quality.html", "quality_first.png",
+                     "quality_second.png"}  # fmt: skip
+    page = (folder / "quality.html").read_text(encoding="utf-8")
+    assert not re.search(r'(src|href)="(?!data:|#)', page)
+    assert page.count("<img") == 2
+    assert "outlier: 1 samples in 1 place(s)" in page
+    before = (folder / "first.nc").stat().st_mtime_ns
+    assert cli.main(["prepare", str(tmp_path / "campaign.toml"), "--no-sheet"]) == 0
+    assert (folder / "first.nc").stat().st_mtime_ns == before

@@ -1,0 +1,164 @@
+"""Clocks: recovered from pulses, from a shared signal, and from related signals."""
+
+import numpy as np
+import pytest
+
+from seakeep.errors import DataError, RequestError
+from seakeep.signals import (
+    Clock,
+    clock_from_correlation,
+    clock_from_pulses,
+    clock_from_shared,
+    pool_drift,
+)
+from seakeep.signals.pulses import find_pulses
+
+
+def pulses(t, period=20.0, width=0.5):
+    phase = (t - 10.0 + 0.5 * period) % period - 0.5 * period
+    return np.where(np.abs(phase) < 0.5 * width, np.cos(np.pi * phase / width) ** 2, 0.0)
+
+
+def logger(signal, rate, offset, drift, length, noise, seed):
+    readings = np.arange(round(length * rate)) / rate
+    true = (readings - offset) / (1 + drift)
+    return signal(true) + noise * np.random.default_rng(seed).standard_normal(true.size), readings
+
+
+@pytest.mark.parametrize(
+    ("rate", "offset", "drift", "noise"),
+    [(500.0, 0.0, 0.0, 0.002), (50.0, 0.37, 25e-6, 0.002), (30.0, -1.2, -40e-6, 0.02)],
+)
+def test_pulses_give_offset_and_drift_with_honest_errors(rate, offset, drift, noise):
+    misses = []
+    for seed in range(20):
+        ours = logger(pulses, rate, offset, drift, 270.0, noise, seed)
+        reference = logger(pulses, 500.0, 0.0, 0.0, 270.0, 0.002, 100 + seed)
+        clock = clock_from_pulses(*ours, *reference)
+        # Below 2 ms for a fast logger, a tenth of a sample for the others: the issue's bounds.
+        assert abs(clock.offset - offset) < (2e-3 if rate >= 500 else 0.1 / rate)
+        misses.append(
+            (
+                (clock.offset - offset) / clock.offset_error,
+                (clock.drift - drift) / clock.drift_error,
+            )
+        )
+    # The scatter of 20 normalised errors is 1 ± 0.16; within 3 of these.
+    assert np.all(np.abs(np.std(misses, axis=0) - 1) < 0.5)
+
+
+def test_edges_lie_between_samples():
+    signal, time = logger(pulses, 50.0, 0.0, 0.0, 60.0, 0.0, 0)
+    found = find_pulses(signal, time)
+    assert found.height == pytest.approx(1.0, abs=0.02)
+    np.testing.assert_allclose(found.centres, [10.0, 30.0, 50.0], atol=1e-3)  # symmetric pulses
+    np.testing.assert_allclose(found.fall - found.rise, 0.25, atol=5e-3)  # chords of a cosine
+
+
+def test_pulses_down_lost_and_doubled():
+    signal, time = logger(pulses, 100.0, 0.2, 1e-5, 200.0, 0.001, 0)
+    reference, instants = logger(pulses, 500.0, 0.0, 0.0, 200.0, 0.001, 1)
+    signal[(time > 45) & (time < 55)] = 0.0  # a lost pulse
+    signal[(time > 61) & (time < 61.02)] = 5.0  # a spike is no pulse
+    clock = clock_from_pulses(-3 * signal + 7, time, reference, instants)
+    assert clock.offset == pytest.approx(0.2, abs=1e-3)
+    assert clock.count == 9
+    assert clock.modulus == pytest.approx(20.0, abs=0.1)
+
+
+def test_which_period_of_a_train_is_meant_can_be_said():
+    signal, time = logger(pulses, 100.0, 19.5, 0.0, 200.0, 0.001, 0)
+    reference, instants = logger(pulses, 500.0, 0.0, 0.0, 200.0, 0.001, 1)
+    nearest = clock_from_pulses(signal, time, reference, instants)
+    stated = clock_from_pulses(signal, time, reference, instants, expected_offset=19.0)
+    assert nearest.offset == pytest.approx(-0.5, abs=2e-3)
+    assert stated.offset == pytest.approx(19.5, abs=2e-3)
+
+
+def test_uneven_pulses_leave_no_doubt():
+    def train(t):
+        return sum(np.exp(-(((t - c) / 0.1) ** 2)) for c in (5.0, 17.0, 31.0, 64.0, 90.0))
+
+    clock = clock_from_pulses(
+        *logger(train, 100.0, 33.0, 0.0, 130.0, 0.001, 0),
+        *logger(train, 500.0, 0.0, 0.0, 100.0, 0.001, 1),
+    )
+    assert clock.offset == pytest.approx(33.0, abs=1e-3)
+    assert clock.modulus == np.inf
+
+
+def test_one_pulse_gives_an_offset_and_no_drift():
+    clock = clock_from_pulses(
+        *logger(pulses, 100.0, 0.2, 0.0, 20.0, 0.001, 0),
+        *logger(pulses, 500.0, 0.0, 0.0, 20.0, 0.001, 1),
+    )
+    assert clock.offset == pytest.approx(0.2, abs=1e-3)
+    assert clock.drift == 0
+    assert np.isnan(clock.drift_error)
+
+
+def test_no_pulses():
+    reference = logger(pulses, 500.0, 0.0, 0.0, 60.0, 0.001, 1)
+    with pytest.raises(DataError, match=r"the logger's trigger has no pulses that stand out of"):
+        clock_from_pulses(np.zeros(600), np.arange(600) / 10, *reference)
+    noise = np.random.default_rng(0).standard_normal(600)
+    with pytest.raises(DataError, match=r"Check the column, or synchronise by another signal"):
+        clock_from_pulses(noise, np.arange(600) / 10, *reference)
+
+
+def waves(t):
+    frequency = np.linspace(0.3, 1.1, 30)
+    phase = np.random.default_rng(9).uniform(0, 6.28, 30)
+    return np.cos(2 * np.pi * np.outer(t, frequency) + phase).sum(axis=1)
+
+
+@pytest.mark.parametrize("rate", [50.0, 20.0])
+def test_a_shared_signal(rate):
+    ours = logger(lambda t: 3 * waves(t) + 8, rate, 1.3, 60e-6, 300.0, 0.5, 0)
+    reference = logger(waves, 40.0, 0.0, 0.0, 300.0, 0.05, 1)
+    clock = clock_from_shared(*ours, *reference)
+    assert abs(clock.offset - 1.3) < 4 * clock.offset_error < 0.1 / rate
+    assert abs(clock.drift - 60e-6) < 4 * clock.drift_error < 40e-6
+    assert clock.method == "shared channel"
+
+
+def test_related_signals():
+    def filtered(t):  # another response to the same waves, in phase with them
+        return waves(t) + 0.3 * np.cos(11 * t)
+
+    ours = logger(filtered, 30.0, -0.8, 100e-6, 300.0, 0.3, 0)
+    reference = logger(waves, 50.0, 0.0, 0.0, 300.0, 0.05, 1)
+    clock = clock_from_correlation(*ours, *reference, window=20.0, largest_lag=3.0)
+    assert abs(clock.offset + 0.8) < 5 * clock.offset_error < 0.05
+    assert abs(clock.drift - 100e-6) < 5 * clock.drift_error < 2e-4
+
+
+def test_unrelated_signals():
+    rng = np.random.default_rng(0)
+    t = np.arange(2000) / 20
+    with pytest.raises(DataError, match=r"0 of \d+ windows correlate by 0\.6 or more"):
+        clock_from_correlation(
+            rng.standard_normal(2000), t, rng.standard_normal(2000), t, 20.0, 2.0
+        )
+    with pytest.raises(RequestError, match=r"the records share 99\.95 s, and a window of 98 s"):
+        clock_from_correlation(waves(t), t, waves(t), t, 98.0, 2.0)
+
+
+def test_drifts_that_differ_are_not_pooled():
+    def clock(drift):
+        return Clock(0.1, drift, 1e-3, 2e-6, "trigger pulses", 13, 1e-3, centre=100.0)
+
+    apart = [clock(10e-6), clock(60e-6)]
+    assert pool_drift(apart) == apart
+    one, other, same = pool_drift([clock(20e-6), clock(22e-6), Clock()])
+    assert one.drift == other.drift == pytest.approx(21e-6)
+    assert one.drift_error == pytest.approx(2e-6 / np.sqrt(2))
+    assert one.method == "trigger pulses, drift of 2 runs"
+    assert one.reading(100.0) == pytest.approx(clock(20e-6).reading(100.0), abs=1e-12)
+    assert same == Clock()
+
+
+def test_words():
+    assert Clock().describe() == "the same clock"
+    clock = Clock(0.37, 25e-6, 1e-4, 1e-6, "trigger pulses", 13, 1e-4)
+    assert clock.describe() == "+370.00 ± 0.10 ms, +25.0 ± 1.0 ppm (trigger pulses, 13)"
