@@ -155,7 +155,8 @@ def deviations(result: StudyResult) -> ReportTable:
     conditional = str(result.attrs.get("conditional_on", ""))
     rows = [
         ("mean encounter period T̂", "N/T, a frequency; 1.64 s is T/N",
-         f"T/N = {float(result.attrs['encounter_period']):.4f} s"),
+         f"{'stated' if result.settings['study'].get('encounter_period') else 'T/N'}: "
+         f"{float(result.attrs['encounter_period']):.4f} s"),
         ("alignment of the waves to the vessel", "one effective celerity, measured surge",
          each("alignment").replace("None", "none: the waves are taken where the probes stand")),
         ("measured outputs read after the start", "surge, through the alignment",

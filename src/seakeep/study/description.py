@@ -98,7 +98,8 @@ def _source(campaign: Campaign, name: str) -> str:
         return ""
     if made.expression is not None:
         return made.expression
-    return f"{made.step} of {made.source}".replace("_", " ")
+    words = {"integrate": "integral", "differentiate": "derivative"}
+    return f"{words.get(str(made.step), str(made.step))} of {made.source}".replace("_", " ")
 
 
 def _positive(name: str) -> str:

@@ -119,7 +119,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
         _check_channels(name, run, channels)
     runs = {name: run[channels] for name, run in prepared.items()}
     dt = float(next(iter(runs.values())).attrs["dt"])
-    period = campaign.encounter_period()
+    period = settings.study.encounter_period or campaign.encounter_period()
     specs = {n: build_model(model_settings(study, n), period, dt) for n in settings.models}
     needs = needs_of(list(specs.values()), dt)
     training = choose_training(settings, runs, training_names, needs)

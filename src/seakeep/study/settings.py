@@ -54,6 +54,9 @@ class GeneralStudySettings(Table):
         default="paper", description="'paper' or 'recommended', for models that state no other"
     )
     seed: Annotated[int, Field(ge=0)] = Field(default=0, description="an integer, 0 or more")
+    encounter_period: Positive | None = Field(
+        default=None, description="seconds, in which lengths are counted; left out, the campaign's"
+    )
     truth: str | None = Field(
         default=None, description="folder of RUN.nc with the true channels (the virtual tank's)"
     )

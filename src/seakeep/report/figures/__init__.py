@@ -65,7 +65,7 @@ def report_figures(result: StudyResult) -> list[ReportFigure]:
                 "waves",
                 "Power spectral density of the wave elevation: nominal where it is known, and "
                 "measured (mean over the irregular runs, or over all where none is) with the "
-                "paper's Welch segments and with long ones. Dashed lines: peaks of the regular waves.",
+                "paper's Welch segments and with long ones. Dashed: peaks of the regular waves.",
                 partial(spectrum_figure, result),
             )
         )

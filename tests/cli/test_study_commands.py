@@ -1,0 +1,89 @@
+"""``seakeep study``, ``report`` and ``reproduce`` as a user runs them."""
+
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from seakeep import cli
+
+pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+
+TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
+STUDY = """
+[study]
+campaign = "campaign.toml"
+preset = "recommended"
+[training]
+windows = 2
+[models.deterministic]
+[models.bayesian]
+kind = "bayesian_hankel_dmdc"
+n_members = 4
+train_length = { uniform = [10, 20] }
+[tests.unseen]
+runs = ["unseen"]
+windows = 3
+length = 6
+[statistics]
+n_series = 8
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for path in TUTORIAL.glob("*"):
+        if path.suffix in (".toml", ".csv"):
+            shutil.copy(path, tmp_path)
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    return tmp_path
+
+
+def test_a_study_ends_with_its_table_and_the_place_of_its_report(folder, capfd):
+    out = folder / "out"
+    assert cli.main(["study", str(folder / "study.toml"), "-o", str(out), "--workers", "1"]) == 0
+    told = capfd.readouterr()
+    assert "ANRMSE median" in told.out
+    assert told.out.rstrip().endswith(f"Report: {out / 'report.html'}")
+    assert "Study 2/6" in told.err
+    (out / "report.html").unlink()
+    assert cli.main(["report", str(out)]) == 0
+    assert capfd.readouterr().out.strip() == str(out / "report.html")
+    assert (out / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["study", "missing.toml"], "the study file missing.toml does not exist"),
+        (["report", "nowhere"], "nowhere holds no finished study"),
+        (["reproduce", "--preset", "papers"], "--preset must be paper or recommended"),
+    ],
+)
+def test_a_wrong_request_is_told_and_ends_with_2(arguments, words, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(arguments) == 2
+    assert words in capfd.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends Ctrl-C to a console alone")
+def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(folder):
+    out = folder / "out"
+    command = [sys.executable, "-m", "seakeep", "study", "study.toml", "-o", str(out)]
+    process = subprocess.Popen(
+        [*command, "--workers", "1"], cwd=folder, stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 120
+    while not list((out / "cells").glob("*.npz")) and time.monotonic() < deadline:
+        assert process.poll() is None, "the study ended before it could be stopped"
+        time.sleep(0.002)
+    process.send_signal(signal.SIGINT)
+    told = process.communicate(timeout=60)[1]
+    assert process.returncode == 130, told
+    assert "the same command goes on where it stopped" in told
+    assert "Traceback" not in told
+    assert list((out / "cells").glob("*.npz"))
