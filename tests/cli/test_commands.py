@@ -66,6 +66,8 @@ def test_the_entry_point_and_the_module_are_one_program():
 @pytest.mark.parametrize("verb", VERBS)
 def test_the_example_of_each_help_runs(verb, run, place):
     """What --help shows works as it stands (fetching aside: it needs the network)."""
+    if verb == "tank":
+        pytest.importorskip("numba")
     status, out, _ = run(f"{verb} --help")
     assert status == 0
     example = re.search(r"Example: (seakeep .*?)(?:\n\n|\Z)", out, re.DOTALL)
