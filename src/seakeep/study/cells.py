@@ -267,7 +267,7 @@ def _forecast(model: HankelDMDcModel, runs: Runs, windows: Windows) -> FloatArra
     )
     with np.errstate(over="ignore"):  # a run that is lost is cut just below
         values = model.state_scale.physical(deviations)
-    return cut_divergence(values, model.state_scale)
+    return cut_divergence(values, model.state_scale, windows.histories[:, -1:])
 
 
 def training_moments(plan: Plan, runs: Runs, training: TrainingSet) -> FloatArray:

@@ -16,8 +16,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from seakeep.campaign import Campaign, read_campaign
-from seakeep.campaign.readers import checksum, expand
-from seakeep.campaign.settings import ModelSettings, Names, Positive, Table
+from seakeep.campaign.readers import expand
+from seakeep.campaign.settings import ModelSettings
+from seakeep.campaign.tables import Names, Positive, Table
 from seakeep.campaign.validation import mistakes_of, read_toml
 from seakeep.errors import RequestError, did_you_mean
 
@@ -235,7 +236,7 @@ class Study:
             del each["label"]
         content["channels"] = [list(self.states), list(self.inputs)]
         content["campaign"] = self.campaign.digest
-        content["files"] = {n: checksum(self.campaign.file_of(n)) for n in self.campaign.runs}
+        content["files"] = {n: self.campaign.checksum_of(n) for n in self.campaign.runs}
         content["format"] = FORMAT
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
