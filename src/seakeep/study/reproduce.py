@@ -20,9 +20,9 @@ from seakeep.study.store import StudyResult, storing, versions
 __all__ = ["Size", "reproduce"]
 
 NOTE = (
-    "Virtual tank: made-up vessel and seas, so no number here replicates the paper's. All "
-    "instruments were recorded by one logger at 100 Hz with their noise, load cells with slap; "
-    "what the loggers' own clocks and drop-outs would add is not in these numbers."
+    "Virtual tank: a made-up vessel in made-up seas, so no number here replicates the paper's. Its "
+    "raw files come from four loggers with clocks of their own, with noise, drop-outs and slap, "
+    "and were prepared as a tank's would be."
 )
 
 
@@ -133,7 +133,7 @@ def _play(folder: Path, preset: Preset, seed: int, progress: Progress | None) ->
     mark = folder / "played.txt"
     if not mark.exists() or mark.read_text(encoding="utf-8").strip() != digest:
         with storing(folder):
-            play(settings, folder, one_logger=True, progress=_telling(progress))
+            play(settings, folder, progress=_telling(progress))
             mark.write_text(digest + "\n", encoding="utf-8")
     frequency = np.linspace(0.2, 1.5, 261)
     spectra = {
