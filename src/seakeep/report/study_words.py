@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -158,7 +159,7 @@ def deviations(result: StudyResult) -> ReportTable:
          f"{'stated' if result.settings['study'].get('encounter_period') else 'T/N'}: "
          f"{float(result.attrs['encounter_period']):.4f} s"),
         ("alignment of the waves to the vessel", "one effective celerity, measured surge",
-         each("alignment").replace("None", "none: the waves are taken where the probes stand")),
+         _alignment_words(each("alignment"))),
         ("measured outputs read after the start", "surge, through the alignment",
          conditional or "none"),
         ("history of the training window", "its sizes hold only before it", each("history")),
@@ -186,6 +187,13 @@ def deviations(result: StudyResult) -> ReportTable:
         tuple(rows),
         str(result.attrs.get("preparation_note", "")),
     )
+
+
+def _alignment_words(text: str) -> str:
+    """An alignment without the keys that were left out."""
+    if text == "None":
+        return "none: the waves are taken where the probes stand"
+    return re.sub(r", \w+=None|\w+=None, ", "", text)
 
 
 def settings_table(result: StudyResult) -> ReportTable:

@@ -91,7 +91,8 @@ def _source(campaign: Campaign, name: str) -> str:
         each = settings.channels[name]
         sign = "−" if each.sign < 0 else ""
         offset = f" + {each.offset:g}" if each.offset else ""
-        unit = f" [{each.unit}]" if each.unit else ""
+        known = each.unit is None or (each.column or "").endswith(f"[{each.unit}]")
+        unit = "" if known else f" [{each.unit}]"
         return f"{sign}column {each.column or name}{unit}{offset}"
     made = settings.derived.get(name)
     if made is None:
