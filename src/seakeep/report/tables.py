@@ -11,7 +11,7 @@ from rich.table import Table
 
 from seakeep.files import replacing
 
-__all__ = ["comparison_columns", "rich_comparison", "write_csv"]
+__all__ = ["rich_comparison", "write_csv"]
 
 _HEADINGS = {
     "nrmse": ("NRMSE", "{:.3f}"),
@@ -23,11 +23,6 @@ _HEADINGS = {
     "measured_max": ("max meas.", "{:.4g}"),
     "predicted_max": ("max pred.", "{:.4g}"),
 }
-
-
-def comparison_columns() -> list[str]:
-    """Variables of a comparison table in the order they are shown."""
-    return list(_HEADINGS)
 
 
 def rich_comparison(table: xr.Dataset) -> Table:
