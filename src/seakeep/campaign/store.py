@@ -12,7 +12,7 @@ import xarray as xr
 
 from seakeep.campaign.prepare import Campaign, Progress, version
 from seakeep.errors import SeakeepWarning
-from seakeep.files import replacing
+from seakeep.files import make_folder, replacing
 
 __all__ = ["load_prepared", "write_prepared"]
 
@@ -50,7 +50,7 @@ def write_prepared(
         As :meth:`Campaign.prepare`.
     """
     folder = _folder(campaign, out_dir)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     wanted = list(campaign.runs if names is None else names)
     files = {name: folder / f"{name}.nc" for name in wanted}
     fresh = {name: _fresh_step(campaign, name, files[name]) for name in wanted}
