@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from seakeep.errors import DataError, RequestError, did_you_mean
-from seakeep.files import replacing
+from seakeep.files import make_folder, replacing
 
 __all__ = ["DATASETS", "PublicDataset", "data_folder", "fetch", "find_dataset", "state_of"]
 
@@ -192,13 +192,7 @@ def fetch(
     addresses = dataset.sources if sources is None else tuple(sources)
     if not addresses:
         raise RequestError(f"'{dataset.name}' cannot be fetched; {dataset.note}.")
-    target = folder / dataset.name
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RequestError(
-            f"cannot make the folder {target}: {error.strerror or error}. Choose another with --to."
-        ) from error
+    target = make_folder(folder / dataset.name)
     for done, (name, wanted) in enumerate(dataset.files, start=1):
         if _checksum(target / name) != wanted:
             content = _download(name, wanted, addresses)

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.errors import RequestError
+from seakeep.files import make_folder
 from seakeep.tank.dynamics import Rig
 from seakeep.tank.play import check_settings, play, play_run, truth
 from seakeep.tank.realised import Realised, comparison, matrix_rows, realise
@@ -146,7 +147,7 @@ def _draw(settings: TankSettings, rig: Rig, measured: list[Realised], folder: Pa
     from seakeep.report.style import save_figure
     from seakeep.report.tank_figures import hydrodynamics_figure, run_figure, spectrum_figure
 
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     written = [save_figure(hydrodynamics_figure(rig, settings), folder / "hydrodynamics.png")]
     if any(each.irregular for each in measured):
         written.append(save_figure(spectrum_figure(settings, measured), folder / "spectrum.png"))

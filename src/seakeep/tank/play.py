@@ -12,6 +12,7 @@ import xarray as xr
 
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
+from seakeep.files import make_folder
 from seakeep.tank.campaign_file import campaign_text
 from seakeep.tank.dynamics import Rig, assemble_rig, simulate
 from seakeep.tank.hydrodynamics import excitation_at
@@ -295,9 +296,7 @@ def play(
         records = (
             [record_together(played, SINGLE_RATE, rng)] if one_logger else record_run(played, rng)
         )
-        raw, hidden = folder / "raw" / name, folder / "truth"
-        raw.mkdir(parents=True, exist_ok=True)
-        hidden.mkdir(parents=True, exist_ok=True)
+        raw, hidden = make_folder(folder / "raw" / name), make_folder(folder / "truth")
         files[name] = {record.name: write_record(record, raw, kind) for record in records}
         if name in filmed:
             files[name]["side_view"] = render_side_view(
