@@ -110,6 +110,53 @@ def test_every_form_gives_the_papers_formula(problem, ridge, all_rows):
         np.testing.assert_allclose(found.coefficients, expected, atol=RESULT)
 
 
+class Poisoned(Scratch):
+    """Memory in which every number, read before it is written, raises a floating-point error."""
+
+    SIGNALLING = np.array([0x7FF0_0000_0000_0001], dtype=np.uint64).view(float)[0:1]
+
+    def take(self, shape):
+        out = super().take(shape)
+        out.view(np.uint64)[...] = self.SIGNALLING.view(np.uint64)
+        return out
+
+
+def test_poison_is_noticed_when_it_is_read():
+    with np.errstate(all="raise"), pytest.raises(FloatingPointError, match="add"):
+        Poisoned().take((3, 4)).__iadd__(1.0)
+
+
+@settings(deadline=None)
+@given(problems(), st.floats(0.5, 200.0), st.booleans(), st.integers(1, 3), st.integers(1, 30))
+def test_no_number_is_read_before_it_is_written(problem, ridge, all_rows, count, steps):
+    states, inputs, windows, s, z = problem
+    N, Q = states[0].shape[1], inputs[0].shape[1]
+    rng = np.random.default_rng(s + 7 * z)
+    with np.errstate(all="raise", under="ignore"):
+        for method in ("primal", "dual", None):
+            found = identify(
+                states,
+                inputs,
+                windows,
+                state_delays=s,
+                input_delays=z,
+                ridge=ridge,
+                all_rows=all_rows,
+                method=method,
+                scratch=Poisoned(),
+            ).coefficients
+            extended = N * (s + 1)
+            out = rollout(
+                found[:, :extended],
+                found[:, extended:],
+                rng.normal(size=(count, s + 1, N)),
+                rng.normal(size=(count, (z if Q else 0) + steps, Q)),
+                scratch=Poisoned(),
+            )
+            assert out.shape == (count, steps, N)
+            assert np.isfinite(out).all()
+
+
 @settings(deadline=None)
 @given(
     st.integers(0, 2**32 - 1),

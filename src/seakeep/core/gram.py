@@ -168,7 +168,8 @@ def primal_system(
     signed = edges.copy()
     signed[1::2] *= -1.0
     gram = scratch.take((size, size))
-    _upper_product(edges.T, signed, gram)
+    # The running sums take whole blocks, so the squares on the diagonal must be there.
+    _upper_product(edges.T, signed, gram, below=max(N, Q) - 1)
     _fill_primal(gram, heads, N, Q, inputs)
     return PrimalSystem(gram, right, heads, edges, N, Q, inputs)
 
@@ -221,7 +222,7 @@ def snapshot_gram(
     signed = steps.copy()
     signed[:, N + Q :] *= -1.0
     gram = scratch.take((len(steps), len(steps)))
-    _upper_product(steps, signed.T, gram)
+    _upper_product(steps, signed.T, gram, below=0)
     for i, piece in enumerate(pieces):
         own_x = recent(piece.states, piece.first, s + 1)
         own_u = recent(piece.inputs, piece.first, z + 1)
@@ -242,8 +243,10 @@ def snapshot_gram(
     return gram
 
 
-def _upper_product(left: FloatArray, right: FloatArray, out: FloatArray) -> None:
-    # In panels of rows, each from its diagonal on: a little more than half of the product.
+def _upper_product(left: FloatArray, right: FloatArray, out: FloatArray, below: int) -> None:
+    # In panels of rows, each from its diagonal (or `below` it) on: a little more than half of the
+    # product. What is left out is memory as it was found, and must never be read.
     edges = [len(out) * panel // PANELS for panel in range(PANELS + 1)]
     for begin, stop in pairwise(edges):
-        np.matmul(left[begin:stop], right[:, begin:], out=out[begin:stop, begin:])
+        first = max(0, begin - below)
+        np.matmul(left[begin:stop], right[:, first:], out=out[begin:stop, first:])
