@@ -143,7 +143,7 @@ class DerivedSettings(Table):
     )
     crossover: Frequency | None = Field(
         default=None,
-        description="'blend': where both count half, Hz or per period, below the waves",
+        description="'blend': where both count half, below the waves, Hz or per period",
     )
     offset: Vector | None = Field(
         default=None, description="'transfer': [x, y, z] from the measured to the wanted point, m"

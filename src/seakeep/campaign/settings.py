@@ -64,6 +64,11 @@ class GeneralSettings(Table):
         default=None,
         description="the wave channel whose zero-up-crossings define the encounter period",
     )
+    period_hysteresis: Annotated[float, Field(ge=0, lt=1)] = Field(
+        default=0.0,
+        description="part of its standard deviation by which a wave must pass its mean either way "
+        "to count; 0, the paper's, counts all. Still water around the waves never counts",
+    )
 
 
 class RigSettings(Table):
