@@ -7,9 +7,11 @@ from collections.abc import Mapping
 import xarray as xr
 
 from seakeep.campaign import Campaign, ModelSettings, load_prepared
+from seakeep.campaign.periods import Periods, counted
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.models import HankelDMDc, HankelDMDcModel
+from seakeep.models.settings import periods_to_samples
 from seakeep.study.repeats import warn_of_repeats
 
 __all__ = ["build_spec", "fit_campaign", "training_runs"]
@@ -50,12 +52,16 @@ def build_spec(settings: ModelSettings, encounter_period: float | None, dt: floa
         )
     stated = settings.arguments()
     stated.pop("stop", None)
-    if settings.preset is not None:
-        if encounter_period is None:
-            raise RequestError(
-                f"preset = '{settings.preset}' counts in encounter periods, and the campaign has "
-                "none. State encounter_period (s) in [campaign]."
-            )
+    if encounter_period is None and (settings.preset is not None or any(counted(settings))):
+        what = f"preset = '{settings.preset}'" if settings.preset else "the model"
+        raise RequestError(
+            f"{what} counts in encounter periods, and the campaign has none. State "
+            "encounter_period (s) in [campaign]."
+        )
+    for key, value in stated.items():
+        if isinstance(value, Periods) and encounter_period is not None:
+            stated[key] = periods_to_samples(value.count, encounter_period, dt)
+    if settings.preset is not None and encounter_period is not None:
         preset = HankelDMDc.paper if settings.preset == "paper" else HankelDMDc.recommended
         base = preset(encounter_period, dt)
         names = base.__dataclass_fields__
@@ -148,10 +154,14 @@ def fit_campaign(
     if not prepared:
         raise RequestError(NOTHING_TRAINS)
     dt = float(next(iter(prepared.values())).attrs["dt"])
-    period = campaign.encounter_period() if settings.preset is not None else None
+    needed = settings.preset is not None or any(counted(settings))
+    period = campaign.encounter_period() if needed else None
     spec = build_spec(settings, period, dt)
     runs = training_runs(prepared, spec.window if spec.history == "before" else None)
-    identified = spec.fit(runs, list(settings.states), list(settings.inputs), stop=settings.stop)
+    stop = settings.stop
+    if isinstance(stop, Periods) and period is not None:
+        stop = stop.at(period)
+    identified = spec.fit(runs, list(settings.states), list(settings.inputs), stop=stop)
     both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
     warn_of_repeats(identified, campaign, both)
     return identified
