@@ -9,8 +9,9 @@ from seakeep.study.comparison import (
 )
 from seakeep.study.run import run_study
 from seakeep.study.settings import Study, StudySettings, read_study
+from seakeep.study.specs import build_spec
 from seakeep.study.store import StorageError, StudyResult, read_result
-from seakeep.study.workflow import build_spec, fit_campaign, training_runs
+from seakeep.study.workflow import fit_campaign, training_runs
 
 __all__ = [
     "Comparison",
