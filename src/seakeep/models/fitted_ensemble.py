@@ -30,7 +30,7 @@ from seakeep.models.members import (
 from seakeep.models.model import HankelDMDcModel, Training
 from seakeep.models.progress import Progress, told
 from seakeep.models.settings import HankelSettings
-from seakeep.models.summaries import STATISTICS, check_level, first_lost, reduce_members
+from seakeep.models.summaries import check_level, first_lost, reduce_members, statistic_coordinate
 from seakeep.models.workers import Backend, check_workers, side_by_side
 
 __all__ = ["HankelEnsemble"]
@@ -330,7 +330,7 @@ class HankelEnsemble:
         return xr.Dataset(
             variables,
             coords={
-                "statistic": list(STATISTICS),
+                "statistic": statistic_coordinate(level),
                 "member": np.arange(self.n_members),
                 "time": window.time,
             },
@@ -417,7 +417,7 @@ class HankelEnsemble:
             self.state_labels, self.state_spread, values, ("window", "statistic", "lead")
         )
         variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
-        coords = window_coords(windows, self.dt) | {"statistic": list(STATISTICS)}
+        coords = window_coords(windows, self.dt) | {"statistic": statistic_coordinate(level)}
         attrs = self._attributes(run, windows[0]) | {"level": level, "members": self.n_members}
         return xr.Dataset(variables, coords=coords, attrs=attrs)
 

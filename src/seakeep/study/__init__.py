@@ -5,6 +5,7 @@ from seakeep.study.comparison import (
     at_full_scale,
     compare,
     comparison_table,
+    forecast_at_full_scale,
     in_degrees,
 )
 from seakeep.study.run import run_study
@@ -24,6 +25,7 @@ __all__ = [
     "compare",
     "comparison_table",
     "fit_campaign",
+    "forecast_at_full_scale",
     "in_degrees",
     "read_result",
     "read_study",
