@@ -1,5 +1,6 @@
 """Every verb, run as a user runs it, on the tutorial's campaign."""
 
+import csv
 import re
 import shlex
 import shutil
@@ -28,12 +29,9 @@ def place(tmp_path_factory):
     shutil.copytree(
         TUTORIAL, folder / "docs" / "tutorial", ignore=shutil.ignore_patterns("prepared", "*.md")
     )
-    assert (
-        cli.main(
-            ["fit", str(folder / "docs/tutorial/campaign.toml"), "-o", str(folder / "model.nc")]
-        )
-        == 0
-    )
+    fit = ["fit", str(folder / "docs/tutorial/campaign.toml"), "-o"]
+    assert cli.main([*fit, str(folder / "model.nc")]) == 0
+    assert cli.main([*fit, str(folder / "ensemble.nc"), "--model", "ensemble"]) == 0
     return folder
 
 
@@ -70,14 +68,15 @@ def test_the_example_of_each_help_runs(verb, run, place):
         pytest.importorskip("numba")
     status, out, _ = run(f"{verb} --help")
     assert status == 0
-    example = re.search(r"Example: (seakeep .*?)(?:\n\n|\Z)", out, re.DOTALL)
-    assert example, f"the help of {verb} has no example"
-    words = " ".join(example[1].split())
-    if verb == "init":
-        words = words.replace("campaign.toml", "draft.toml")
-    status, _, err = run(words.removeprefix("seakeep "))
-    shutil.rmtree(place / "docs/tutorial/prepared", ignore_errors=True)
-    assert status == 0, err
+    examples = re.findall(r"(?:Example|An ensemble): (seakeep .*?)(?:\n\n|\Z)", out, re.DOTALL)
+    assert len(examples) == 1 + (verb in ("fit", "forecast", "compare"))
+    for example in examples:
+        words = " ".join(example.split())
+        if verb == "init":
+            words = words.replace("campaign.toml", "draft.toml")
+        status, _, err = run(words.removeprefix("seakeep "))
+        shutil.rmtree(place / "docs/tutorial/prepared", ignore_errors=True)
+        assert status == 0, err
 
 
 def test_help_lists_every_verb(run):
@@ -109,6 +108,117 @@ def test_forecast_writes_netcdf_and_csv_alike(run, place):
     table = np.genfromtxt(place / "f.csv", delimiter=",", names=True, deletechars="")
     assert list(table.dtype.names[:2]) == ["time_[s]", "heave_[m]"]
     np.testing.assert_array_equal(table["heave_[m]"], heave)  # CSV keeps all digits
+
+
+def test_fit_says_what_an_ensemble_is_made_of(run, place):
+    status, out, _ = run(f"fit {CAMPAIGN} --model ensemble -o again.nc --workers 2")
+    assert status == 0
+    for words in (
+        "Ensemble of 40 Hankel DMD models with control: 5 states, 2 inputs, dt 0.08 s",
+        "Monte Carlo, seed 0; none infeasible",
+        "2 runs, a window of one of them a member, drawn",
+        "(stable)",
+    ):
+        assert words in out
+    one, two = (seakeep.load_model(place / f"{name}.nc") for name in ("ensemble", "again"))
+    assert one.members == two.members
+    # Eigenvalues that were found are kept in the file, the same for any number of workers.
+    np.testing.assert_array_equal(one.radii, two.radii)
+    assert two.radii[3] == pytest.approx(two.member(3).spectral_radius, rel=1e-12)
+
+
+FROM_20 = f"{CAMPAIGN} --run unseen --start 20 --steps 50"
+
+
+def test_forecast_writes_the_band_of_an_ensemble_as_netcdf_and_csv(run, place):
+    for name in ("band.nc", "band.csv"):
+        status, _, err = run(f"forecast ensemble.nc {FROM_20} --level 0.9 -o {name}")
+        assert status == 0
+        assert "mean, std and 90 % band of 40 members at 50 instants after t = 20 s" in err
+    campaign = seakeep.read_campaign(place / CAMPAIGN)
+    unseen = campaign.prepare(names=["unseen"])["unseen"]
+    ensemble = seakeep.load_model(place / "ensemble.nc")
+    expected = ensemble.forecast_summary(unseen, 20.0, 50, 0.9)
+    with xr.open_dataset(place / "band.nc", engine="h5netcdf") as stored:
+        xr.testing.assert_identical(stored.load(), expected)
+        assert "0.05 and 0.95 of the members" in stored["statistic"].attrs["comment"]
+    table = np.genfromtxt(place / "band.csv", delimiter=",", names=True, deletechars="")
+    assert list(table.dtype.names[:6]) == [
+        *("time_[s]", "heave_[m]", "heave_std_[m]", "heave_lower_[m]", "heave_upper_[m]"),
+        "pitch_[rad]",
+    ]
+    for column, statistic in (("_", "mean"), ("_std_", "std"), ("_upper_", "upper")):
+        found = table[f"heave{column}[m]"]
+        np.testing.assert_array_equal(found, expected["heave"].sel(statistic=statistic))
+
+
+def test_forecast_writes_the_members_when_asked(run, place):
+    for name in ("members.nc", "members.csv"):
+        status, _, err = run(f"forecast ensemble.nc {FROM_20} --members -o {name}")
+        assert status == 0
+        assert "40 members at 50 instants" in err
+    with xr.open_dataset(place / "members.nc", engine="h5netcdf") as stored:
+        assert dict(stored.sizes) == {"member": 40, "time": 50}
+        heave = stored["heave"].values
+        assert set(stored["status"].values) == {"ok"}
+    table = np.genfromtxt(place / "members.csv", delimiter=",", names=True, deletechars="")
+    np.testing.assert_array_equal(table["heave_member_39_[m]"], heave[39])
+
+
+def test_compare_judges_the_mean_of_an_ensemble_and_its_band(run, place):
+    status, out, err = run(f"compare ensemble.nc {CAMPAIGN} -o judged --level 0.8")
+    assert status == 0, err
+    assert "80 % band against measurement" in out
+    assert re.search(r"unseen: the 80 % band of 40 members holds \d+ % of the measured", out)
+    heave = judged_rows(place / "judged")["heave"]
+    unseen = seakeep.read_campaign(place / CAMPAIGN).prepare(names=["unseen"])["unseen"]
+    ensemble = seakeep.load_model(place / "ensemble.nc")
+    start = float(unseen.time[ensemble.history_samples - 1])
+    band = ensemble.forecast_summary(unseen, start, level=0.8)["heave"]
+    measured = unseen["heave"].sel(time=band["time"])
+    lower, upper = (band.sel(statistic=key) for key in ("lower", "upper"))
+    inside = float(((measured >= lower) & (measured <= upper)).mean())
+    # The same arithmetic, summed in another order.
+    assert float(heave["coverage"]) == pytest.approx(100 * inside, rel=1e-12)
+    assert float(heave["band_width"]) == pytest.approx(float((upper - lower).mean()), rel=1e-12)
+    assert (heave["members"], heave["diverged"]) == ("40", "0")
+    mean = band.sel(statistic="mean", drop=True).to_dataset()
+    expected = seakeep.metrics.nrmse(predicted=mean, measured=measured.to_dataset())
+    assert float(heave["nrmse"]) == pytest.approx(float(expected["heave"]), rel=1e-12)
+
+
+def judged_rows(folder):
+    """Rows of a comparison's CSV by their channel."""
+    lines = (folder / "comparison.csv").read_text(encoding="utf-8").splitlines()
+    return {row["channel"]: row for row in csv.DictReader(lines)}
+
+
+def test_bands_come_in_degrees_and_at_full_scale(run, place):
+    text = (place / CAMPAIGN).read_text(encoding="utf-8")
+    scaled = place / "docs/tutorial/scaled_ensemble.toml"
+    scaled.write_text(text.replace("[campaign]", "[campaign]\nscale_factor = 25.0", 1))
+    found = {}
+    for name, options in (("model", ""), ("full", "--full-scale"), ("radians", "--radians")):
+        command = f"compare ensemble.nc {scaled} --start 20 --steps 100 -o {name} {options}"
+        assert run(command)[0] == 0
+        found[name] = judged_rows(place / name)
+
+    def width(name, channel):
+        return float(found[name][channel]["band_width"])
+
+    assert width("full", "heave") == pytest.approx(25 * width("model", "heave"), rel=1e-12)
+    assert width("full", "pitch") == pytest.approx(width("model", "pitch"), rel=1e-12)
+    assert width("model", "pitch") == pytest.approx(np.degrees(width("radians", "pitch")))
+    for channel in ("heave", "pitch", "mooring_bow"):
+        inside = {found[name][channel]["coverage"] for name in found}
+        assert len(inside) == 1
+    command = f"forecast ensemble.nc {scaled} --run unseen --start 20 --steps 30 -o {{}}.nc"
+    assert run(command.format("small"))[0] == 0
+    assert run(command.format("large") + " --full-scale")[0] == 0
+    small, large = (xr.load_dataset(place / f"{n}.nc") for n in ("small", "large"))
+    np.testing.assert_allclose(large["heave"], 25 * small["heave"], rtol=1e-12)
+    np.testing.assert_allclose(large["time"], 5 * small["time"], rtol=1e-12)
+    assert list(large["status"].values) == ["ok"] * 40
 
 
 def test_compare_without_matplotlib_judges_and_says_what_is_missing(run, place, monkeypatch):
@@ -170,6 +280,28 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
             r"Did you mean 'unseen'",
         ),
         (f"forecast model.nc {CAMPAIGN} --run unseen --start 9 -o f.txt", 2, r"\.nc or \.csv"),
+        (
+            f"forecast model.nc {FROM_20} --members -o f.nc",
+            2,
+            r"--members is for ensembles, and",
+        ),
+        (
+            f"compare model.nc {CAMPAIGN} --level 0.9",
+            2,
+            r"--level is for ensembles, and",
+        ),
+        (
+            f"forecast ensemble.nc {FROM_20} --members --level 0.9 -o f.nc",
+            2,
+            r"--level belongs to the band, and --members writes the members without it\. Leave one",
+        ),
+        (
+            f"forecast ensemble.nc {FROM_20} --level 95 -o f.nc",
+            2,
+            r"level must lie between 0 and 1",
+        ),
+        (f"forecast ensemble.nc {FROM_20} -o no/f.nc", 2, r"the folder no does not exist"),
+        (f"fit {CAMPAIGN} -o m.nc --workers 0", 2, r"Invalid value for '--workers'"),
         (f"prepare {CAMPAIGN} -o model.nc", 2, r"cannot make the folder model\.nc: File exists"),
         (f"fit {CAMPAIGN} -o .", 2, r"cannot write \.: it is a folder\. Name a file in it"),
         (f"compare . {CAMPAIGN}", 2, r"\. is a folder\. Name the model file in it"),
@@ -223,7 +355,7 @@ def test_an_unforeseen_error_asks_for_a_report(run, monkeypatch):
 def test_a_diverging_forecast_is_told_and_ends_with_1(run, place):
     text = (place / CAMPAIGN).read_text()
     unstable = text.replace(
-        'preset = "recommended"', "state_delays = 60\ninput_delays = 5\nridge = 0.0"
+        'preset = "recommended"', "state_delays = 60\ninput_delays = 5\nridge = 0.0", 1
     )
     (place / "docs/tutorial/unstable.toml").write_text(unstable)
     status, _, err = run("fit docs/tutorial/unstable.toml -o unstable.nc")

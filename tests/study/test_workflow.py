@@ -1,11 +1,14 @@
 """From a campaign's [model] table to a model, and which samples train and test."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import seakeep
+from seakeep import BayesianHankelDMDc, Fixed, LogUniform, Uniform
 from seakeep.campaign import ModelSettings
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.study import (
@@ -127,6 +130,165 @@ def test_a_missing_key_is_named_with_the_preset_as_a_way_out():
         RequestError, match=r"no input_delays\. Add input_delays, ridge, or a preset"
     ):
         build_spec(settings, encounter_period=1.0, dt=0.1)
+
+
+ENSEMBLE = """
+kind = "bayesian_hankel_dmdc"
+n_members = 4
+seed = 7
+"""
+
+
+def table(**keys):
+    channels = {"states": ("heave",), "inputs": ("eta_fwd",)}
+    return ModelSettings.model_validate({**channels, "kind": "bayesian_hankel_dmdc", **keys})
+
+
+def test_one_function_makes_the_spec_of_an_ensemble_too():
+    stated = table(
+        train_length={"fixed": 12},
+        state_delay=0.5,
+        input_delay={"uniform": [1, 2]},
+        ridge={"log_uniform": [0.1, 10]},
+        n_members=9,
+        seed=3,
+        sampling="sobol",
+        train_on="windows",
+        delay_rows="exact",
+        alignment={"surge": "none"},
+    )
+    assert build_spec(stated, encounter_period=2.0, dt=0.1) == BayesianHankelDMDc(
+        encounter_period=2.0,
+        dt=0.1,
+        train_length=Fixed(12),
+        state_delay=Fixed(0.5),
+        input_delay=Uniform(1, 2),
+        ridge=LogUniform(0.1, 10),
+        n_members=9,
+        seed=3,
+        sampling="sobol",
+        train_on="windows",
+        delay_rows="exact",
+        alignment=seakeep.ProbeAlignment(surge="none"),
+    )
+
+
+def test_a_preset_of_an_ensemble_is_overridden_key_by_key():
+    stated = table(preset="paper", n_members=5, ridge=80.0, train_on="runs")
+    expected = dataclasses.replace(
+        BayesianHankelDMDc.paper(encounter_period=2.0, dt=0.1, n_members=5),
+        ridge=Fixed(80.0),
+        train_on="runs",
+    )
+    assert build_spec(stated, encounter_period=2.0, dt=0.1) == expected
+
+
+def test_distributions_of_scipy_are_named_in_the_table():
+    stated = {"distribution": "truncnorm", "parameters": {"a": -2, "b": 2, "loc": 1, "scale": 0.1}}
+    spec = build_spec(table(preset="paper", state_delay=stated), encounter_period=2.0, dt=0.1)
+    expected = stats.truncnorm(-2, 2, loc=1, scale=0.1).ppf([0.0, 0.3, 1.0])
+    np.testing.assert_array_equal(spec.state_delay.ppf(np.array([0.0, 0.3, 1.0])), expected)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "{ uniform = [30, 10] }",
+            r"state_delay.uniform: the bounds are \[low, high\], two",
+        ),
+        ("{ uniform = [1, inf] }", r"two finite numbers with low below high"),
+        ("{ log_uniform = [0, 1] }", r"'log_uniform' needs positive bounds"),
+        ("{ uniform = [1, 2], fixed = 1 }", r"state_delay: a prior is one of { uniform"),
+        ("{ fixed = 1, parameters = { loc = 1 } }", r"'parameters' go with 'distribution'; remove"),
+        (
+            '{ distribution = "nrom" }',
+            r"scipy.stats has no distribution 'nrom'. Did you mean 'norm'\?",
+        ),
+        (
+            '{ distribution = "gamma", parameters = { scale = 2.0 } }',
+            r"'parameters' of 'gamma' are a, loc, scale \(",
+        ),
+        (
+            '{ distribution = "norm", parameters = { scale = -1.0 } }',
+            r"'norm' with these 'parameters' has no median; correct them",
+        ),
+        ("-1.0", r"state_delay: received -1.0, which should be greater than or equal to 0"),
+    ],
+)
+def test_wrong_priors_in_the_file_are_named(halves, text, message):
+    with pytest.raises(RequestError, match=message):
+        campaign(halves, f'{ENSEMBLE}\npreset = "paper"\nstate_delay = {text}')
+
+
+def test_keys_of_an_ensemble_in_a_single_model_are_named(halves):
+    with pytest.raises(RequestError, match="'train_on' belongs to kind = 'bayesian_hankel_dmdc'"):
+        campaign(halves, EXACT + '\ntrain_on = "runs"')
+
+
+def test_an_ensemble_without_period_or_priors_says_where_to_state_them():
+    with pytest.raises(RequestError, match=r"an ensemble counts in .* State encounter_period"):
+        build_spec(table(state_delay=1, input_delay=1, ridge=1), encounter_period=None, dt=0.1)
+    with pytest.raises(
+        RequestError, match=r"no input_delay\. Add input_delay, ridge as priors, such as { uniform"
+    ):
+        build_spec(table(state_delay=1), encounter_period=2.0, dt=0.1)
+
+
+WINDOWED = ENSEMBLE + "state_delay = 0.2\ninput_delay = { uniform = [1, 3] }\nridge = 1e-9"
+LATE = '[runs.all]\nfile = "run.csv"\ntrain = [100.0, 150.0]\ntest = [150.0, 200.0]\n'
+
+
+@pytest.mark.parametrize("train_on", ["all", "runs", "windows"])
+def test_an_ensemble_learns_inside_the_training_span(halves, train_on):
+    model = f'{WINDOWED}\ntrain_length = {{ uniform = [4, 8] }}\ntrain_on = "{train_on}"'
+    ensemble = fit_campaign(campaign(halves, model, LATE))
+    assert ensemble.n_members == 4
+    first, stop = ensemble.training_spans["all"]
+    longest = 0.1 * (int(ensemble.draws.train_length_samples.max()) - 1)
+    assert first >= 100.0
+    assert stop <= 150.0 + 1e-9
+    if train_on == "windows":
+        assert len(set(ensemble.draws.last_sample.values)) > 1
+    else:
+        assert (first, stop) == (pytest.approx(150.0 - longest), pytest.approx(150.0))
+
+
+def test_the_history_of_an_ensemble_may_come_from_before_the_span(halves):
+    # The span holds 501 samples: beside a window of 495 there is no room for the delays.
+    period = campaign(halves, EXACT, LATE).encounter_period()
+    snapshots = 495
+    model = f"{WINDOWED}\ntrain_length = {snapshots * 0.1 / period}"
+    ensemble = fit_campaign(campaign(halves, model, LATE))
+    assert set(ensemble.draws.train_length_samples.values) == {snapshots}
+    assert ensemble.draws.attrs["redrawn"] == 0
+    for number in range(4):
+        assert ensemble.member(number).training.columns == (snapshots - 1,)
+
+
+def test_the_same_table_gives_the_members_that_python_gives(halves):
+    model = f"{WINDOWED}\ntrain_length = {{ uniform = [10, 20] }}"
+    whole = campaign(halves, model)
+    ensemble = fit_campaign(whole)
+    spec = BayesianHankelDMDc(
+        encounter_period=whole.encounter_period(),
+        train_length=Uniform(10, 20),
+        state_delay=Fixed(0.2),
+        input_delay=Uniform(1, 3),
+        ridge=Fixed(1e-9),
+        n_members=4,
+        seed=7,
+    )
+    run = whole.prepare()["all"].sel(time=slice(None, 100.0 + 1e-6))
+    expected = spec.fit({"all": run}, ["heave"], ["eta_fwd"])
+    assert expected.members == ensemble.members
+    np.testing.assert_array_equal(ensemble.member(2).A, expected.member(2).A)
+
+
+def test_repeats_of_an_ensemble_are_warned_of(repeating):
+    whole = campaign(repeating, ENSEMBLE + "state_delay = 0.2\ninput_delay = 0.2\nridge = 1")
+    with pytest.warns(seakeep.SeakeepWarning, match=REPEATS):
+        fit_campaign(whole)
 
 
 def test_a_campaign_without_training_run_is_refused(halves):

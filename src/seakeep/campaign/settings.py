@@ -6,9 +6,10 @@ turns what does not fit into messages. A field's description is the mend that a 
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from seakeep.campaign.chain_settings import (
     DerivedSettings,
@@ -22,7 +23,6 @@ from seakeep.campaign.tables import (
     Instant,
     Names,
     Positive,
-    Range,
     RunName,
     Samples,
     Span,
@@ -30,6 +30,7 @@ from seakeep.campaign.tables import (
     Window,
 )
 from seakeep.conventions import canonical_channel
+from seakeep.errors import did_you_mean
 
 __all__ = [
     "AlignmentSettings",
@@ -226,19 +227,66 @@ class RunSettings(Table):
         return self
 
 
+def _in_order(bounds: tuple[float, float]) -> tuple[float, float]:
+    if not (math.isfinite(bounds[0]) and math.isfinite(bounds[1]) and bounds[0] < bounds[1]):
+        raise ValueError("the bounds are [low, high], two finite numbers with low below high")
+    return bounds
+
+
+Bounds = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_in_order)]
+
+
 class PriorSettings(Table):
     """A prior of the ensemble, such as ``{ uniform = [10, 30] }``."""
 
-    uniform: Range | None = Field(default=None, description="[low, high]")
-    log_uniform: Range | None = Field(default=None, description="[low, high], both positive")
+    uniform: Bounds | None = Field(default=None, description="[low, high]")
+    log_uniform: Bounds | None = Field(default=None, description="[low, high], both positive")
     fixed: Finite | None = Field(default=None, description="a number")
+    distribution: str | None = Field(
+        default=None, description="name of a distribution of scipy.stats, such as 'norm'"
+    )
+    parameters: dict[str, Finite] = Field(
+        default_factory=dict,
+        description="of that distribution, such as { loc = 1.0, scale = 0.1 }",
+    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> PriorSettings:
-        if sum(getattr(self, k) is not None for k in ("uniform", "log_uniform", "fixed")) != 1:
-            raise ValueError("a prior is one of { uniform = [a, b] }, { log_uniform = [a, b] }, "
-                             "{ fixed = value }")  # fmt: skip
+        kinds = ("uniform", "log_uniform", "fixed", "distribution")
+        if sum(getattr(self, kind) is not None for kind in kinds) != 1:
+            raise ValueError(
+                "a prior is one of { uniform = [a, b] }, { log_uniform = [a, b] }, "
+                "{ fixed = value }, { distribution = 'name', parameters = { … } }"
+            )
+        if self.log_uniform is not None and self.log_uniform[0] <= 0:
+            raise ValueError("'log_uniform' needs positive bounds; logarithms start above zero")
+        if self.distribution is not None:
+            self._check_distribution()
+        elif self.parameters:
+            raise ValueError("'parameters' go with 'distribution'; remove them")
         return self
+
+    def _check_distribution(self) -> None:
+        from scipy import stats
+
+        found = getattr(stats, str(self.distribution), None)
+        if not isinstance(found, stats.rv_continuous | stats.rv_discrete):
+            known = [
+                name
+                for name in dir(stats)
+                if isinstance(getattr(stats, name), stats.rv_continuous | stats.rv_discrete)
+            ]
+            raise ValueError(
+                f"scipy.stats has no distribution '{self.distribution}'."
+                f"{did_you_mean(str(self.distribution), known)} Name another one"
+            )
+        try:
+            median = float(found(**self.parameters).ppf(0.5))
+        except TypeError as error:
+            shapes = f"{found.shapes}, loc, scale" if found.shapes else "loc, scale"
+            raise ValueError(f"'parameters' of '{found.name}' are {shapes} ({error})") from None
+        if not math.isfinite(median):
+            raise ValueError(f"'{found.name}' with these 'parameters' has no median; correct them")
 
 
 def _branch(value: object) -> str:
@@ -251,7 +299,10 @@ NumberOrPrior = Annotated[
     Discriminator(_branch),
 ]
 _ONE_MODEL = ("state_delays", "input_delays", "window")
-_ENSEMBLE = ("train_length", "state_delay", "input_delay", "n_members", "seed")
+_ENSEMBLE = (
+    *("train_length", "state_delay", "input_delay"),
+    *("n_members", "seed", "sampling", "train_on"),
+)
 
 
 class ModelSettings(Table):
@@ -293,11 +344,29 @@ class ModelSettings(Table):
     alignment: AlignmentSettings | None = Field(
         default=None, description="a table, such as { mode = 'dispersion', surge = 'predicted' }"
     )
-    train_length: PriorSettings | None = Field(default=None, description="a prior, in periods")
-    state_delay: PriorSettings | None = Field(default=None, description="a prior, in periods")
-    input_delay: PriorSettings | None = Field(default=None, description="a prior, in periods")
-    n_members: Annotated[int, Field(ge=1)] | None = Field(default=None, description="members")
-    seed: Annotated[int, Field(ge=0)] | None = Field(default=None, description="an integer")
+    train_length: NumberOrPrior | None = Field(
+        default=None, description="a prior or a number, in encounter periods; for an ensemble"
+    )
+    state_delay: NumberOrPrior | None = Field(
+        default=None, description="a prior or a number, in encounter periods; for an ensemble"
+    )
+    input_delay: NumberOrPrior | None = Field(
+        default=None, description="a prior or a number, in encounter periods; for an ensemble"
+    )
+    n_members: Annotated[int, Field(ge=1)] | None = Field(
+        default=None, description="number of members of an ensemble"
+    )
+    seed: Annotated[int, Field(ge=0)] | None = Field(
+        default=None, description="an integer, 0 or more; for an ensemble"
+    )
+    sampling: Literal["monte_carlo", "sobol"] | None = Field(
+        default=None, description="'monte_carlo' or 'sobol'; for an ensemble"
+    )
+    train_on: Literal["all", "runs", "windows"] | None = Field(
+        default=None,
+        description="what a member learns from: 'all' runs, one of the 'runs', or one of their "
+        "'windows'; for an ensemble",
+    )
 
     @model_validator(mode="after")
     def _keys_fit_kind(self) -> ModelSettings:

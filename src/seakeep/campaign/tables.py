@@ -25,7 +25,6 @@ __all__ = [
     "Interval",
     "Names",
     "Positive",
-    "Range",
     "RunName",
     "Samples",
     "Span",
@@ -90,12 +89,6 @@ def _rising_band(band: tuple[float, float]) -> tuple[float, float]:
     return band
 
 
-def _rising_range(pair: tuple[float, float]) -> tuple[float, float]:
-    if not rises(*pair):
-        raise ValueError("a range is [low, high], low before high")
-    return pair
-
-
 def _as_written(value: float) -> float | str:
     return str(value) if isinstance(value, Periods) else value
 
@@ -116,7 +109,6 @@ Frequency = Annotated[Positive, _in_periods(-1), AfterValidator(_positive), _STA
 Edge = Annotated[float, _in_periods(1), _STATED]
 Span = Annotated[tuple[Edge, Edge], Field(strict=False), AfterValidator(_rising)]
 Band = Annotated[tuple[Frequency, Frequency], Field(strict=False), AfterValidator(_rising_band)]
-Range = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_rising_range)]
 RunName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$")]
 Names = Annotated[tuple[str, ...], Field(strict=False)]
 

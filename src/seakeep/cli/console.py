@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from seakeep.campaign.prepare import Progress as Report
 from seakeep.errors import SeakeepWarning
 
-__all__ = ["messages", "progress_bar", "results", "tell_warnings"]
+__all__ = ["messages", "progress_bar", "results", "tell_warnings", "worker_count"]
 
 PIPE_WIDTH = 140
 """Columns of a table that goes to a file or a pipe, where nobody can widen the window."""
@@ -28,6 +29,15 @@ def results() -> Console:
 def messages() -> Console:
     """Console of messages, on standard error; long lines are left to the terminal."""
     return Console(file=sys.stderr, highlight=False, soft_wrap=True, markup=False)
+
+
+def worker_count(workers: int | None) -> int:
+    """Number of workers that was asked for; by default one a core that may be used."""
+    if workers is not None:
+        return workers
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 @contextmanager

@@ -2,32 +2,63 @@
 
 from __future__ import annotations
 
+import sys
+import time
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 import xarray as xr
 
 from seakeep.campaign import Campaign, load_prepared, read_campaign
-from seakeep.cli.console import messages, progress_bar, results
+from seakeep.campaign.prepare import Progress
+from seakeep.cli.console import messages, progress_bar, results, worker_count
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.files import check_place, make_folder, replacing
-from seakeep.models import HankelDMDcModel, load_model
+from seakeep.files import check_place, make_folder
+from seakeep.models import HankelDMDcModel, HankelEnsemble, load_model
 from seakeep.report.overlay import overlay_figure
 from seakeep.report.style import save_figure
-from seakeep.report.tables import rich_comparison, write_csv
-from seakeep.signals import to_full_scale
-from seakeep.study import at_full_scale, comparison_table, fit_campaign, in_degrees
+from seakeep.report.tables import (
+    band_findings,
+    forecast_words,
+    rich_bands,
+    rich_comparison,
+    write_csv,
+    write_forecast,
+)
+from seakeep.study import (
+    at_full_scale,
+    comparison_table,
+    fit_campaign,
+    forecast_at_full_scale,
+    in_degrees,
+)
 from seakeep.study import compare as compare_runs
 
 __all__ = ["compare", "fit", "forecast"]
+
+DEFAULT_LEVEL = 0.95
+SECONDS_BETWEEN_LINES = 5.0
 
 CampaignFile = Annotated[Path, typer.Argument(help="Campaign file.", metavar="CAMPAIGN.toml")]
 FullScale = Annotated[
     bool,
     typer.Option(
         "--full-scale", help="Convert results by Froude's law with the campaign's scale factor."
+    ),
+]
+Level = Annotated[
+    float | None,
+    typer.Option(
+        "--level",
+        help="Of an ensemble: probability between the bounds of the band; by default 0.95.",
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers", help="Members of an ensemble side by side; by default one a core.", min=1
     ),
 ]
 ModelFile = Annotated[
@@ -42,14 +73,23 @@ def fit(
         str | None,
         typer.Option("--model", help="Key in [models.NAME]; by default the table [model]."),
     ] = None,
+    workers: Workers = None,
 ) -> None:
-    """Identify a model from the training runs of a campaign.
+    """Identify a model, or an ensemble of models, from the training runs of a campaign.
+
+    The table [model] decides which: kind = 'bayesian_hankel_dmdc' is an ensemble.
 
     Example: seakeep fit docs/tutorial/campaign.toml -o model.nc
+
+    An ensemble: seakeep fit docs/tutorial/campaign.toml --model ensemble -o ensemble.nc
     """
     check_place(out)
     with progress_bar("Preparing") as progress:
         identified = fit_campaign(read_campaign(campaign), model, progress)
+    if isinstance(identified, HankelEnsemble):
+        with progress_bar("Stability") as progress:
+            tell = _quietly(progress)
+            identified.spectral_radii(workers=worker_count(workers), progress=tell)
     typer.echo(identified.summary())
     identified.save(out)
     messages().print(f"Wrote {out}. Judge it with: seakeep compare {out} {campaign}")
@@ -64,31 +104,59 @@ def forecast(
     steps: Annotated[
         int | None, typer.Option("--steps", help="Number of instants; by default to the end.")
     ] = None,
+    level: Level = None,
+    members: Annotated[
+        bool,
+        typer.Option("--members", help="Of an ensemble: write each member, and no statistics."),
+    ] = False,
+    workers: Workers = None,
     full_scale: FullScale = False,
 ) -> None:
     """Forecast a run: the model runs freely after START, driven by the measured waves.
 
+    Of an ensemble, mean, standard deviation and band of its members are written.
+
     Example: seakeep forecast model.nc docs/tutorial/campaign.toml --run unseen --start 20
     --steps 400 -o forecast.csv
+
+    An ensemble: seakeep forecast ensemble.nc docs/tutorial/campaign.toml --run unseen --start 20
+    --steps 400 --level 0.9 -o band.csv
     """
     if out.suffix not in (".nc", ".csv"):
         raise RequestError(f"{out} ends in '{out.suffix}'; a forecast is written as .nc or .csv.")
+    check_place(out)
     identified = load_model(model)
     read = read_campaign(campaign)
-    result = identified.forecast(_prepared(read, run), start=start, steps=steps)
+    if isinstance(identified, HankelEnsemble):
+        if members and level is not None:
+            raise RequestError(
+                "--level belongs to the band, and --members writes the members without it. Leave "
+                "one of them out."
+            )
+        prepared = _prepared(read, run)
+        with progress_bar("Forecasting") as progress:
+            how: dict[str, Any] = {
+                "workers": worker_count(workers),
+                "progress": _quietly(progress),
+            }
+            if members:
+                result = identified.forecast(prepared, start, steps, **how)
+            else:
+                result = identified.forecast_summary(
+                    prepared, start, steps, DEFAULT_LEVEL if level is None else level, **how
+                )
+    else:
+        _refuse_for_one(model, {"--level": level is not None, "--members": members})
+        result = identified.forecast(_prepared(read, run), start=start, steps=steps)
     if full_scale:
-        result = to_full_scale(result, _scale(read))
-    with replacing(out) as temporary:
-        if out.suffix == ".nc":
-            result.to_netcdf(temporary, engine="h5netcdf")
-        else:
-            _with_units(result).to_dataframe().to_csv(temporary)
+        result = forecast_at_full_scale(result, _scale(read))
+    write_forecast(result, out)
     status = result.attrs["status"]
     messages().print(
-        f"Wrote {out}: {result.sizes['time']} instants after t = {result.attrs['start']:.10g} s, "
-        f"status {status}."
+        f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
+        f"t = {result.attrs['start']:.10g} s, status {status}."
     )
-    if status != "ok":
+    if not _usable(result):
         raise typer.Exit(1)
 
 
@@ -118,25 +186,37 @@ def compare(
     radians: Annotated[
         bool, typer.Option("--radians", help="Show angles in radians instead of degrees.")
     ] = False,
+    level: Level = None,
+    workers: Workers = None,
     full_scale: FullScale = False,
 ) -> None:
     """Forecast test runs and judge the forecasts against the measurement.
 
-    Prints a table a channel and writes it as CSV, with an overlay figure a run.
+    Prints a table a channel and writes it as CSV, with an overlay figure a run. Of an ensemble the
+    members' mean is judged, and how much of the measurement their band holds.
 
     Example: seakeep compare model.nc docs/tutorial/campaign.toml -o comparison
+
+    An ensemble: seakeep compare ensemble.nc docs/tutorial/campaign.toml -o judged
     """
     if format_ not in ("png", "svg", "pdf"):
         raise RequestError(f"--format must be png, svg or pdf; received '{format_}'.")
     identified = load_model(model)
-    if not isinstance(identified, HankelDMDcModel):
-        raise RequestError(
-            f"{model} holds an ensemble; compare judges a single model. Forecast the ensemble with "
-            "`seakeep forecast`, or save one member with ensemble.member(0).save(...)."
-        )
-    with progress_bar("Preparing") as progress:
+    if isinstance(identified, HankelDMDcModel):
+        _refuse_for_one(model, {"--level": level is not None})
+    with progress_bar("Comparing") as progress:
         read = read_campaign(campaign)
-        comparisons = compare_runs(identified, read, run or (), start, steps, progress)
+        comparisons = compare_runs(
+            identified,
+            read,
+            run or (),
+            start,
+            steps,
+            progress,
+            members=_quietly(progress),
+            level=DEFAULT_LEVEL if level is None else level,
+            workers=worker_count(workers),
+        )
     if full_scale:
         scale = _scale(read)
         comparisons = [at_full_scale(each, scale) for each in comparisons]
@@ -144,6 +224,10 @@ def compare(
         comparisons = [in_degrees(each) for each in comparisons]
     table = comparison_table(comparisons)
     results().print(rich_comparison(table))
+    if "coverage" in table:
+        results().print(rich_bands(table))
+    for text in band_findings(table):
+        results().print(text, soft_wrap=True)
     make_folder(out)
     written = [write_csv(table, out / "comparison.csv")]
     if find_spec("matplotlib") is None:
@@ -156,7 +240,7 @@ def compare(
             path = out / f"{comparison.run}.{format_}"
             written.append(save_figure(overlay_figure(comparison), path))
     messages().print("Wrote " + ", ".join(map(str, written)))
-    if any(comparison.status != "ok" for comparison in comparisons):
+    if not all(comparison.complete for comparison in comparisons):
         raise typer.Exit(1)
 
 
@@ -179,11 +263,33 @@ def _prepared(campaign: Campaign, run: str) -> xr.Dataset:
     return load_prepared(campaign, names=[run])[run]
 
 
-def _with_units(result: xr.Dataset) -> xr.Dataset:
-    names = {
-        str(name): f"{name} [{variable.attrs.get('units', '')}]"
-        for name, variable in result.data_vars.items()
-    }
-    # Instants are multiples of a step; nine decimals hide the rounding of the product.
-    timed = result.assign_coords(time=result["time"].round(9))
-    return timed.rename({**names, "time": "time [s]"})
+def _refuse_for_one(model: Path, given: dict[str, bool]) -> None:
+    """Refuse options of ensembles where a file holds a single model."""
+    for option, stated in given.items():
+        if stated:
+            raise RequestError(
+                f"{option} is for ensembles, and {model} holds a single model. Leave it out, or "
+                "fit an ensemble (kind = 'bayesian_hankel_dmdc' in [model])."
+            )
+
+
+def _usable(result: xr.Dataset) -> bool:
+    """Whether there is a forecast at all instants, of one member at least."""
+    if "member" in result.dims:
+        return int(result.attrs["diverged"]) < result.sizes["member"]
+    return str(result.attrs["status"]) == "ok"
+
+
+def _quietly(progress: Progress) -> Progress:
+    """Tell every few seconds where each step would be a line of its own."""
+    if sys.stderr.isatty():
+        return progress
+    told = time.monotonic()
+
+    def tell(done: int, total: int, what: str) -> None:
+        nonlocal told
+        if time.monotonic() - told > SECONDS_BETWEEN_LINES:
+            told = time.monotonic()
+            progress(done, total, what)
+
+    return tell

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Callable
@@ -14,7 +13,7 @@ from rich import box
 from rich.table import Table
 
 from seakeep.campaign.prepare import Progress
-from seakeep.cli.console import messages, progress_bar, results
+from seakeep.cli.console import messages, progress_bar, results, worker_count
 from seakeep.errors import RequestError
 from seakeep.report.page import write_report
 from seakeep.report.study_tables import ReportTable, overview_table
@@ -47,7 +46,9 @@ def study(
     """
     asked = read_study(study_file)
     folder = out or study_file.parent / f"{study_file.stem}-results"
-    _run(folder, lambda tell: run_study(asked, folder, workers=_count(workers), progress=tell))
+    _run(
+        folder, lambda tell: run_study(asked, folder, workers=worker_count(workers), progress=tell)
+    )
 
 
 def reproduce(
@@ -79,7 +80,7 @@ def reproduce(
     _run(
         out,
         lambda tell: reproduce_study(
-            out, chosen, size=size, seed=seed, workers=_count(workers), progress=tell
+            out, chosen, size=size, seed=seed, workers=worker_count(workers), progress=tell
         ),
     )
 
@@ -95,14 +96,6 @@ def report(
     with _Progress("Report") as tell:
         page = write_report(found, tell)
     typer.echo(str(page))
-
-
-def _count(workers: int | None) -> int:
-    if workers is not None:
-        return workers
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 class _Progress:

@@ -50,6 +50,7 @@ class Parts:
     dt: float
     labels: dict[str, tuple[ChannelLabel, ...]]
     alignment: FittedAlignment | None
+    radii: np.ndarray[Any, np.dtype[np.float64]] | None
 
 
 def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Dataset:
@@ -82,10 +83,14 @@ def pack(
     dt: float,
     labels: Mapping[str, tuple[ChannelLabel, ...]],
     alignment: FittedAlignment | None = None,
+    radii: np.ndarray[Any, np.dtype[np.float64]] | None = None,
 ) -> xr.Dataset:
     """Put the parts of an ensemble into a Dataset of arrays and JSON texts."""
     dataset = draws_dataset(members, origin)
     variables: dict[str, Any] = {}
+    if radii is not None:
+        label = {"long_name": "spectral radius", "units": "1"}
+        variables["spectral_radius"] = ("member", radii, label)
     for number, (x, u) in enumerate(zip(arrays.states, arrays.inputs, strict=True)):
         variables[f"states_{number}"] = ((f"sample_{number}", "state"), x)
         variables[f"inputs_{number}"] = ((f"sample_{number}", "input"), u)
@@ -138,6 +143,7 @@ def unpack(dataset: xr.Dataset) -> Parts:
         dt=float(dataset.attrs["dt"]),
         labels=labels,
         alignment=FittedAlignment.from_dict(alignment) if alignment else None,
+        radii=_values(dataset, "spectral_radius") if "spectral_radius" in dataset else None,
     )
 
 

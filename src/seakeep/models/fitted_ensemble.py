@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,16 +14,23 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.errors import RequestError
-from seakeep.models import aligned, ensemble_store, forecasting, store
+from seakeep.models import aligned, ensemble_store, ensemble_summary, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.draws import Draw
+from seakeep.models.ensemble_labels import label_channels, statuses, verdict, window_coords
+from seakeep.models.ensemble_series import member_series, read_windows
+from seakeep.models.ensemble_summary import warn_of_unstable
 from seakeep.models.forecasting import ForecastWindow
 from seakeep.models.labelled import ChannelLabel
-from seakeep.models.members import Task, TrainingArrays, forecast_member, identify_member
+from seakeep.models.members import (
+    TrainingArrays,
+    identify_member,
+    member_radius,
+)
 from seakeep.models.model import HankelDMDcModel, Training
-from seakeep.models.offsets import check_offset
+from seakeep.models.progress import Progress, told
 from seakeep.models.settings import HankelSettings
-from seakeep.models.summaries import STATISTICS, check_level, first_lost, reduce_members
+from seakeep.models.summaries import check_level, first_lost, reduce_members, statistic_coordinate
 from seakeep.models.workers import Backend, check_workers, side_by_side
 
 __all__ = ["HankelEnsemble"]
@@ -54,6 +61,8 @@ class HankelEnsemble:
         Names and units of states and inputs.
     alignment : FittedAlignment, optional
         How the wave input is aligned to the vessel; the training arrays are aligned.
+    radii : ndarray, shape (member,), optional
+        Spectral radii of the members, once :meth:`spectral_radii` has found them.
     """
 
     settings: HankelSettings = field(repr=False)
@@ -64,6 +73,7 @@ class HankelEnsemble:
     state_labels: tuple[ChannelLabel, ...]
     input_labels: tuple[ChannelLabel, ...]
     alignment: FittedAlignment | None = None
+    radii: FloatArray | None = field(default=None, repr=False)
 
     @property
     def n_members(self) -> int:
@@ -106,6 +116,30 @@ class HankelEnsemble:
         """
         return ensemble_store.draws_dataset(self.members, self.origin)
 
+    @cached_property
+    def state_spread(self) -> FloatArray:
+        """Standard deviation of the states over all that members learn from, shape (N,)."""
+        spread: FloatArray = np.concatenate(self.arrays.states).std(axis=0, ddof=1)
+        return spread
+
+    @cached_property
+    def training_spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant of the training windows in each run that trains a member, s."""
+        spans: dict[str, tuple[float, float]] = {}
+        for run, name in enumerate(self.arrays.names):
+            ends = [self._ends(draw, run) for draw in self.members if draw.run in (None, run)]
+            if ends:
+                spans[name] = min(first for first, _ in ends), max(stop for _, stop in ends)
+        return spans
+
+    def _ends(self, draw: Draw, run: int) -> tuple[float, float]:
+        """First and last instant of a member's training window in a run, s."""
+        arrays = self.arrays
+        last = len(arrays.states[run]) - 1 if draw.last is None else draw.last - arrays.offsets[run]
+        stop = arrays.begins[run] + last * self.dt
+        samples = last + 1 if draw.window is None else draw.window
+        return stop - (samples - 1) * self.dt, stop
+
     def member(self, number: int) -> HankelDMDcModel:
         """One member as a model of its own.
 
@@ -138,14 +172,7 @@ class HankelEnsemble:
             ridge=draw.ridge,
             window=draw.window,
         )
-        first, stop = [], []
-        for run, window in zip(found.runs, found.windows, strict=True):
-            end = draw.last
-            end = (
-                len(self.arrays.states[run]) - 1 if end is None else end - self.arrays.offsets[run]
-            )
-            stop.append(self.arrays.begins[run] + end * self.dt)
-            first.append(stop[-1] - (window.last - window.first) * self.dt)
+        ends = [self._ends(draw, run) for run in found.runs]
         return HankelDMDcModel(
             settings=settings,
             coefficients=found.solution.coefficients,
@@ -156,8 +183,8 @@ class HankelEnsemble:
             input_scale=found.input_scale,
             training=Training(
                 runs=tuple(self.arrays.names[run] for run in found.runs),
-                first=tuple(first),
-                stop=tuple(stop),
+                first=tuple(first for first, _ in ends),
+                stop=tuple(stop for _, stop in ends),
                 columns=tuple(window.columns for window in found.windows),
                 method=found.solution.method,
                 ridge=found.solution.ridge,
@@ -165,6 +192,52 @@ class HankelEnsemble:
             ),
             alignment=self.alignment,
         )
+
+    def spectral_radii(
+        self,
+        *,
+        workers: int = 1,
+        backend: Backend = "threads",
+        progress: Progress | None = None,
+    ) -> FloatArray:
+        """Largest modulus of an eigenvalue of each member; a member is stable below one.
+
+        Found once: the ensemble keeps them, and its file does.
+
+        Parameters
+        ----------
+        workers, backend, progress
+            As in :meth:`forecast`.
+
+        Returns
+        -------
+        ndarray, shape (member,)
+
+        Warns
+        -----
+        SeakeepWarning
+            When they are found, if one or more are not below one.
+        """
+        if self.radii is None:
+            check_workers(workers, backend)
+            data = (self.arrays, self.settings)
+            found = side_by_side(member_radius, data, self.members, workers, backend)
+            radii = np.array(list(told(found, self.n_members, progress)))
+            radii.flags.writeable = False
+            object.__setattr__(self, "radii", radii)
+            warn_of_unstable(radii)
+        assert self.radii is not None
+        return self.radii
+
+    def summary(self) -> str:
+        """Text that says what the ensemble is made of, and how stable its members are.
+
+        Returns
+        -------
+        str
+            A few lines; the first reading finds the :meth:`spectral_radii`.
+        """
+        return ensemble_summary.summary(self)
 
     def forecast(
         self,
@@ -174,6 +247,7 @@ class HankelEnsemble:
         *,
         workers: int = 1,
         backend: Backend = "threads",
+        progress: Progress | None = None,
     ) -> xr.Dataset:
         """Free runs of all members.
 
@@ -185,6 +259,8 @@ class HankelEnsemble:
             Members at work at a time; the result does not depend on it.
         backend : {"threads", "processes"}, optional
             Kind of worker.
+        progress : callable, optional
+            Called as ``progress(done, total, what)`` after each member.
 
         Returns
         -------
@@ -197,15 +273,16 @@ class HankelEnsemble:
         RequestError, DataError
             As :meth:`HankelDMDcModel.forecast`.
         """
-        windows = self._windows(run, [start], steps)
-        values = np.stack(list(self._series(run, windows, workers, backend)))[:, 0]
+        windows = read_windows(self, run, [start], steps)
+        series = member_series(self, run, windows, workers, backend, progress)
+        values = np.stack(list(series))[:, 0]
         lost = first_lost(values)
-        variables = self._variables(values, ("member", "time"))
-        variables["status"] = xr.Variable(("member",), _status(lost, windows[0].time.values))
+        variables = self._labelled(values, "member", "time")
+        variables["status"] = xr.Variable(("member",), statuses(lost, windows[0].time.values))
         return xr.Dataset(
             variables,
             coords={"member": np.arange(self.n_members), "time": windows[0].time},
-            attrs=self._attributes(run, windows[0]) | _verdict(lost) | {"start": windows[0].start},
+            attrs=self._attributes(run, windows[0]) | verdict(lost) | {"start": windows[0].start},
         )
 
     def forecast_summary(
@@ -217,12 +294,13 @@ class HankelEnsemble:
         *,
         workers: int = 1,
         backend: Backend = "threads",
+        progress: Progress | None = None,
     ) -> xr.Dataset:
         """Mean, standard deviation and band of the members, never all of them at once.
 
         Parameters
         ----------
-        run, start, steps, workers, backend
+        run, start, steps, workers, backend, progress
             As in :meth:`forecast`.
         level : float, optional
             Probability between ``lower`` and ``upper``.
@@ -240,17 +318,19 @@ class HankelEnsemble:
             As :meth:`forecast`.
         """
         level = check_level(level)
-        (window,) = self._windows(run, [start], steps)
-        series = self._series(run, [window], workers, backend)
+        (window,) = read_windows(self, run, [start], steps)
+        series = member_series(self, run, [window], workers, backend, progress)
         shape = (1, window.steps, len(self.states))
         values, lost = reduce_members(series, self.n_members, shape, level)
-        variables = self._variables(values[0], ("statistic", "time"))
-        variables["status"] = xr.Variable(("member",), _status(lost[:, 0], window.time.values))
-        counts = {"level": level, "members": self.n_members, **_verdict(lost)}
+        variables = label_channels(
+            self.state_labels, self.state_spread, values[0], ("statistic", "time")
+        )
+        variables["status"] = xr.Variable(("member",), statuses(lost[:, 0], window.time.values))
+        counts = {"level": level, "members": self.n_members, **verdict(lost)}
         return xr.Dataset(
             variables,
             coords={
-                "statistic": list(STATISTICS),
+                "statistic": statistic_coordinate(level),
                 "member": np.arange(self.n_members),
                 "time": window.time,
             },
@@ -286,15 +366,17 @@ class HankelEnsemble:
         RequestError, DataError
             As :meth:`forecast`.
         """
-        windows = self._windows(run, starts, steps)
-        values = np.stack(list(self._series(run, windows, workers, backend)), axis=1)
+        windows = read_windows(self, run, starts, steps)
+        values = np.stack(list(member_series(self, run, windows, workers, backend)), axis=1)
         first = first_lost(values)
-        variables = self._variables(values, ("window", "member", "lead"))
+        variables = label_channels(
+            self.state_labels, self.state_spread, values, ("window", "member", "lead")
+        )
         status = [
-            _status(row, window.time.values) for row, window in zip(first, windows, strict=True)
+            statuses(row, window.time.values) for row, window in zip(first, windows, strict=True)
         ]
         variables["status"] = xr.Variable(("window", "member"), np.stack(status))
-        coords = self._window_coords(windows) | {"member": np.arange(self.n_members)}
+        coords = window_coords(windows, self.dt) | {"member": np.arange(self.n_members)}
         return xr.Dataset(variables, coords=coords, attrs=self._attributes(run, windows[0]))
 
     def summarize_windows(
@@ -327,64 +409,20 @@ class HankelEnsemble:
             As :meth:`forecast`.
         """
         level = check_level(level)
-        windows = self._windows(run, starts, steps)
+        windows = read_windows(self, run, starts, steps)
         shape = (len(windows), windows[0].steps, len(self.states))
-        series = self._series(run, windows, workers, backend)
+        series = member_series(self, run, windows, workers, backend)
         values, lost = reduce_members(series, self.n_members, shape, level)
-        variables = self._variables(values, ("window", "statistic", "lead"))
+        variables = label_channels(
+            self.state_labels, self.state_spread, values, ("window", "statistic", "lead")
+        )
         variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
-        coords = self._window_coords(windows) | {"statistic": list(STATISTICS)}
+        coords = window_coords(windows, self.dt) | {"statistic": statistic_coordinate(level)}
         attrs = self._attributes(run, windows[0]) | {"level": level, "members": self.n_members}
         return xr.Dataset(variables, coords=coords, attrs=attrs)
 
-    def _windows(
-        self, run: xr.Dataset, starts: Sequence[float], steps: int | None
-    ) -> list[ForecastWindow]:
-        windows = [forecasting.read_window(self, run, float(start), steps) for start in starts]
-        if not windows:
-            raise RequestError("starts is empty: name at least one instant to forecast from.")
-        if self.alignment is None:
-            return windows
-        check_offset(run)
-        if self.alignment.settings.surge == "predicted":
-            return windows
-        return [aligned.align_window(self, run, window) for window in windows]
-
-    def _series(
-        self,
-        run: xr.Dataset,
-        windows: Sequence[ForecastWindow],
-        workers: int,
-        backend: Backend,
-    ) -> Iterator[FloatArray]:
-        """Members one after the other, each (window, steps, N)."""
-        check_workers(workers, backend)
-        if self.alignment is not None and self.alignment.settings.surge == "predicted":
-            members = map(self.member, range(self.n_members))
-            return (
-                np.stack([aligned.closed_loop(member, run, window) for window in windows])
-                for member in members
-            )
-        histories = np.stack([window.state_history for window in windows])
-        inputs = np.stack([np.concatenate([w.input_history, w.input_future]) for w in windows])
-        task = Task(self.arrays, self.settings, histories, inputs, windows[0].steps)
-        return side_by_side(forecast_member, task, self.members, workers, backend)
-
-    def _variables(self, values: FloatArray, dims: tuple[str, ...]) -> dict[str, xr.Variable]:
-        return {
-            label.name: xr.Variable(
-                dims, values[..., column], {"units": label.units, "long_name": label.long_name}
-            )
-            for column, label in enumerate(self.state_labels)
-        }
-
-    def _window_coords(self, windows: Sequence[ForecastWindow]) -> dict[str, xr.Variable]:
-        lead = self.dt * np.arange(1, windows[0].steps + 1)
-        starts = np.array([window.start for window in windows])
-        return {
-            "start": xr.Variable(("window",), starts, {"units": "s", "long_name": "start"}),
-            "lead": xr.Variable(("lead",), lead, {"units": "s", "long_name": "time after start"}),
-        }
+    def _labelled(self, values: FloatArray, *dims: str) -> dict[str, xr.Variable]:
+        return label_channels(self.state_labels, self.state_spread, values, dims)
 
     def _attributes(self, run: xr.Dataset, window: ForecastWindow) -> dict[str, Any]:
         notes = {} if self.alignment is None else aligned.notes(self.alignment, run)
@@ -415,6 +453,7 @@ class HankelEnsemble:
             dt=self.dt,
             labels={"state": self.state_labels, "input": self.input_labels},
             alignment=self.alignment,
+            radii=self.radii,
         )
 
     @classmethod
@@ -441,16 +480,5 @@ class HankelEnsemble:
             state_labels=parts.labels["state"],
             input_labels=parts.labels["input"],
             alignment=parts.alignment,
+            radii=parts.radii,
         )
-
-
-def _verdict(lost: npt.NDArray[np.int64]) -> dict[str, Any]:
-    diverged = int(np.count_nonzero(lost >= 0))
-    status = f"{diverged} of {len(lost)} members diverged" if diverged else "ok"
-    return {"status": status, "diverged": diverged}
-
-
-def _status(first_lost: npt.NDArray[np.int64], time: FloatArray) -> npt.NDArray[np.str_]:
-    return np.array(
-        ["ok" if at < 0 else f"diverged at t = {time[at]:g} s" for at in first_lost], dtype=str
-    )

@@ -14,6 +14,7 @@ from seakeep.models import labelled
 from seakeep.models.identification import Scale
 
 if TYPE_CHECKING:
+    from seakeep.models.alignment import FittedAlignment
     from seakeep.models.model import HankelDMDcModel
 
 __all__ = ["ForecastWindow", "label_forecast", "modes", "read_window", "summary"]
@@ -22,6 +23,10 @@ FloatArray = npt.NDArray[np.float64]
 
 DIVERGED = 1e6
 """A free run is given up where a state is this many training SDs from where it began."""
+
+
+DIVERGED_AT = "diverged at t = "
+"""How the status of a free run that was given up begins."""
 
 
 class Reader(Protocol):
@@ -202,12 +207,25 @@ def cut_divergence(values: FloatArray, scale: Scale, begun: FloatArray) -> Float
     return values
 
 
+def status_text(lost: int, time: FloatArray) -> str:
+    """What ``status`` says of a free run whose first lost instant is `lost`, or −1 for none."""
+    return "ok" if lost < 0 else f"{DIVERGED_AT}{time[lost]:.10g} s"
+
+
+def status_at_clock(status: str, clock: float) -> str:
+    """The same status where time runs by a factor `clock`, as at full scale."""
+    if not status.startswith(DIVERGED_AT):
+        return status
+    instant = float(status.removeprefix(DIVERGED_AT).removesuffix(" s"))
+    return f"{DIVERGED_AT}{clock * instant:.10g} s"
+
+
 def label_forecast(
     model: HankelDMDcModel, window: ForecastWindow, values: FloatArray
 ) -> xr.Dataset:
     """Dataset of a forecast of shape (steps, N), with units, spread in training, and status."""
     lost = np.flatnonzero(np.isnan(values).any(axis=1))
-    status = "ok" if lost.size == 0 else f"diverged at t = {window.time.values[lost[0]]:.10g} s"
+    status = status_text(int(lost[0]) if lost.size else -1, window.time.values)
     variables = {
         label.name: xr.Variable(
             ("time",),
@@ -268,13 +286,14 @@ def summary(model: HankelDMDcModel) -> str:
     lines = [
         f"Hankel DMD with control: {counted(states, 'state')}, "
         f"{counted(inputs, 'input')}, dt {model.dt:g} s",
-        f"  states        {', '.join(_with_units(model.state_labels))}",
-        f"  inputs        {', '.join(_with_units(model.input_labels)) or 'none (autonomous)'}",
+        f"  states        {', '.join(with_units(model.state_labels))}",
+        f"  inputs        {', '.join(with_units(model.input_labels)) or 'none (autonomous)'}",
         f"  delays        {model.state_delays} of the states ({model.state_delays * model.dt:g} s),"
         f" {model.input_delays} of the inputs ({model.input_delays * model.dt:g} s)",
         f"  history       {model.history_samples} samples up to the start of a forecast",
         f"  regression    {_regression(model)}; delay rows "
         f"{'exact' if settings.delay_rows == 'exact' else 'regressed'}",
+        *alignment_line(model.alignment),
         f"  training      {sum(training.columns)} snapshot pairs of "
         f"{counted(len(training.runs), 'run')}",
     ]
@@ -297,8 +316,18 @@ def summary(model: HankelDMDcModel) -> str:
     return "\n".join(lines)
 
 
-def _with_units(labels: tuple[labelled.ChannelLabel, ...]) -> list[str]:
+def with_units(labels: tuple[labelled.ChannelLabel, ...]) -> list[str]:
+    """Names of channels with their units."""
     return [f"{label.name} [{label.units or '?'}]" for label in labels]
+
+
+def alignment_line(alignment: FittedAlignment | None) -> list[str]:
+    """Line of a summary that says how the input is aligned; none without an alignment."""
+    if alignment is None:
+        return []
+    speed = "" if alignment.celerity is None else f", celerity {alignment.celerity:.4g} m/s"
+    settings = alignment.settings
+    return [f"  alignment     mode {settings.mode}{speed}; surge {settings.surge}"]
 
 
 def _regression(model: HankelDMDcModel) -> str:

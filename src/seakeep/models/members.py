@@ -17,7 +17,14 @@ from seakeep.models.forecasting import cut_divergence
 from seakeep.models.identification import Scale, moments
 from seakeep.models.settings import HankelSettings
 
-__all__ = ["Member", "Task", "TrainingArrays", "forecast_member", "identify_member"]
+__all__ = [
+    "Member",
+    "Task",
+    "TrainingArrays",
+    "forecast_member",
+    "identify_member",
+    "member_radius",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -189,6 +196,34 @@ def forecast_member(task: Task, draw: Draw, scratch: Scratch) -> FloatArray:
     with np.errstate(over="ignore"):  # a run that is lost is cut just below
         values = member.state_scale.physical(deviations)
     return cut_divergence(values, member.state_scale, task.histories[:, -1:])
+
+
+def member_radius(
+    data: tuple[TrainingArrays, HankelSettings], draw: Draw, scratch: Scratch
+) -> float:
+    """Identify one member and find the largest modulus of an eigenvalue of its Â.
+
+    Parameters
+    ----------
+    data : (TrainingArrays, HankelSettings)
+        Training data, and what all members share.
+    draw : Draw
+        The member.
+    scratch : Scratch
+        Memory that the member alone uses while it is at work.
+
+    Returns
+    -------
+    float
+        The spectral radius.
+    """
+    arrays, settings = data
+    scratch.reset()
+    N = len(arrays.state_names)
+    size = N * (draw.state_delays + 1)
+    top = identify_member(arrays, settings, draw, scratch).solution.coefficients[:, :size]
+    square = top if len(top) == size else np.concatenate([top, np.eye(size - N, size)])
+    return float(np.abs(np.linalg.eigvals(square)).max())
 
 
 def reach(draws: Sequence[Draw], samples: Sequence[int], inside: bool) -> list[int]:

@@ -150,6 +150,14 @@ class HankelDMDcModel:
         return self.input_scale.std
 
     @property
+    def training_spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant of the training window of each run, s."""
+        training = self.training
+        return dict(
+            zip(training.runs, zip(training.first, training.stop, strict=True), strict=True)
+        )
+
+    @property
     def top(self) -> tuple[FloatArray, FloatArray]:
         """Regressed rows of Â and B̂: N of them with exact delay rows, else all."""
         size = len(self.state_labels) * (self.state_delays + 1)

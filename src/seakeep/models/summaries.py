@@ -59,6 +59,16 @@ def statistics_of(values: FloatArray, level: float) -> FloatArray:
     return out
 
 
+def statistic_coordinate(level: float) -> xr.Variable:
+    """Coordinate of the statistics, which says what the bounds of the band are."""
+    bounds = f"the quantiles {0.5 - level / 2:g} and {0.5 + level / 2:g} of the members"
+    attrs = {
+        "long_name": "statistic over the members",
+        "comment": f"lower and upper are {bounds}; members that diverged are left out of all four",
+    }
+    return xr.Variable(("statistic",), list(STATISTICS), attrs)
+
+
 def first_lost(values: FloatArray) -> npt.NDArray[np.int64]:
     """First instant at which a channel is NaN, or −1, of values (…, steps, N)."""
     gone: npt.NDArray[np.bool_] = np.isnan(values.sum(axis=-1))
@@ -185,7 +195,7 @@ def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
     }
     return xr.Dataset(
         variables,
-        coords={**coords, "statistic": list(STATISTICS)},
+        coords={**coords, "statistic": statistic_coordinate(level)},
         attrs={**forecast.attrs, "level": level, "members": members, "diverged": dropped},
     )
 

@@ -5,12 +5,14 @@ from seakeep.study.comparison import (
     at_full_scale,
     compare,
     comparison_table,
+    forecast_at_full_scale,
     in_degrees,
 )
 from seakeep.study.run import run_study
 from seakeep.study.settings import Study, StudySettings, read_study
+from seakeep.study.specs import build_spec
 from seakeep.study.store import StorageError, StudyResult, read_result
-from seakeep.study.workflow import build_spec, fit_campaign, training_runs
+from seakeep.study.workflow import fit_campaign, training_runs
 
 __all__ = [
     "Comparison",
@@ -23,6 +25,7 @@ __all__ = [
     "compare",
     "comparison_table",
     "fit_campaign",
+    "forecast_at_full_scale",
     "in_degrees",
     "read_result",
     "read_study",

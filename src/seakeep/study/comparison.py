@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from seakeep import metrics
+from seakeep import metrics, statistics
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.conventions import conversion
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
-from seakeep.models import HankelDMDcModel
+from seakeep.models import HankelDMDcModel, HankelEnsemble
+from seakeep.models.forecasting import status_at_clock
 from seakeep.models.identification import is_constant
-from seakeep.signals import to_full_scale
+from seakeep.signals import froude_factor, to_full_scale
 from seakeep.study.repeats import warn_of_repeats
 
-__all__ = ["Comparison", "at_full_scale", "compare", "comparison_table", "in_degrees"]
+__all__ = [
+    "Comparison",
+    "at_full_scale",
+    "compare",
+    "comparison_table",
+    "forecast_at_full_scale",
+    "in_degrees",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +42,13 @@ class Comparison:
     sea_state : str
         As the campaign states it.
     forecast : Dataset
-        As :meth:`seakeep.HankelDMDcModel.forecast` gives it.
+        As :meth:`seakeep.HankelDMDcModel.forecast` gives it; of an ensemble, the members' mean.
     measured : Dataset
         The states at the same instants.
     inputs : Dataset
         The inputs over the forecast, to be drawn beside it.
+    band : Dataset, optional
+        Of an ensemble: ``lower`` and ``upper`` over ``statistic``, at the same instants.
     """
 
     run: str
@@ -45,6 +56,7 @@ class Comparison:
     forecast: xr.Dataset
     measured: xr.Dataset
     inputs: xr.Dataset
+    band: xr.Dataset | None = None
 
     @property
     def start(self) -> float:
@@ -53,8 +65,13 @@ class Comparison:
 
     @property
     def status(self) -> str:
-        """Whether the forecast went well ("ok"), or from when on it diverged."""
+        """Whether the forecast went well ("ok"), from when on it diverged, or how many members."""
         return str(self.forecast.attrs["status"])
+
+    @property
+    def complete(self) -> bool:
+        """Whether there is a forecast at all instants: members that were lost are left out."""
+        return not any(bool(each.isnull().any()) for each in self.forecast.data_vars.values())
 
     @property
     def anrmse(self) -> float:
@@ -80,6 +97,7 @@ def in_degrees(comparison: Comparison) -> Comparison:
         forecast=_degrees(comparison.forecast),
         measured=_degrees(comparison.measured),
         inputs=_degrees(comparison.inputs),
+        band=None if comparison.band is None else _degrees(comparison.band),
     )
 
 
@@ -105,10 +123,41 @@ def at_full_scale(comparison: Comparison, scale: float) -> Comparison:
     """
     return replace(
         comparison,
-        forecast=to_full_scale(comparison.forecast, scale),
+        forecast=forecast_at_full_scale(comparison.forecast, scale),
         measured=to_full_scale(comparison.measured, scale),
         inputs=to_full_scale(comparison.inputs, scale),
+        band=None if comparison.band is None else to_full_scale(comparison.band, scale),
     )
+
+
+def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
+    """Convert a forecast to full scale by Froude's law, its status with it.
+
+    Parameters
+    ----------
+    forecast : Dataset
+        Of a model, or of an ensemble: its members, or their statistics.
+    scale : float
+        Scale factor, full-scale length over model length.
+
+    Returns
+    -------
+    Dataset
+        Times and values at full scale, also where the status names an instant.
+
+    Raises
+    ------
+    RequestError
+        If the unit of a channel does not scale.
+    """
+    clock = froude_factor("s", scale)
+    out = to_full_scale(forecast.drop_vars("status", errors="ignore"), scale)
+    out.attrs["status"] = status_at_clock(str(forecast.attrs["status"]), clock)
+    if "status" in forecast:
+        told = forecast["status"]
+        words = [status_at_clock(str(each), clock) for each in told.values]
+        out["status"] = (told.dims, words, told.attrs)
+    return out
 
 
 def _degrees(run: xr.Dataset) -> xr.Dataset:
@@ -127,19 +176,23 @@ def _degrees(run: xr.Dataset) -> xr.Dataset:
 
 
 def compare(
-    model: HankelDMDcModel,
+    model: HankelDMDcModel | HankelEnsemble,
     campaign: Campaign,
     runs: Sequence[str] = (),
     start: float | None = None,
     steps: int | None = None,
     progress: Progress | None = None,
+    *,
+    members: Progress | None = None,
+    level: float = 0.95,
+    workers: int = 1,
 ) -> list[Comparison]:
     """Forecast runs of a campaign and put the measurement beside.
 
     Parameters
     ----------
-    model : HankelDMDcModel
-        The model.
+    model : HankelDMDcModel or HankelEnsemble
+        The model. Of an ensemble the members' mean is judged, and their band beside it.
     campaign : Campaign
         The campaign.
     runs : sequence of str, optional
@@ -151,6 +204,12 @@ def compare(
         Number of instants; by default to the end of the test span.
     progress : callable, optional
         Called as ``progress(done, total, run)`` while runs are prepared.
+    members : callable, optional
+        Called as ``members(done, total, what)`` while members of an ensemble are at work.
+    level : float, optional
+        Probability between the bounds of an ensemble's band.
+    workers : int, optional
+        Members of an ensemble at work at a time.
 
     Returns
     -------
@@ -184,11 +243,29 @@ def compare(
         )
     prepared = load_prepared(campaign, names=wanted, progress=progress)
     warn_of_repeats(model, campaign, prepared)
-    return [_compare_run(model, run, name, start, steps) for name, run in prepared.items()]
+
+    def forecast(run: xr.Dataset, start: float, steps: int) -> xr.Dataset:
+        if isinstance(model, HankelDMDcModel):
+            return model.forecast(run, start=start, steps=steps)
+        tell = None if members is None else _named(members, str(run.attrs["run"]))
+        return model.forecast_summary(run, start, steps, level, workers=workers, progress=tell)
+
+    return [
+        _compare_run(model, forecast, run, name, start, steps) for name, run in prepared.items()
+    ]
+
+
+def _named(tell: Progress, run: str) -> Progress:
+    return lambda done, total, what: tell(done, total, f"{run}, {what}")
 
 
 def _compare_run(
-    model: HankelDMDcModel, run: xr.Dataset, name: str, start: float | None, steps: int | None
+    model: HankelDMDcModel | HankelEnsemble,
+    forecast_run: Callable[[xr.Dataset, float, int], xr.Dataset],
+    run: xr.Dataset,
+    name: str,
+    start: float | None,
+    steps: int | None,
 ) -> Comparison:
     time = run["time"].values
     begin, end = run.attrs.get("test_span", (time[0], time[-1]))
@@ -199,18 +276,22 @@ def _compare_run(
         last = int(np.searchsorted(time, float(end) + 0.5 * model.dt)) - 1
         at = int(np.argmin(np.abs(time - start)))
         steps = max(last - at, 1)
-    forecast = model.forecast(run, start=start, steps=steps)
-    inside = forecast.sel(time=slice(None, time[-1]))
-    if inside.sizes["time"] < forecast.sizes["time"]:
-        inside.attrs = forecast.attrs
+    found = forecast_run(run, start, steps)
+    # The last instant may lie a step beyond the record: the input before it is known.
+    inside = found[model.states].sel(time=slice(None, time[-1])).assign_attrs(found.attrs)
     instants = {"time": inside["time"]}
+    forecast, band = inside, None
+    if "statistic" in inside.dims:
+        forecast = inside.sel(statistic="mean", drop=True)
+        band = inside.sel(statistic=["lower", "upper"])
     _warn_of_dead(run[[*model.states, *model.inputs]].sel(instants), name)
     return Comparison(
         run=name,
         sea_state=str(run.attrs.get("sea_state", "")),
-        forecast=inside,
+        forecast=forecast,
         measured=run[model.states].sel(instants),
         inputs=run[model.inputs].sel(instants),
+        band=band,
     )
 
 
@@ -244,11 +325,17 @@ def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
         the channels that can be judged, ``slack_channels`` (how many cannot), ``status``,
         ``start``, and ``conditional_on``: the measured output that the forecast read after its
         start, or an empty text; ``probe_offset`` and ``probe_offset_spread`` (m), NaN where the
-        run has none.
+        run has none. Of an ensemble also ``coverage``, the part of the measured instants that lie
+        in the band (%), ``band_width``, its mean width (in ``channel_units``), and
+        ``relative_band_width`` (in measured standard deviations); over ``run``:
+        ``mean_coverage`` over the channels that can be judged, ``members``, ``diverged`` and
+        ``level``.
     """
     rows = [_row(comparison) for comparison in comparisons]
     table = xr.concat(rows, dim="run")
     for name, (units, label) in _COLUMNS.items():
+        if name not in table:
+            continue
         table[name].attrs = {"units": units, "long_name": label}
     return table
 
@@ -262,6 +349,9 @@ _COLUMNS = {
     "measured_max": ("channel's", "measured maximum"),
     "predicted_min": ("channel's", "predicted minimum"),
     "predicted_max": ("channel's", "predicted maximum"),
+    "coverage": ("%", "measured instants in the band"),
+    "band_width": ("channel's", "mean width of the band"),
+    "relative_band_width": ("1", "mean width of the band in measured standard deviations"),
 }
 
 
@@ -287,6 +377,7 @@ def _row(comparison: Comparison) -> xr.Dataset:
             name: ("channel", np.array([float(values[channel]) for channel in names]))
             for name, values in each.items()
         }
+        | _band_entries(comparison, slack)
         | {
             "anrmse": comparison.anrmse,
             "mean_nammae": float(metrics.nammae(predicted=p, measured=m)),
@@ -303,3 +394,22 @@ def _row(comparison: Comparison) -> xr.Dataset:
             "channel_units": ("channel", [str(p[name].attrs.get("units", "")) for name in names]),
         },
     )
+
+
+def _band_entries(comparison: Comparison, slack: xr.Dataset) -> dict[str, Any]:
+    if comparison.band is None:
+        return {}
+    lower, upper = (comparison.band.sel(statistic=key, drop=True) for key in ("lower", "upper"))
+    found = statistics.coverage(lower, upper, comparison.measured)
+    inside = 100.0 * found["inside"].values
+    judged = ~np.array([bool(slack[str(name)]) for name in found["channel"].values])
+    attrs = comparison.forecast.attrs
+    return {
+        "coverage": ("channel", inside),
+        "band_width": ("channel", found["width"].values),
+        "relative_band_width": ("channel", found["relative_width"].values),
+        "mean_coverage": float(inside[judged].mean()) if judged.any() else np.nan,
+        "members": int(attrs["members"]),
+        "diverged": int(attrs["diverged"]),
+        "level": float(attrs["level"]),
+    }

@@ -14,7 +14,7 @@ from seakeep.models import HankelDMDc
 from seakeep.models.settings import periods_to_samples
 from seakeep.study.needs import needs_of
 from seakeep.study.settings import Study
-from seakeep.study.specs import Spec, build_model, model_settings
+from seakeep.study.specs import Spec, build_spec, model_settings
 from seakeep.study.windows import (
     Needs,
     TestWindow,
@@ -120,7 +120,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
     runs = {name: run[channels] for name, run in prepared.items()}
     dt = float(next(iter(runs.values())).attrs["dt"])
     period = settings.study.encounter_period or campaign.encounter_period()
-    specs = {n: build_model(model_settings(study, n), period, dt) for n in settings.models}
+    specs = {n: build_spec(model_settings(study, n), period, dt) for n in settings.models}
     needs = needs_of(list(specs.values()), dt)
     training = choose_training(settings, runs, training_names, needs)
     tests = {

@@ -10,14 +10,14 @@ import xarray as xr
 
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.errors import SeakeepWarning
-from seakeep.models import HankelDMDcModel
+from seakeep.models import HankelDMDcModel, HankelEnsemble
 from seakeep.signals import find_repeat
 
 __all__ = ["warn_of_repeats"]
 
 
 def warn_of_repeats(
-    model: HankelDMDcModel, campaign: Campaign, tested: Mapping[str, xr.Dataset]
+    model: HankelDMDcModel | HankelEnsemble, campaign: Campaign, tested: Mapping[str, xr.Dataset]
 ) -> None:
     """Warn where a test run's input repeats the model's training input, up to a constant phase.
 
@@ -26,7 +26,7 @@ def warn_of_repeats(
 
     Parameters
     ----------
-    model : HankelDMDcModel
+    model : HankelDMDcModel or HankelEnsemble
         The model, which knows the runs and spans it was trained on.
     campaign : Campaign
         The campaign.
@@ -39,10 +39,8 @@ def warn_of_repeats(
         One for each test run that repeats.
     """
     training = {
-        name: (first, stop)
-        for name, first, stop in zip(
-            model.training.runs, model.training.first, model.training.stop, strict=True
-        )
+        name: span
+        for name, span in model.training_spans.items()
         if name in campaign.settings.runs and campaign.settings.runs[name].waves != "regular"
     }
     if not (model.inputs and training):

@@ -1,20 +1,25 @@
-"""From the settings of a study's models to their specs."""
+"""From the settings of a model, in a campaign file or a study file, to its spec."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from seakeep.campaign import ModelSettings, PriorSettings
+from seakeep.campaign.periods import Periods, counted
 from seakeep.errors import RequestError
 from seakeep.models import HankelDMDc
 from seakeep.models.ensemble import BayesianHankelDMDc
 from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform
+from seakeep.models.settings import periods_to_samples
 from seakeep.study.settings import Study, StudyModelSettings
-from seakeep.study.workflow import build_spec
 
-__all__ = ["Spec", "build_model", "model_settings"]
+__all__ = ["Spec", "build_spec", "counts_in_periods", "model_settings"]
 
 Spec = HankelDMDc | BayesianHankelDMDc
+
+ENSEMBLE = "bayesian_hankel_dmdc"
+PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
 
 
 def model_settings(study: Study, name: str) -> ModelSettings:
@@ -36,68 +41,92 @@ def model_settings(study: Study, name: str) -> ModelSettings:
     general = study.settings.study
     content: dict[str, Any] = {key: getattr(stated, key) for key in stated.model_fields_set}
     content |= {"states": study.states, "inputs": study.inputs}
-    if stated.preset is None and _incomplete(stated):
+    if stated.preset is None and _missing(stated):
         content["preset"] = general.preset
-    if stated.kind == "bayesian_hankel_dmdc" and stated.seed is None:
+    if stated.kind == ENSEMBLE and stated.seed is None:
         content["seed"] = general.seed
     return ModelSettings.model_validate(content)
 
 
-def _incomplete(stated: StudyModelSettings) -> bool:
-    ensemble = stated.kind == "bayesian_hankel_dmdc"
+def _missing(stated: ModelSettings | StudyModelSettings) -> list[str]:
+    """Keys that only a preset could fill in."""
+    ensemble = stated.kind == ENSEMBLE
     delays = ("state_delay", "input_delay") if ensemble else ("state_delays", "input_delays")
-    return any(getattr(stated, key) is None for key in (*delays, "ridge"))
+    return [key for key in (*delays, "ridge") if getattr(stated, key) is None]
 
 
-def build_model(settings: ModelSettings, encounter_period: float, dt: float) -> Spec:
-    """Settings of a model, or of an ensemble of them.
+def counts_in_periods(settings: ModelSettings) -> bool:
+    """Whether a model is stated in encounter periods: by a preset, a key, or as an ensemble."""
+    return settings.preset is not None or settings.kind == ENSEMBLE or any(counted(settings))
+
+
+def build_spec(settings: ModelSettings, encounter_period: float | None, dt: float) -> Spec:
+    """Turn the table of a model into the settings of a model, or of an ensemble of them.
 
     Parameters
     ----------
     settings : ModelSettings
-        A preset, keys of the constructor, or a preset with keys that override it.
-    encounter_period : float
-        Mean encounter period, s.
+        The table: a preset, keys of the constructor, or a preset with keys that override it.
+    encounter_period : float or None
+        Mean encounter period, s; a preset and an ensemble need it.
     dt : float
         Time step of the prepared runs, s.
 
     Returns
     -------
     HankelDMDc or BayesianHankelDMDc
+        The settings.
 
     Raises
     ------
     RequestError
-        If a key that has no default is missing, or out of range.
+        If there is no encounter period to count in, or a key that has no default is missing or
+        out of range.
     """
-    if settings.kind == "hankel_dmdc":
-        return build_spec(settings, encounter_period, dt)
+    ensemble = settings.kind == ENSEMBLE
     stated = settings.arguments()
     stated.pop("stop", None)
-    for key in ("train_length", "state_delay", "input_delay", "ridge"):
-        if key in stated:
-            stated[key] = _prior(stated[key])
-    if settings.preset is not None:
-        recommended = settings.preset == "recommended"
-        preset = BayesianHankelDMDc.recommended if recommended else BayesianHankelDMDc.paper
-        base = preset(encounter_period, dt)
-        names = [name for name, each in base.__dataclass_fields__.items() if each.init]
-        return BayesianHankelDMDc(**{**{name: getattr(base, name) for name in names}, **stated})
-    missing = [key for key in ("state_delay", "input_delay", "ridge") if key not in stated]
-    if missing:
+    if ensemble:
+        stated |= {key: _prior(stated[key]) for key in PRIORS if key in stated}
+    if encounter_period is None:
+        if counts_in_periods(settings):
+            what = "an ensemble" if ensemble else "the model"
+            what = what if settings.preset is None else f"preset = '{settings.preset}'"
+            raise RequestError(
+                f"{what} counts in encounter periods, and the campaign has none. State "
+                "encounter_period (s) in [campaign]."
+            )
+    else:
+        for key, value in stated.items():
+            if isinstance(value, Periods):
+                stated[key] = periods_to_samples(value.count, encounter_period, dt)
+    if settings.preset is not None and encounter_period is not None:
+        kind: type[Spec] = BayesianHankelDMDc if ensemble else HankelDMDc
+        preset = kind.paper if settings.preset == "paper" else kind.recommended
+        return replace(preset(encounter_period, dt), **stated)
+    if missing := _missing(settings):
+        as_priors = " as priors, such as { uniform = [0.5, 1.5] }" if ensemble else ""
         raise RequestError(
-            f"the ensemble states no {missing[0]}. Add {', '.join(missing)} as priors, such as "
-            "{ uniform = [0.5, 1.5] }, or a preset: preset = 'recommended' or 'paper'."
+            f"the [model] table states no {missing[0]}. Add {', '.join(missing)}{as_priors}, or a "
+            "preset: preset = 'recommended' or 'paper'."
         )
-    stated.setdefault("train_length", None)
-    return BayesianHankelDMDc(encounter_period=encounter_period, dt=dt, **stated)
+    if not ensemble:
+        return HankelDMDc(**stated)
+    period = {"encounter_period": encounter_period, "dt": dt}
+    return BayesianHankelDMDc(**{"train_length": None, **period, **stated})
 
 
 def _prior(stated: PriorSettings | float) -> Prior:
-    if isinstance(stated, PriorSettings):
-        if stated.uniform is not None:
-            return Uniform(*stated.uniform)
-        if stated.log_uniform is not None:
-            return LogUniform(*stated.log_uniform)
-        return Fixed(float(stated.fixed or 0.0))
-    return Fixed(float(stated))
+    if not isinstance(stated, PriorSettings):
+        return Fixed(float(stated))
+    if stated.uniform is not None:
+        return Uniform(*stated.uniform)
+    if stated.log_uniform is not None:
+        return LogUniform(*stated.log_uniform)
+    if stated.distribution is not None:
+        from scipy import stats
+
+        frozen: Prior = getattr(stats, stated.distribution)(**stated.parameters)
+        return frozen
+    assert stated.fixed is not None
+    return Fixed(stated.fixed)

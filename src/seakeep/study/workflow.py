@@ -6,73 +6,21 @@ from collections.abc import Mapping
 
 import xarray as xr
 
-from seakeep.campaign import Campaign, ModelSettings, load_prepared
-from seakeep.campaign.periods import Periods, counted
+from seakeep.campaign import Campaign, load_prepared
+from seakeep.campaign.periods import Periods
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
-from seakeep.models import HankelDMDc, HankelDMDcModel
-from seakeep.models.settings import periods_to_samples
+from seakeep.models import HankelDMDc, HankelDMDcModel, HankelEnsemble
+from seakeep.study.needs import needs_of
 from seakeep.study.repeats import warn_of_repeats
+from seakeep.study.specs import Spec, build_spec, counts_in_periods
 
-__all__ = ["build_spec", "fit_campaign", "training_runs"]
-
+__all__ = ["fit_campaign", "training_runs"]
 
 NOTHING_TRAINS = (
     "no run of the campaign trains a model. Give one role = 'train', or a span "
     "train = [begin, end]."
 )
-
-
-def build_spec(settings: ModelSettings, encounter_period: float | None, dt: float) -> HankelDMDc:
-    """Turn the ``[model]`` table of a campaign into the settings of a model.
-
-    Parameters
-    ----------
-    settings : ModelSettings
-        The table: a preset, keys of the constructor, or a preset with keys that override it.
-    encounter_period : float or None
-        Mean encounter period, s; a preset needs it.
-    dt : float
-        Time step of the prepared runs, s.
-
-    Returns
-    -------
-    HankelDMDc
-        The settings.
-
-    Raises
-    ------
-    RequestError
-        If the kind of model is not known, a preset has no encounter period, or a key that has no
-        default is missing.
-    """
-    if settings.kind != "hankel_dmdc":
-        raise RequestError(
-            f"kind = '{settings.kind}' is not available in this version. Use kind = 'hankel_dmdc'."
-        )
-    stated = settings.arguments()
-    stated.pop("stop", None)
-    if encounter_period is None and (settings.preset is not None or any(counted(settings))):
-        what = f"preset = '{settings.preset}'" if settings.preset else "the model"
-        raise RequestError(
-            f"{what} counts in encounter periods, and the campaign has none. State "
-            "encounter_period (s) in [campaign]."
-        )
-    for key, value in stated.items():
-        if isinstance(value, Periods) and encounter_period is not None:
-            stated[key] = periods_to_samples(value.count, encounter_period, dt)
-    if settings.preset is not None and encounter_period is not None:
-        preset = HankelDMDc.paper if settings.preset == "paper" else HankelDMDc.recommended
-        base = preset(encounter_period, dt)
-        names = base.__dataclass_fields__
-        return HankelDMDc(**{**{name: getattr(base, name) for name in names}, **stated})
-    missing = [key for key in ("state_delays", "input_delays", "ridge") if key not in stated]
-    if missing:
-        raise RequestError(
-            f"the [model] table states no {missing[0]}. Add {', '.join(missing)}, or a preset: "
-            "preset = 'recommended' or 'paper'."
-        )
-    return HankelDMDc(**stated)
 
 
 def training_runs(
@@ -85,9 +33,9 @@ def training_runs(
     prepared : mapping of str to Dataset
         Runs of a campaign, as ``campaign.prepare()`` gives them.
     window : int, optional
-        Snapshots that a model takes from the end of the span. Where the span holds them, what
-        lies before the span is kept, so that the delay history may come from there. Without it
-        the whole span is the window, and the history lies inside it.
+        Most snapshots that a model takes from the end of the span. Where the span holds them,
+        what lies before the span is kept, so that the delay history may come from there. Without
+        it the whole span is the window, and the history lies inside it.
 
     Returns
     -------
@@ -120,8 +68,8 @@ def between(run: xr.Dataset, span: tuple[float, float]) -> xr.Dataset:
 
 def fit_campaign(
     campaign: Campaign, model: str | None = None, progress: Progress | None = None
-) -> HankelDMDcModel:
-    """Identify the model that a campaign describes from its training runs.
+) -> HankelDMDcModel | HankelEnsemble:
+    """Identify the model, or the ensemble, that a campaign describes from its training runs.
 
     Parameters
     ----------
@@ -134,8 +82,8 @@ def fit_campaign(
 
     Returns
     -------
-    HankelDMDcModel
-        The model.
+    HankelDMDcModel or HankelEnsemble
+        As the table's ``kind`` says.
 
     Raises
     ------
@@ -154,10 +102,9 @@ def fit_campaign(
     if not prepared:
         raise RequestError(NOTHING_TRAINS)
     dt = float(next(iter(prepared.values())).attrs["dt"])
-    needed = settings.preset is not None or any(counted(settings))
-    period = campaign.encounter_period() if needed else None
+    period = campaign.encounter_period() if counts_in_periods(settings) else None
     spec = build_spec(settings, period, dt)
-    runs = training_runs(prepared, spec.window if spec.history == "before" else None)
+    runs = training_runs(prepared, _longest_window(spec, dt))
     stop = settings.stop
     if isinstance(stop, Periods) and period is not None:
         stop = stop.at(period)
@@ -165,3 +112,14 @@ def fit_campaign(
     both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
     warn_of_repeats(identified, campaign, both)
     return identified
+
+
+def _longest_window(spec: Spec, dt: float) -> int | None:
+    """Most snapshots before the end of a span, where the history may lie before them."""
+    if spec.history == "inside":
+        return None
+    if isinstance(spec, HankelDMDc):
+        return spec.window
+    if spec.train_length is None or spec.train_on == "windows":
+        return None
+    return needs_of([spec], dt).snapshots
