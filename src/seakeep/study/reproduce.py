@@ -58,6 +58,7 @@ def reproduce(
     size: Size | None = None,
     seed: int = 0,
     workers: int = 1,
+    scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> StudyResult:
     """Play the virtual campaign and run the paper's study on it.
@@ -73,8 +74,8 @@ def reproduce(
         Counts; the default is the paper's.
     seed : int, optional
         Of the waves, the noise, the windows and the draws.
-    workers : int, optional
-        Processes side by side.
+    workers, scheduler
+        As in :func:`seakeep.study.run_study`.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
 
@@ -100,6 +101,7 @@ def reproduce(
         read_study(out / "study.toml"),
         out,
         workers=workers,
+        scheduler=scheduler,
         progress=progress,
         extra={"nominal": nominal},
         notes={"preparation_note": NOTE},
