@@ -1,9 +1,9 @@
 """Work on the workers of a running Dask cluster.
 
-What all items need is pickled once and becomes the value of one task, the root. Each worker asks
-for it once, from another worker that has it; if all that had it are lost, the scheduler makes it
-again. The tasks name the root and carry their items alone. The tasks of a worker that is lost go to
-the others.
+What all items need is pickled once and becomes the value of one task, the root, which every worker
+has before the work begins: each fetches it once, from another one. A worker that joins later does
+so when it takes over work, and if all that had it are lost, the scheduler makes it again. The other
+tasks name the root and carry their items alone. Those of a worker that is lost go to the others.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager
 from importlib import metadata
+from itertools import count
 from typing import Any, TypeVar
 
 from seakeep.errors import RequestError
@@ -28,7 +29,7 @@ from seakeep.models.crew import (
     one_blas_thread,
 )
 
-__all__ = ["Parcel", "cluster"]
+__all__ = ["Parcel", "check_cluster", "cluster"]
 
 Data = TypeVar("Data")
 Item = TypeVar("Item")
@@ -124,57 +125,74 @@ def cluster(
     Raises
     ------
     RequestError
-        If Dask is not installed here, no scheduler answers, it has no workers, or they have other
-        versions than this process.
+        As :func:`check_cluster`.
     WorkerLostError
         If the scheduler was lost, or a piece of work took several workers with it.
     """
-    try:
+    with _connected(scheduler) as client:
         import dask
-        from distributed import Client
+        from distributed.comm import CommClosedError
         from distributed.scheduler import KilledWorker
-    except ImportError as error:
-        raise RequestError(
-            f"work on a Dask cluster needs {error.name}, which is not installed. Install it with: "
-            "pip install 'seakeep[cluster]'"
-        ) from error
-    with _connected(Client, scheduler) as client:
+
         _check_alike(client, scheduler)
         name = f"seakeep-{uuid.uuid4().hex}"
         payload = pickle.dumps(data, protocol=5)
-        # The data are meant to travel inside the root, whatever their size.
-        with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 TB"}):
-            root = client.submit(_unpacked, payload, versions(), key=f"{name}-data", pure=False)
-        del payload
-        executor, count = client.get_executor(pure=False), 0
-
-        def submit(items: Sequence[Item]) -> Future[list[Result]]:
-            nonlocal count
-            count += 1
-            future: Future[list[Result]] = executor.submit(
-                _work, root, function, items, key=f"{name}-{count}"
-            )
-            return future
-
-        threads = sum(client.nthreads().values())
-        batch = 1 if small is None else max(1, min(BATCH, small // (4 * threads)))
         try:
+            # The data are meant to travel inside the root, whatever their size.
+            with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 TB"}):
+                root = client.submit(_unpacked, payload, versions(), key=f"{name}-data", pure=False)
+            client.replicate([root])  # work is given to workers that have what it needs
+            executor, numbers = client.get_executor(pure=False), count(1)
+
+            def submit(items: Sequence[Item]) -> Future[list[Result]]:
+                future: Future[list[Result]] = executor.submit(
+                    _work, root, function, items, key=f"{name}-{next(numbers)}"
+                )
+                return future
+
+            threads = max(1, sum(client.nthreads().values()))
+            batch = 1 if small is None else max(1, min(BATCH, small // (4 * threads)))
             yield Team(submit, 3 * threads, batch)
         except KilledWorker as error:
             raise WorkerLostError(
                 f"a piece of work took several workers of {scheduler} with it (is their memory "
                 f"large enough?): {error}"
             ) from None
-        except CancelledError:
+        except (CancelledError, CommClosedError):
             raise WorkerLostError(
                 f"the connection to the scheduler {scheduler} was lost. Start it again."
             ) from None
 
 
+def check_cluster(scheduler: str) -> None:
+    """Refuse a cluster that cannot be used.
+
+    Parameters
+    ----------
+    scheduler : str
+        Address of the scheduler.
+
+    Raises
+    ------
+    RequestError
+        If Dask is not installed here, no scheduler answers, it has no workers, or they have other
+        versions than this process.
+    """
+    with _connected(scheduler) as client:
+        _check_alike(client, scheduler)
+
+
 @contextmanager
-def _connected(client_class: Any, scheduler: str) -> Iterator[Any]:
+def _connected(scheduler: str) -> Iterator[Any]:
     try:
-        client = client_class(
+        from distributed import Client
+    except ImportError as error:
+        raise RequestError(
+            f"work on a Dask cluster needs {error.name}, which is not installed. Install it with: "
+            "pip install 'seakeep[cluster]'"
+        ) from error
+    try:
+        client = Client(
             scheduler,
             timeout=PATIENCE,
             set_as_default=False,

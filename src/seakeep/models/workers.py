@@ -30,6 +30,7 @@ __all__ = [
     "Crew",
     "WorkerLostError",
     "as_finished",
+    "check_crew",
     "one_blas_thread",
     "side_by_side",
 ]
@@ -37,6 +38,26 @@ __all__ = [
 Data = TypeVar("Data")
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+
+def check_crew(crew: Crew) -> None:
+    """Refuse a cluster that cannot be used, before work is prepared for it.
+
+    Parameters
+    ----------
+    crew : Crew
+        Who will do the work.
+
+    Raises
+    ------
+    RequestError
+        If Dask is not installed here, no scheduler answers, it has no workers, or they have other
+        versions than this process.
+    """
+    if crew.scheduler is not None:
+        from seakeep.models.cluster import check_cluster
+
+        check_cluster(crew.scheduler)
 
 
 def side_by_side(

@@ -13,6 +13,7 @@ import xarray as xr
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.files import replacing
+from seakeep.models.workers import Crew, check_crew
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
 from seakeep.study.store import StudyResult, storing, versions
@@ -87,10 +88,12 @@ def reproduce(
     Raises
     ------
     RequestError
-        If the tank's libraries are not installed, or the folder holds another study.
+        If the tank's libraries are not installed, the folder holds another study, or the cluster
+        cannot be used.
     StorageError
         If the disk is full.
     """
+    check_crew(Crew(workers, scheduler=scheduler))
     out, counts = Path(out), size or Size()
     with storing(out):
         out.mkdir(parents=True, exist_ok=True)

@@ -12,7 +12,7 @@ import xarray as xr
 
 from seakeep.campaign.prepare import Progress
 from seakeep.core.scratch import Scratch
-from seakeep.models.workers import Crew, WorkerLostError, as_finished
+from seakeep.models.workers import Crew, WorkerLostError, as_finished, check_crew
 from seakeep.study.cells import Unit, cells_of, compute, units_of
 from seakeep.study.description import describe_study
 from seakeep.study.merge import merge_cells
@@ -84,6 +84,7 @@ def run_study(
         if found.attrs.get("digest") == study.digest:
             tell(1, 1, "finished before")
             return found
+    check_crew(crew)
     plan, runs = make_plan(study, lambda done, total, name: tell(0, 1, f"preparing {name}"))
     units = units_of(plan, study.settings.output.eigenvalues)
     left = [unit for unit in units if not all(cells.has(name) for name in cells_of(plan, unit))]
