@@ -74,8 +74,11 @@ class TestShipSection:
         lag = float(re.search(r"lag ([+-]\d\.\d+) ", found.text)[1])
         assert lag == pytest.approx(-0.38, abs=0.03)  # negative: the camera is early
 
-    def test_poor_agreement(self, section):
-        assert "agreement" in {each.kind for each in of_camera(section["3142_1"])}
+    def test_motion_below_the_resolution_and_poor_agreement(self, section):
+        found = {each.kind: each.text for each in of_camera(section["3142_1"])}
+        assert {"resolution", "agreement"} <= set(found)
+        # Half of the camera's pixel of 0.9 mm: each reading is a mean over several markers.
+        assert "(0.00047 m)" in found["resolution"]
 
     def test_runs_away(self, section):
         texts = [each.text for each in of_camera(section["3031_2"]) if each.kind == "lag"]

@@ -4,12 +4,16 @@ import numpy as np
 import pytest
 
 from seakeep.signals.quality import (
+    LATE,
+    LEAST_CORRELATION,
+    RUN_AWAY,
     compare_sensors,
     find_outliers,
     find_saturation,
     find_stuck,
     level_drift,
 )
+from seakeep.signals.resolution import reading_step
 
 DT = 0.04
 T = DT * np.arange(3000)
@@ -75,3 +79,46 @@ def test_constant_and_unrelated():
     ]
     assert "agrees poorly" in compare_sensors(waves(seed=7), waves(), DT).faults()[0]
     assert compare_sensors(waves(0.05), waves(), DT).faults() == []
+
+
+def test_the_limits_on_lags_are_where_they_alone_make_the_least_correlation():
+    period = 1.6
+    t = np.arange(0, 200 * period, 0.001 * period)
+    still = np.sin(2 * np.pi * t / period)
+    late = np.sin(2 * np.pi * (t / period - LATE))
+    assert np.corrcoef(still, late)[0, 1] == pytest.approx(LEAST_CORRELATION, abs=1e-3)
+    grown = np.sin(2 * np.pi * (t / period - RUN_AWAY * (t / t[-1] - 0.5)))
+    # The limit is stated to two digits.
+    assert np.corrcoef(still, grown)[0, 1] == pytest.approx(LEAST_CORRELATION, abs=5e-3)
+
+
+@pytest.mark.parametrize(("part", "flagged"), [(0.8, False), (1.2, True)])
+def test_either_side_of_the_limit_on_lags(part, flagged):
+    trusted = waves()
+    period = compare_sensors(trusted, trusted, DT).period
+    late = np.interp(T - part * LATE * period, T, trusted)
+    assert bool(compare_sensors(late, trusted, DT).faults()) is flagged
+    grown = np.interp(T - part * RUN_AWAY * period * (1.1 * T / T[-1] - 0.55), T, trusted)
+    assert bool(compare_sensors(grown, trusted, DT).faults()) is flagged
+
+
+def test_what_stands_still_has_no_lag():
+    """A sensor that runs away and then freezes: the windows that it froze in say nothing."""
+    stretched = np.interp(T * (1 - 1.2 / T[-1]), T, waves())
+    frozen = np.where(np.arange(T.size) < 2600, stretched, stretched[2600])
+    held = np.arange(T.size) >= 2600
+    found = compare_sensors(frozen, waves(), DT, held=held)
+    assert found.growth == pytest.approx(
+        1.2 * 2600 / T.size, abs=0.15
+    )  # windows of 3 s at the ends
+    assert found.centre[-1] < 2600 * DT
+
+
+@pytest.mark.parametrize(("spanned", "flagged"), [(2, True), (4, True), (7, False), (20, False)])
+def test_motion_below_the_resolution(noisy, spanned, flagged):
+    trusted = waves()
+    step = 2 * np.sqrt(2) * trusted.std() / spanned
+    read = step * np.round(noisy / step)
+    found = compare_sensors(read, trusted, DT, step=reading_step(read))
+    assert found.spanned == pytest.approx(spanned, rel=0.05)  # windows of an irregular sea
+    assert any(each.startswith("motion below the resolution") for each in found.faults()) is flagged

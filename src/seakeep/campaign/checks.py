@@ -30,6 +30,7 @@ from seakeep.signals.quality import (
     flag_attributes,
     level_drift,
 )
+from seakeep.signals.resolution import reading_step
 
 __all__ = ["Finding", "check_clocks", "check_levels", "check_pairs", "check_samples", "findings_of"]
 
@@ -49,7 +50,7 @@ class Finding:
         Channel, or the logger for a clock.
     kind : str
         ``constant``, ``missing``, ``outliers``, ``saturated``, ``stuck``, ``drift``, ``lag``,
-        ``agreement`` or ``clock``.
+        ``resolution``, ``agreement`` or ``clock``.
     text : str
         What, how much, and what was done about it.
     """
@@ -82,7 +83,8 @@ def check_samples(dataset: xr.Dataset, replace: bool) -> xr.Dataset:
     Returns
     -------
     Dataset
-        The same with ``NAME_flags`` where there is something to flag.
+        The same with ``NAME_flags`` where there is something to flag, and the attribute
+        ``reading_step`` (in the channel's unit) where a sensor reads in steps.
     """
     time = dataset["time"].to_numpy()
     dt = float(time[1] - time[0])
@@ -97,6 +99,8 @@ def check_samples(dataset: xr.Dataset, replace: bool) -> xr.Dataset:
         if x.size < 16 or not np.ptp(x):
             continue
         there = (flags & (MISSING | BRIDGED)) == 0
+        if np.isfinite(step := reading_step(x)):
+            dataset[name].attrs["reading_step"] = step
         outlier = find_outliers(x) & there
         stuck = find_stuck(x, dt, max(dominant_period(x, dt), 5 * dt)) & there
         flags[outlier] |= OUTLIER
@@ -217,12 +221,17 @@ def check_pairs(
         trusted = _filled(run[pair.channels[0]])
         for name in pair.channels[1:]:
             x = _filled(run[name])
-            agreement = compare_sensors(x, trusted, dt, pair.window)
+            held = None
+            if f"{name}_flags" in run.coords:
+                held = (run[f"{name}_flags"].to_numpy() & STUCK) > 0
+            step = float(run[name].attrs.get("reading_step", np.nan))
+            agreement = compare_sensors(x, trusted, dt, pair.window, held, step)
             compared[name] = agreement
             for fault in agreement.faults():
-                kind = "lag" if fault.startswith("lag") else "agreement"
-                kind = "constant" if fault.startswith("constant") else kind
-                out.append(Finding(name, kind, f"against {pair.channels[0]}: {fault}"))
+                text = f"against {pair.channels[0]}: {fault}"
+                if (kind := _kind(fault)) == "resolution":
+                    text += f" ({step:.2g} {run[name].attrs['units']})"
+                out.append(Finding(name, kind, text))
             if not np.isfinite(agreement.period):
                 continue
             stuck = find_stuck(x, dt, agreement.period, trusted)
@@ -233,6 +242,12 @@ def check_pairs(
                 )
                 out.append(Finding(name, "stuck", text))
     return out, compared
+
+
+def _kind(fault: str) -> str:
+    """Kind of finding that a fault of :meth:`Agreement.faults` is."""
+    starts = {"lag": "lag", "constant": "constant", "motion below": "resolution"}
+    return next((kind for start, kind in starts.items() if fault.startswith(start)), "agreement")
 
 
 def check_clocks(

@@ -15,7 +15,7 @@ from scipy import stats
 from seakeep.errors import RequestError
 from seakeep.signals.filters import as_series, odd_extension, positive
 from seakeep.signals.gaps import stretches
-from seakeep.signals.lags import windowed_lags
+from seakeep.signals.lags import Lags, windowed_lags
 
 __all__ = [
     "Agreement",
@@ -31,6 +31,26 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 MISSING, BRIDGED, OUTLIER, SATURATED, STUCK, REPLACED = 1, 2, 4, 8, 16, 32
+
+LEAST_CORRELATION = 0.8
+"""A sensor that follows the motion less closely is flagged: 36 % of the variance, 0.6 of the
+standard deviation, would be its own doing. The two limits on lags follow from it."""
+
+LATE = float(np.arccos(LEAST_CORRELATION) / (2 * np.pi))
+r"""Lag that alone brings the correlation down to 0.8, in periods: :math:`\cos 2\pi\tau/T`, 0.102.
+
+The scatter of lags that noise makes on sound runs of the virtual tank is far below it
+(benchmarks/results/quality.md)."""
+
+RUN_AWAY = 0.36
+r"""Growth of a lag over a record that alone brings the correlation down to 0.8 even at the best
+constant lag, in periods: the mean of :math:`\cos 2\pi\tau/T` over a lag that grows by g periods is
+:math:`\sin(\pi g)/(\pi g)`."""
+
+FEWEST_STEPS = 5.0
+"""Steps of a sensor that a motion must span from crest to trough: measurement-systems analysis asks
+for five distinct categories (AIAG, MSA, 4th edition)."""
+
 FLAGS = {"missing": MISSING, "bridged": BRIDGED, "outlier": OUTLIER, "saturated": SATURATED,
          "stuck": STUCK, "replaced": REPLACED}  # fmt: skip
 
@@ -263,12 +283,17 @@ class Agreement:
     ----------
     period : float
         Dominant period of the trusted one, s.
+    motion : float
+        Standard deviation of the trusted one over the windows compared, in its unit.
+    step : float
+        Step in which the sensor reads, in the same unit; NaN where it is not known to.
     lag, lag_spread : float
         Median over windows, s, positive where the sensor is late, searched within half a period;
         and 1.4826 times the median absolute deviation. NaN where nothing moves.
     growth : float
         Lag gained from the first two windows to the last two, s; where it jumped by a period it
-        is taken to have gone on.
+        is taken to have gone on. These windows are half as long, since a lag that runs away does
+        so within a window.
     correlation : float
         Median correlation at the peaks.
     at_zero : float
@@ -280,6 +305,8 @@ class Agreement:
     """
 
     period: float
+    motion: float
+    step: float
     lag: float
     lag_spread: float
     growth: float
@@ -292,23 +319,39 @@ class Agreement:
     def faults(self) -> list[str]:
         """What speaks against the sensor, in words; empty if nothing does.
 
-        An eighth of a period of lag is 45° of phase, a quarter of growth 90°; a correlation of
-        0.8 leaves 36 % of the variance unexplained.
+        A lag or its growth is a fault where it alone would bring the correlation below the least
+        one; a motion that spans fewer than five of the sensor's steps is below its resolution.
         """
         if not np.isfinite(self.correlation):
             return ["constant while the other sensor moves" if self.gain == 0 else "no motion seen"]
         out = []
-        if self.correlation < 0.8:
+        if self.spanned < FEWEST_STEPS:
+            out.append(
+                f"motion below the resolution: from crest to trough it spans {self.spanned:.1f} of "
+                "the steps in which the sensor reads"
+            )
+        if self.correlation < LEAST_CORRELATION:
             out.append(f"agrees poorly (correlation {self.correlation:.2f} at its best lag)")
-        elif abs(self.growth) > self.period / 4:
+        elif abs(self.growth) > RUN_AWAY * self.period:
             out.append(f"lag runs away by {self.growth:+.2f} s over the record")
-        elif abs(self.lag) > self.period / 8:
+        elif abs(self.lag) > LATE * self.period:
             out.append(f"lag {self.lag:+.2f} ± {self.lag_spread:.2f} s")
         return out
 
+    @property
+    def spanned(self) -> float:
+        """Steps of the sensor that the motion spans from crest to trough (2√2 of its SD)."""
+        known = np.isfinite(self.step) and self.step > 0
+        return float(2 * np.sqrt(2) * self.motion / self.step) if known else float("inf")
+
 
 def compare_sensors(
-    series: npt.ArrayLike, trusted: npt.ArrayLike, dt: float, window: float | None = None
+    series: npt.ArrayLike,
+    trusted: npt.ArrayLike,
+    dt: float,
+    window: float | None = None,
+    held: npt.ArrayLike | None = None,
+    step: float = float("nan"),
 ) -> Agreement:
     """Compare a sensor with a trusted one of the same motion, window by window.
 
@@ -320,12 +363,17 @@ def compare_sensors(
         Time step, s.
     window : float, optional
         Length of the windows, s; by default four periods.
+    held : array_like of bool, shape (time,), optional
+        Samples at which the sensor is known to be stuck; a lag of what stands still means nothing.
+    step : float, optional
+        Step in which the sensor reads, as :func:`seakeep.signals.resolution.reading_step` finds it
+        in the record.
 
     Returns
     -------
     Agreement
-        Windows in which the trusted sensor moves by less than 0.3 of what it does at most are
-        left out.
+        Windows that hold a stuck sample, and those in which the trusted sensor moves by less than
+        0.3 of what it does at most, are left out.
 
     Raises
     ------
@@ -337,27 +385,53 @@ def compare_sensors(
     empty = np.zeros(0)
     gain = float(x.std() / y.std()) if y.std() > 0 else float("nan")
     gain = 0.0 if gain < 1e-6 else gain  # what resampling makes of a constant
-    nothing = Agreement(period, *(float("nan"),) * 5, gain, empty, empty)
+    nothing = Agreement(period, float("nan"), step, *(float("nan"),) * 5, gain, empty, empty)
     length = 4 * period if window is None else window
     if gain == 0 or not np.isfinite(gain) or x.size * dt < length + period:
         return nothing
-    found = windowed_lags(x, y, dt, length, 0.5 * period)
-    half = 0.5 * length
-    begin = np.clip(((found.centre - half) / dt).astype(int), 0, None)
-    end = ((found.centre + half) / dt).astype(int)
-    motion = np.array([y[i:j].std() for i, j in zip(begin, end, strict=True)])
-    kept = (motion > 0.3 * motion.max()) & np.isfinite(found.lag)
-    if not kept.any():
+    stuck = np.zeros(x.size, dtype=bool) if held is None else np.asarray(held, dtype=bool)
+    found, motion = _windows(x, y, dt, length, period, stuck)
+    if not found.lag.size:
         return nothing
-    centre, lags, peak = found.centre[kept], found.lag[kept], found.correlation[kept]
-    # Where the two do not go together, a lag says nothing.
-    together = peak >= 0.6 if (peak >= 0.6).sum() > 3 else np.ones(peak.size, dtype=bool)
-    straight = np.unwrap(lags[together], period=period)
-    growth = 0.0
-    if straight.size > 3:
-        growth = float(straight[-2:].mean() - straight[:2].mean())
-    middle = float(np.median(lags[together]))
+    lags = found.lag[_together(found)]
+    middle = float(np.median(lags))
     return Agreement(
-        period, middle, float(1.4826 * np.median(np.abs(lags[together] - middle))), growth,
-        float(np.median(peak)), float(np.median(found.at_zero[kept])), gain, centre, lags,
-    )  # fmt: skip
+        period=period,
+        motion=motion,
+        step=step,
+        lag=middle,
+        lag_spread=float(1.4826 * np.median(np.abs(lags - middle))),
+        growth=_growth(_windows(x, y, dt, 0.5 * length, period, stuck)[0], period),
+        correlation=float(np.median(found.correlation)),
+        at_zero=float(np.median(found.at_zero)),
+        gain=gain,
+        centre=found.centre,
+        lags=found.lag,
+    )
+
+
+def _windows(
+    x: FloatArray, y: FloatArray, dt: float, length: float, period: float, stuck: BoolArray
+) -> tuple[Lags, float]:
+    """Lags in windows of a length that tell something, and the trusted sensor's SD in them."""
+    found = windowed_lags(x, y, dt, length, 0.5 * period)
+    begin = np.clip(((found.centre - 0.5 * length) / dt).astype(int), 0, None)
+    end = ((found.centre + 0.5 * length) / dt).astype(int)
+    motion = np.array([y[i:j].std() for i, j in zip(begin, end, strict=True)])
+    free = np.array([not stuck[i : j + 1].any() for i, j in zip(begin, end, strict=True)])
+    kept = (motion > 0.3 * motion.max()) & np.isfinite(found.lag)
+    kept &= free | ~np.any(kept & free)  # a sensor that sticks all the time is judged all the same
+    told = Lags(found.centre[kept], found.lag[kept], found.correlation[kept], found.at_zero[kept])
+    return told, float(np.sqrt(np.mean(motion[kept] ** 2))) if kept.any() else float("nan")
+
+
+def _together(found: Lags) -> BoolArray:
+    """Windows in which the two go together: elsewhere a lag says nothing."""
+    alike: BoolArray = found.correlation >= 0.6
+    return alike if alike.sum() > 3 else np.ones(alike.size, dtype=bool)
+
+
+def _growth(found: Lags, period: float) -> float:
+    """Lag gained from the first two windows to the last two, s."""
+    straight = np.unwrap(found.lag[_together(found)], period=period)
+    return float(straight[-2:].mean() - straight[:2].mean()) if straight.size > 3 else 0.0

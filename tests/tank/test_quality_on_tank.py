@@ -1,0 +1,35 @@
+"""Faults put into runs of the virtual tank: each is found, and a sound run is left alone."""
+
+import numpy as np
+import pytest
+import quality
+from quality import FAULTS
+
+pytest.importorskip("numba", reason="needs the extra tank")
+
+
+@pytest.fixture(scope="module", params=["irregular_1", "regular_3"])
+def heaves(request, settings, rig):
+    return quality.heaves(settings, rig, request.param)
+
+
+def test_a_sound_run_gives_no_alarm(heaves):
+    measured, trusted, dt = heaves
+    assert quality.kinds(measured, trusted, dt) == set()
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_are_found_and_what_is_below_a_limit_is_not(heaves, fault):
+    measured, trusted, dt = heaves
+    put, kind, size, _ = FAULTS[fault]
+    found = kind in quality.kinds(put(measured, dt, np.random.default_rng(1), size), trusted, dt)
+    assert found is not ("below" in fault or "finer" in fault)
+
+
+def test_noise_makes_no_lag(heaves):
+    measured, trusted, dt = heaves
+    found = quality.compare_sensors(measured, trusted, dt)
+    # The scatter of lags that the sensors' noise makes is a fiftieth of the limit or less.
+    assert abs(found.lag) + 2 * found.lag_spread < 0.02 * found.period
+    assert abs(found.growth) < 0.02 * found.period
+    assert found.correlation > 0.99
