@@ -112,11 +112,39 @@ def test_no_time_column_but_a_rate(tmp_path):
 
 
 def test_latin_1_is_read_and_said(tmp_path):
-    path = write(tmp_path, "tid [s],vinkel [°]\n0,1\n1,2\n", encoding="latin-1")
-    with pytest.warns(SeakeepWarning, match="is not UTF-8 and was read as Latin-1; check"):
+    path = write(tmp_path, "tid [s],bølge [°]\n0,1\n1,2\n", encoding="latin-1")
+    with pytest.warns(
+        SeakeepWarning, match=r"is not UTF-8 and was read as Windows-1252 \(Latin-1\); check"
+    ):
         run = read_table(path)
-    assert run["vinkel"].attrs["units"] == "°"
+    assert run["bølge"].attrs["units"] == "°"
     assert read_table(path, FileSettings(encoding="latin-1")).identical(run)
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "iso8859-15"])
+def test_signs_of_units_are_the_same_in_all_western_encodings(tmp_path, encoding):
+    """Degrees, micro and powers, as loggers write them: nothing to doubt, so no warning."""
+    head = "t [s],turn [°],strain [µm],load [N·m],acc [m/s²]"
+    path = write(tmp_path, head + "\n0,1,2,3,4\n1,2,3,4,5\n", encoding=encoding)
+    run = read_table(path)
+    units = [each.attrs["units"] for each in run.data_vars.values()]
+    assert units == ["°", "µm", "N·m", "m/s²"]
+
+
+def test_quotes_of_windows_are_read(tmp_path):
+    path = write(tmp_path, "t,“Ångström” – x\n0,1\n1,2\n", encoding="cp1252")
+    with pytest.warns(SeakeepWarning, match="Windows-1252"):
+        assert list(read_table(path).data_vars) == ["“Ångström” – x"]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_utf16_without_its_mark(tmp_path, encoding):
+    path = write(tmp_path, PLAIN, encoding=encoding)
+    with pytest.raises(
+        DataError, match=rf"seems to be UTF-16 without the mark .* State encoding = '{encoding}'"
+    ):
+        read_table(path)
+    check_plain(read_table(path, FileSettings(encoding=encoding)))
 
 
 def test_missing_values_are_nan(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import warnings
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
@@ -224,9 +225,18 @@ def read_netcdf(path: Path, options: FileSettings) -> Columns:
             flat[str(name)] = array
         elif array.ndim == 2:
             tables[str(name)] = array
+    faults: dict[str, str] = {}
     axes = {array.dims[0] for array in flat.values()}
     if len(axes) > 1:
         axis = _time_axis(flat, options.time)
+        length = next(array.size for array in flat.values() if array.dims == (axis,))
+        faults = {
+            name: f"{path}: '{name}' has {array.size} values along '{array.dims[0]}', and the time "
+            f"{length} along '{axis}'. Save channels of one clock, each as long as the time, or "
+            "put each clock's channels into a file of its own."
+            for name, array in flat.items()
+            if array.dims != (axis,)
+        }
         flat = {name: array for name, array in flat.items() if array.dims == (axis,)}
     for name, table in tables.items():
         flat.update(_split_table(path, name, table))
@@ -239,23 +249,33 @@ def read_netcdf(path: Path, options: FileSettings) -> Columns:
     values = {name: array.to_numpy().astype(float) for name, array in flat.items()}
     _check_lengths(path, values)
     units = {
-        name: str(array.attrs["units"]) for name, array in flat.items() if "units" in array.attrs
+        name: _text(array.attrs["units"]) for name, array in flat.items() if "units" in array.attrs
     }
-    return Columns(values=values, units=units, headers={name: name for name in values})
+    headers = {name: name for name in [*values, *faults]}
+    return Columns(values=values, units=units, faults=faults, headers=headers)
+
+
+def _text(attribute: Any) -> str:
+    """Text of an attribute, which HDF5 may hold as bytes of any encoding."""
+    if not isinstance(attribute, bytes):
+        return str(attribute)
+    try:
+        return attribute.decode("utf-8")
+    except UnicodeDecodeError:
+        return attribute.decode("latin-1")
 
 
 def _opened(path: Path, group: str | None) -> xr.Dataset:
     with path.open("rb") as file:
         classic = file.read(3) == b"CDF"
+    how: dict[str, Any] = {"engine": "scipy"}
+    if not classic:
+        how = {"engine": "h5netcdf", "group": group, "phony_dims": "sort"}
     try:
-        if classic:
-            opened = xr.open_dataset(path, engine="scipy", decode_times=False)
-        else:
-            opened = xr.open_dataset(
-                path, engine="h5netcdf", decode_times=False, group=group, phony_dims="sort"
-            )
-        with opened:
-            return opened.load()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UnicodeWarning)  # units in another encoding: see _text
+            with xr.open_dataset(path, decode_times=False, **how) as opened:
+                return opened.load()
     except (OSError, ValueError, TypeError, KeyError, IndexError, EOFError, RuntimeError,
             AttributeError, struct.error, zlib.error) as error:  # fmt: skip
         if group is not None and isinstance(error, OSError) and "group" in str(error).lower():

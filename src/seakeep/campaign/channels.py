@@ -10,6 +10,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.campaign.checks import check_samples
+from seakeep.campaign.columns import is_unit
 from seakeep.campaign.derivation import derive
 from seakeep.campaign.instruments import Logger, channels_of, homes
 from seakeep.campaign.readers import labelled_table
@@ -121,9 +122,12 @@ def _channels(
     table = labelled_table(path, logger.columns, logger.options, columns)
     time = table["time"].copy(data=clock.reference(table["time"].to_numpy()))
     table = _cut(table.assign_coords(time=time), settings.runs[run], run)
-    variables = {
-        name: ("time", *_mapped(table, name, each, path)) for name, each in channels.items()
-    }
+    own = settings.runs[run].channels
+    variables = {}
+    for name, each in channels.items():
+        if not (name in own and "unit" in own[name].model_fields_set):
+            _refuse_other_unit(table, name, each, run, path)
+        variables[name] = ("time", *_mapped(table, name, each, path))
     dataset = xr.Dataset(variables, {"time": table["time"]})
     if preparation.gaps == "refuse":
         _refuse_gaps(dataset, run, path)
@@ -201,13 +205,38 @@ def _cut(table: xr.Dataset, settings: RunSettings, run: str) -> xr.Dataset:
     return table.isel(time=kept)
 
 
+def _column(table: xr.Dataset, name: str, settings: ChannelSettings) -> xr.DataArray:
+    """Column of a channel, by name or full header."""
+    wanted = settings.column or name
+    found = table.get(wanted)
+    if found is None:
+        found = next(c for c in table.data_vars.values() if c.attrs["long_name"] == wanted)
+    return found
+
+
+def _refuse_other_unit(
+    table: xr.Dataset, name: str, settings: ChannelSettings, run: str, path: Path
+) -> None:
+    """Refuse a unit that is stated for all runs where this run's file says another one."""
+    stated = settings.unit
+    said = str(_column(table, name, settings).attrs.get("units", "")).strip()
+    if stated is None or said in ("", "-", "1") or not is_unit(said):
+        return
+    same = si_unit(said) == si_unit(stated)
+    if same and conversion(said, si_unit(said)) == conversion(stated, si_unit(stated)):
+        return
+    raise RequestError(
+        f"channels.{name}: the unit '{stated}' is stated, and run '{run}' ({path}) says "
+        f"'{said}' of the column '{settings.column or name}'. Leave unit out where the files say "
+        f"it; or, if this file is wrong, state the unit in [runs.{run}.channels.{name}]."
+    )
+
+
 def _mapped(
     table: xr.Dataset, name: str, settings: ChannelSettings, path: Path
 ) -> tuple[FloatArray, dict[str, str]]:
     wanted = settings.column or name
-    column = table.get(wanted)
-    if column is None:
-        column = next(c for c in table.data_vars.values() if c.attrs["long_name"] == wanted)
+    column = _column(table, name, settings)
     unit = settings.unit if settings.unit is not None else column.attrs.get("units")
     if unit is None:
         raise RequestError(

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from seakeep.conventions import si_unit
 from seakeep.errors import RequestError
 
-__all__ = ["Columns", "split_unit"]
+__all__ = ["Columns", "is_unit", "split_unit", "unique_names"]
 
 FloatArray = npt.NDArray[np.float64]
 

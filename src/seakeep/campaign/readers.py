@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import os
 import re
@@ -14,6 +15,7 @@ import xarray as xr
 
 from seakeep.campaign.binary import read_matlab, read_netcdf
 from seakeep.campaign.columns import Columns
+from seakeep.campaign.kinds import refuse_foreign
 from seakeep.campaign.rosbag import is_recording, read_recording
 from seakeep.campaign.settings import FileSettings
 from seakeep.campaign.tdms import read_tdms
@@ -28,6 +30,8 @@ FloatArray = npt.NDArray[np.float64]
 
 _TIMES = {"time", "t", "times", "tid", "tempo", "zeit", "temps", "tiempo", "time_s", "t_s",
           "sec", "seconds", "elapsed", "elapsed time", "time elapsed", "timestamp"}  # fmt: skip
+SHOWN = 5
+"""Names of a folder that a message lists at most."""
 _VARIABLE = re.compile(r"\$\{([^}]*)\}")
 
 
@@ -86,10 +90,12 @@ def _check_there(path: Path) -> None:
         )
     beside = sorted(p.name for p in path.parent.iterdir())
     near = did_you_mean(path.name, beside)
-    shown = ", ".join(beside[:8]) + (" …" if len(beside) > 8 else "")
-    raise RequestError(
-        f"{path} does not exist.{near} Its folder holds {shown or 'nothing'}. Correct the name."
-    )
+    likeness = {name: difflib.SequenceMatcher(None, path.name, name).ratio() for name in beside}
+    nearest = sorted(sorted(beside, key=lambda name: -likeness[name])[:SHOWN])
+    shown = ", ".join(nearest) or "nothing"
+    if len(beside) > SHOWN:
+        shown = f"{len(beside)} names, the nearest of them {shown}"
+    raise RequestError(f"{path} does not exist.{near} Its folder holds {shown}. Correct the name.")
 
 
 def read_columns(path: Path, options: FileSettings | None = None) -> Columns:
@@ -122,10 +128,13 @@ def read_columns(path: Path, options: FileSettings | None = None) -> Columns:
         head = file.read(600)
     if not head:
         raise DataError(f"{path} is empty (0 bytes). Export the run again.")
+    refuse_foreign(path, head)
     suffix = path.suffix.lower()
+    if head.startswith(b"\x89HDF"):
+        return read_netcdf(path, options)
     if head.startswith(b"MATLAB") or suffix == ".mat":
         return read_matlab(path, options)
-    if head.startswith((b"\x89HDF", b"CDF")) or suffix in (".nc", ".nc4", ".h5", ".hdf5", ".hdf"):
+    if head.startswith(b"CDF") or suffix in (".nc", ".nc4", ".h5", ".hdf5", ".hdf"):
         return read_netcdf(path, options)
     if head.startswith(b"TDSm") or suffix == ".tdms":
         return read_tdms(path, options)

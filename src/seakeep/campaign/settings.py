@@ -105,7 +105,11 @@ class FileSettings(Table):
     skip_rows: Annotated[int, Field(ge=0)] = Field(
         default=0, description="lines to leave out at the head of the file"
     )
-    encoding: str | None = Field(default=None, description="such as 'utf-8' or 'latin-1'")
+    encoding: str | None = Field(
+        default=None,
+        description="of a text file, such as 'utf-8', 'cp1252' or 'utf-16-le'; left out, UTF-8, "
+        "UTF-16 with its mark, or Windows-1252 (Latin-1)",
+    )
     group: str | None = Field(
         default=None,
         description="the part of a file that is read, where it holds several: the group of a TDMS, "

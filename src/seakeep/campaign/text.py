@@ -56,8 +56,13 @@ def read_text(path: Path, options: FileSettings) -> Columns:
     DataError
         If the file is empty, damaged, or its rows differ in length.
     """
-    layout = _layout(path, _lines(path, options), options)
+    text = _text(path, options)
+    # Not splitlines: it would break lines at form feeds and other marks inside a cell.
+    lines = re.split(r"\r\n|\r|\n", text)
+    layout = _layout(path, lines if lines[-1] else lines[:-1], options)
     _check_widths(path, layout)
+    if lines[-1]:
+        _warn_of_a_short_end(path, layout)
     names, units = unique_names(layout.headers)
     if layout.units is not None:
         units = [row or unit for row, unit in zip(layout.units, units, strict=True)]
@@ -77,7 +82,19 @@ def read_text(path: Path, options: FileSettings) -> Columns:
     )
 
 
-def _lines(path: Path, options: FileSettings) -> list[str]:
+def _warn_of_a_short_end(path: Path, layout: _Layout) -> None:
+    """Warn where the last line has no end and its last cell is shorter than those above."""
+    cells = [_cells(line, layout.delimiter)[-1] for _, line in layout.body[-50:]]
+    if len(cells) > 2 and len(cells[-1]) < min(map(len, cells[:-1])):
+        warnings.warn(
+            f"{path} ends within line {layout.body[-1][0]}, at {cells[-1]!r}: it seems to be cut "
+            "off. Export it again, or end the last line if it is whole.",
+            SeakeepWarning,
+            stacklevel=3,
+        )
+
+
+def _text(path: Path, options: FileSettings) -> str:
     raw = path.read_bytes()
     if raw[:2] == b"\x1f\x8b":
         try:
@@ -88,15 +105,32 @@ def _lines(path: Path, options: FileSettings) -> list[str]:
             ) from None
     if not raw.strip():
         raise DataError(f"{path} is empty. Export the run again.")
-    if b"\x00" in raw[:4096] and not raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        raise DataError(
-            f"{path} holds binary data that are no text table. Readable are CSV and text tables "
-            "(plain or gzip), MATLAB .mat (version 5 to 7.2), NetCDF and HDF5; export to one of "
-            "these."
-        )
-    # Not splitlines: it would break lines at form feeds and other marks inside a cell.
-    lines = re.split(r"\r\n|\r|\n", _decode(path, raw, options.encoding))
-    return lines if lines[-1] else lines[:-1]
+    _refuse_binary(path, raw, options.encoding)
+    return _decode(path, raw, options.encoding)
+
+
+def _refuse_binary(path: Path, raw: bytes, encoding: str | None) -> None:
+    """Refuse zero bytes, which no text has but one of two or four bytes a letter."""
+    wide = raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    if b"\x00" not in raw[:4096] or wide or encoding is not None:
+        return
+    for form, zeros, letters in (("utf-16-le", raw[1:200:2], raw[0:200:2]),
+                                 ("utf-16-be", raw[0:200:2], raw[1:200:2])):  # fmt: skip
+        if not any(zeros) and all(letters):
+            raise DataError(
+                f"{path} seems to be UTF-16 without the mark that says so. State encoding = "
+                f"'{form}' in [files]."
+            )
+    raise DataError(
+        f"{path} holds binary data that are no text table. Readable are CSV and text tables "
+        "(plain or gzip), MATLAB .mat (version 5 to 7.3), NetCDF and HDF5, TDMS, ROS 2 bags and "
+        "MCAP; export to one of these."
+    )
+
+
+_UNUSED = {0x81, 0x8D, 0x8F, 0x90, 0x9D}
+_SIGNS = frozenset("°µ²³·".encode("latin-1"))
+"""Signs of units that are the same byte in Latin-1, its relatives and Windows-1252."""
 
 
 def _decode(path: Path, raw: bytes, encoding: str | None) -> str:
@@ -114,13 +148,15 @@ def _decode(path: Path, raw: bytes, encoding: str | None) -> str:
                 f"{path} is not {encoding}: byte {error.start} does not fit. Correct 'encoding' in "
                 "[files], or leave it out."
             ) from None
-    warnings.warn(
-        f"{path} is not UTF-8 and was read as Latin-1; check the letters of its header, or state "
-        "encoding in [files].",
-        SeakeepWarning,
-        stacklevel=2,
-    )
-    return raw.decode("latin-1")
+    if not {byte for byte in raw if byte >= 0x80} <= _SIGNS:
+        warnings.warn(
+            f"{path} is not UTF-8 and was read as Windows-1252 (Latin-1); check the letters of its "
+            "header, or state encoding in [files].",
+            SeakeepWarning,
+            stacklevel=2,
+        )
+    # Five bytes are no letter of Windows-1252; Latin-1 has control characters in their place.
+    return raw.decode("cp1252" if not _UNUSED & set(raw) else "latin-1")
 
 
 def _layout(path: Path, lines: list[str], options: FileSettings) -> _Layout:

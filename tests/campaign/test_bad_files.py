@@ -1,0 +1,312 @@
+"""Every reader fed what is no run: one error that says what it is and how to mend it."""
+
+import re
+import shutil
+import struct
+import zlib
+from functools import cache
+
+import h5py
+import numpy as np
+import pytest
+from scipy import io
+from small_tank import CAMPAIGN, tank_columns, write_csv
+
+from seakeep.campaign import read_campaign, read_table
+from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
+
+T = 0.05 * np.arange(400)
+HEAVE = np.sin(T)
+
+
+def csv(path):
+    write_csv(path, {"time [s]": T, "heave [m]": HEAVE})
+
+
+def matlab_5(path):
+    io.savemat(path, {"time": T, "heave": HEAVE})
+
+
+def matlab_73(path):
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in (("time", T), ("heave", HEAVE)):
+            file[name] = values[None, :]
+            file[name].attrs["MATLAB_class"] = np.bytes_("double")
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+
+
+def netcdf(path):
+    read_table_of().to_netcdf(path, engine="h5netcdf")
+
+
+def netcdf_3(path):
+    read_table_of().to_netcdf(path, engine="scipy")
+
+
+def hdf5(path):
+    with h5py.File(path, "w") as file:
+        file["time"], file["heave"] = T, HEAVE
+
+
+def tdms(path):
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment([nptdms.ChannelObject("run", "heave", HEAVE, {"wf_increment": 0.05})])
+
+
+def mcap(path):
+    pytest.importorskip("rosbags")
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    kind, folder = "std_msgs/msg/Float64", path.with_name("bag")
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topic = writer.add_connection("/heave", kind, typestore=store)
+        for t, x in zip(T, HEAVE, strict=True):
+            message = store.types[kind](data=float(x))
+            writer.write(topic, int(1e9 * t), store.serialize_cdr(message, kind))
+    shutil.move(next(folder.glob("*.mcap")), path)
+    shutil.rmtree(folder)
+
+
+def read_table_of():
+    import xarray as xr
+
+    return xr.Dataset({"heave": ("time", HEAVE)}, {"time": ("time", T, {"units": "s"})})
+
+
+READERS = {
+    "csv": csv, "v5.mat": matlab_5, "v73.mat": matlab_73, "nc": netcdf, "3.nc": netcdf_3,
+    "h5": hdf5, "tdms": tdms, "mcap": mcap,
+}  # fmt: skip
+
+
+@cache
+def png():
+    """A picture of one pixel, whole and sound."""
+
+    def chunk(kind, data):
+        tail = struct.pack(">I", zlib.crc32(kind + data))
+        return struct.pack(">I", len(data)) + kind + data + tail
+
+    head = chunk(b"IHDR", struct.pack(">2I5B", 1, 1, 8, 0, 0, 0, 0))
+    body = head + chunk(b"IDAT", zlib.compress(b"\x00\x00")) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + body
+
+
+@pytest.fixture(params=list(READERS), ids=list(READERS))
+def path(request, tmp_path):
+    """A sound file of each kind."""
+    made = tmp_path / f"run.{request.param}"
+    READERS[request.param](made)
+    assert read_table(made).sizes["time"] == T.size
+    return made
+
+
+def test_empty(path):
+    path.write_bytes(b"")
+    with pytest.raises(DataError, match=r"run\..* is empty \(0 bytes\)\. Export the run again\."):
+        read_table(path)
+
+
+@pytest.mark.parametrize("part", [0.15, 0.5, 0.9])
+def test_truncated(path, part):
+    if path.suffix == ".csv":
+        return  # below: a text that is cut off is one still
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(part * len(whole))])
+    with pytest.raises(
+        DataError, match=r"run\..*cut off.*(Copy|copy|Save it again|Export it again|was not closed)"
+    ):
+        read_table(path)
+
+
+@pytest.mark.parametrize("left", range(1, 12))
+def test_a_text_cut_off_within_its_last_line(tmp_path, left):
+    """Wherever it is cut: too few cells are an error, a last cell too short a warning."""
+    path = tmp_path / "run.csv"
+    lines = ["t,heave", *(f"{t:.3f},{x:.5f}" for t, x in zip(T, 2 + HEAVE, strict=True))]
+    last = lines[200]
+    path.write_text("\n".join([*lines[:200], last[:left]]))
+    if left > last.index(","):
+        shown = re.escape(repr(last[:left].split(",")[1].strip()))
+        with pytest.warns(SeakeepWarning, match=f"ends within line 201, at {shown}: it seems"):
+            read_table(path)
+    else:
+        with pytest.raises(DataError, match=r"line 201: 1 cells where .* the file was cut off"):
+            read_table(path)
+    path.write_text("\n".join([*lines[:200], last]))  # whole, without an end: no word
+    assert read_table(path).sizes["time"] == 200
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (png(), r"is a PNG picture, and no table\. Name the file that holds the run's samples"),
+        (b"\xff\xd8\xff\xe0" + bytes(99), r"is a JPEG picture, and no table"),
+        (b"%PDF-1.7\n%\xe2\xe3\n" + bytes(99), r"is a PDF document, and no table"),
+        (
+            b"PK\x03\x04" + bytes(99),
+            r"is an Excel workbook .*\. Save its sheet as CSV and name",
+        ),
+        (b"\xd0\xcf\x11\xe0" + bytes(99), r"is an Excel workbook of the old kind .* as CSV"),
+        (bytes(4) + b"ftypisom" + bytes(99), r"is a video in MP4, .* first, with `seakeep track`"),
+        (b"RIFF" + bytes(99), r"is a recording in AVI or WAV, .* with `seakeep track`"),
+        (
+            bytes(range(256)) * 4,
+            r"holds binary data that are no text|cannot be read as (a MATLAB file|NetCDF|a TDMS"
+            " file|a recording of ROS 2).*(cut off|damaged)",
+        ),
+    ],
+    ids=["PNG", "JPEG", "PDF", "Excel", "old Excel", "MP4", "AVI", "noise"],
+)
+def test_another_kind_of_file_under_the_name(path, content, message):
+    path.write_bytes(content)
+    with pytest.raises(DataError, match=message):
+        read_table(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "cp1252"])
+def test_text_under_the_name_of_a_binary_format(path, encoding):
+    """A table that is not UTF-8 either; a text file's own reader takes it."""
+    path.write_bytes("tid [s],vinkel [°]\n0,1\n1,2\n".encode(encoding))
+    if path.suffix == ".csv":
+        assert read_table(path)["vinkel"].attrs["units"] == "°"
+        return
+    with pytest.raises(
+        DataError,
+        match=r"run\..* is no (MATLAB|NetCDF|HDF5|TDMS|MCAP) file: it holds text and begins with "
+        r"'tid \[s\],vinkel .*If it is a table, name it \.csv or \.txt; else copy or export it",
+    ):
+        read_table(path)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".dat", ".mat", ""])
+@pytest.mark.parametrize("make", [netcdf, netcdf_3, hdf5, matlab_5, matlab_73, tdms])
+def test_a_sound_file_under_another_name_is_recognised(tmp_path, make, suffix):
+    if suffix == ".mat" and make in (netcdf_3, tdms):
+        pytest.skip("taken for what its name says")
+    path = tmp_path / "run.x"
+    make(path)
+    path = path.rename(tmp_path / f"run{suffix}")
+    np.testing.assert_array_equal(read_table(path)["heave"], HEAVE)
+
+
+def test_units_of_an_attribute_that_is_not_utf_8(tmp_path):
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file["time"], file["pitch"] = T, HEAVE
+        file["pitch"].attrs["units"] = np.bytes_("°".encode("latin-1"))
+    assert read_table(path)["pitch"].attrs["units"] == "°"
+
+
+def test_channels_of_another_length_in_one_netcdf_file(tmp_path):
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file["time"], file["heave"], file["load"] = T, HEAVE, HEAVE[:-3]
+    assert list(read_table(path, columns=["heave"]).data_vars) == ["heave"]
+    with pytest.raises(
+        DataError,
+        match=r"'load' has 397 values along '.*', and the time 400 along '.*'\. Save chan",
+    ):
+        read_table(path, columns=["load"])
+
+
+class TestUnits:
+    """Runs and files that state different units."""
+
+    def prepared(self, tank, header, text=CAMPAIGN):
+        columns = tank_columns(1)
+        size = {"mm": 1.0, "cm": 0.1, "m": 1e-3, "deg": 1.0, "-": 1.0, "": 1.0}[header]
+        heave = columns.pop("Heave [mm]") * size
+        columns[f"Heave [{header}]" if header else "Heave"] = heave
+        write_csv(tank / "second.csv", columns)
+        (tank / "campaign.toml").write_text(text)
+        return read_campaign(tank / "campaign.toml").prepare()
+
+    @pytest.mark.parametrize("unit", ["cm", "m"])
+    def test_each_header_counts_for_its_own_run(self, tank, unit):
+        same = self.prepared(tank, "mm")["second"]
+        # One product with another rounded factor.
+        np.testing.assert_allclose(self.prepared(tank, unit)["second"]["heave"], same["heave"],
+                                   rtol=1e-12, atol=1e-15)  # fmt: skip
+
+    def test_a_stated_unit_against_a_header(self, tank):
+        text = CAMPAIGN.replace('column = "Heave"', 'column = "Heave"\nunit = "mm"')
+        assert "second" in self.prepared(tank, "mm", text)
+        assert "second" in self.prepared(tank, "-", text)
+        assert "second" in self.prepared(tank, "", text)
+        for header in ("m", "deg"):
+            with pytest.raises(
+                RequestError,
+                match=rf"channels\.heave: the unit 'mm' is stated, and run 'second' \(.*\.csv\) "
+                rf"says '{header}' of the column 'Heave'\. Leave unit out where the files say it; "
+                r"or, if this file is wrong, state the unit in \[runs\.second\.channels\.heave\]",
+            ):
+                self.prepared(tank, header, text)
+        mended = text.replace(
+            "[preparation]", "[runs.second.channels.heave]\nunit = 'm'\n[preparation]"
+        )
+        assert float(self.prepared(tank, "deg", mended)["second"]["heave"].std()) > 1.0
+
+    def test_one_unit_in_other_words(self, tank):
+        text = CAMPAIGN.replace('column = "Pitch"', 'column = "Pitch"\nunit = "°"')
+        assert "second" in self.prepared(tank, "mm", text)
+
+    def test_a_unit_in_one_run_alone(self, tank):
+        with pytest.raises(RequestError, match=r"column 'Heave' of .*second\.csv states no unit"):
+            self.prepared(tank, "")
+
+
+class TestLengths:
+    """Two loggers a run, one of them stopped early, or another day."""
+
+    TEXT = (
+        "[channels.load]\n[channels.heave]\n[instruments]\nreference = 'loads'\n"
+        "[instruments.loads]\n[instruments.mru]\n[runs.r.files]\nloads = 'loads.csv'\n"
+        "mru = 'mru.csv'\n"
+    )
+
+    def prepared(self, folder, begin, end):
+        write_csv(folder / "loads.csv", {"time [s]": T, "load [N]": HEAVE})
+        at = np.arange(begin, end, 0.02)
+        write_csv(folder / "mru.csv", {"time [s]": at, "heave [m]": np.sin(at)})
+        (folder / "campaign.toml").write_text(self.TEXT)
+        return read_campaign(folder / "campaign.toml").prepare()["r"]
+
+    def test_the_run_is_what_all_recorded(self, tmp_path):
+        run = self.prepared(tmp_path, 2.0, 12.0)
+        assert float(run["time"][0]) == pytest.approx(2.0)
+        assert float(run["time"][-1]) == pytest.approx(11.95)
+        assert np.isfinite(run["heave"]).all()
+
+    def test_loggers_that_never_recorded_together(self, tmp_path):
+        with pytest.raises(
+            DataError,
+            match=r"run 'r': its instruments never recorded together \(loads 0 to 19\.95 s, mru 30 "
+            r"to 39\.98 s, on the reference's clock\)\. Check the files of the run and the clocks",
+        ):
+            self.prepared(tmp_path, 30.0, 40.0)
+
+
+@pytest.mark.parametrize("content", [png(), b"a text\n" * 9, "é à".encode("latin-1") * 9])
+def test_what_is_no_video(tmp_path, content):
+    pytest.importorskip("cv2")
+    from seakeep.signals import track_video
+
+    path = tmp_path / "side.mp4"
+    path.write_bytes(content)
+    with pytest.raises(SeakeepError, match=r"side\.mp4 (cannot be opened as a video|holds|states)"):
+        track_video(path)
+
+
+def test_a_long_folder_is_not_listed(tmp_path):
+    for i in range(200):
+        (tmp_path / f"run_{i:03d}.csv").write_text("")
+    with pytest.raises(RequestError) as caught:
+        read_table(tmp_path / "run_17.csv")
+    message = str(caught.value)
+    assert "Its folder holds 200 names, the nearest of them run_017.csv, " in message
+    assert message.count(".csv") <= 1 + 1 + 5  # the one asked for, the guess, five names
