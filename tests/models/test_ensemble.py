@@ -3,9 +3,18 @@ import dataclasses
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import stats
 
 import seakeep
-from seakeep import BayesianHankelDMDc, DataError, Fixed, HankelDMDc, RequestError, Uniform
+from seakeep import (
+    BayesianHankelDMDc,
+    DataError,
+    Fixed,
+    HankelDMDc,
+    RequestError,
+    SeakeepWarning,
+    Uniform,
+)
 from seakeep.models import summaries
 from seakeep.models.draws import child
 
@@ -55,6 +64,10 @@ def small(**changes):
 
 def fitted(run, **changes):
     return small(**changes).fit(run, STATES, INPUTS, stop=60.0)
+
+
+STABLE = Uniform(200, 400)
+"""λ at which all members of these tests are stable."""
 
 
 def arrays(forecast):
@@ -296,6 +309,101 @@ def test_members_that_diverge_say_when():
     np.testing.assert_array_equal(summary.status, forecast.status)
     assert summary.attrs["diverged"] == forecast.attrs["diverged"] == lost.sum()
     assert forecast.attrs["status"] == f"{lost.sum()} of 6 members diverged"
+    with pytest.warns(SeakeepWarning, match=r"6 of 6 members have a spectral radius of one or mor"):
+        radii = ensemble.spectral_radii()
+    assert np.all(radii[lost] > 1)
+    assert f"({np.sum(radii >= 1)} of 6 UNSTABLE: their long forecasts" in ensemble.summary()
+
+
+def test_the_summary_says_what_the_members_are(run):
+    ensemble = fitted(run, train_length=Uniform(30, 40), n_members=20, ridge=STABLE)
+    text = ensemble.summary()
+    draws = ensemble.draws
+    for words in (
+        "Ensemble of 20 Hankel DMD models with control: 2 states, 1 input, dt 0.1 s",
+        "heave [m], pitch [m]",
+        f"Monte Carlo, seed 3; {draws.attrs['redrawn']} infeasible and drawn again",
+        f"({int(draws.train_length_samples.min())} to {int(draws.train_length_samples.max())} sam",
+        f"state delay   {float(draws.state_delay.min()):.4g} to",
+        f"({int(draws.input_delay_samples.min())} to {int(draws.input_delay_samples.max())} sam",
+        f"ridge         {float(draws.ridge.min()):.4g} to {float(draws.ridge.max()):.4g}; delay",
+        f"history       {ensemble.history_samples} samples up to",
+        "to 60 s",
+        "(stable)",
+    ):
+        assert words in text
+    windows = small(train_on="windows", sampling="sobol", ridge=STABLE).fit(
+        [run, wave_run(1)], STATES, INPUTS
+    )
+    assert "Sobol, seed 3" in windows.summary()
+    assert "2 runs, a window of one of them a member, drawn" in windows.summary()
+    whole = small(train_length=None, ridge=STABLE).fit(run, STATES, INPUTS)
+    assert "window        all of a run" in whole.summary()
+
+
+def test_spectral_radii_are_those_of_the_members_for_any_workers(run, tmp_path):
+    radii = fitted(run, ridge=STABLE).spectral_radii()
+    ensemble = fitted(run, ridge=STABLE)
+    for number in range(6):
+        # The same matrix through the same routine; scratch memory may lie otherwise.
+        expected = ensemble.member(number).spectral_radius
+        assert radii[number] == pytest.approx(expected, rel=1e-12)
+    told = []
+    again = ensemble.spectral_radii(workers=2, progress=lambda *step: told.append(step))
+    np.testing.assert_array_equal(again, radii)
+    assert told == [(k, 6, f"member {k}") for k in range(1, 7)]
+    ensemble.spectral_radii(progress=lambda *step: told.append(step))
+    assert len(told) == 6  # found once
+    back = seakeep.load_model(ensemble.save(tmp_path / "e.nc"))
+    np.testing.assert_array_equal(back.radii, radii)
+    assert seakeep.load_model(fitted(run, ridge=STABLE).save(tmp_path / "f.nc")).radii is None
+
+
+def test_training_spans_are_those_of_the_members(run):
+    runs = {"one": run, "two": wave_run(1)}
+    for train_on in ("all", "runs", "windows"):
+        ensemble = small(train_on=train_on, n_members=8).fit(runs, STATES, INPUTS, stop=60.0)
+        ends = {}
+        for number in range(8):
+            for name, span in ensemble.member(number).training_spans.items():
+                ends.setdefault(name, []).append(span)
+        assert ensemble.training_spans == {
+            name: (min(first for first, _ in spans), max(stop for _, stop in spans))
+            for name, spans in ends.items()
+        }
+
+
+def test_progress_of_a_forecast_counts_the_members(run):
+    told = []
+    fitted(run).forecast_summary(run, 65.0, 5, progress=lambda *step: told.append(step[:2]))
+    assert told == [(k, 6) for k in range(1, 7)]
+
+
+def test_forecasts_carry_the_spread_that_tells_a_slack_channel(run):
+    ensemble = fitted(run)
+    pooled = np.concatenate(ensemble.arrays.states).std(axis=0, ddof=1)
+    for forecast in (
+        ensemble.forecast(run, 65.0, 5),
+        ensemble.forecast_summary(run, 65.0, 5),
+        ensemble.summarize_windows(run, [65.0], 5),
+    ):
+        found = [forecast[name].attrs["training_std"] for name in STATES]
+        np.testing.assert_array_equal(found, pooled)
+
+
+def test_draws_are_quantiles_of_any_distribution_of_scipy(run):
+    prior = stats.truncnorm(-2, 2, loc=11, scale=1)
+    draws = fitted(run, train_length=prior, ridge=stats.gamma(2.0)).draws
+    for member in range(6):
+        quantiles = child(np.random.SeedSequence(3), member).random(4)
+        assert float(draws.train_length[member]) == prior.ppf(quantiles[0])
+        assert float(draws.ridge[member]) == stats.gamma(2.0).ppf(quantiles[3])
+
+
+def test_both_ensembles_at_once_differ_in_settings_and_windows(run):
+    draws = fitted(run, train_on="windows").draws
+    for name in ("ridge", "last_sample", "train_length_samples"):
+        assert len(np.unique(draws[name])) > 1
 
 
 def test_the_presets():

@@ -30,6 +30,9 @@ __all__ = ["Campaign", "Progress", "read_campaign"]
 Progress = Callable[[int, int, str], None]
 """Called after each run with how many are done, how many there are, and the run's name."""
 
+SHOWN_RUNS = 6
+"""Runs that a campaign's representation names."""
+
 FORMAT = 2
 """Goes into the digest: raise it when the same settings begin to give other arrays."""
 
@@ -50,6 +53,15 @@ class Campaign:
 
     path: Path
     settings: CampaignSettings
+
+    def __repr__(self) -> str:
+        runs = list(self.settings.runs)
+        shown = ", ".join(runs[:SHOWN_RUNS]) + (", …" if len(runs) > SHOWN_RUNS else "")
+        models = ", ".join(self.settings.all_models()) or "none"
+        return (
+            f"{type(self).__name__}({self.name!r}, path={str(self.path)!r}, {len(runs)} runs: "
+            f"{shown}; models: {models})"
+        )
 
     @property
     def name(self) -> str:

@@ -44,7 +44,6 @@ def rollout(
     inputs: npt.ArrayLike,
     *,
     n_states: int | None = None,
-    limit: float = np.inf,
     scratch: Scratch | None = None,
 ) -> FloatArray:
     r"""Free run of one model over several windows side by side.
@@ -66,15 +65,13 @@ def rollout(
         square `A` with extended `histories` leaves it open: lower rows that are an exact shift are
         read as delays, and any other square `A` as N = N(s+1), so that the whole extended state
         is returned.
-    limit : float, optional
-        A window is given up where a value exceeds this or is not finite: NaN from there on.
     scratch : Scratch, optional
         Memory of an earlier call to use again.
 
     Returns
     -------
     ndarray, shape (window, steps, N)
-        :math:`x_1 … x_{steps}`.
+        :math:`x_1 … x_{steps}`; NaN from where a window is no longer finite on.
 
     Raises
     ------
@@ -114,7 +111,7 @@ def rollout(
         if out is None:
             symmetric, propagator = _prepare(a, b, count, channels, len(start), steps, memory)
             out = _run(propagator, symmetric, start, driving, steps, count, memory)
-        lost = ~(np.abs(out) <= min(limit, np.finfo(float).max)).all(axis=2)
+        lost = ~np.isfinite(out).all(axis=2)
     if lost.any():
         out[np.logical_or.accumulate(lost, axis=1)] = np.nan
     return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -15,6 +15,7 @@ from seakeep.errors import RequestError
 from seakeep.models import forecasting, labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment, fit_alignment
 from seakeep.models.forecasting import ForecastWindow
+from seakeep.signals.alignment import CarriedElevation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,6 +29,7 @@ __all__ = [
     "aligned_inputs",
     "closed_loop",
     "notes",
+    "prepare_loop",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -176,13 +178,41 @@ def align_window(model: Aligning, run: xr.Dataset, window: ForecastWindow) -> Fo
     return replace(window, input_history=values[:history], input_future=values[history:])
 
 
-def closed_loop(model: HankelDMDcModel, run: xr.Dataset, window: ForecastWindow) -> FloatArray:
-    """Free run that carries the elevation to the surge that it predicts.
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """What a closed loop reads of a run after the start: the same for all members of an ensemble.
 
     Parameters
     ----------
-    model : HankelDMDcModel
-        A model with an alignment by predicted surge.
+    run : Dataset
+        The run; its surge is read up to the start and not after.
+    window : ForecastWindow
+        What :func:`seakeep.models.forecasting.read_window` cut out of it.
+    raw : ndarray, shape (steps, Q)
+        Inputs from the start on, as measured.
+    carriers : list of CarriedElevation or None
+        Elevations to be read where the surge is predicted.
+    places : ndarray, shape (Q,)
+        Constant distances, m.
+    first : int
+        Sample of the carriers at the start.
+    """
+
+    run: xr.Dataset
+    window: ForecastWindow
+    raw: FloatArray
+    carriers: list[CarriedElevation | None]
+    places: FloatArray
+    first: int
+
+
+def prepare_loop(model: Aligning, run: xr.Dataset, window: ForecastWindow) -> Loop:
+    """Prepare the elevations of a window to be carried to a surge that is predicted.
+
+    Parameters
+    ----------
+    model : HankelDMDcModel or HankelEnsemble
+        With an alignment by predicted surge.
     run : Dataset
         The run; its surge is read up to the start and not after.
     window : ForecastWindow
@@ -190,28 +220,51 @@ def closed_loop(model: HankelDMDcModel, run: xr.Dataset, window: ForecastWindow)
 
     Returns
     -------
-    ndarray, shape (steps, N)
-        States after the start, physical units; NaN from where the run diverged on.
+    Loop
+        For :func:`closed_loop`.
     """
     alignment = model.alignment
     assert alignment is not None
     at, _ = _place(model, run, window)
-    history = align_history(model, run, window)
     needed = slice(at, at + window.steps)
     stretch = alignment.stretch(run, model.inputs, window.name, needed)
-    raw = labelled.channel_matrix(run, model.inputs, window.name, needed)
-    carriers = alignment.carry(run, model.inputs, window.name, stretch, alignment.surge_range)
-    offsets = alignment.offsets(run, model.inputs)
+    return Loop(
+        run=run,
+        window=window,
+        raw=labelled.channel_matrix(run, model.inputs, window.name, needed),
+        carriers=alignment.carry(run, model.inputs, window.name, stretch, alignment.surge_range),
+        places=alignment.offsets(run, model.inputs),
+        first=at - stretch.start,
+    )
+
+
+def closed_loop(model: HankelDMDcModel, loop: Loop) -> FloatArray:
+    """Free run that carries the elevation to the surge that it predicts.
+
+    Parameters
+    ----------
+    model : HankelDMDcModel
+        A model with an alignment by predicted surge.
+    loop : Loop
+        From :func:`prepare_loop`, of the model or of an ensemble that it is a member of.
+
+    Returns
+    -------
+    ndarray, shape (steps, N)
+        States after the start, physical units; NaN from where the run diverged on.
+    """
+    alignment, window = model.alignment, loop.window
+    assert alignment is not None
+    history = align_history(model, loop.run, window)
     column = model.states.index(alignment.settings.surge_channel)
     low, high = alignment.surge_range
 
     def next_input(step: int, deviations: FloatArray) -> FloatArray:
         surge = np.clip(model.state_scale.physical(deviations)[column], low, high)
-        values = raw[step].copy()
-        for index, carrier in enumerate(carriers):
+        values = loop.raw[step].copy()
+        for index, carrier in enumerate(loop.carriers):
             if carrier is not None:
-                place = at + step - stretch.start
-                values[index] = carrier.at(surge + offsets[index], place)[0]
+                values[index] = carrier.at(surge + loop.places[index], loop.first + step)[0]
         return model.input_scale.deviations(values)
 
     a, b = model.top

@@ -40,8 +40,9 @@ class BayesianHankelDMDc:
     Priors over training length, delays and ridge are pushed forward: each member is a
     :class:`HankelDMDc` with settings drawn from them, and the spread of the members' forecasts is
     the uncertainty (paper, equations of :math:`\mu[x(t)]` and :math:`\sigma[x(t)]`). There is no
-    likelihood: "Bayesian" is the paper's word. With ``train_on`` members also, or only, differ in
-    the data they saw: a frequentist ensemble.
+    likelihood: "Bayesian" is the paper's word, and a band holds what the members differ in, not
+    noise or model error: judge its coverage before you trust it. With ``train_on`` members also,
+    or only, differ in the data they saw: a frequentist ensemble.
 
     Parameters
     ----------
@@ -65,7 +66,8 @@ class BayesianHankelDMDc:
     dt : float, optional
         Time step the runs must have, s; None takes theirs.
     history, delay_rows, ridge_scale, rank, standardize, alignment
-        As in :class:`HankelDMDc`.
+        As in :class:`HankelDMDc`. What an alignment estimates, it estimates once for all members,
+        from all that is given up to ``stop``: no member's draw moves another's input.
 
     Raises
     ------

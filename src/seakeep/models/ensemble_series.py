@@ -90,8 +90,8 @@ def member_series(
     """
     found: Iterator[FloatArray]
     if ensemble.alignment is not None and ensemble.alignment.settings.surge == "predicted":
-        loop = (ensemble, run, windows)
-        found = side_by_side(_closed_loops, loop, range(ensemble.n_members), crew)
+        loops = [aligned.prepare_loop(ensemble, run, window) for window in windows]
+        found = side_by_side(_closed_loops, (ensemble, loops), range(ensemble.n_members), crew)
     else:
         histories = np.stack([window.state_history for window in windows])
         inputs = np.stack([np.concatenate([w.input_history, w.input_future]) for w in windows])
@@ -101,8 +101,8 @@ def member_series(
 
 
 def _closed_loops(
-    data: tuple[HankelEnsemble, xr.Dataset, Sequence[ForecastWindow]], number: int, _: Scratch
+    data: tuple[HankelEnsemble, Sequence[aligned.Loop]], number: int, _: Scratch
 ) -> FloatArray:
-    ensemble, run, windows = data
+    ensemble, loops = data
     member = ensemble.member(number)
-    return np.stack([aligned.closed_loop(member, run, window) for window in windows])
+    return np.stack([aligned.closed_loop(member, loop) for loop in loops])

@@ -66,6 +66,11 @@ class HankelDMDc(HankelSettings):
     decided by λ, or by least norm at λ = 0. Forecasts then compare with another method's;
     coefficients, and the eigenvalues that the surplus delays bring, do not.
 
+    Whether a model is stable is found when its eigenvalues are asked for (``summary()``,
+    ``spectral_radius``, ``modes()``), and an unstable one warns then: no bound that is cheaper
+    than the eigenvalues tells a slowly decaying mode from a slowly growing one. A forecast that
+    is lost says so in its ``status`` either way.
+
     Examples
     --------
     >>> HankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32).window

@@ -256,7 +256,7 @@ class HankelDMDcModel:
         if self.alignment is None:
             return forecasting.label_forecast(self, window, self._free_run(window))
         if self.alignment.settings.surge == "predicted":
-            values = aligned.closed_loop(self, run, window)
+            values = aligned.closed_loop(self, aligned.prepare_loop(self, run, window))
         else:
             values = self._free_run(aligned.align_window(self, run, window))
         forecast = forecasting.label_forecast(self, window, values)
