@@ -113,22 +113,30 @@ def test_every_form_gives_the_papers_formula(problem, ridge, all_rows):
 class Poisoned(Scratch):
     """Memory in which every number, read before it is written, raises a floating-point error."""
 
-    SIGNALLING = np.array([0x7FF0_0000_0000_0001], dtype=np.uint64).view(float)[0:1]
-
-    def take(self, shape):
-        out = super().take(shape)
-        out.view(np.uint64)[...] = self.SIGNALLING.view(np.uint64)
+    def take(self, shape, dtype=np.float64):
+        out = super().take(shape, dtype)
+        double = out.itemsize == 8
+        bits = np.uint64(0x7FF0_0000_0000_0001) if double else np.uint32(0x7F80_0001)
+        out.view(bits.dtype)[...] = bits
         return out
 
 
 def test_poison_is_noticed_when_it_is_read():
-    with np.errstate(all="raise"), pytest.raises(FloatingPointError, match="add"):
-        Poisoned().take((3, 4)).__iadd__(1.0)
+    for dtype in (np.float64, np.float32):
+        with np.errstate(all="raise"), pytest.raises(FloatingPointError, match="add"):
+            Poisoned().take((3, 4), dtype).__iadd__(1.0)
 
 
 @settings(deadline=None)
-@given(problems(), st.floats(0.5, 200.0), st.booleans(), st.integers(1, 3), st.integers(1, 30))
-def test_no_number_is_read_before_it_is_written(problem, ridge, all_rows, count, steps):
+@given(
+    problems(),
+    st.floats(100.0, 200.0),
+    st.booleans(),
+    st.integers(1, 3),
+    st.integers(1, 30),
+    st.sampled_from(["double", "single"]),
+)
+def test_no_number_is_read_before_it_is_written(problem, ridge, all_rows, count, steps, precision):
     states, inputs, windows, s, z = problem
     N, Q = states[0].shape[1], inputs[0].shape[1]
     rng = np.random.default_rng(s + 7 * z)
@@ -143,6 +151,7 @@ def test_no_number_is_read_before_it_is_written(problem, ridge, all_rows, count,
                 ridge=ridge,
                 all_rows=all_rows,
                 method=method,
+                precision=precision,
                 scratch=Poisoned(),
             ).coefficients
             extended = N * (s + 1)

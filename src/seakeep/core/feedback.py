@@ -42,6 +42,7 @@ def feedback_rollout(
         States after the start.
     """
     count, width = states.shape[1], inputs.shape[1]
+    a, b = a.astype(float, copy=False), b.astype(float, copy=False)
     x, u = states[::-1].ravel(), inputs[::-1].ravel()
     exact = a.shape[0] == count < x.size
     out = np.empty((steps, count))

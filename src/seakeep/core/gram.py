@@ -121,7 +121,11 @@ def gram_trace(pieces: Sequence[Piece], state_delays: int, input_delays: int) ->
 
 
 def primal_system(
-    pieces: Sequence[Piece], state_delays: int, input_delays: int, scratch: Scratch
+    pieces: Sequence[Piece],
+    state_delays: int,
+    input_delays: int,
+    scratch: Scratch,
+    single: bool = False,
 ) -> PrimalSystem:
     r"""Gram matrix :math:`\hat Y \hat Y^T` and right-hand side :math:`X' \hat Y^T`.
 
@@ -133,6 +137,8 @@ def primal_system(
         s and z.
     scratch : Scratch
         Memory.
+    single : bool, optional
+        Whether the Gram matrix is rounded to single precision; all sums are made in double.
 
     Returns
     -------
@@ -167,6 +173,8 @@ def primal_system(
             row[inputs + N :] = recent(x, at, s)
     gram = scratch.take((size, size))
     _fill_primal(gram, heads, edges, N, Q, inputs)
+    if single:
+        gram = _rounded(gram, [*_panels(0, inputs, Q), *_panels(inputs, size, N)], scratch)
     return PrimalSystem(gram, right, heads, edges, N, Q, inputs)
 
 
@@ -199,7 +207,11 @@ def _fill_primal(
 
 
 def snapshot_gram(
-    pieces: Sequence[Piece], state_delays: int, input_delays: int, scratch: Scratch
+    pieces: Sequence[Piece],
+    state_delays: int,
+    input_delays: int,
+    scratch: Scratch,
+    single: bool = False,
 ) -> FloatArray:
     r"""Gram matrix :math:`\hat Y^T \hat Y` of the snapshots of all runs.
 
@@ -211,6 +223,8 @@ def snapshot_gram(
         s and z.
     scratch : Scratch
         Memory; the result is part of it.
+    single : bool, optional
+        Whether the result is rounded to single precision; all sums are made in double.
 
     Returns
     -------
@@ -237,8 +251,11 @@ def snapshot_gram(
         for piece, begin, stop in zip(pieces, ends[:-1], ends[1:], strict=True):
             head[begin:stop] = lagged_response(piece.states, own_x, piece.first, piece.count)
             head[begin:stop] += lagged_response(piece.inputs, own_u, piece.first, piece.count)
-    gram = scratch.take((len(steps), len(steps)))
+    gram: FloatArray = scratch.take((len(steps), len(steps)))
     _fill_snapshots(gram, heads, steps, signed, ends)
+    if single:
+        runs = pairwise(ends.tolist())
+        gram = _rounded(gram, [panel for run in runs for panel in _panels(*run, 1)], scratch)
     return gram
 
 
@@ -264,6 +281,14 @@ def _fill_snapshots(
                 for other, end in runs[run + 1 :]:
                     row = gram[at, other + 1 : end]
                     row += gram[at - 1, other : end - 1]
+
+
+def _rounded(gram: FloatArray, panels: Sequence[tuple[int, int]], scratch: Scratch) -> FloatArray:
+    """The panels of a Gram matrix as they were made, in single precision."""
+    out: FloatArray = scratch.take(gram.shape, np.float32)
+    for begin, stop in panels:
+        out[begin:stop, begin:] = gram[begin:stop, begin:]
+    return out
 
 
 def _panels(begin: int, end: int, block: int) -> Iterator[tuple[int, int]]:

@@ -96,8 +96,8 @@ def shifting_propagator(a: FloatArray, b: FloatArray, channels: int, steps: int)
     N, size = a.shape
     K = max(1, min(steps, -(-OUTPUT_ROWS // N)))
     width = b.shape[1]
-    output_state = np.empty((K * N, size))
-    output_input = np.zeros((K * N, width + (K - 1) * channels))
+    output_state = np.empty((K * N, size), a.dtype)
+    output_input = np.zeros((K * N, width + (K - 1) * channels), a.dtype)
     row, at = a, (K - 1) * N
     output_state[at:] = a
     # P of step i: û of the i-th instant enters through B̂, older ones through the step before.
@@ -117,13 +117,18 @@ def shifting_propagator(a: FloatArray, b: FloatArray, channels: int, steps: int)
     return Propagator(K, output_state, output_input)
 
 
-def step_cost(size: int, windows: int) -> float:
-    """Estimate of the time of one step of `windows` rows with a square matrix, ns."""
+def step_cost(size: int, windows: int, width: float = 1.0) -> float:
+    """Estimate of the time of one step of `windows` rows with a square matrix, ns.
+
+    `width` is the size of a number beside one in double precision.
+    """
     fixed, entry, row = SKINNY_COST
-    return fixed + size * size * (entry + row * (windows - 1))
+    return fixed + width * size * size * (entry + row * (windows - 1))
 
 
-def doublings(size: int, inputs: int, windows: int, steps: int) -> tuple[int, float]:
+def doublings(
+    size: int, inputs: int, windows: int, steps: int, width: float = 1.0
+) -> tuple[int, float]:
     """How often to double the step of a square model so that the free run costs least.
 
     Parameters
@@ -132,6 +137,8 @@ def doublings(size: int, inputs: int, windows: int, steps: int) -> tuple[int, fl
         Columns of Â and B̂.
     windows, steps : int
         Windows side by side, and their steps.
+    width : float, optional
+        Size of a number beside one in double precision.
 
     Returns
     -------
@@ -140,15 +147,15 @@ def doublings(size: int, inputs: int, windows: int, steps: int) -> tuple[int, fl
     cost : float
         Estimate of the time, ns.
     """
-    once = step_cost(size, windows)
+    once, rate = step_cost(size, windows, width), GEMM_RATE / width
     best, least, preparation = 0, np.inf, 0.0
     for count in range(MOST_DOUBLINGS + 1):
         blocks = -(-steps // 2**count)
-        forcing = 2.0 * blocks * windows * size * inputs / GEMM_RATE
+        forcing = 2.0 * blocks * windows * size * inputs / rate
         cost = preparation + blocks * once + forcing
         if cost < least:
             best, least = count, cost
-        preparation += 2.0 * size * size * (size + inputs) / GEMM_RATE
+        preparation += 2.0 * size * size * (size + inputs) / rate
     return best, least
 
 
@@ -177,7 +184,8 @@ def mirrored(
     fixed, entry = MIRRORED_COST
     cost = steps * (fixed + entry * size * size + 2.0 * size * inputs / GEMM_RATE)
     block = a[count:, :kept]
-    if kept == 0 or cost > doublings(size, inputs, 1, steps)[1]:
+    # In single precision BLAS is no faster with half of a matrix than with all of it.
+    if a.dtype == np.float32 or kept == 0 or cost > doublings(size, inputs, 1, steps)[1]:
         return None
     # Square by square, so that a block and its mirror image lie in cache together.
     for row in range(0, kept, TILE):
@@ -186,7 +194,7 @@ def mirrored(
             if not np.array_equal(tile, block[column : column + TILE, row : row + TILE].T):
                 return None
     padded = size + (-size) % LINE
-    out = scratch.take((padded, padded))
+    out: FloatArray = scratch.take((padded, padded))
     out[:kept, :size] = a[count:]
     out[:kept, size:] = 0.0
     out[kept:] = 0.0
@@ -218,7 +226,7 @@ def square_propagator(
     for _ in range(times):
         pad = K * channels
         width = b.shape[1]
-        wider_output = np.zeros((2 * len(output_state), width + pad))
+        wider_output = np.zeros((2 * len(output_state), width + pad), a.dtype)
         half = len(output_state)
         # Newest first: the second half of the steps stands above the first.
         wider_output[:half, pad:] = output_state @ b
@@ -226,7 +234,8 @@ def square_propagator(
         wider_output[half:, pad:] = output_input
         output_state = np.concatenate([output_state @ a, output_state])
         output_input = wider_output
-        wider, squared = scratch.take((len(b), width + pad)), scratch.take(a.shape)
+        wider = scratch.take((len(b), width + pad), a.dtype)
+        squared = scratch.take(a.shape, a.dtype)
         wider[:, :pad] = 0.0
         np.matmul(a, b, out=wider[:, pad:])
         wider[:, :width] += b

@@ -12,7 +12,7 @@ come from their structure (:mod:`seakeep.core.gram`). Both choose the form in on
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -25,16 +25,27 @@ from seakeep.core.gram import Piece, gram_trace, primal_system, snapshot_gram
 from seakeep.core.inverse import ridge_rows
 from seakeep.core.lagged import lagged_sums
 from seakeep.core.scratch import Scratch
+from seakeep.errors import RequestError
 
-__all__ = ["Method", "Solution", "identify", "solve"]
+__all__ = ["Method", "Precision", "Solution", "check_single", "identify", "solve"]
 
 FloatArray = npt.NDArray[np.float64]
 Method = Literal["primal", "dual", "svd"]
+Precision = Literal["double", "single"]
 
 GRAM_LIMIT = 1e-6
 """Least effective λ, as a part of the largest squared singular value, for a Gram matrix.
 
 Its condition number is then below 1e6, and ten digits are left of sixteen."""
+
+SINGLE_RIDGE = 100.0
+"""Least effective λ for single precision."""
+SINGLE_LIMIT = 1e-4
+"""What :data:`GRAM_LIMIT` is, for a factor in single precision.
+
+Rounding is 6e-8 there, so an error of a free run stays within 1e-4 standard deviations with a few
+to spare for what is summed over the horizon."""
+DOUBLE = "Use precision='double', or raise ridge"
 
 
 @dataclass(frozen=True)
@@ -125,21 +136,23 @@ def choose_method(regressors: FloatArray, ridge: float) -> Method:
     return "primal" if rows <= columns else "dual"
 
 
-def _gram_suffices(ridge: float, trace: float, gram: FloatArray | None) -> bool | None:
+def _gram_suffices(
+    ridge: float, trace: float, gram: FloatArray | None, limit: float = GRAM_LIMIT
+) -> bool | None:
     """Whether λ ≥ 1e-6 σ²_max; None where only the (upper triangle of the) Gram matrix can tell."""
     # Two bounds of the largest squared singular value from above, then the value itself.
-    if ridge >= GRAM_LIMIT * trace:
+    if ridge >= limit * trace:
         return True
     if ridge <= 0:
         return False
     if gram is None:
         return None
     upper = np.triu(gram)
-    if ridge >= GRAM_LIMIT * float(np.linalg.norm(upper + np.triu(upper, 1).T)):
+    if ridge >= limit * float(np.linalg.norm(upper + np.triu(upper, 1).T)):
         return True
     top = len(gram) - 1
     largest = linalg.eigvalsh(upper, lower=False, subset_by_index=[top, top], check_finite=False)
-    return bool(ridge >= GRAM_LIMIT * largest[0])
+    return bool(ridge >= limit * largest[0])
 
 
 def _factor(gram: FloatArray, ridge: float) -> FloatArray:
@@ -149,7 +162,8 @@ def _factor(gram: FloatArray, ridge: float) -> FloatArray:
     """
     size = len(gram)
     gram.reshape(-1)[:: size + 1] += ridge
-    factor, failed = lapack.dpotrf(gram.T, lower=1, overwrite_a=1, clean=0)
+    potrf = lapack.spotrf if gram.dtype == np.float32 else lapack.dpotrf
+    factor, failed = potrf(gram.T, lower=1, overwrite_a=1, clean=0)
     if failed:
         raise np.linalg.LinAlgError(
             f"the Gram matrix of {size} rows with ridge {ridge:g} is not positive definite. Raise "
@@ -160,7 +174,8 @@ def _factor(gram: FloatArray, ridge: float) -> FloatArray:
 
 def _apply(factor: FloatArray, right: FloatArray) -> FloatArray:
     """`right` times the inverse of the factored matrix; shape of `right`, which is overwritten."""
-    solved, _ = lapack.dpotrs(factor, right.T, lower=1, overwrite_b=1)
+    potrs = lapack.spotrs if factor.dtype == np.float32 else lapack.dpotrs
+    solved, _ = potrs(factor, right.T, lower=1, overwrite_b=1)
     return np.asarray(solved).T
 
 
@@ -179,6 +194,34 @@ def _by_singular_values(
     return Solution(coefficients, "svd", ridge, kept)
 
 
+def check_single(ridge: float, rank: int | None) -> None:
+    """Refuse single precision where it would lose too many digits.
+
+    Parameters
+    ----------
+    ridge : float
+        Effective λ.
+    rank : int or None
+        Number of singular values, instead of λ.
+
+    Raises
+    ------
+    RequestError
+        If λ is below 100, or a rank is given.
+    """
+    if rank is not None:
+        raise RequestError(
+            f"precision='single' does not go with rank = {rank}: singular values need the digits. "
+            "Use precision='double'."
+        )
+    if ridge < SINGLE_RIDGE:
+        raise RequestError(
+            f"precision='single' needs an effective ridge of at least {SINGLE_RIDGE:g}; received "
+            f"{ridge:g}. {DOUBLE} (it counts times the number of snapshot pairs where "
+            "ridge_scale='per_snapshot')."
+        )
+
+
 def identify(
     states: Sequence[FloatArray],
     inputs: Sequence[FloatArray],
@@ -191,6 +234,7 @@ def identify(
     rank: int | None = None,
     all_rows: bool = True,
     method: Method | None = None,
+    precision: Precision = "double",
     scratch: Scratch | None = None,
 ) -> Solution:
     r"""Identify :math:`[\hat A\; \hat B]` from one or several runs.
@@ -218,6 +262,10 @@ def identify(
         alone.
     method : {"primal", "dual", "svd"}, optional
         As in :func:`solve`.
+    precision : {"double", "single"}, optional
+        Precision of the result and, where the first N rows alone are regressed, of the factor and
+        of what is solved with it. Sums over snapshots are made in double precision, and so are
+        all rows: their displacement structure magnifies rounding (:mod:`seakeep.core.inverse`).
     scratch : Scratch, optional
         Memory of an earlier call to use again.
 
@@ -225,6 +273,11 @@ def identify(
     -------
     Solution
         Coefficients of shape (N(s+1) or N, N(s+1) + Q(z+1)).
+
+    Raises
+    ------
+    RequestError
+        If single precision is asked for where it would lose too many digits.
     """
     pieces = [
         Piece(x, u, window.first_column, window.columns)
@@ -232,17 +285,31 @@ def identify(
     ]
     columns = sum(piece.count for piece in pieces)
     effective = ridge * columns if per_snapshot else ridge
-    problem = _Delayed(pieces, state_delays, input_delays, all_rows, scratch or Scratch())
+    single = precision == "single"
+    if single:
+        check_single(effective, rank)
+    memory = scratch or Scratch()
+    factored = single and not all_rows
+    problem = _Delayed(pieces, state_delays, input_delays, all_rows, memory, factored)
+    if factored and not problem.suffices(effective, SINGLE_LIMIT):
+        raise RequestError(
+            f"precision='single' needs an effective ridge of at least {SINGLE_LIMIT:g} of the "
+            f"largest squared singular value of the {columns} snapshot pairs; received "
+            f"{effective:g}. {DOUBLE}."
+        )
     chosen = "svd" if rank is not None else method or problem.choose(effective)
     full_rank = min(problem.rows, columns)
-    if chosen == "primal":
-        return Solution(problem.primal(effective), "primal", effective, full_rank)
-    if chosen == "dual":
-        return Solution(problem.dual(effective), "dual", effective, full_rank)
-    regressors, targets = problem.matrices()
-    if rank is not None:
-        return _by_singular_values(regressors, targets, 0.0, rank)
-    return _by_singular_values(regressors, targets, effective, None)
+    if chosen == "svd":
+        regressors, targets = problem.matrices()
+        if rank is not None:
+            return _by_singular_values(regressors, targets, 0.0, rank)
+        solution = _by_singular_values(regressors, targets, effective, None)
+    else:
+        form = problem.primal if chosen == "primal" else problem.dual
+        solution = Solution(form(effective), chosen, effective, full_rank)
+    if single:
+        solution = replace(solution, coefficients=solution.coefficients.astype(np.float32))
+    return solution
 
 
 @dataclass(frozen=True)
@@ -254,6 +321,7 @@ class _Delayed:
     input_delays: int
     all_rows: bool
     scratch: Scratch
+    single: bool = False
 
     @property
     def shape(self) -> tuple[Sequence[Piece], int, int]:
@@ -289,11 +357,15 @@ class _Delayed:
 
     def choose(self, ridge: float) -> Method:
         """The form, or singular values where λ is too small for a Gram matrix."""
+        return self.form() if self.suffices(ridge, GRAM_LIMIT) else "svd"
+
+    def suffices(self, ridge: float, limit: float) -> bool:
+        """Whether λ is at least `limit` of the largest squared singular value."""
         trace = gram_trace(self.pieces, self.state_delays, self.input_delays)
-        settled = _gram_suffices(ridge, trace, None)
+        settled = _gram_suffices(ridge, trace, None, limit)
         if settled is None:
-            settled = _gram_suffices(ridge, trace, self.gram())
-        return self.form() if settled else "svd"
+            settled = _gram_suffices(ridge, trace, self.gram(), limit)
+        return bool(settled)
 
     def gram(self) -> FloatArray:
         """The smaller Gram matrix, its upper triangle."""
@@ -321,11 +393,11 @@ class _Delayed:
 
     def primal(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
-        system = primal_system(*self.shape, self.scratch)
+        system = primal_system(*self.shape, self.scratch, self.single)
         factor = _factor(system.gram, ridge)
         if self.all_rows:
             return ridge_rows(system, factor, ridge, self.scratch)
-        top = _apply(factor, system.right)
+        top = _apply(factor, system.right.astype(factor.dtype))
         return np.concatenate([top[:, system.inputs :], top[:, : system.inputs]], axis=1)
 
     def dual(self, ridge: float) -> FloatArray:
@@ -335,13 +407,13 @@ class _Delayed:
         summed against the lagged series; all rows are :math:`\hat X' L^{-T} Z` with
         :math:`Z = L^{-1} \hat Y^T`, and those of the delayed states are :math:`P Z^T Z`.
         """
-        factor = _factor(snapshot_gram(*self.shape, self.scratch), ridge)
+        factor = _factor(snapshot_gram(*self.shape, self.scratch, self.single), ridge)
         targets = np.concatenate([piece.targets for piece in self.pieces])
         if not self.all_rows:
-            weights = _apply(factor, targets.T.copy()).T
+            weights = _apply(factor, targets.T.astype(factor.dtype, order="C")).T
             top, at = np.zeros((targets.shape[1], self.rows)), 0
             for piece in self.pieces:
-                own = weights[at : at + piece.count]
+                own = weights[at : at + piece.count].astype(float)
                 at += piece.count
                 x = lagged_sums(own, piece.states, piece.first, self.state_delays + 1, self.scratch)
                 u = lagged_sums(own, piece.inputs, piece.first, self.input_delays + 1, self.scratch)

@@ -51,7 +51,8 @@ def rollout(
     Parameters
     ----------
     A : array_like, shape (N(s+1), N(s+1)) or (N, N(s+1))
-        State matrix. With N rows alone the delayed states are shifted exactly.
+        State matrix. With N rows alone the delayed states are shifted exactly. One of type
+        float32 asks for single precision throughout.
     B : array_like, shape (rows of A, Q(z+1))
         Input matrix; no columns for a model without input.
     histories : array_like, shape (window, N(s+1)) or (window, s+1, N)
@@ -83,9 +84,9 @@ def rollout(
     >>> rollout([[0.5]], [[1.0]], [[1.0]], [[[0.0], [1.0], [0.0]]])[0, :, 0]
     array([0.5  , 1.25 , 0.625])
     """
-    a, b = np.atleast_2d(np.asarray(A, dtype=float)), np.asarray(B, dtype=float)
-    start = np.asarray(histories, dtype=float)
-    driving = np.asarray(inputs, dtype=float)
+    kind = np.float32 if np.asarray(A).dtype == np.float32 else np.float64
+    arrays: list[FloatArray] = [np.asarray(each, kind) for each in (A, B, histories, inputs)]
+    a, b, start, driving = np.atleast_2d(arrays[0]), *arrays[1:]
     if start.ndim not in (2, 3) or driving.ndim != 3 or b.ndim != 2 or len(b) != len(a):
         raise RequestError(
             "rollout needs A (rows, N(s+1)), B (rows, Q(z+1)), histories (window, N(s+1)) or "
@@ -111,7 +112,8 @@ def rollout(
         if out is None:
             symmetric, propagator = _prepare(a, b, count, channels, len(start), steps, memory)
             out = _run(propagator, symmetric, start, driving, steps, count, memory)
-        lost = ~np.isfinite(out).all(axis=2)
+        out = out.astype(float, copy=False)
+        lost = ~(np.abs(out) <= float(np.finfo(kind).max)).all(axis=2)
     if lost.any():
         out[np.logical_or.accumulate(lost, axis=1)] = np.nan
     return out
@@ -123,9 +125,11 @@ def _superposes(a: FloatArray, b: FloatArray, count: int, inputs: FloatArray, st
     size = len(a)
     if size < a.shape[1] or not channels or windows * count * (length + steps) > PIECE:
         return False
-    cost = superposition_cost(size, count, channels, length - steps, windows, steps)
+    width = a.itemsize / 8
+    cost = superposition_cost(size, count, channels, length - steps, windows, steps, width)
+    stepwise = doublings(size, b.shape[1], windows, steps, width)[1]
     # A transform would spread a gap over all instants.
-    return cost < doublings(size, b.shape[1], windows, steps)[1] and bool(np.isfinite(inputs).all())
+    return cost < stepwise and bool(np.isfinite(inputs).all())
 
 
 def _superpose(
@@ -143,7 +147,7 @@ def _superpose(
     impulse = impulse_states(a, b, channels, scratch)
     rest = state_at_rest(impulse, inputs)
     begun = np.concatenate([start - rest, impulse[-1]])
-    silent = np.zeros((len(begun), steps, 0))
+    silent = np.zeros((len(begun), steps, 0), a.dtype)
     _, propagator = _prepare(a, b[:, :0], count, 0, len(begun), steps, scratch)
     free = _run(propagator, None, begun, silent, steps, count, scratch)
     early = impulse[:, :, :count].copy()
@@ -173,7 +177,7 @@ def _prepare(
     symmetric = mirrored(a, b.shape[1], count, steps, scratch) if windows == 1 else None
     times = 0
     if symmetric is None:
-        times, _ = doublings(a.shape[1], b.shape[1], windows, steps)
+        times, _ = doublings(a.shape[1], b.shape[1], windows, steps, a.itemsize / 8)
     propagator = square_propagator(a, b, count, channels, times, scratch)
     assert propagator.state is not None
     # A model that grows without bound overflows sooner in powers of Â than in single steps.
@@ -249,7 +253,7 @@ def _run(
     held += 0 if propagator.state is None else 2 * size
     blocks = -(-steps // K)
     most = max(1, PIECE // (held * max(windows, 1)))
-    out = np.empty((windows, blocks * K, count))
+    out = np.empty((windows, blocks * K, count), start.dtype)
     state = start
     for first in range(0, blocks, most):
         number = min(most, blocks - first)
@@ -279,10 +283,10 @@ def _input_rows(
     windows, _, channels = inputs.shape
     K, width = propagator.steps, propagator.output_input.shape[1]
     if width == 0:
-        return np.zeros((number * windows, 0))
+        return np.zeros((number * windows, 0), inputs.dtype)
     delays = width // channels - K
     begin, length = first * K, number * K + delays
-    newest_first = np.zeros((windows, length, channels))
+    newest_first = np.zeros((windows, length, channels), inputs.dtype)
     piece = inputs[:, begin : begin + length]
     newest_first[:, length - piece.shape[1] :] = piece[:, ::-1]
     window, step, channel = newest_first.strides
@@ -292,7 +296,7 @@ def _input_rows(
         strides=(K * step, window, channel),
         writeable=False,
     )
-    out = scratch.take((number, windows, width))
+    out: FloatArray = scratch.take((number, windows, width), inputs.dtype)
     out[:] = blocks
     return out.reshape(number * windows, width)
 
@@ -305,10 +309,10 @@ def _run_shifting(
     windows = len(start)
     width, size = propagator.output_state.shape
     number = len(rows) // windows
-    forcing = scratch.take((len(rows), width))
+    forcing = scratch.take((len(rows), width), rows.dtype)
     np.matmul(rows, propagator.output_input.T, out=forcing)
     forcing = forcing.reshape(number, windows, width)
-    samples = scratch.take((windows, number * width + size))
+    samples = scratch.take((windows, number * width + size), rows.dtype)
     samples[:, number * width :] = start
     if windows == 1:
         line, output = samples[0], propagator.output_state
@@ -358,7 +362,7 @@ def _run_square(
     assert propagator.state is not None
     assert propagator.state_input is not None
     # states[block + 1] starts block; states[0] is what the piece ends with.
-    states = scratch.take((number + 1, windows, size))
+    states = scratch.take((number + 1, windows, size), rows.dtype)
     states[number] = start
     np.matmul(rows, propagator.state_input.T, out=states[:number].reshape(-1, size))
     if windows == 1:

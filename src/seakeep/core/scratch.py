@@ -9,6 +9,7 @@ large block, which can serve the next computation too.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -41,32 +42,35 @@ class Scratch:
         self._block = 0
         self._at = 0
 
-    def take(self, shape: tuple[int, ...]) -> FloatArray:
+    def take(self, shape: tuple[int, ...], dtype: npt.DTypeLike = np.float64) -> Any:
         """Cut out an array; its values are whatever stood there.
 
         Parameters
         ----------
         shape : tuple of int
             Shape.
+        dtype : dtype, optional
+            Double precision, or a narrower type.
 
         Returns
         -------
         ndarray
             Contiguous, valid until :meth:`reset`.
         """
-        size = math.prod(shape)
+        numbers = math.prod(shape)
+        size = -(-numbers * np.dtype(dtype).itemsize // 8)
         while self._block < len(self._blocks):
             block = self._blocks[self._block]
             if self._at + size <= block.size:
                 begin, self._at = self._at, self._at + size + (-size) % LINE
-                return block[begin : begin + size].reshape(shape)
+                return block[begin : begin + size].view(dtype)[:numbers].reshape(shape)
             self._block, self._at = self._block + 1, 0
         self._blocks.append(_aligned(max(8 * size, BLOCK)))
-        return self.take(shape)
+        return self.take(shape, dtype)
 
-    def zeros(self, shape: tuple[int, ...]) -> FloatArray:
+    def zeros(self, shape: tuple[int, ...], dtype: npt.DTypeLike = np.float64) -> Any:
         """As :meth:`take`, filled with zeros."""
-        out = self.take(shape)
+        out = self.take(shape, dtype)
         out[...] = 0.0
         return out
 

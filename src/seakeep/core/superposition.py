@@ -40,7 +40,13 @@ TRANSFORM_COST = 8.0
 
 
 def superposition_cost(
-    size: int, count: int, channels: int, delays: int, windows: int, steps: int
+    size: int,
+    count: int,
+    channels: int,
+    delays: int,
+    windows: int,
+    steps: int,
+    width: float = 1.0,
 ) -> float:
     """Estimate of the time of free runs by superposition, ns.
 
@@ -50,11 +56,13 @@ def superposition_cost(
         Columns of Â, N, Q and z.
     windows, steps : int
         Windows side by side, and their steps.
+    width : float, optional
+        Size of a number beside one in double precision.
     """
     transformed = channels * (windows + count) + windows * count
     return (
-        (delays + 1) * step_cost(size, channels)
-        + doublings(size, 0, windows + channels, steps)[1]
+        (delays + 1) * step_cost(size, channels, width)
+        + doublings(size, 0, windows + channels, steps, width)[1]
         + TRANSFORM_COST * transformed * (delays + 2 * steps)
     )
 
@@ -77,12 +85,12 @@ def impulse_states(a: FloatArray, b: FloatArray, channels: int, scratch: Scratch
         :math:`v_1 … v_{z+1}`.
     """
     size = len(a)
-    out = scratch.take((b.shape[1] // channels, channels, size))
+    out: FloatArray = scratch.take((b.shape[1] // channels, channels, size), a.dtype)
     out.reshape(-1, size)[...] = b.T
     # Rows that begin on lines of cache: a quarter of the time of so narrow a product.
-    aligned = scratch.take((size, size + (-size) % LINE))[:, :size]
+    aligned = scratch.take((size, size + (-size) % LINE), a.dtype)[:, :size]
     aligned[...] = a
-    moved, transposed = scratch.take((channels, size)), aligned.T
+    moved, transposed = scratch.take((channels, size), a.dtype), aligned.T
     for before, state in pairwise(out):
         np.matmul(before, transposed, out=moved)
         state += moved

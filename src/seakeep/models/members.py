@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.core.embedding import TrainingWindow, training_window
+from seakeep.core.embedding import History, TrainingWindow, training_window
 from seakeep.core.regression import Solution, identify
 from seakeep.core.rollout import rollout
 from seakeep.core.scratch import Scratch
@@ -153,6 +153,7 @@ def identify_member(
         per_snapshot=settings.ridge_scale == "per_snapshot",
         rank=settings.rank,
         all_rows=settings.delay_rows == "ridge",
+        precision=settings.precision,
         scratch=scratch,
     )
     return Member(solution, tuple(chosen), tuple(windows), state_scale, input_scale)
@@ -224,6 +225,21 @@ def member_radius(
     top = identify_member(arrays, settings, draw, scratch).solution.coefficients[:, :size]
     square = top if len(top) == size else np.concatenate([top, np.eye(size - N, size)])
     return float(np.abs(np.linalg.eigvals(square)).max())
+
+
+def member_columns(draw: Draw, samples: Sequence[int], history: History) -> int:
+    """Snapshot pairs that a member learns from; `samples` are those of each run up to its stop."""
+    runs = range(len(samples)) if draw.run is None else (draw.run,)
+    return sum(
+        training_window(
+            samples[run] - 1 if draw.last is None else draw.last,
+            draw.window,
+            draw.state_delays,
+            draw.input_delays,
+            history,
+        ).columns
+        for run in runs
+    )
 
 
 def reach(draws: Sequence[Draw], samples: Sequence[int], inside: bool) -> list[int]:

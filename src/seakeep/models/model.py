@@ -69,7 +69,7 @@ class HankelDMDcModel:
     settings : HankelSettings
         The settings it was identified with.
     coefficients : ndarray, shape (N(s+1) or N, N(s+1) + Q(z+1))
-        Regressed rows of [Â B̂], on standardised deviations.
+        Regressed rows of [Â B̂], on standardised deviations, in the precision of the settings.
     dt : float
         Time step, s.
     state_labels, input_labels : tuple of ChannelLabel
@@ -166,16 +166,16 @@ class HankelDMDcModel:
     @cached_property
     def A(self) -> FloatArray:
         """Â, shape (N(s+1), N(s+1)), on standardised deviations, newest block first."""
-        a = self.top[0]
+        a = self.top[0].astype(float, copy=False)
         size, count = a.shape[1], len(self.state_labels)
         if a.shape[0] == size:
-            return a
+            return _read_only(a)
         return _read_only(np.concatenate([a, np.eye(size - count, size)]))
 
     @cached_property
     def B(self) -> FloatArray:
         """B̂, shape (N(s+1), Q(z+1)), on standardised deviations, newest block first."""
-        b = self.top[1]
+        b = self.top[1].astype(float, copy=False)
         missing = self.A.shape[0] - b.shape[0]
         return _read_only(np.concatenate([b, np.zeros((missing, b.shape[1]))]))
 

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from seakeep.core.embedding import History
+from seakeep.core.regression import Precision
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models.alignment import ProbeAlignment
 
@@ -18,6 +19,7 @@ __all__ = [
     "DelayRows",
     "HankelSettings",
     "History",
+    "Precision",
     "RidgeScale",
     "check_choice",
     "check_integer",
@@ -105,6 +107,7 @@ class HankelSettings:
     rank: int | None = None
     standardize: bool = True
     alignment: ProbeAlignment | None = None
+    precision: Precision = "double"
 
     def __post_init__(self) -> None:
         check_integer("state_delays", self.state_delays, 0)
@@ -115,6 +118,7 @@ class HankelSettings:
         check_choice("history", self.history, ("before", "inside"))
         check_choice("delay_rows", self.delay_rows, ("ridge", "exact"))
         check_choice("ridge_scale", self.ridge_scale, ("absolute", "per_snapshot"))
+        check_choice("precision", self.precision, ("double", "single"))
         if not isinstance(self.standardize, bool | np.bool_):
             raise RequestError(f"standardize must be True or False; received {self.standardize!r}.")
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))

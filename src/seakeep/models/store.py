@@ -86,19 +86,20 @@ def unpack(dataset: xr.Dataset) -> Parts:
         key: tuple(value) if isinstance(value, list) else value
         for key, value in json.loads(dataset.attrs["training"]).items()
     }
+    settings = json.loads(dataset.attrs["settings"])
     return Parts(
-        settings=json.loads(dataset.attrs["settings"]),
+        settings=settings,
         training=training,
         labels=labels,
         scales=scales,
         dt=float(dataset.attrs["dt"]),
-        coefficients=_values(dataset, "coefficients"),
+        coefficients=_values(dataset, "coefficients", settings.get("precision", "double")),
         alignment=json.loads(dataset.attrs.get("alignment", "null")),
     )
 
 
-def _values(dataset: xr.Dataset, name: str) -> FloatArray:
-    return np.ascontiguousarray(dataset[name].values, dtype=np.float64)
+def _values(dataset: xr.Dataset, name: str, precision: str = "double") -> FloatArray:
+    return np.ascontiguousarray(dataset[name].values, dtype=precision)
 
 
 def _json(value: object) -> str:
