@@ -29,7 +29,7 @@ __all__ = ["Campaign", "Progress", "read_campaign"]
 Progress = Callable[[int, int, str], None]
 """Called after each run with how many are done, how many there are, and the run's name."""
 
-FORMAT = 2
+FORMAT = 3
 """Goes into the digest: raise it when the same settings begin to give other arrays."""
 
 
