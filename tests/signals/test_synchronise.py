@@ -12,6 +12,7 @@ from seakeep.signals import (
     pool_drift,
 )
 from seakeep.signals.pulses import find_pulses
+from seakeep.signals.synchronise import without_doubtful_drift
 
 
 def pulses(t, period=20.0, width=0.5):
@@ -162,3 +163,45 @@ def test_words():
     assert Clock().describe() == "the same clock"
     clock = Clock(0.37, 25e-6, 1e-4, 1e-6, "trigger pulses", 13, 1e-4)
     assert clock.describe() == "+370.00 ± 0.10 ms, +25.0 ± 1.0 ppm (trigger pulses, 13)"
+
+
+def dim_video(drift, seed):
+    """Clock of a video of 60 s whose lamp stands out of the noise little: three pulses."""
+    return clock_from_pulses(
+        *logger(pulses, 30.0, -1.2, drift, 60.0, 0.06, seed),
+        *logger(pulses, 500.0, 0.0, 0.0, 60.0, 0.002, 100),
+    )
+
+
+def test_a_doubtful_drift_is_not_applied():
+    found = [dim_video(10e-6, seed) for seed in range(40)]
+    kept = [without_doubtful_drift(clock) for clock in found]
+    doubtful = [one for one, other in zip(kept, found, strict=True) if one != other]
+    assert len(doubtful) > 30  # 10 ppm against a standard error of some 100 ppm
+    assert all(clock.drift == 0 and "offset only" in clock.describe() for clock in doubtful)
+    ends = np.array([0.0, 300.0])  # read on beyond the pulses, as a longer run would
+    true = -1.2 + (1 + 10e-6) * ends
+
+    def error(clocks):
+        return np.sqrt(np.mean([(clock.reading(ends) - true) ** 2 for clock in clocks]))
+
+    assert error(kept) < 0.7 * error(found)
+
+
+def test_a_certain_drift_and_a_stated_one_are_applied():
+    found = dim_video(900e-6, 0)
+    assert without_doubtful_drift(found) is found
+    stated = Clock(0.1, 1e-6, method="as stated")
+    assert without_doubtful_drift(stated) is stated
+    assert without_doubtful_drift(Clock()) == Clock()
+
+
+def test_without_its_drift_a_clock_reads_the_same_in_the_middle():
+    found = dim_video(0.0, 3)
+    kept = without_doubtful_drift(found)
+    assert kept.drift == 0
+    assert found.drift != 0
+    # To the rounding of sums of some tens of seconds.
+    assert kept.reading(found.centre) == pytest.approx(
+        float(found.reading(found.centre)), abs=1e-12
+    )

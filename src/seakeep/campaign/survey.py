@@ -15,6 +15,7 @@ from seakeep.campaign.resampling import inside, on_one_axis
 from seakeep.campaign.settings import CampaignSettings, RunSettings
 from seakeep.errors import DataError
 from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step
+from seakeep.signals.synchronise import without_doubtful_drift
 
 __all__ = ["Survey", "survey"]
 
@@ -61,7 +62,8 @@ def survey(
     Returns
     -------
     Survey
-        Drifts are pooled over the runs, where the campaign does not say otherwise.
+        Drifts are pooled over the runs, where the campaign does not say otherwise, and one that
+        is not certain is left out.
 
     Raises
     ------
@@ -92,6 +94,8 @@ def survey(
             pooled = pool_drift([clocks[run][logger] for run in having])
             for run, clock in zip(having, pooled, strict=True):
                 clocks[run][logger] = clock
+    for each in clocks.values():
+        each.update({logger: without_doubtful_drift(clock) for logger, clock in each.items()})
     return Survey(clocks, periods)
 
 

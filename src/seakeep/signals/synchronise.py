@@ -26,6 +26,7 @@ __all__ = [
     "clock_from_pulses",
     "clock_from_shared",
     "pool_drift",
+    "without_doubtful_drift",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -411,3 +412,40 @@ def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
             )
         )
     return pooled
+
+
+def without_doubtful_drift(clock: Clock) -> Clock:
+    """Clock with its offset alone where the data do not tell its drift.
+
+    A drift is applied only if it exceeds its expanded uncertainty (twice the standard error, 95 %):
+    a doubtful one would put a larger error into the ends of a record than it takes out. Without
+    it the clock reads as before in the middle of what it was found from.
+
+    Parameters
+    ----------
+    clock : Clock
+        As it was found, or pooled over runs.
+
+    Returns
+    -------
+    Clock
+        The same where its drift is certain or stated; else with a drift of zero, and what was found
+        told in `method`. `drift_error` stays: that is how well the drift is known to be zero.
+
+    Examples
+    --------
+    >>> found = Clock(0.1, 20e-6, 1e-3, 30e-6, "trigger pulses", 3, 1e-3, centre=30.0)
+    >>> kept = without_doubtful_drift(found)
+    >>> kept.drift, round(kept.offset, 4), kept.method
+    (0.0, 0.1006, 'trigger pulses, offset only: a drift of +20.0 ppm is not certain')
+    """
+    doubtful = 0 < abs(clock.drift) <= 2.0 * clock.drift_error
+    if not doubtful:
+        return clock
+    told = f"offset only: a drift of {1e6 * clock.drift:+.1f} ppm is not certain"
+    return replace(
+        clock,
+        offset=clock.offset + clock.drift * clock.centre,
+        drift=0.0,
+        method=f"{clock.method}, {told}",
+    )
