@@ -25,6 +25,11 @@ NOTE = (
     "and were prepared as a tank's would be."
 )
 
+WAVES = {
+    "paper": "√(2E Δf); 100 components at equal spacing, as printed",
+    "recommended": "√(2E Δf); 100 components at jittered frequencies, which do not repeat",
+}
+
 
 @dataclass(frozen=True)
 class Size:
@@ -102,7 +107,7 @@ def reproduce(
         workers=workers,
         progress=progress,
         extra={"nominal": nominal},
-        notes={"preparation_note": NOTE},
+        notes={"preparation_note": NOTE, "waves_note": WAVES[preset]},
     )
 
 
