@@ -101,6 +101,31 @@ def test_figures_and_tables_are_files_too(page):
     assert r"\toprule" in latex
 
 
+def test_the_data_quality_is_in_the_page_for_every_run_and_channel(page):
+    text, result = page.read_text("utf-8"), read_result(page.parent)
+    assert len(result.prepared) == 3
+    for name, run in result.prepared.items():
+        assert f'id="figure-quality_{name}"' in text
+        assert (page.parent / "figures" / f"quality_{name}.png").exists()
+        with (page.parent / "tables" / f"quality_{name}.csv").open(encoding="utf-8") as file:
+            rows = list(csv.reader(file))
+        assert len(rows) == 1 + len(run.data_vars)
+    assert text.count("data:image/png;base64,") >= 3
+    with (page.parent / "tables" / "runs.csv").open(encoding="utf-8", newline="") as file:
+        assert [row[0] for row in csv.reader(file)] == ["run", *result.prepared]
+
+
+def test_the_deviations_name_what_is_in_effect(page):
+    with (page.parent / "tables" / "deviations.csv").open(encoding="utf-8", newline="") as file:
+        rows = {row[0]: row[2] for row in csv.reader(file)}
+    assert rows["preset"].startswith("'recommended'")
+    assert rows["alignment of the waves to the vessel"].startswith("none: ")
+    assert rows["measured outputs read after the start"] == "none: forecasts in the strict sense"
+    assert rows["rows of Â that shift the delays"] == "exact shifts"
+    assert not any("None" in value or "celerity=" in value for value in rows.values())
+    assert " T̂ of " in rows["training windows"]
+
+
 def test_letters_that_latex_reads_otherwise():
     assert latex_text("50 % of a_b & λ") == r"50 \% of a\_b \& $\lambda$"
 

@@ -194,6 +194,12 @@ def test_a_damaged_cell_is_computed_again(study_folder):
     assert not folder.has("cell")
 
 
+def test_a_result_of_another_format_is_told(finished, monkeypatch):
+    monkeypatch.setattr(store, "FORMAT", store.FORMAT + 1)
+    with pytest.raises(RequestError, match=r"written in format 2.*another folder"):
+        read_result(finished.folder)
+
+
 def test_a_folder_without_a_study_is_told(tmp_path):
     with pytest.raises(RequestError, match="holds no finished study"):
         read_result(tmp_path)

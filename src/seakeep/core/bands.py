@@ -49,7 +49,7 @@ def split_bands(
     -------
     low, high : ndarray, shape (…, time, channel)
         Slow part (zero-phase Butterworth filter) and the rest. Within about two periods of
-        the split frequency of either end both rest on a point reflection of the series.
+        the split frequency of either end both rest on a mirror image of the series.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def split_bands(
         )
     sections = butter(ORDER, frequency, fs=1.0 / dt, output="sos")
     reach = min(x.shape[-2] - 1, round(1.0 / (frequency * dt)))
-    low: FloatArray = sosfiltfilt(sections, x, axis=-2, padlen=reach)
+    low: FloatArray = sosfiltfilt(sections, x, axis=-2, padtype="even", padlen=reach)
     low = np.where(np.isfinite(x).all(axis=-2, keepdims=True), low, np.nan)
     return low, x - low
 

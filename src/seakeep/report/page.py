@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import html
 import io
 import re
@@ -12,8 +13,10 @@ from typing import TYPE_CHECKING
 
 from seakeep.campaign.prepare import Progress
 from seakeep.files import replacing
+from seakeep.report.deviations import deviations, training_overlap
 from seakeep.report.figures import ReportFigure, report_figures
 from seakeep.report.interactive import history_data
+from seakeep.report.regular import response_table, response_words
 from seakeep.report.study_tables import (
     ReportTable,
     coverage_table,
@@ -25,12 +28,11 @@ from seakeep.report.study_tables import (
     write_latex_table,
 )
 from seakeep.report.study_words import (
-    deviations,
     findings,
     quality_table,
+    run_table,
     settings_table,
     sign_table,
-    training_overlap,
     training_table,
     versions_table,
 )
@@ -47,10 +49,14 @@ __all__ = ["report_tables", "write_report"]
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 """What the page may load: nothing that is not in it."""
 
+RASTER_DPI = 80
+"""Of pictures without vectors: as wide as the page."""
+
 SECTIONS = {
     "summary": "What came out",
     "deviations": "Deviations in effect",
     "errors": "Errors",
+    "regular": "Regular waves: where the error comes from",
     "explore": "Time histories, interactive",
     "histories": "Time histories",
     "time": "Error over the age of a forecast",
@@ -81,6 +87,9 @@ def report_tables(result: StudyResult) -> dict[str, list[ReportTable]]:
         "summary": [overview_table(result)],
         "deviations": [deviations(result)],
         "errors": [error_table(result, test) for test in result.tests],
+        "regular": [
+            table for test in result.tests if (table := response_table(result, test)) is not None
+        ],
         "time": [trend_table(result)],
         "coverage": [coverage_table(result, model) for model in ensembles],
         "densities": [
@@ -88,7 +97,11 @@ def report_tables(result: StudyResult) -> dict[str, list[ReportTable]]:
             for model in (*ensembles, *(m for m in result.models if m not in ensembles))
             for variant in VARIANTS
         ],
-        "data": [sign_table(result), quality_table(result)],
+        "data": [
+            sign_table(result),
+            run_table(result),
+            *(quality_table(result, name) for name in result.prepared),
+        ],
         "settings": [settings_table(result), training_table(result)],
         "versions": [versions_table(result)],
     }
@@ -130,7 +143,11 @@ def write_report(result: StudyResult, progress: Progress | None = None) -> Path:
             tell(number, len(figures), f"drawing {each.name.replace('_', ' ')}")
             figure = each.draw()
             _lay_out(figure)
-            save_figure(figure, result.folder / "figures" / f"{each.name}.png")
+            picture = result.folder / "figures" / f"{each.name}.png"
+            save_figure(figure, picture, RASTER_DPI if each.raster else None)
+            if each.raster:
+                drawn.setdefault(each.section, []).append((each, inline_png(picture, each.name)))
+                continue
             text = svg_text(figure, each.name)
             with replacing(result.folder / "figures" / f"{each.name}.svg") as temporary:
                 temporary.write_text(text, encoding="utf-8")
@@ -180,6 +197,25 @@ def inline_svg(text: str, name: str) -> str:
     text = re.sub(r'\bid="', f'id="{name}-', text)
     text = re.sub(r'href="#', f'href="#{name}-', text)
     return re.sub(r"url\(#", f"url(#{name}-", text)
+
+
+def inline_png(path: Path, name: str) -> str:
+    """Element ``<img>`` that holds a picture.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    name : str
+        Of the figure.
+
+    Returns
+    -------
+    str
+    """
+    encoded = base64.b64encode(path.read_bytes()).decode("ascii")
+    words = html.escape(name.replace("_", " "))
+    return f'<img alt="{words}" src="data:image/png;base64,{encoded}">'
 
 
 def _asset(name: str) -> str:
@@ -245,10 +281,14 @@ def _section(
         parts.append(_summary(result))
     if key == "explore":
         parts.append(_explorer(result))
+    if key == "regular":
+        parts.append(_paragraphs(response_words(result)))
     if key == "settings":
         parts.append(_paragraphs([training_overlap(result)]))
-    parts += [_figure(each, svg) for each, svg in drawn.get(key, [])]
+    figures = [(each.raster, _figure(each, drawing)) for each, drawing in drawn.get(key, [])]
+    parts += [text for raster, text in figures if not raster]
     parts += [_table(table) for table in tables.get(key, [])]
+    parts += [text for raster, text in figures if raster]
     return "\n".join(part for part in parts if part)
 
 
@@ -303,10 +343,16 @@ Ctrl or Shift the wheel zooms too. Physical units, angles in degrees.</p>
 """
 
 
-def _figure(figure: ReportFigure, svg: str) -> str:
+def _figure(figure: ReportFigure, drawing: str) -> str:
     caption = html.escape(figure.caption)
+    if figure.raster:
+        return (
+            f'<details class="only-screen"><summary>{caption}</summary>\n'
+            f'<figure id="figure-{figure.name}">{drawing}<figcaption>File: '
+            f"figures/{figure.name}.png.</figcaption></figure></details>"
+        )
     return (
-        f'<figure id="figure-{figure.name}">\n{svg}\n<figcaption>{caption} '
+        f'<figure id="figure-{figure.name}">\n{drawing}\n<figcaption>{caption} '
         f"<span class='only-screen'>Files: figures/{figure.name}.png, .svg.</span></figcaption>"
         "</figure>"
     )

@@ -66,7 +66,8 @@ class ReportTable:
     averages: tuple[int, ...] = ()
 
 
-def _number(value: float, digits: int = 3) -> str:
+def number(value: float, digits: int = 3) -> str:
+    """Text of a number; a dash for one that is not finite."""
     return f"{value:.{digits}f}" if np.isfinite(value) else MISSING
 
 
@@ -103,7 +104,7 @@ def error_table(result: StudyResult, test: str) -> ReportTable:
             for model in result.models:
                 at = boxes.sel(model=model, measure=measure, channel=name)
                 spread = float(at["upper_quartile"] - at["lower_quartile"])
-                row.append(f"{_number(float(at['median']))} [{_number(spread)}]")
+                row.append(f"{number(float(at['median']))} [{number(spread)}]")
                 left_out += int(at["left_out"]) if measure == "nrmse" else 0
         rows.append(tuple(row))
     judged = int(result.tests[test]["judged"].sum())
@@ -148,7 +149,7 @@ def overview_table(result: StudyResult) -> ReportTable:
             for measure in HEADING:
                 at = boxes.sel(model=model, measure=measure)
                 spread = float(at["upper_quartile"] - at["lower_quartile"])
-                row += [_number(float(at["median"])), _number(spread)]
+                row += [number(float(at["median"])), number(spread)]
             count = boxes.sel(model=model, measure="nrmse")["count"]
             rows.append((*row, str(int(count))))
     heads = [f"{words} {k}" for words in HEADING.values() for k in ("median", "IQR")]
@@ -193,10 +194,10 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> ReportTab
     rows = []
     for name in result.channels:
         one = at.sel(channel=name)
-        row = [channel_words(name), *(_number(float(one[key]), 4) for key in numbers)]
+        row = [channel_words(name), *(number(float(one[key]), 4) for key in numbers)]
         row.append(str(int(one["block_length"])) if np.isfinite(one["block_length"]) else MISSING)
         rows.append((*row, PUBLISHED.get(name, MISSING)) if comparable else tuple(row))
-    means = [_number(float(at[key].mean()), 4) for key in numbers]
+    means = [number(float(at[key].mean()), 4) for key in numbers]
     rows.append(("average", *means, "", *((JSD_MEAN,) if comparable else ())))
     columns = ("channel", "EV", "q0.025", "q0.975", "U", "noise floor", "block (samples)")
     test = result.label_of(str(data.attrs["test"]))
@@ -244,8 +245,8 @@ def coverage_table(result: StudyResult, model: str) -> ReportTable:
         row = ["average" if name == "average" else channel_words(name)]
         for data in tables.values():
             at = data.sel(channel=name)
-            row += [_number(float(v), 2) for v in at["inside"].values]
-            row.append(_number(float(at["relative_width"].sel(against="measured")), 2))
+            row += [number(float(v), 2) for v in at["inside"].values]
+            row.append(number(float(at["relative_width"].sel(against="measured")), 2))
         rows.append(tuple(row))
     level = float(result.settings["statistics"]["level"])
     note = (
@@ -283,17 +284,17 @@ def trend_table(result: StudyResult) -> ReportTable:
         for band, words in BAND_WORDS.items():
             for model in result.models:
                 at = data.sel(model=model, band=band)
-                interval = ", ".join(_number(float(at[key]), 4) for key in ("lower", "upper"))
+                interval = ", ".join(number(float(at[key]), 4) for key in ("lower", "upper"))
                 rows.append(
                     (
                         result.label_of(test),
                         words,
                         model_words(model),
-                        _number(float(at["error_mean"].mean())),
-                        _number(float(at["change"])),
-                        f"{_number(float(at['slope']), 4)} [{interval}]",
-                        _number(float(at["kendall_tau"]), 2),
-                        _number(float(at["p_value"])),
+                        number(float(at["error_mean"].mean())),
+                        number(float(at["change"])),
+                        f"{number(float(at['slope']), 4)} [{interval}]",
+                        number(float(at["kendall_tau"]), 2),
+                        number(float(at["p_value"])),
                     )
                 )
     period = float(result.settings["statistics"]["split_period"])

@@ -1,25 +1,24 @@
-"""What a report says in words: findings, deviations from the paper, settings, provenance."""
+"""What a report says in words: findings, data quality, settings, provenance."""
 
 from __future__ import annotations
 
 import json
-import re
 from typing import Any
 
 import numpy as np
 
+from seakeep.campaign.checks import findings_of
 from seakeep.report.figures.common import HEADING, model_words
+from seakeep.report.quality_sheet import channel_rows
 from seakeep.report.study_tables import ReportTable, channel_words
 from seakeep.study import StudyResult
-from seakeep.study.windows import windows_overlap
 
 __all__ = [
-    "deviations",
     "findings",
     "quality_table",
+    "run_table",
     "settings_table",
     "sign_table",
-    "training_overlap",
     "training_table",
     "versions_table",
 ]
@@ -90,112 +89,6 @@ def _coverage_findings(result: StudyResult, model: str) -> list[str]:
     ]
 
 
-def training_overlap(result: StudyResult) -> str:
-    """Sentence on how far the training windows overlap.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-
-    Returns
-    -------
-    str
-        Empty where windows are not drawn.
-    """
-    training = result.groups["training"]
-    if result.settings["training"]["scheme"] != "halves" or "stop" not in training:
-        return ""
-    period = float(result.attrs["encounter_period"])
-    length = float(result.attrs["longest_training"])
-    stops, runs = training["stop"].values, training["run"].values
-    spans = [(str(r), float(s) - length, float(s)) for r, s in zip(runs, stops, strict=True)]
-    share = windows_overlap(spans)
-    halves = result.groups["runs"]["train_span"].values
-    longest = max((_seconds(str(span)) for span in halves if span), default=np.nan)
-    return (
-        f"A training window must hold the largest draw with its delay history, "
-        f"{length / period:.1f} T̂ of the {longest / period:.0f} T̂ of a training span: so the "
-        f"{len(spans)} windows share {100 * share:.0f} % of their length with one another. They "
-        "are not independent, and the boxes show the spread over test windows more than that over "
-        "training data."
-    )
-
-
-def _seconds(span: str) -> float:
-    begin, _, end = span.removesuffix(" s").partition(" to ")
-    return float(end) - float(begin)
-
-
-def deviations(result: StudyResult) -> ReportTable:
-    """What the paper leaves open or misprints, and what is in effect here.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-
-    Returns
-    -------
-    ReportTable
-    """
-    specs: dict[str, dict[str, str]] = json.loads(result.attrs["specs"])
-
-    def each(key: str) -> str:
-        values = {model: spec.get(key, "") for model, spec in specs.items()}
-        if len(set(values.values())) == 1:
-            return next(iter(values.values()))
-        return "; ".join(f"{model_words(model)}: {value}" for model, value in values.items())
-
-    training = result.settings["training"]
-    scheme = {
-        "halves": "windows in the training spans (halves), tests in the others",
-        "pooled": "all training spans pooled, tests in the others",
-        "leave_out": f"leave one {training['leave_out'].replace('_', ' ')} out",
-    }[training["scheme"]]
-    conditional = str(result.attrs.get("conditional_on", ""))
-    rows = [
-        ("mean encounter period T̂", "N/T, a frequency; 1.64 s is T/N",
-         f"{'stated' if result.settings['study'].get('encounter_period') else 'T/N'}: "
-         f"{float(result.attrs['encounter_period']):.4f} s"),
-        ("alignment of the waves to the vessel", "one effective celerity, measured surge",
-         _alignment_words(each("alignment"))),
-        ("measured outputs read after the start", "surge, through the alignment",
-         conditional or "none"),
-        ("history of the training window", "its sizes hold only before it", each("history")),
-        ("rows of Â that shift the delays", "ridge on all rows", each("delay_rows")),
-        ("ridge", "λ absolute while m varies", f"{each('ridge_scale')}: {each('ridge')}"),
-        ("delays to samples", "nearest integer in the text, floor in the box", "nearest"),
-        ("training window", "where it lies is unstated", "ends at the window's stop"),
-        ("training and test", "first and second halves", scheme),
-        ("band", "'95 % confidence interval'", "quantiles of the members, point by point"),
-        ("block length", "(2φ/a)^(2/3) T^(1/3), φ with a square missing",
-         "paper variant: with the square, capped at a quarter; recommended: Politis–White"),
-        ("bandwidth", "1.06 min(SD, IQR) T^(-1/5), IQR lacks /1.34",
-         "paper variant: as printed; recommended: Silverman's"),
-        ("series for the divergence", "which models' forecasts enter is unstated",
-         "each training set's (mean) forecast over its test windows, joined; pooled"),
-        ("U of the divergence", "q0.95 − q0.025 in the equation", "q0.975 − q0.025"),
-        ("test of ε(t)", "'no trend', so arbitrarily long forecasts",
-         "tested; nothing is said beyond the window"),
-        ("'Bayesian'", "the prior pushed forward", "the same: there is no likelihood"),
-    ]  # fmt: skip
-    return ReportTable(
-        "deviations",
-        f"What the paper leaves open, and what is in effect here (preset {result.attrs['preset']})",
-        ("subject", "the paper", "in effect here"),
-        tuple(rows),
-        str(result.attrs.get("preparation_note", "")),
-    )
-
-
-def _alignment_words(text: str) -> str:
-    """An alignment without the keys that were left out."""
-    if text == "None":
-        return "none: the waves are taken where the probes stand"
-    return re.sub(r", \w+=None|\w+=None, ", "", text)
-
-
 def settings_table(result: StudyResult) -> ReportTable:
     """Settings of the study and of each model."""
     rows: list[tuple[str, str]] = []
@@ -239,32 +132,97 @@ def sign_table(result: StudyResult) -> ReportTable:
     )
 
 
-def quality_table(result: StudyResult) -> ReportTable:
-    """Data quality of each run and channel."""
-    runs = result.groups["runs"]
-    rows = []
-    for run in runs["run"].values:
-        for name in runs["name"].values:
-            at = runs.sel(run=run, name=name)
-            slack = float(at["slack"])
-            rows.append(
-                (
-                    str(run),
-                    channel_words(str(name)),
-                    *(f"{float(at[key]):.4g}" for key in ("mean", "sd", "min", "max")),
-                    f"{100 * float(at['constant']):.2f}",
-                    f"{100 * slack:.1f}" if np.isfinite(slack) else "",
-                )
+def run_table(result: StudyResult) -> ReportTable:
+    """What preparation found in each run: part used, clocks, number of findings."""
+    runs, rows = result.groups["runs"], []
+    for name, run in result.prepared.items():
+        found = findings_of(run)
+        clocks = [
+            f"{key.removeprefix('clock_')}: {value}"
+            for key, value in run.attrs.items()
+            if key.startswith("clock_") and isinstance(value, str)
+        ]
+        others = [
+            f"{each.channel}: {each.text}" for each in found if each.channel not in run.data_vars
+        ]
+        words = dict.fromkeys(f"{each.channel.replace('_', ' ')} ({each.kind})" for each in found)
+        rows.append(
+            (
+                name,
+                str(runs["sea_state"].sel(run=name).values),
+                f"{float(run['time'][0]):.2f} to {float(run['time'][-1]):.2f} s",
+                str(len(found)),
+                ", ".join(words) or "nothing found",
+                "; ".join(clocks + others),
             )
+        )
     return ReportTable(
-        "quality",
-        "Prepared runs, channel by channel (SI units)",
-        ("run", "channel", "mean", "SD", "min", "max", "frozen %", "slack %"),
+        "runs",
+        "Data quality of the runs, as preparation found it",
+        ("run", "sea state", "part used", "findings", "channels", "clocks against the reference"),
         tuple(rows),
-        "After preparation; no value is missing, or the study would have refused the run. Frozen: "
-        "samples equal to both neighbours. Slack: a load below 0.1 % of its largest.",
-        (2, 3, 4, 5, 6, 7),
+        "Checks flag and tell; nothing is repaired unless the campaign asks for it, and what was "
+        "repaired is in the tables below. A finding concerns the whole record, the part that is "
+        "cut off too.",
+        (3,),
     )
+
+
+def quality_table(result: StudyResult, name: str) -> ReportTable:
+    """Data quality of a run, channel by channel.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    name : str
+        The run.
+
+    Returns
+    -------
+    ReportTable
+        All channels of the prepared run, those that the study does not use too.
+    """
+    runs, used = result.groups["runs"], set(result.groups["runs"]["name"].values)
+    rows = []
+    for each in channel_rows(result.prepared[name]):
+        channel = each["channel"]
+        frozen = slack = ""
+        if channel in used:
+            at = runs.sel(run=name, name=channel)
+            frozen = f"{100 * float(at['constant']):.2f}"
+            part = float(at["slack"])
+            slack = f"{100 * part:.1f}" if np.isfinite(part) else ""
+        words = [finding.text for finding in each["findings"]]
+        if each["repaired"]:
+            words.append(f"repaired: {each['repaired']}")
+        low, high, mean, spread = (f"{value:.4g}" for value in each["numbers"])
+        rows.append(
+            (
+                channel_words(channel),
+                "yes" if channel in used else "",
+                each["units"],
+                mean,
+                spread,
+                low,
+                high,
+                frozen,
+                slack,
+                each["flagged"],
+                "; ".join(words),
+            )
+        )
+    return ReportTable(
+        f"quality_{name}",
+        f"Data quality of {name.replace('_', ' ')}, channel by channel (SI units)",
+        ("channel", "used", "unit", "mean", "SD", "min", "max", "frozen %", "slack %", "flagged",
+         "found, and done about it"),
+        tuple(rows),
+        "After preparation; no value that the study uses is missing, or it would have refused the "
+        "run. Frozen: samples equal to both neighbours. Slack: a load below 0.1 % of its largest. "
+        "Flagged: part of the samples.",
+        (3, 4, 5, 6, 7, 8),
+    )  # fmt: skip
 
 
 def training_table(result: StudyResult) -> ReportTable:

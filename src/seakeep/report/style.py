@@ -80,8 +80,22 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def save_figure(figure: Figure, path: Path) -> Path:
+def save_figure(figure: Figure, path: Path, dpi: float | None = None) -> Path:
     """Write a figure to a temporary name and rename it; the suffix decides the format.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    path : Path
+        The file.
+    dpi : float, optional
+        Dots an inch of a PNG, where not the style's.
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
@@ -96,7 +110,7 @@ def save_figure(figure: Figure, path: Path) -> Path:
         from PIL import Image  # comes with matplotlib
 
         picture = io.BytesIO()
-        figure.savefig(picture, format=kind)
+        figure.savefig(picture, format=kind, dpi=_RC["savefig.dpi"] if dpi is None else dpi)
         # Line drawings lose nothing to a palette and shrink to a third.
         with Image.open(picture) as full:
             full.convert("RGB").quantize(128).save(temporary, format=kind, optimize=True)

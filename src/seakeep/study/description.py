@@ -11,9 +11,15 @@ import xarray as xr
 from seakeep.campaign import Campaign
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
+from seakeep.models import HankelDMDc, ProbeAlignment
+from seakeep.models.alignment import fit_alignment
 from seakeep.signals import significant_height, wave_spectrum
 from seakeep.study.plan import Plan
+from seakeep.study.response import wave_frequency
 from seakeep.study.settings import Study
+from seakeep.study.specs import Spec
+from seakeep.study.windows import whole_span
+from seakeep.study.workflow import between
 
 __all__ = ["describe_study"]
 
@@ -50,13 +56,15 @@ def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset
     Returns
     -------
     dict of str to Dataset
-        ``channels``, ``training``, ``runs`` and, where there is a wave elevation among the
-        inputs, ``spectra``.
+        ``channels``, ``training``, ``runs``, ``prepared/RUN`` (all channels of a run with the
+        flags and findings of its preparation, single precision) and, where there is a wave
+        elevation among the inputs, ``spectra``.
     """
     groups = {
         "channels": _channels(study.campaign, plan, runs),
-        "training": _training(plan),
+        "training": _training(plan, runs),
         "runs": _runs(plan, runs),
+        **{f"prepared/{name}": _prepared(run) for name, run in runs.items()},
     }
     spectra = _spectra(plan, runs)
     return {**groups, **({"spectra": spectra} if spectra is not None else {})}
@@ -112,7 +120,15 @@ def _positive(name: str) -> str:
     return "tension" if name.startswith("mooring_") else "as measured"
 
 
-def _training(plan: Plan) -> xr.Dataset:
+def _prepared(run: xr.Dataset) -> xr.Dataset:
+    """Return a prepared run as the report draws it; flags of channels without any are left out."""
+    idle = [
+        str(name) for name in run.coords if str(name).endswith("_flags") and not run[name].any()
+    ]
+    return run.drop_vars(idle).astype(np.float32, keep_attrs=True)
+
+
+def _training(plan: Plan, runs: Runs) -> xr.Dataset:
     spans = [
         ", ".join(f"{run} {begin:.4g} to {stop:.4g} s" for run, begin, stop in each.spans)
         for each in plan.training
@@ -131,6 +147,25 @@ def _training(plan: Plan) -> xr.Dataset:
     if single:
         out["run"] = ("training", np.array([e.spans[0][0] for e in plan.training], dtype=object))
         out["stop"] = ("training", np.array([e.spans[0][2] for e in plan.training]))
+    for model, spec in plan.specs.items():
+        celerities = _celerities(spec, plan, runs)
+        if celerities:
+            out[f"{model}_celerity"] = ("training", np.array(celerities), {"units": "m/s"})
+    return out
+
+
+def _celerities(spec: Spec, plan: Plan, runs: Runs) -> list[float]:
+    """Celerity by which a single model carries the waves to the measured surge, m/s."""
+    wanted = ProbeAlignment.of(spec.alignment)
+    if not isinstance(spec, HankelDMDc) or wanted is None:
+        return []
+    if (wanted.mode, wanted.surge) != ("effective", "measured"):
+        return []
+    out = []
+    for each in plan.training:
+        parts = {name: between(runs[name], (begin, stop)) for name, begin, stop in each.spans}
+        fitted = fit_alignment(wanted, parts, plan.states, plan.inputs, spec.window)
+        out.append(float(fitted.celerity or np.nan))
     return out
 
 
@@ -155,8 +190,13 @@ def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
         key: ("run", np.array([_span(run, key) for run in runs.values()], dtype=object))
         for key in ("train_span", "test_span")
     }
+    trained = {run for each in plan.training for run in each.runs}
+    depths = [float(run.attrs.get("water_depth", np.nan)) for run in runs.values()]
     return xr.Dataset(
         {
+            "trains": ("run", np.array([name in trained for name in runs])),
+            "water_depth": ("run", np.array(depths)),
+            "wave_frequency": ("run", np.array([_frequency(plan, r) for r in runs.values()])),
             **{n: (("run", "name"), values[i]) for i, n in enumerate(numbers)},
             **words,
             **spans,
@@ -170,6 +210,14 @@ def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
         },
         coords={"run": list(runs), "name": names},
     )
+
+
+def _frequency(plan: Plan, run: xr.Dataset) -> float:
+    """Return the frequency of a run's regular waves, Hz; NaN for others."""
+    waves = [name for name in plan.inputs if name.startswith("eta_")]
+    if run.attrs.get("waves") != "regular" or not waves:
+        return float("nan")
+    return wave_frequency(between(run, whole_span(run))[waves[0]].values, plan.dt)
 
 
 def _span(run: xr.Dataset, key: str) -> str:

@@ -100,7 +100,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
     plan : Plan
         What there is to do.
     runs : dict of str to Dataset
-        Prepared runs, cut to the channels of the study.
+        Prepared runs with all of their channels.
 
     Raises
     ------
@@ -113,11 +113,9 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
     training_names = list(settings.training.runs) or campaign.training_runs
     testing = {name: _test_runs(study, name) for name in settings.tests}
     wanted = dict.fromkeys([*training_names, *(n for names in testing.values() for n in names)])
-    prepared = load_prepared(campaign, names=list(wanted), progress=progress)
-    channels = [*study.states, *study.inputs]
-    for name, run in prepared.items():
-        _check_channels(name, run, channels)
-    runs = {name: run[channels] for name, run in prepared.items()}
+    runs = load_prepared(campaign, names=list(wanted), progress=progress)
+    for name, run in runs.items():
+        _check_channels(name, run, [*study.states, *study.inputs])
     dt = float(next(iter(runs.values())).attrs["dt"])
     period = settings.study.encounter_period or campaign.encounter_period()
     specs = {n: build_spec(model_settings(study, n), period, dt) for n in settings.models}

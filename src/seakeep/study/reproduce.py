@@ -26,6 +26,11 @@ NOTE = (
     "and were prepared as a tank's would be."
 )
 
+WAVES = {
+    "paper": "√(2E Δf); 100 components at equal spacing, as printed",
+    "recommended": "√(2E Δf); 100 components at jittered frequencies, which do not repeat",
+}
+
 
 @dataclass(frozen=True)
 class Size:
@@ -107,7 +112,7 @@ def reproduce(
         scheduler=scheduler,
         progress=progress,
         extra={"nominal": nominal},
-        notes={"preparation_note": NOTE},
+        notes={"preparation_note": NOTE, "waves_note": WAVES[preset]},
     )
 
 

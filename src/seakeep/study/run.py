@@ -113,6 +113,7 @@ def _attributes(
         "encounter_period": plan.encounter_period,
         "dt": plan.dt,
         "longest_training": plan.needs.training * plan.dt,
+        "preparation": study.campaign.settings.preparation.model_dump_json(),
         "settings": study.settings.model_dump_json(),
         "specs": json.dumps({name: _fields(spec) for name, spec in plan.specs.items()}),
         "conditional_on": _conditional(plan),

@@ -21,6 +21,7 @@ from seakeep.campaign.settings import ModelSettings
 from seakeep.campaign.tables import Names, Positive, Table
 from seakeep.campaign.validation import mistakes_of, read_toml
 from seakeep.errors import RequestError, did_you_mean
+from seakeep.study.store import FORMAT
 
 __all__ = [
     "Study",
@@ -30,9 +31,6 @@ __all__ = [
     "TrainingSettings",
     "read_study",
 ]
-
-FORMAT = 2
-"""Goes into the digest: raise it when the same settings begin to give other arrays."""
 
 Preset = Literal["paper", "recommended"]
 Placement = Literal["random", "apart"]

@@ -19,6 +19,7 @@ import xarray as xr
 from seakeep import statistics
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.study.merge import BAND_ERRORS
+from seakeep.study.response import is_regular, regular_response
 from seakeep.study.settings import StudySettings
 from seakeep.study.windows import random_stream
 
@@ -41,7 +42,7 @@ def judge(
     Parameters
     ----------
     groups : mapping of str to Dataset
-        ``tests/NAME`` with the arrays of every model.
+        ``tests/NAME`` with the arrays of every model, ``runs``, ``training`` and ``spectra``.
     settings : StudySettings
         The study.
     channels : sequence of str
@@ -52,6 +53,7 @@ def judge(
     dict of str to Dataset
         ``statistics/boxes/TEST`` over (model, measure, channel), ``statistics/coverage/TEST``
         over (model, against, channel), ``statistics/trend/TEST`` over (band, model),
+        ``statistics/response/TEST`` for regular waves (:func:`regular_response`),
         ``statistics/divergence`` over (model, variant, channel) and ``statistics/densities`` over
         (model, channel, grid).
     """
@@ -65,6 +67,8 @@ def judge(
             out[f"statistics/coverage/{name}"] = coverage_table(test, ensembles)
         rng = random_stream(settings.study.seed, f"trend.{name}")
         out[f"statistics/trend/{name}"] = trend_table(test, models, rng)
+        if is_regular(groups, name):
+            out[f"statistics/response/{name}"] = regular_response(groups, name, models)
     name = settings.statistics.densities_of or next(iter(settings.tests))
     test = groups[f"tests/{name}"]
     found = [_divergences(test, model, channels, settings, name) for model in models]

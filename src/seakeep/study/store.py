@@ -29,6 +29,9 @@ __all__ = [
     "write_result",
 ]
 
+FORMAT = 2
+"""Goes into digest and result: raise it when the same settings begin to give other arrays."""
+
 RESULT = "study.nc"
 HEADER = "study.json"
 CELLS = "cells"
@@ -204,8 +207,8 @@ class StudyResult:
     attrs : dict
         Settings (JSON), digest, seed, versions, and what figures and tables need to know.
     groups : dict of str to Dataset
-        ``channels``, ``training``, ``runs``, ``spectra``, ``tests/NAME``, ``draws/MODEL``,
-        ``eigenvalues/MODEL``, and ``statistics/…``.
+        ``channels``, ``training``, ``runs``, ``prepared/RUN``, ``spectra``, ``tests/NAME``,
+        ``draws/MODEL``, ``eigenvalues/MODEL``, and ``statistics/…``.
     """
 
     folder: Path
@@ -233,6 +236,12 @@ class StudyResult:
         """Test sets by name."""
         names = self.settings["tests"]
         return {name: self.groups[f"tests/{name}"] for name in names}
+
+    @property
+    def prepared(self) -> dict[str, xr.Dataset]:
+        """Prepared runs with all of their channels, flags and findings, by name."""
+        names = [str(name) for name in self.groups["runs"]["run"].values]
+        return {name: self.groups[f"prepared/{name}"] for name in names}
 
     def is_ensemble(self, model: str) -> bool:
         """Whether a model is an ensemble."""
@@ -267,7 +276,7 @@ def write_result(
     StorageError
         If the file cannot be written.
     """
-    kept = {**attrs, "created": datetime.now(UTC).isoformat(timespec="seconds")}
+    kept = {**attrs, "format": FORMAT, "created": datetime.now(UTC).isoformat(timespec="seconds")}
     with storing(folder), replacing(folder / RESULT) as temporary:
         xr.Dataset(attrs=kept).to_netcdf(temporary, engine="h5netcdf", mode="w")
         for name, group in groups.items():
@@ -296,7 +305,7 @@ def read_result(folder: Path | str) -> StudyResult:
     Raises
     ------
     RequestError
-        If there is no finished study.
+        If there is no finished study, or one of another format.
     DataError
         If its file is damaged.
     """
@@ -316,13 +325,19 @@ def read_result(folder: Path | str) -> StudyResult:
         with xr.open_dataset(path, engine="h5netcdf") as root:
             attrs = {key: _plain(value) for key, value in root.attrs.items()}
         groups = {}
-        for name in json.loads(attrs["groups"]):
+        names = json.loads(attrs["groups"]) if attrs.get("format") == FORMAT else []
+        for name in names:
             with xr.open_dataset(path, engine="h5netcdf", group=name, decode_times=False) as opened:
                 groups[name] = opened.load()
     except (OSError, KeyError, ValueError, TypeError) as error:
         raise DataError(
             f"{path} cannot be read: {error}. Remove it and run the study again."
         ) from error
+    if attrs.get("format") != FORMAT:
+        raise RequestError(
+            f"{path} was written in format {attrs.get('format', 'unknown')}, and this version of "
+            f"seakeep reads format {FORMAT}. Run the study again in another folder."
+        )
     return StudyResult(folder, attrs, groups)
 
 

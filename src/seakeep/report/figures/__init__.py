@@ -14,6 +14,7 @@ from seakeep.report.figures.eigenvalues import eigenvalue_figure
 from seakeep.report.figures.errors import error_over_time_figure, hyperparameter_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.figures.spectra import spectrum_figure
+from seakeep.report.quality_sheet import quality_figure
 from seakeep.study import StudyResult
 
 if TYPE_CHECKING:
@@ -36,12 +37,15 @@ class ReportFigure:
         What it shows.
     draw : callable
         Draws it.
+    raster : bool, optional
+        Too many points for vectors: PNG alone, folded away on the page until it is wanted.
     """
 
     name: str
     section: str
     caption: str
     draw: Callable[[], Figure]
+    raster: bool = False
 
 
 def report_figures(result: StudyResult) -> list[ReportFigure]:
@@ -69,7 +73,21 @@ def report_figures(result: StudyResult) -> list[ReportFigure]:
                 partial(spectrum_figure, result),
             )
         )
-    return [*figures, *_boxes(result), *_histories(result), *_judgements(result)]
+    return [*figures, *_boxes(result), *_histories(result), *_judgements(result), *_data(result)]
+
+
+def _data(result: StudyResult) -> list[ReportFigure]:
+    return [
+        ReportFigure(
+            f"quality_{name}",
+            "data",
+            f"All channels of {name.replace('_', ' ')} after preparation, flagged samples marked; "
+            "orange: a channel in which something was found.",
+            partial(quality_figure, run, {}),
+            raster=True,
+        )
+        for name, run in result.prepared.items()
+    ]
 
 
 def _boxes(result: StudyResult) -> list[ReportFigure]:

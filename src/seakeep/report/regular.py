@@ -1,0 +1,161 @@
+"""Regular waves: what of the error is offset, what amplitude and phase, and why."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.report.figures.common import model_words
+from seakeep.report.study_tables import MISSING, ReportTable, channel_words, conditional, number
+from seakeep.study import StudyResult
+
+__all__ = ["response_table", "response_words"]
+
+LARGE = 0.5
+"""NRMSE from which on the words look for a cause."""
+PHASE = 15.0
+"""Degrees by which a forecast is out of step; 15° make an NRMSE of 0.26."""
+
+
+def _response(result: StudyResult, test: str) -> xr.Dataset | None:
+    return result.groups.get(f"statistics/response/{test}")
+
+
+def response_table(result: StudyResult, test: str) -> ReportTable | None:
+    """Error of a test set in regular waves, taken apart channel by channel.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    test : str
+        Test set.
+
+    Returns
+    -------
+    ReportTable or None
+        None where the set's waves are not regular.
+    """
+    data = _response(result, test)
+    if data is None:
+        return None
+    rows = []
+    for name in result.channels:
+        for model in result.models:
+            at = data.sel(channel=name, model=model)
+            lead = float(at["phase_lead"])
+            rows.append(
+                (
+                    channel_words(name),
+                    model_words(model),
+                    number(float(at["sd_ratio"]), 2),
+                    f"{float(at['mean_shift']):+.2f}",
+                    *(number(float(at[f"error_{key}"]), 2) for key in ("offset", "wave", "rest")),
+                    number(float(at["amplitude_ratio"]), 2),
+                    f"{lead:+.0f}" if np.isfinite(lead) else MISSING,
+                )
+            )
+    return ReportTable(
+        f"response_{test}",
+        f"Error taken apart, {result.label_of(test)} ({data.attrs['frequency']:.3f} Hz)",
+        (
+            "channel", "model", "measured SD [training SD]", "mean off training [training SD]",
+            "offset", "at the wave's frequency", "rest", "amplitude ratio", "phase lead [°]",
+        ),
+        tuple(rows),
+        "Offset, response at the wave's frequency and rest are root mean squares over all cells in "
+        "measured SDs; their squares add up to that of the NRMSE. Amplitude ratio and phase lead: "
+        "forecast against measurement at that frequency; a lead says that the forecast is early."
+        + conditional(result),
+        tuple(range(2, 9)),
+    )  # fmt: skip
+
+
+def response_words(result: StudyResult) -> list[str]:
+    """Why the error in regular waves is what it is, as far as the numbers tell.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    list of str
+        A paragraph a test set of regular waves.
+    """
+    said = []
+    for test in result.tests:
+        data = _response(result, test)
+        if data is not None:
+            said.append(_words(result, test, data))
+    return said
+
+
+def _words(result: StudyResult, test: str, data: xr.Dataset) -> str:
+    label, model = result.label_of(test), result.models[0]
+    at, facts = data.sel(model=model), data.attrs
+    words = [f"{label[:1].upper() + label[1:]}, {facts['frequency']:.3f} Hz:"]
+    if np.isfinite(facts["energy_share"]):
+        words.append(
+            f"{100 * facts['energy_share']:.0f} % of the training sea's energy lies within a tenth "
+            f"of this frequency, and the waves are {facts['height_ratio']:.2f} times as high (4 "
+            "standard deviations)."
+        )
+    drifting = (at["error_offset"] > at["error_wave"]) & (at["error_offset"] > LARGE)
+    waves = at["error_wave"].where(~drifting)
+    moving = data["channel"].values[np.isfinite(waves.values)]
+    if len(moving):
+        words.append(_wave_words(at, moving, model_words(model)))
+    words += _celerity_words(at, facts)
+    if bool(drifting.any()):
+        words.append(_drift_words(at, [str(n) for n in data["channel"].values[drifting.values]]))
+    return " ".join(words)
+
+
+def _wave_words(at: xr.Dataset, moving: npt.NDArray[Any], who: str) -> str:
+    part = at.sel(channel=moving)
+    ratio, lead = float(part["amplitude_ratio"].median()), float(part["phase_lead"].median())
+    error = float(part["error_wave"].median())
+    size = f"{100 * abs(ratio - 1):.0f} % too {'large' if ratio > 1 else 'small'}"
+    sense = "early" if lead > 0 else "late"
+    return (
+        f"In the {len(moving)} channels where no offset leads, the {who} forecast is in the median "
+        f"{size} at the wave's frequency and {abs(lead):.0f}° {sense}; that is an NRMSE of "
+        f"{error:.2f} there."
+    )
+
+
+def _celerity_words(at: xr.Dataset, facts: dict[str, float]) -> list[str]:
+    lead, shift = float(at["celerity_phase"]), float(facts["surge_shift"])
+    if not np.isfinite(lead):
+        return []
+    sense = "early" if lead > 0 else "late"
+    said = (
+        f"The alignment carries all waves at {float(at['celerity']):.2f} m/s; these run at "
+        f"{facts['phase_speed']:.2f} m/s, and the vessel lies {abs(shift):.2f} m "
+        f"{'down' if shift > 0 else 'up'}stream of its training mean: that alone makes the "
+        f"forecast {abs(lead):.0f}° {sense}."
+    )
+    if abs(lead) > PHASE:
+        said += " Alignment by linear dispersion (mode = 'dispersion') has no such error."
+    return [said]
+
+
+def _drift_words(at: xr.Dataset, names: list[str]) -> str:
+    part = at.sel(channel=names)
+    listed = ", ".join(
+        f"{channel_words(name)} ({float(each['error_offset']):.1f} measured SDs; mean "
+        f"{float(each['mean_shift']):+.1f} training SDs off, measured SD "
+        f"{float(each['sd_ratio']):.2f} of the training SD)"
+        for name in names
+        for each in [part.sel(channel=name)]
+    )
+    return (
+        f"An offset leads in {listed}. Steady drift grows with the square of the waves, and a "
+        "linear model falls back to its training mean; where the measured SD is small, the same "
+        "offset counts as many SDs."
+    )

@@ -1,0 +1,108 @@
+"""The error in regular waves is taken apart into what it was made of."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep.study.response import is_regular, regular_response, wave_frequency
+from seakeep.waves import phase_speed
+
+DT, FREQUENCY, CELERITY = 0.05, 0.86, 2.8
+TIME = DT * np.arange(1, 161)
+
+
+def groups(shift=0.9, offset=0.3, ratio=0.8, lead=40.0):
+    """Two training sets, three windows, of one channel named surge."""
+    turn = 2 * np.pi * FREQUENCY * TIME
+    phases = np.array([0.0, 1.0, 2.0])[:, None]
+    measured = shift + 0.1 * np.cos(turn + phases)
+    forecast = shift + offset + 0.1 * ratio * np.cos(turn + phases + np.radians(lead))
+    shape = (2, 3, TIME.size, 1)
+    test = xr.Dataset(
+        {
+            "measured": (("window", "time", "channel"), measured[..., None]),
+            "judged": (("training", "window"), np.ones((2, 3), dtype=bool)),
+            "run": ("window", np.array(["wave"] * 3, dtype=object)),
+            "training_mean": (("training", "channel"), np.zeros((2, 1))),
+            "training_std": (("training", "channel"), np.full((2, 1), 0.25)),
+            "m_mean": (
+                ("training", "window", "time", "channel"),
+                np.broadcast_to(forecast[None, ..., None], shape).copy(),
+            ),
+            "m_nrmse": (("training", "window", "channel"), np.ones((2, 3, 1))),
+        },
+        coords={"time": TIME, "channel": ["surge"]},
+    )
+    runs = xr.Dataset(
+        {
+            "wave_frequency": ("run", [FREQUENCY, np.nan]),
+            "water_depth": ("run", [3.6, 3.6]),
+            "trains": ("run", [False, True]),
+        },
+        coords={"run": ["wave", "sea"]},
+    )
+    frequency = np.linspace(0, 2, 201)
+    spectra = xr.Dataset(
+        {
+            "sea_recommended_frequency": ("f", frequency),
+            "sea_recommended_density": ("f", np.where(frequency <= 1.72, 1.0, 0.0)),
+            "significant_height": ("run", [0.3, 0.2]),
+        },
+        coords={"run": ["wave", "sea"]},
+    )
+    training = xr.Dataset({"m_celerity": ("training", [CELERITY, CELERITY])})
+    return {"tests/t": test, "runs": runs, "spectra": spectra, "training": training}
+
+
+def test_the_parts_are_what_the_forecast_was_made_of():
+    found = regular_response(groups(), "t", ["m"]).sel(model="m", channel="surge")
+    # The record is no whole number of periods, so that its own SD differs from 0.1/√2.
+    own = groups()["tests/t"]["measured"].std("time", ddof=1).values[:, 0]
+    offset = np.sqrt(np.mean((0.3 / own) ** 2))
+    # The offset and the wave are not quite orthogonal over 6.9 periods: 1 % of the offset.
+    assert float(found["error_offset"]) == pytest.approx(offset, rel=0.01)
+    assert float(found["amplitude_ratio"]) == pytest.approx(0.8, rel=1e-9)
+    assert float(found["phase_lead"]) == pytest.approx(40.0, abs=1e-6)
+    assert float(found["mean_shift"]) == pytest.approx(0.9 / 0.25, rel=0.01)
+    assert float(found["error_rest"]) < 1e-6
+
+
+def test_the_squares_add_up_to_that_of_the_error():
+    made = groups()
+    rng = np.random.default_rng(0)
+    made["tests/t"]["m_mean"] += 0.05 * rng.standard_normal(made["tests/t"]["m_mean"].shape)
+    found = regular_response(made, "t", ["m"]).sel(model="m", channel="surge")
+    test = made["tests/t"]
+    error = ((test["m_mean"] - test["measured"]) ** 2).mean("time")
+    expected = float((error / test["measured"].var("time", ddof=1)).mean())
+    squares = sum(float(found[f"error_{key}"]) ** 2 for key in ("offset", "wave", "rest"))
+    assert squares == pytest.approx(expected, rel=1e-12)
+
+
+def test_one_celerity_makes_the_phase_error_of_linear_theory():
+    found = regular_response(groups(), "t", ["m"])
+    speed = float(phase_speed(2 * np.pi * FREQUENCY, 3.6))
+    shift = float(groups()["tests/t"]["measured"].mean("time").median())
+    lead = 360 * FREQUENCY * shift * (1 / speed - 1 / CELERITY)
+    assert float(found["celerity_phase"][0]) == pytest.approx(lead, rel=1e-6)
+    assert lead > 30  # waves slower than the celerity: carried too fast, the forecast is early
+
+
+def test_the_training_sea_is_weighed():
+    found = regular_response(groups(), "t", ["m"])
+    # A flat spectrum to 1.72 Hz: a band of 0.172 Hz holds a tenth, to one of its 172 bins.
+    assert found.attrs["energy_share"] == pytest.approx(0.1, abs=0.01)
+    assert found.attrs["height_ratio"] == pytest.approx(1.5)
+
+
+def test_a_set_in_an_irregular_sea_is_not_taken_apart():
+    made = groups()
+    assert is_regular(made, "t")
+    made["tests/t"]["run"] = ("window", np.array(["wave", "sea", "wave"], dtype=object))
+    assert not is_regular(made, "t")
+
+
+def test_the_frequency_of_a_noisy_wave():
+    noise = 0.1 * np.random.default_rng(1).standard_normal(1200)
+    found = wave_frequency(np.sin(2 * np.pi * 0.86 * np.arange(1200) * DT) + noise, DT)
+    assert found == pytest.approx(0.86, abs=1e-3)  # 6 % of the resolution of 60 s
