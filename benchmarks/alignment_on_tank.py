@@ -1,34 +1,33 @@
 """What alignment brings on the virtual tank: measured, predicted, none; dispersion, effective.
 
-The three irregular runs are played with ideal instruments (stated noise, no clock errors), cut
-after the start-up and sampled 32 times a mean encounter period. Each run in turn is forecast, in
-windows of 15 periods that do not overlap, by models that were identified from the two others. The
-alignments see the same windows, so that their errors are compared in pairs.
+The three irregular runs are played, delivered as raw files of four loggers, and prepared by the
+tank's campaign file (32 samples a mean encounter period); what is used begins after the start-up.
+Each run in turn is forecast, in windows of 15 periods that do not overlap, by models that were
+identified from the two others. The alignments see the same windows, so that their errors are
+compared in pairs.
 
-    python benchmarks/alignment_on_tank.py [--preset paper|recommended] [--csv FILE]
+    python benchmarks/alignment_on_tank.py [--preset paper|recommended] [--out FILE.md]
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
+import tempfile
 import warnings
 from pathlib import Path
 
 import numpy as np
+from chain_on_tank import deliver, used
 
 import seakeep
 from seakeep.models.settings import periods_to_samples
-from seakeep.signals import encounter_period, low_pass
-from seakeep.tank.play import check_settings, noisy_truth
-from seakeep.tank.settings import default_settings
 
 STATES = [
     *("surge", "heave", "pitch", "surge_rate", "heave_rate", "pitch_rate"),
     *("surge_acceleration", "heave_acceleration", "pitch_acceleration"),
     *("mooring_bow", "mooring_stern"),
 ]
-INPUTS = ["eta_kn_fwd", "eta_kn_cog"]
+INPUTS = ["eta_fwd", "eta_cog"]
 PERIODS = 15
 ALIGNMENTS = {
     f"{surge}, {mode}": seakeep.ProbeAlignment(mode=mode, surge=surge)
@@ -39,29 +38,11 @@ ALIGNMENTS["none"] = None
 
 
 def irregular_runs():
-    """Mean encounter period, and the irregular runs of the tank sampled 32 times a period."""
-    settings = default_settings()
-    rig = check_settings(settings)
-    names = [name for name, run in settings.runs.items() if run.spectrum is not None]
-    begin = {name: settings.runs[name].startup for name in names}
-    fine = {name: noisy_truth(settings, name, 0.01, rig) for name in names}
-    period = float(
-        np.mean(
-            [
-                encounter_period(
-                    low_pass(run["eta_kn_fwd"].values, 0.01, 2.0, 3.0)[round(begin[name] / 0.01) :],
-                    0.01,
-                )
-                for name, run in fine.items()
-            ]
-        )
-    )
-    dt = period / 32
-    runs = {}
-    for name in names:
-        run = noisy_truth(settings, name, dt, rig).sel(time=slice(begin[name], None))
-        runs[name] = run.assign_attrs(dt=dt)
-    return period, runs
+    """Mean encounter period, and the irregular runs of the tank as `seakeep prepare` makes them."""
+    with tempfile.TemporaryDirectory() as folder:
+        runs = deliver(Path(folder)).campaign.prepare()
+    period = next(iter(runs.values())).attrs["encounter_period"]
+    return period, {name: used(run) for name, run in runs.items()}
 
 
 def window_errors(runs, period, preset, alignment, forecast_runs=None):
@@ -93,49 +74,51 @@ def paired(values, reference, rng, resamples=2000):
     return float(np.median(difference)), *np.quantile(medians, [0.025, 0.975])
 
 
-def main(arguments=None):
-    """Print the table, and write it if asked."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--preset", choices=["paper", "recommended"], default="paper")
-    parser.add_argument("--csv", type=Path)
-    options = parser.parse_args(arguments)
-    warnings.simplefilter("ignore", seakeep.SeakeepWarning)
-    period, runs = irregular_runs()
+def table(preset, period, runs):
+    """Text of the table of one preset."""
     errors = {
-        name: window_errors(runs, period, options.preset, alignment)
+        name: window_errors(runs, period, preset, alignment)
         for name, alignment in ALIGNMENTS.items()
     }
     none = errors["none"].mean(axis=1)
-    print(f"preset {options.preset}, T = {period:.3f} s, {none.size} windows of {PERIODS} periods")
-    print("median ANRMSE; paired difference to none with 95 % interval; median NRMSE a channel")
-    table = []
+    lines = [
+        f"## Preset {preset}",
+        "",
+        f"T = {period:.3f} s, {none.size} windows of {PERIODS} periods, each forecast by a model "
+        "of the other two runs.",
+        "",
+        "| alignment | ANRMSE | less none, 95 % interval | " + " | ".join(STATES) + " |",
+        "|---" * (3 + len(STATES)) + "|",
+    ]
     for name, each in errors.items():
         mean = each.mean(axis=1)
         middle, low, high = paired(mean, none, np.random.default_rng(0))
-        conditional = "surge" if name.startswith("measured") else ""
-        channels = {
-            state: float(m) for state, m in zip(STATES, np.median(each, axis=0), strict=True)
-        }
-        table.append(
-            {
-                "alignment": name,
-                "conditional_on": conditional,
-                "anrmse": float(np.median(mean)),
-                "difference": middle,
-                "low": low,
-                "high": high,
-                **channels,
-            }
+        mark = " ¹" if name.startswith("measured") else ""
+        gained = "" if name == "none" else f"{middle:+.3f} [{low:+.3f}, {high:+.3f}]"
+        cells = [f"{value:.2f}" for value in np.median(each, axis=0)]
+        lines.append(
+            f"| {name}{mark} | {np.median(mean):.3f} | {gained} | " + " | ".join(cells) + " |"
         )
-        shown = " ".join(f"{key} {value:.2f}" for key, value in channels.items())
-        mark = " (conditional on measured surge)" if conditional else ""
-        print(f"{name:24s} {np.median(mean):.3f}  {middle:+.3f} [{low:+.3f}, {high:+.3f}]{mark}")
-        print(f"    {shown}")
-    if options.csv is not None:
-        with options.csv.open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.DictWriter(stream, list(table[0]))
-            writer.writeheader()
-            writer.writerows(table)
+    return "\n".join([*lines, "", "¹ conditional on measured surge", ""])
+
+
+def main(arguments=None):
+    """Print the tables, and write them."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--preset", choices=["paper", "recommended"], help="by default both")
+    place = Path(__file__).parent / "results" / "alignment_on_tank.md"
+    parser.add_argument("--out", type=Path, default=place, help="file for the tables")
+    options = parser.parse_args(arguments)
+    warnings.simplefilter("ignore", seakeep.SeakeepWarning)
+    period, runs = irregular_runs()
+    presets = ["paper", "recommended"] if options.preset is None else [options.preset]
+    head = (
+        "# What alignment brings on the virtual tank\n\nMade by `python benchmarks/"
+        "alignment_on_tank.py` from the tank's raw files: medians over the same windows.\n"
+    )
+    text = "\n".join([head, *(table(preset, period, runs) for preset in presets)])
+    print(text)
+    options.out.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

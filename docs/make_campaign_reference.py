@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pydantic_core import PydanticUndefined
 
-from seakeep.campaign.settings import CampaignSettings
+from seakeep.campaign.settings import CampaignSettings, InstrumentSettings, InstrumentsSettings
 from seakeep.campaign.tables import Table
 
 PAGE = Path(__file__).with_name("campaign_file.md")
@@ -29,9 +29,39 @@ one. Paths are relative to the file; `${SEAKEEP_DATA_DIR}` and `~` are expanded.
 | `role` | `"train"`, `"test"` or `"unused"`: what the run, or its span, serves for. |
 | `train = [a, b]`, `test = [a, b]` | two parts of one run, instead of `role`. The run is not cut: the delay history of a forecast in the test part may come from before it. |
 
-Times are seconds of the file's own clock; `inf` stands for the end of the record. A channel is
+Times are seconds of the reference's clock; `inf` stands for the end of the record. A channel is
 `sign * (reading + offset)`, converted to SI units and radians. Derived channels are computed at the
 file's own rate, before the runs are resampled to the common step.
+
+(encounter-periods)=
+## Lengths in encounter periods
+
+A number is in seconds, samples or hertz, as the tables below say. A text counts in encounter periods T̂
+instead: `"1.5 T"` is a length or an instant, `"16 /T"` a frequency. So this campaign trains on sixty periods
+after the tenth, filters at sixteen times the encounter frequency and delays the input by five periods:
+
+```toml
+[campaign]
+encounter_period = 1.64
+
+[preparation]
+steps_per_period = 32
+low_pass = ["16 /T", "18 /T"]
+
+[runs.slow]
+file = "slow.csv"
+train = ["10 T", "70 T"]
+test = ["70 T", inf]
+
+[model]
+state_delays = "1 T"
+input_delays = "5 T"
+```
+
+T̂ is `encounter_period` of `[campaign]`, or measured: the mean zero-up-crossing period of the wave channel over
+the irregular runs, in the part of each run that is used. What that measurement rests on (spans of those runs,
+clocks, bridged gaps) can count in periods only where `encounter_period` is stated; a message says so. Lengths of
+models become samples by rounding to the nearest integer. Priors of ensembles count in periods anyway.
 
 ## Tables and keys
 
@@ -86,6 +116,8 @@ def page():
         done.append(table)
         lines += [f"### {table.__name__.removesuffix('Settings')}", "", text_of(table), ""]
         lines += ["| key | default | meaning |", "|---|---|---|", *rows(table), ""]
+        if table is InstrumentsSettings:
+            queue.insert(0, InstrumentSettings)
         for field in table.model_fields.values():
             queue += tables_of(field.annotation)
     return "\n".join(lines).rstrip() + "\n"

@@ -19,6 +19,7 @@ import xarray as xr
 from seakeep.core import bootstrap as _bootstrap
 from seakeep.core import coverage as _coverage
 from seakeep.core import divergence as _divergence
+from seakeep.core.bands import BandErrors, band_error_over_time, split_bands
 from seakeep.core.bootstrap import (
     BlockChoice,
     BlockRule,
@@ -42,11 +43,13 @@ from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 
 __all__ = [
     "BandCoverage",
+    "BandErrors",
     "BlockChoice",
     "BoxStatistics",
     "DensityInterval",
     "JsdInterval",
     "TrendTest",
+    "band_error_over_time",
     "block_length",
     "box_statistics",
     "choose_block_length",
@@ -59,6 +62,7 @@ __all__ = [
     "kernel_density",
     "lag_one_correlation",
     "moving_block_bootstrap",
+    "split_bands",
     "trend_test",
 ]
 

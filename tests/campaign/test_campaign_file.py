@@ -80,8 +80,8 @@ MISTAKES = [
     (
         "span = [2, 18]",
         "span = [18, 2]",
-        "runs.second.span: a span is [begin, end] in seconds of the file's clock, begin before "
-        "end; 'inf' stands for the end of the record; received [18, 2].",
+        "runs.second.span: a span is [begin, end] in seconds of the file's clock or in encounter "
+        "periods ('10 T'), begin before end; 'inf' stands for the end of the record; received",
     ),
     (
         "span = [2, 18]",
@@ -144,7 +144,7 @@ MISTAKES = [
     (
         "state_delays = 4",
         "state_delays = 4.5",
-        "model.state_delays: received 4.5, which should be an integer. Give samples.",
+        "model.state_delays: received 4.5, which should be an integer. Give samples, or per",
     ),
     (
         "eta_fwd = -2.5",

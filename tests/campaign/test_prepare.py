@@ -13,6 +13,7 @@ from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.signals import (
     band_pass,
     differentiate,
+    encounter_period,
     envelope_squared,
     integrate,
     low_pass,
@@ -229,6 +230,31 @@ class TestEncounterPeriod:
         campaign = read_campaign(path)
         assert campaign.encounter_period() == 1.64
         assert campaign.prepare(["first"])["first"].attrs["encounter_period"] == 1.64
+
+    def test_still_water_before_the_waves_does_not_count(self, tank):
+        # Spans do not cut it off, and the probe's noise crosses the mean all the while.
+        rng = np.random.default_rng(0)
+
+        def change(columns):
+            waves = tank_columns(0, seconds=60.0)
+            for name, values in waves.items():
+                columns[name] = values
+            still = waves["Time [s]"] < 25
+            noise = 0.05 * rng.standard_normal(still.sum())
+            columns["WP fwd [mm]"] = np.where(still, 0.0, waves["WP fwd [mm]"])
+            columns["WP fwd [mm]"][still] = noise
+
+        path = tank / "campaign.toml"
+        text = path.read_text().replace("train = [0, 10]\ntest = [10, inf]", 'role = "train"')
+        path.write_text(text.replace('role = "test"\nspan = [2, 18]', 'role = "unused"'))
+        campaign = rewrite(tank, change, "first.csv")
+        waves = tank_columns(0, seconds=60.0)["WP fwd [mm]"][1250:]
+        # A wave or two of 25 may fall to the still part.
+        assert campaign.encounter_period() == pytest.approx(encounter_period(waves, DT), rel=0.02)
+        hard = text.replace("[campaign]", "[campaign]\nperiod_hysteresis = 0.9")
+        path.write_text(hard.replace('role = "test"\nspan = [2, 18]', 'role = "unused"'))
+        # Only waves that pass 0.9 of a deviation on either side are counted: fewer, so longer.
+        assert read_campaign(path).encounter_period() > 1.1 * encounter_period(waves, DT)
 
     def test_channel_stated(self, edited):
         path = edited(("scale_factor = 30.0", 'period_channel = "heave"'))

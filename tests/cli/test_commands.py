@@ -394,6 +394,29 @@ def test_full_scale_by_froudes_law(run, place):
     assert run(command.format(scaled, "model_scale"))[0] == 0
     assert run(command.format(scaled, "full_scale") + " --full-scale")[0] == 0
     small, full = (xr.load_dataset(place / f"{n}_scale.nc") for n in ("model", "full"))
-    np.testing.assert_allclose(full["heave"], 25 * small["heave"], rtol=1e-12)
+    # Froude: lengths by the scale, times by its root, so rates by 1/root; loads by its cube.
+    by = {"heave": 25, "pitch": 1, "heave_rate": 5, "pitch_rate": 1 / 5, "mooring_bow": 25**3}
+    assert set(by) == set(full.data_vars)
+    for name, factor in by.items():
+        np.testing.assert_allclose(full[name], factor * small[name], rtol=1e-12)
+        assert full[name].attrs["units"] == small[name].attrs["units"]
     np.testing.assert_allclose(full["time"], 5 * small["time"], rtol=1e-12)
-    np.testing.assert_allclose(full["pitch"], small["pitch"], rtol=1e-12)
+    assert full.attrs["start"] == pytest.approx(5 * small.attrs["start"], rel=1e-12)
+    assert (full.attrs["scale"], full.attrs["scale_factor"]) == ("full", 25.0)
+
+    compared = []
+    for out, option in (("small", ""), ("large", " --full-scale")):
+        status, _, err = run(f"compare model.nc {scaled} -o {out} --radians{option}")
+        assert status == 0, err
+        rows = (place / out / "comparison.csv").read_text().splitlines()
+        header = rows[0].split(",")
+        compared.append([dict(zip(header, row.split(","), strict=True)) for row in rows[1:]])
+    for model, large in zip(*compared, strict=True):
+        assert model["channel"] == large["channel"]
+        for key in model:
+            if key.split()[0].split("_")[0] in ("measured", "predicted"):
+                expected = by[model["channel"]] * float(model[key])
+                assert float(large[key]) == pytest.approx(expected, rel=1e-9), key
+            elif key in ("nrmse", "fit", "nammae", "sd_ratio", "anrmse"):
+                assert float(large[key]) == pytest.approx(float(model[key]), rel=1e-9)
+        assert float(large["start"]) == pytest.approx(5 * float(model["start"]), rel=1e-9)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from seakeep import cli
+from seakeep.models import cluster
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
@@ -62,12 +63,30 @@ def test_a_study_ends_with_its_table_and_the_place_of_its_report(folder, capfd):
         (["study", "missing.toml"], "the study file missing.toml does not exist"),
         (["report", "nowhere"], "nowhere holds no finished study"),
         (["reproduce", "--preset", "papers"], "--preset must be paper or recommended"),
+        (
+            ["reproduce", "--workers", "2", "--scheduler", "tcp://127.0.0.1:8786"],
+            "--workers 2 counts processes on this machine, and --scheduler tcp://127.0.0.1:8786 "
+            "hands all work to a cluster. Give one of the two",
+        ),
     ],
 )
 def test_a_wrong_request_is_told_and_ends_with_2(arguments, words, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     assert cli.main(arguments) == 2
     assert words in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("verb", ["study", "reproduce"])
+def test_a_scheduler_that_does_not_answer_is_told_before_any_work(verb, folder, monkeypatch, capfd):
+    pytest.importorskip("distributed", reason="a Dask cluster needs distributed")
+    monkeypatch.setattr(cluster, "PATIENCE", 0.3)
+    out = folder / "out"
+    arguments = ["study", str(folder / "study.toml")] if verb == "study" else ["reproduce"]
+    assert cli.main([*arguments, "-o", str(out), "--scheduler", "tcp://127.0.0.1:9"]) == 2
+    told = capfd.readouterr().err
+    assert "no Dask scheduler answers at 'tcp://127.0.0.1:9'" in told
+    assert "preparing" not in told
+    assert "playing" not in told
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends Ctrl-C to a console alone")

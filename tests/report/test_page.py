@@ -93,6 +93,9 @@ def test_figures_and_tables_are_files_too(page):
         rows = list(csv.reader(file))
     assert rows[0][-1] == "paper: EV, another data set"
     assert all(len(row) == len(rows[0]) for row in rows)
+    with (tables / "trend.csv").open(encoding="utf-8", newline="") as file:
+        bands = [row[1] for row in csv.reader(file)][1:]
+    assert bands == [f"{k} frequencies" for k in ("all", "low", "wave") for _ in range(2)]
     latex = (tables / "jsd_bayesian_paper.tex").read_text("utf-8")
     assert r"\begin{tabular}" in latex
     assert r"\toprule" in latex

@@ -14,6 +14,7 @@ import xarray as xr
 
 from seakeep.errors import RequestError
 from seakeep.models.labelled import nearest_sample
+from seakeep.statistics import band_error_over_time
 from seakeep.study import StorageError, read_result, read_study, run_study, store
 from seakeep.study.plan import make_plan
 from seakeep.study.statistics import joined
@@ -67,6 +68,29 @@ def test_cells_are_what_the_models_say(study_folder, finished):
                 np.testing.assert_array_equal(column["measured"], measured)
 
 
+def test_the_error_over_time_is_kept_in_bands_and_each_is_tested_for_a_trend(finished):
+    test, trend = finished.tests["unseen"], finished.groups["statistics/trend/unseen"]
+    split = 1 / (3.0 * finished.attrs["encounter_period"])  # the default: three periods
+    cell = test.isel(training=1, window=2)
+    found = band_error_over_time(
+        predicted=cell["bayesian_mean"].values,
+        measured=cell["measured"].values,
+        dt=finished.attrs["dt"],
+        frequency=split,
+        training_std=cell["training_std"].values,
+    )
+    np.testing.assert_array_equal(cell["bayesian_error_low"], found.low)
+    np.testing.assert_array_equal(cell["bayesian_error_wave"], found.wave)
+    assert list(trend["band"].values) == ["all", "low", "wave"]
+    for band, key in (("all", "error_over_time"), ("low", "error_low"), ("wave", "error_wave")):
+        at = trend.sel(model="deterministic", band=band)
+        mean = test[f"deterministic_{key}"].mean(("training", "window"))
+        np.testing.assert_allclose(at["error_mean"], mean, rtol=1e-12)
+        slope = np.polyfit(test["time"], mean, 1)[0]
+        assert float(at["slope"]) == pytest.approx(slope, rel=1e-9)
+        assert 0 < float(at["p_value"]) <= 1
+
+
 def test_arrays_do_not_depend_on_workers(study_folder, finished):
     study = read_study(study_folder / "study.toml")
     same(finished, run_study(study, study_folder / "alone", workers=1))
@@ -93,12 +117,12 @@ def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished
     command = [sys.executable, "go.py", "study.toml", str(out)]
     process = subprocess.Popen(command, cwd=study_folder)
     deadline = time.monotonic() + 120
-    while not list((out / "cells").glob("*.npz")) and time.monotonic() < deadline:
+    unit = 3  # cells: one model of one training set, on the three windows
+    while len(list((out / "cells").glob("*.npz"))) < unit and time.monotonic() < deadline:
         assert process.poll() is None, "the study ended before it could be killed"
         time.sleep(0.002)
     process.send_signal(signal.SIGKILL)
     process.wait()
-    time.sleep(0.5)  # a worker whose parent is gone ends by itself
     kept = {path: path.stat().st_mtime_ns for path in (out / "cells").glob("*.npz")}
     assert kept
     assert not (out / "study.nc").exists()

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from seakeep.campaign import load_prepared, write_prepared
 from seakeep.tank.dynamics import assemble_rig
 from seakeep.tank.hydrodynamics import load_hydrodynamics
 from seakeep.tank.seas import Sea
@@ -46,6 +47,22 @@ def ideal_rig(linear_rig):
         pool=linear_rig.pool * [1.0, 0.0, 0.0],
         lines=lines,
     )
+
+
+@pytest.fixture(scope="session")
+def delivered(tmp_path_factory):
+    """The irregular runs as the tank delivers them; the truth was read and then deleted."""
+    import chain_on_tank
+
+    return chain_on_tank.deliver(tmp_path_factory.mktemp("delivered"))
+
+
+@pytest.fixture(scope="session")
+def prepared(delivered):
+    """Those runs prepared, and written where the commands look for them."""
+    assert not (delivered.campaign.path.parent / "truth").exists()
+    write_prepared(delivered.campaign)
+    return load_prepared(delivered.campaign)
 
 
 @pytest.fixture(scope="session")

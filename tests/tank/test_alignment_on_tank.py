@@ -1,75 +1,76 @@
-"""The alignment on the virtual tank: celerities against the true sea, and what it brings."""
+"""The alignment on the virtual tank's raw files: what it brings, and what it reads."""
 
-import importlib.util
-from pathlib import Path
-
+import chain_on_tank
 import numpy as np
 import pytest
+import xarray as xr
+from alignment_on_tank import ALIGNMENTS, INPUTS, STATES, paired, window_errors
 
 import seakeep
-from seakeep.signals import effective_celerity, peak_period, phase_celerity
-from seakeep.tank.play import play_run
-from seakeep.waves import phase_speed
 
-pytest.importorskip("numba")
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "alignment_on_tank.py"
+pytest.importorskip("numba", reason="needs the extra tank")
 
 
 @pytest.fixture(scope="module")
-def script():
-    found = importlib.util.spec_from_file_location("alignment_on_tank", SCRIPT)
-    module = importlib.util.module_from_spec(found)
-    found.loader.exec_module(module)
-    return module
+def runs(prepared):
+    return {name: chain_on_tank.used(run) for name, run in prepared.items()}
 
 
 @pytest.fixture(scope="module")
-def sampled(script):
-    return script.irregular_runs()
+def period(runs):
+    return next(iter(runs.values())).attrs["encounter_period"]
 
 
-def test_celerities_are_those_of_the_sea_that_was_played(sampled, settings, rig):
-    period, runs = sampled
-    assert period == pytest.approx(1.64, abs=0.05)  # the paper's
-    for name, run in runs.items():
-        upstream, downstream = run["eta_kn_fwd"].values, run["eta_kn_cog"].values
-        depth, apart = run.attrs["water_depth"], 52.09 - 48.42
-        found = effective_celerity(upstream, downstream, run.attrs["dt"], apart, depth)
-        sea = play_run(settings, name, rig).sea
-        lags = np.linspace(*found.bounds, 4001)
-        power = sea.amplitude**2
-        truth = (power * np.cos(np.outer(lags, sea.omega) - sea.wavenumber * apart)).sum(axis=1)
-        # Asked for: 3 %. Found: 0.8 % at most.
-        assert found.celerity == pytest.approx(apart / lags[np.argmax(truth)], rel=0.03)
-        peak = 1 / peak_period(upstream, run.attrs["dt"])
-        phase = phase_celerity(upstream, downstream, run.attrs["dt"], apart, depth)
-        assert phase.at(peak) == pytest.approx(
-            float(phase_speed(2 * np.pi * peak, depth)), rel=0.03
-        )
+@pytest.fixture(scope="module")
+def windows(runs, period):
+    """Errors of all windows of 15 periods of each run, by models of the two others."""
+    names = ("measured, effective", "none")
+    return {name: window_errors(runs, period, "paper", ALIGNMENTS[name]) for name in names}
 
 
 @pytest.mark.filterwarnings("ignore::seakeep.SeakeepWarning")
-def test_alignment_with_measured_surge_lowers_the_error_of_unseen_windows(script, sampled):
-    period, runs = sampled
-    errors = {
-        name: script.window_errors(runs, period, "paper", script.ALIGNMENTS[name], ["irregular_3"])
-        for name in ("measured, effective", "none")
-    }
-    aligned, none = (each.mean(axis=1) for each in errors.values())
-    middle, _, high = script.paired(aligned, none, np.random.default_rng(0))
-    # Over all three runs: −0.21 with an interval of −0.23 to −0.18 (the script's table).
-    assert middle < -0.1
+def test_alignment_with_measured_surge_lowers_the_error_of_unseen_windows(windows):
+    aligned, none = (each.mean(axis=1) for each in windows.values())
+    assert none.size >= 21
+    middle, _, high = paired(aligned, none, np.random.default_rng(0))
+    # The interval is asked for; its figures stand in benchmarks/results/alignment_on_tank.md.
+    assert middle < 0
     assert high < 0
-    medians = dict(
-        zip(script.STATES, np.median(errors["measured, effective"], axis=0), strict=True)
-    )
-    assert medians["heave"] <= 0.4
-    assert medians["pitch"] <= 0.4
 
 
-def test_the_paper_s_halves_repeat_and_other_runs_do_not(sampled):
-    _, runs = sampled
-    first, second, third = (run["eta_kn_fwd"].values for run in runs.values())
+@pytest.mark.filterwarnings("ignore::seakeep.SeakeepWarning")
+def test_the_paper_s_model_forecasts_heave_and_pitch_of_unseen_windows(windows):
+    medians = np.median(windows["measured, effective"], axis=0)
+    found = dict(zip(STATES, medians, strict=True))
+    assert found["heave"] <= 0.4  # asked for; found 0.12
+    assert found["pitch"] <= 0.4  # found 0.18
+
+
+@pytest.mark.filterwarnings("ignore::seakeep.SeakeepWarning")
+def test_predicted_surge_runs_closed_loop(runs, period):
+    train = [run for name, run in runs.items() if name != "irregular_3"]
+    run = runs["irregular_3"]
+    paper = seakeep.HankelDMDc.paper(encounter_period=period, dt=run.attrs["dt"])
+    fields = {name: getattr(paper, name) for name in paper.__dataclass_fields__}
+    alignment = ALIGNMENTS["predicted, effective"]
+    model = seakeep.HankelDMDc(**{**fields, "alignment": alignment}).fit(train, STATES, INPUTS)
+    start = float(run["time"][model.history_samples - 1])
+    expected = model.forecast(run, start=start, steps=96)
+    scrambled = run.copy(deep=True)
+    after = scrambled["time"].values > start
+    rng = np.random.default_rng(0)
+    for name in STATES:
+        scrambled[name].values[after] = rng.permutation(scrambled[name].values[after])
+    xr.testing.assert_equal(model.forecast(scrambled, start=start, steps=96), expected)
+    # The scramble bites where measured surge is read.
+    measured = ALIGNMENTS["measured, effective"]
+    model = seakeep.HankelDMDc(**{**fields, "alignment": measured}).fit(train, STATES, INPUTS)
+    forecasts = [model.forecast(each, start=start, steps=96) for each in (run, scrambled)]
+    assert not np.allclose(forecasts[0]["heave"], forecasts[1]["heave"], atol=1e-3)
+
+
+def test_the_paper_s_halves_repeat_and_other_runs_do_not(runs):
+    first, second, third = (run["eta_fwd"].values for run in runs.values())
     dt = next(iter(runs.values())).attrs["dt"]
     half = first.size // 2
     found = seakeep.signals.find_repeat([first[:half]], first[half:], dt)

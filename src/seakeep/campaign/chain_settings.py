@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
-from seakeep.campaign.tables import Finite, Names, Positive, Span, Table
+from seakeep.campaign.tables import Band, Finite, Frequency, Interval, Names, Positive, Table
 
 __all__ = [
     "DerivedSettings",
@@ -41,8 +41,12 @@ class InstrumentSettings(Table):
     correlated: TwoColumns | None = Field(
         default=None, description="[own column, reference's column] of signals that go together"
     )
-    window: Positive = Field(default=20.0, description="length of correlation windows, s")
-    largest_lag: Positive = Field(default=5.0, description="lags searched on either side, s")
+    window: Interval = Field(
+        default=20.0, description="length of correlation windows, s or periods"
+    )
+    largest_lag: Interval = Field(
+        default=5.0, description="lags searched on either side, s or periods"
+    )
     offset: Finite | None = Field(
         default=None, description="reading of its clock at reference time 0, s"
     )
@@ -124,16 +128,22 @@ class DerivedSettings(Table):
         default=None, description="what to do with the channel named by 'from'"
     )
     times: Literal[1, 2] | None = Field(default=None, description="integrate once or twice")
-    band: Span | None = Field(
-        default=None, description="[low, high] in Hz, kept by 'integrate' and 'band_pass'"
+    band: Band | None = Field(
+        default=None,
+        description="[low, high] in Hz, or ['0.3 /T', '8 /T'], kept by 'integrate' and 'band_pass'",
     )
-    passband: Positive | None = Field(default=None, description="edge of the pass band, Hz")
-    stopband: Positive | None = Field(default=None, description="edge of the stop band, Hz")
+    passband: Frequency | None = Field(
+        default=None, description="edge of the pass band, Hz, or per period such as '16 /T'"
+    )
+    stopband: Frequency | None = Field(
+        default=None, description="edge of the stop band, Hz or per period"
+    )
     position: str | None = Field(
         default=None, description="'blend': the measured position that gives the slow part"
     )
-    crossover: Positive | None = Field(
-        default=None, description="'blend': where both count half, Hz, below the waves"
+    crossover: Frequency | None = Field(
+        default=None,
+        description="'blend': where both count half, below the waves, Hz or per period",
     )
     offset: Vector | None = Field(
         default=None, description="'transfer': [x, y, z] from the measured to the wanted point, m"
@@ -176,8 +186,9 @@ class RedundantSettings(Table):
     """``[redundant.NAME]``: channels that measure one quantity; the first is trusted."""
 
     channels: Names = Field(description="two channels or more of one unit, the trusted one first")
-    window: Positive | None = Field(
-        default=None, description="length of the windows compared, s; by default 5 periods"
+    window: Interval | None = Field(
+        default=None,
+        description="length of the windows compared, s or periods; by default 5 dominant periods",
     )
 
     @model_validator(mode="after")
@@ -207,8 +218,9 @@ class PreparationSettings(Table):
     attenuation: Annotated[float, Field(ge=50, le=200)] = Field(
         default=60.0, description="attenuation above the new Nyquist frequency, dB, at least 50"
     )
-    low_pass: Span | None = Field(
-        default=None, description="[pass, stop] in Hz, of all channels sampled fast enough"
+    low_pass: Band | None = Field(
+        default=None,
+        description="[pass, stop] in Hz or per period, of all channels sampled fast enough",
     )
     anti_alias: bool = Field(
         default=True, description="false: take samples without a filter at the new Nyquist"
@@ -218,7 +230,9 @@ class PreparationSettings(Table):
         description="'refuse': an error; 'mask': NaN where samples are missing; 'bridge': short "
         "gaps filled and flagged, NaN in the others",
     )
-    longest_gap: Positive = Field(default=0.25, description="gaps that 'bridge' fills, s")
+    longest_gap: Interval = Field(
+        default=0.25, description="gaps that 'bridge' fills, s or periods"
+    )
     jitter: Literal["refuse", "interpolate"] = Field(
         default="refuse", description="'refuse' or 'interpolate' times that are not uniform"
     )

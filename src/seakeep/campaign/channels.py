@@ -20,13 +20,13 @@ from seakeep.campaign.settings import (
     RunSettings,
     long_name_of,
 )
-from seakeep.campaign.validation import derivation_order, sources_of
+from seakeep.campaign.validation import derivation_order, needed_channels, sources_of
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import Clock, bridge, inspect_times, onto_uniform, uniform_step
 from seakeep.signals.quality import BRIDGED, MISSING, flag_attributes
 
-__all__ = ["Group", "needed_channels", "read_groups"]
+__all__ = ["Group", "read_groups"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -42,19 +42,6 @@ class Group(dict[str, xr.Dataset]):
     """
 
     late: tuple[str, ...] = ()
-
-
-def needed_channels(settings: CampaignSettings, wanted: Collection[str]) -> set[str]:
-    """Names of channels and of all that they are derived from."""
-    needed: set[str] = set()
-    ahead = list(wanted)
-    while ahead:
-        name = ahead.pop()
-        if name not in needed:
-            needed.add(name)
-            if name in settings.derived:
-                ahead += sources_of(name, settings.derived[name], settings.channel_names)
-    return needed
 
 
 def read_groups(

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +15,10 @@ import xarray as xr
 from seakeep.campaign.channels import Group, read_groups
 from seakeep.campaign.checks import checked
 from seakeep.campaign.instruments import open_loggers
+from seakeep.campaign.labels import attributes_of, cropped, role_of
+from seakeep.campaign.periods import counted, in_seconds, parse_periods
 from seakeep.campaign.readers import checksum, expand
-from seakeep.campaign.resampling import inside, on_one_axis, strays
+from seakeep.campaign.resampling import on_one_axis, strays
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
 from seakeep.campaign.survey import Survey, survey
 from seakeep.campaign.validation import read_settings
@@ -75,12 +76,12 @@ class Campaign:
     @property
     def training_runs(self) -> list[str]:
         """Names of the runs of which all or a part trains."""
-        return [n for n in self.runs if "train" in _role(self.settings.runs[n])]
+        return [n for n in self.runs if "train" in role_of(self.settings.runs[n])]
 
     @property
     def test_runs(self) -> list[str]:
         """Names of the runs of which all or a part tests."""
-        return [n for n in self.runs if "test" in _role(self.settings.runs[n])]
+        return [n for n in self.runs if "test" in role_of(self.settings.runs[n])]
 
     @property
     def models(self) -> list[str]:
@@ -135,8 +136,23 @@ class Campaign:
     @property
     def _measures_period(self) -> bool:
         settings = self.settings
-        asked = settings.preparation.steps_per_period is not None
+        asked = settings.preparation.steps_per_period is not None or self._counts_in_periods
         return asked and settings.campaign.encounter_period is None
+
+    @property
+    def _counts_in_periods(self) -> bool:
+        """Whether something on which prepared runs depend is stated in encounter periods."""
+        models = ("model", "models")
+        return any(place[0] not in models for place in counted(self.settings))
+
+    def _in_seconds(self, period: float | None) -> CampaignSettings:
+        """Settings with all that counts in encounter periods turned into seconds and hertz."""
+        if period is None or not self._counts_in_periods:
+            return self.settings
+        # Models keep their periods: their delays become samples.
+        models = {"model": self.settings.model, "models": self.settings.models}
+        bare = self.settings.model_copy(update={"model": None, "models": {}})
+        return in_seconds(bare, period).model_copy(update=models)
 
     def files_of(self, name: str) -> dict[str, Path]:
         """Paths of a run's files.
@@ -202,15 +218,17 @@ class Campaign:
         DataError
             If the file is damaged, has gaps, or its times are not uniform.
         """
-        found = self._survey([name], periods=False)
-        groups = self._groups(name, found)
+        self._run(name)
+        found, settings, _, _ = self._whole([name], None, steps=False)
+        groups = self._groups(name, found, settings)
         dt = uniform_step(_reference_time(groups), f"run '{name}'")
-        dataset = on_one_axis(groups, dt, self.settings, name)
-        return dataset.assign_attrs(self._attributes(name, dataset, dt, found.clocks[name]))
+        dataset = on_one_axis(groups, dt, settings, name)
+        attributes = self._attributes(name, dataset, dt, found, settings)
+        return dataset.assign_attrs(attributes)
 
-    def _groups(self, name: str, found: Survey) -> Group:
-        loggers = open_loggers(self.files_of(name), self.settings)
-        return read_groups(loggers, found.clocks[name], self.settings, name)
+    def _groups(self, name: str, found: Survey, settings: CampaignSettings) -> Group:
+        loggers = open_loggers(self.files_of(name), settings)
+        return read_groups(loggers, found.clocks[name], settings, name)
 
     def clocks(self, names: Iterable[str] | None = None) -> dict[str, dict[str, Clock]]:
         """Clocks of the loggers of each run against the reference.
@@ -240,10 +258,10 @@ class Campaign:
         several = [n for n in dict.fromkeys([*wanted, *self.runs]) if self._run(n).files]
         pooled = self.settings.instruments.pool_drift and set(wanted) & set(several)
         timed = several if pooled else [n for n in wanted if n in several]
-        irregular = [n for n in self.runs if self.settings.runs[n].waves == "irregular"]
-        waves = (irregular or self.runs) if periods else []
+        waves = self.settings.period_runs if periods else ()
         channel = self.period_channel() if periods else ""
-        found = survey(self.settings, self.files_of, timed, waves, channel, progress)
+        settings = self._in_seconds(self.settings.campaign.encounter_period)
+        found = survey(settings, self.files_of, timed, waves, channel, progress)
         one = {n: {"": Clock()} for n in wanted if n not in several}
         return Survey({**one, **found.clocks}, found.periods)
 
@@ -261,17 +279,13 @@ class Campaign:
         RequestError
             If there is neither.
         """
-        stated = self.settings.campaign.period_channel
-        if stated is not None:
-            return stated
-        inputs = [n for model in self.settings.all_models().values() for n in model.inputs]
-        waves = [n for n in (*inputs, *self.settings.channel_names) if n.startswith("eta_")]
-        if not (waves or inputs):
+        wave = self.settings.wave_channel
+        if wave is None:
             raise RequestError(
                 f"{self.path}: no wave channel to take the encounter period from. State "
                 "encounter_period (s) or period_channel in [campaign], or name a channel eta_…"
             )
-        return [*waves, *inputs][0]
+        return wave
 
     def encounter_period(self) -> float:
         r"""Mean encounter period :math:`\hat T` of the campaign.
@@ -294,6 +308,31 @@ class Campaign:
         if stated is not None:
             return stated
         return self._mean_period(self._survey([], periods=True))
+
+    def seconds(self, stated: float | str) -> float:
+        """Seconds of a length or an instant that may be stated in encounter periods.
+
+        Parameters
+        ----------
+        stated : float or str
+            A number of seconds, or a text such as ``"15 T"``.
+
+        Returns
+        -------
+        float
+            Seconds.
+
+        Raises
+        ------
+        RequestError
+            If the text is no length, or the campaign has no encounter period.
+        """
+        if not isinstance(stated, str):
+            return float(stated)
+        length = parse_periods(stated)
+        if length.power != 1:
+            raise RequestError(f"received '{stated}', a frequency. Give a length such as '15 T'.")
+        return length.at(self.encounter_period())
 
     def _mean_period(self, found: Survey) -> float:
         if not found.periods:
@@ -355,22 +394,23 @@ class Campaign:
         wanted = list(self.runs if names is None else names)
         for name in wanted:
             self._run(name)
-        found, period, dt = self._period_and_step(wanted, progress)
+        found, settings, period, dt = self._whole(wanted, progress)
+        stated = dt is not None
         for done, name in enumerate(wanted, 1):
-            groups = self._groups(name, found)
+            groups = self._groups(name, found, settings)
             reference = _reference_time(groups)
             own = uniform_step(reference, f"run '{name}'")
             dt = own if dt is None else dt
-            stated = self.settings.preparation.model_fields_set & {"sampling_rate", "dt"}
-            if not stated and period is None and strays(own, reference.size, dt):
+            if not stated and strays(own, reference.size, dt):
                 raise RequestError(
                     f"the runs differ in rate: '{wanted[0]}' has a step of {dt:g} s and '{name}' "
                     f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                 )
-            whole = on_one_axis(groups, dt, self.settings, name)
-            findings = checked(groups, whole, found.clocks[name], self.settings)
-            run = self._cropped(whole, name, (float(reference[0]), float(reference[-1])))
-            run.attrs.update(self._attributes(name, run, dt, found.clocks[name]))
+            whole = on_one_axis(groups, dt, settings, name)
+            findings = checked(groups, whole, found.clocks[name], settings)
+            record = (float(reference[0]), float(reference[-1]))
+            run = cropped(whole, name, settings.runs[name], record)
+            run.attrs.update(self._attributes(name, run, dt, found, settings))
             run.attrs["quality"] = findings
             if period is not None:
                 run.attrs["encounter_period"] = period
@@ -378,109 +418,37 @@ class Campaign:
                 progress(done, len(wanted), name)
             yield name, run
 
-    def _period_and_step(
-        self, wanted: list[str], progress: Progress | None
-    ) -> tuple[Survey, float | None, float | None]:
-        """Clocks, encounter period if it is needed, and the common step if there is one."""
-        preparation, stated = self.settings.preparation, self.settings.campaign.encounter_period
-        counted = preparation.steps_per_period is not None
-        found = self._survey(wanted, counted and stated is None, progress)
-        if preparation.steps_per_period is not None:
-            period = self._mean_period(found) if stated is None else stated
-            return found, period, period / preparation.steps_per_period
-        if preparation.sampling_rate is not None:
-            return found, None, 1.0 / preparation.sampling_rate
-        return found, None, preparation.dt
-
-    def _cropped(self, run: xr.Dataset, name: str, record: tuple[float, float]) -> xr.Dataset:
-        """Part of a run that is used; spans lie inside the record of the reference."""
-        settings = self._run(name)
-        time, dt = run["time"].to_numpy(), float(np.median(np.diff(run["time"].to_numpy())))
-        for key in ("span", "train", "test"):
-            span = getattr(settings, key)
-            if span is None:
-                continue
-            finite = [edge for edge in span if np.isfinite(edge)]
-            if any(not record[0] - dt < edge < record[1] + dt for edge in finite):
-                raise RequestError(
-                    f"runs.{name}.{key}: received [{span[0]:g}, {span[1]:g}] s, and the record "
-                    f"runs from {record[0]:g} to {record[1]:g} s. Correct the span; 'inf' stands "
-                    "for the end."
-                )
-        if settings.span is None:
-            return run
-        kept = inside(time, settings.span, dt)
-        if kept.sum() < 2:
-            raise RequestError(
-                f"runs.{name}.span: [{settings.span[0]:g}, {settings.span[1]:g}] s holds "
-                f"{kept.sum()} sample(s) at a step of {dt:g} s. Lengthen the span."
-            )
-        return run.isel(time=kept)
+    def _whole(
+        self, wanted: list[str], progress: Progress | None, steps: bool = True
+    ) -> tuple[Survey, CampaignSettings, float | None, float | None]:
+        """Clocks, settings in seconds, encounter period if it is needed, common step if stated."""
+        preparation, period = self.settings.preparation, self.settings.campaign.encounter_period
+        counting = steps and preparation.steps_per_period is not None
+        needed = counting or self._counts_in_periods
+        found = self._survey(wanted, needed and period is None, progress)
+        if needed and period is None:
+            period = self._mean_period(found)
+        dt = preparation.dt
+        if preparation.steps_per_period is not None and period is not None:
+            dt = period / preparation.steps_per_period
+        elif preparation.sampling_rate is not None:
+            dt = 1.0 / preparation.sampling_rate
+        return found, self._in_seconds(period), period, dt
 
     def _attributes(
-        self, name: str, run: xr.Dataset, dt: float, clocks: Mapping[str, Clock]
+        self, name: str, run: xr.Dataset, dt: float, found: Survey, settings: CampaignSettings
     ) -> dict[str, Any]:
-        settings, rig, general = self._run(name), self.settings.rig, self.settings.campaign
-        time = run["time"].to_numpy()
-        attributes: dict[str, Any] = {
-            "run": name,
+        own = {
             "campaign": self.name,
             "campaign_digest": self.digest,
-            "seakeep_version": version(),
-            "file": settings.file or ", ".join(settings.files.values()),
             "file_sha256": self.checksum_of(name),
             "basis_sha256": self.basis_of(name),
-            "preparation_preset": self.settings.preparation.preset,
-            "dt": float(dt),
-            "scale_factor": general.scale_factor,
-            "sea_state": settings.sea_state,
-            "role": _role(settings),
-            "waves": settings.waves,
-            "water_depth": rig.water_depth,
-            "wave_direction": rig.wave_direction,
-            "frame": rig.frame,
-            "encounter_period": general.encounter_period,
-            "probe_offset": settings.probe_offset,
-            "probe_offset_span": settings.probe_offset_span,
         }
-        whole = (float(time[0]), float(time[-1]))
-        for use in ("train", "test"):
-            span = getattr(settings, use)
-            if span is None and _role(settings) == use:
-                span = whole
-            if span is not None:
-                kept = time[inside(time, span, dt)]
-                if kept.size:
-                    attributes[f"{use}_span"] = (float(kept[0]), float(kept[-1]))
-        for logger, clock in list(clocks.items())[1:]:
-            attributes |= {
-                f"clock_{logger}": clock.describe(),
-                f"clock_{logger}_offset": clock.offset,
-                f"clock_{logger}_offset_error": clock.offset_error,
-                f"clock_{logger}_drift_ppm": 1e6 * clock.drift,
-                f"clock_{logger}_drift_error_ppm": 1e6 * clock.drift_error,
-            }
-        return {key: value for key, value in attributes.items() if value is not None}
+        return {**own, **attributes_of(name, run, dt, found.clocks[name], settings)}
 
 
 def _reference_time(groups: Group) -> Any:
     return next(iter(groups.values()))["time"].to_numpy()
-
-
-def _role(settings: RunSettings) -> str:
-    if settings.train and settings.test:
-        return "train and test"
-    if settings.train or settings.test:
-        return "train" if settings.train else "test"
-    return settings.role or "train"
-
-
-def version() -> str:
-    """Version of seakeep, "unknown" where it is not installed."""
-    try:
-        return metadata.version("seakeep")
-    except metadata.PackageNotFoundError:
-        return "unknown"
 
 
 def read_campaign(path: Path | str) -> Campaign:

@@ -18,7 +18,17 @@ from seakeep.campaign.chain_settings import (
     PreparationSettings,
     RedundantSettings,
 )
-from seakeep.campaign.tables import Finite, Names, Positive, RunName, Span, Table
+from seakeep.campaign.tables import (
+    Finite,
+    Instant,
+    Names,
+    Positive,
+    RunName,
+    Samples,
+    Span,
+    Table,
+    Window,
+)
 from seakeep.conventions import canonical_channel
 from seakeep.errors import did_you_mean
 
@@ -54,6 +64,11 @@ class GeneralSettings(Table):
     period_channel: str | None = Field(
         default=None,
         description="the wave channel whose zero-up-crossings define the encounter period",
+    )
+    period_hysteresis: Annotated[float, Field(ge=0, lt=1)] = Field(
+        default=0.0,
+        description="part of its standard deviation by which a wave must pass its mean either way "
+        "to count; 0, the paper's, counts all. Still water around the waves never counts",
     )
 
 
@@ -91,7 +106,11 @@ class FileSettings(Table):
         default=0, description="lines to leave out at the head of the file"
     )
     encoding: str | None = Field(default=None, description="such as 'utf-8' or 'latin-1'")
-    group: str | None = Field(default=None, description="group of an HDF5 file")
+    group: str | None = Field(
+        default=None,
+        description="the part of a file that is read, where it holds several: the group of a TDMS, "
+        "HDF5 or NetCDF file, the topic of a ROS 2 bag or MCAP file",
+    )
 
 
 class ChannelSettings(Table):
@@ -167,10 +186,18 @@ class RunSettings(Table):
     role: Literal["train", "test", "unused"] | None = Field(
         default=None, description="'train', 'test' or 'unused'"
     )
-    span: Span | None = Field(default=None, description="[begin, end] in s: the part used")
-    train: Span | None = Field(default=None, description="[begin, end] in s, used for training")
-    test: Span | None = Field(default=None, description="[begin, end] in s, used for testing")
-    record: Span | None = Field(default=None, description="[begin, end] in s: the part read")
+    span: Span | None = Field(
+        default=None, description="[begin, end] in s or periods ('10 T'): the part used"
+    )
+    train: Span | None = Field(
+        default=None, description="[begin, end] in s or periods, used for training"
+    )
+    test: Span | None = Field(
+        default=None, description="[begin, end] in s or periods, used for testing"
+    )
+    record: Span | None = Field(
+        default=None, description="[begin, end] in s or periods: the part read"
+    )
     channels: dict[str, ChannelSettings] = Field(
         default_factory=dict, description="keys of [channels.NAME] that differ in this run"
     )
@@ -179,7 +206,8 @@ class RunSettings(Table):
         description="metres by which this run's elevations are carried, positive downstream",
     )
     probe_offset_span: Span | None = Field(
-        default=None, description="[begin, end] in s, from which a model estimates the offset"
+        default=None,
+        description="[begin, end] in s or periods, from which a model estimates the offset",
     )
 
     @model_validator(mode="after")
@@ -270,7 +298,6 @@ NumberOrPrior = Annotated[
     | Annotated[PriorSettings, Tag("<prior>")],
     Discriminator(_branch),
 ]
-Delays = Annotated[int, Field(ge=0)]
 _ONE_MODEL = ("state_delays", "input_delays", "window")
 _ENSEMBLE = (
     *("train_length", "state_delay", "input_delay"),
@@ -294,20 +321,26 @@ class ModelSettings(Table):
         description="list of channels that the model forecasts"
     )
     inputs: Names = Field(default=(), description="list of channels that drive the model")
-    state_delays: Delays | None = Field(default=None, description="samples")
-    input_delays: Delays | None = Field(default=None, description="samples")
+    state_delays: Samples | None = Field(
+        default=None, description="samples, or periods such as '1 T'"
+    )
+    input_delays: Samples | None = Field(
+        default=None, description="samples, or periods such as '5 T'"
+    )
     ridge: NumberOrPrior | None = Field(
         default=None, description="a number, 0 or more; a prior for an ensemble"
     )
-    window: Annotated[int, Field(ge=2)] | None = Field(
-        default=None, description="training snapshots a run"
+    window: Window | None = Field(
+        default=None, description="training snapshots a run, or periods such as '20 T'"
     )
     history: Literal["before", "inside"] | None = Field(default=None, description="")
     delay_rows: Literal["ridge", "exact"] | None = Field(default=None, description="")
     ridge_scale: Literal["absolute", "per_snapshot"] | None = Field(default=None, description="")
     rank: Annotated[int, Field(ge=1)] | None = Field(default=None, description="a positive integer")
     standardize: bool | None = Field(default=None, description="true or false")
-    stop: Finite | None = Field(default=None, description="end of the training window, s")
+    stop: Instant | None = Field(
+        default=None, description="end of the training window, s or periods such as '60 T'"
+    )
     alignment: AlignmentSettings | None = Field(
         default=None, description="a table, such as { mode = 'dispersion', surge = 'predicted' }"
     )
@@ -403,6 +436,25 @@ class CampaignSettings(Table):
     def channel_names(self) -> tuple[str, ...]:
         """Names of the mapped and the derived channels, in the file's order."""
         return (*self.channels, *self.derived)
+
+    @property
+    def wave_channel(self) -> str | None:
+        """Channel that defines the encounter period: stated, or the first wave elevation.
+
+        Elevations (``eta_…``) that drive a model come first; without any it is the first input.
+        """
+        if self.campaign.period_channel is not None:
+            return self.campaign.period_channel
+        inputs = [name for model in self.all_models().values() for name in model.inputs]
+        waves = [name for name in (*inputs, *self.channel_names) if name.startswith("eta_")]
+        return next(iter((*waves, *inputs)), None)
+
+    @property
+    def period_runs(self) -> tuple[str, ...]:
+        """Runs over which the period is measured: irregular ones, or all if none is marked."""
+        used = [name for name, run in self.runs.items() if run.role != "unused"]
+        irregular = [name for name in used if self.runs[name].waves == "irregular"]
+        return tuple(irregular or used)
 
     def all_models(self) -> dict[str, ModelSettings]:
         """Models by the key of their table: ``model`` and ``models.NAME``."""

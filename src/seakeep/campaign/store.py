@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.campaign.prepare import Campaign, Progress, version
+from seakeep.campaign.labels import version
+from seakeep.campaign.prepare import Campaign, Progress
 from seakeep.errors import SeakeepWarning
 from seakeep.files import make_folder, replacing
 

@@ -84,7 +84,8 @@ def survey(
             else:
                 dt = uniform_step(next(iter(groups.values()))["time"].to_numpy())
                 waves = on_one_axis(groups, dt, settings, run)
-            periods[run] = _period(waves, channel, settings.runs[run], run)
+            least = settings.campaign.period_hysteresis
+            periods[run] = _period(waves, channel, settings.runs[run], run, least)
     if settings.instruments.pool_drift:
         for logger in {name for each in clocks.values() for name in each}:
             having = [run for run in clocks if logger in clocks[run]]
@@ -94,12 +95,14 @@ def survey(
     return Survey(clocks, periods)
 
 
-def _period(waves: xr.Dataset, channel: str, settings: RunSettings, run: str) -> float:
+def _period(
+    waves: xr.Dataset, channel: str, settings: RunSettings, run: str, hysteresis: float
+) -> float:
     time, series = waves["time"].to_numpy(), waves[channel].to_numpy()
     step = uniform_step(time, f"run '{run}'")
     kept = inside(time, used_span(settings), step)
     try:
-        return encounter_period(series[kept] if kept.sum() > 2 else series, step)
+        return encounter_period(series[kept] if kept.sum() > 2 else series, step, hysteresis)
     except DataError as error:
         raise DataError(f"run '{run}', channel '{channel}': {error}") from None
 

@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from seakeep.campaign.chain_settings import InstrumentSettings, InstrumentsSettings
+from seakeep.campaign.periods import counted
 from seakeep.campaign.settings import CampaignSettings, ChannelSettings, DerivedSettings
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import RequestError, did_you_mean
@@ -19,6 +20,7 @@ from seakeep.signals.expressions import parse
 __all__ = [
     "derivation_order",
     "mistakes_of",
+    "needed_channels",
     "read_settings",
     "read_toml",
     "sources_of",
@@ -292,6 +294,19 @@ def sources_of(name: str, settings: DerivedSettings, channels: Collection[str]) 
     return tuple(dict.fromkeys(each for each in sources if each != name))
 
 
+def needed_channels(settings: CampaignSettings, wanted: Collection[str]) -> set[str]:
+    """Names of channels and of all that they are derived from."""
+    needed: set[str] = set()
+    ahead = list(wanted)
+    while ahead:
+        name = ahead.pop()
+        if name not in needed:
+            needed.add(name)
+            if name in settings.derived:
+                ahead += sources_of(name, settings.derived[name], settings.channel_names)
+    return needed
+
+
 def _cross_checks(settings: CampaignSettings) -> Iterable[str]:
     yield from _channel_mistakes(settings)
     yield from _derived_mistakes(settings)
@@ -306,6 +321,8 @@ def _cross_checks(settings: CampaignSettings) -> Iterable[str]:
             f"{did_you_mean(wave, names)} {listed}"
         )
     yield from _model_mistakes(settings)
+    if wave is None or wave in names:
+        yield from _period_mistakes(settings)
     yield from _instrument_mistakes(settings)
     for run, each in settings.runs.items():
         for name in each.channels:
@@ -315,6 +332,31 @@ def _cross_checks(settings: CampaignSettings) -> Iterable[str]:
                     f"runs.{run}.channels.{name}: no table [channels.{name}] to change.{near} "
                     "Add it there first."
                 )
+
+
+def _period_mistakes(settings: CampaignSettings) -> Iterable[str]:
+    """Keys in encounter periods where there is no period, or where it is measured with them."""
+    places = list(counted(settings))
+    wave = settings.wave_channel
+    if not places or settings.campaign.encounter_period is not None:
+        return
+    if wave is None:
+        yield (
+            f"{'.'.join(places[0])}: counts in encounter periods, and the campaign has none. State "
+            "encounter_period (s) or period_channel in [campaign], or name a channel eta_…"
+        )
+        return
+    behind = needed_channels(settings, [wave])
+    for place in places:
+        head, name, *rest = place
+        in_run = head == "runs" and name in settings.period_runs and rest != ["probe_offset_span"]
+        behind_wave = head == "derived" and name in behind
+        if in_run or behind_wave or head == "instruments" or name == "longest_gap":
+            yield (
+                f"{'.'.join(place)}: counts in encounter periods, and the period is measured with "
+                f"it, as the zero-up-crossing period of {wave}. State encounter_period (s) in "
+                "[campaign], or this in seconds or hertz."
+            )
 
 
 def _instrument_mistakes(settings: CampaignSettings) -> Iterable[str]:

@@ -26,7 +26,21 @@ from seakeep.study.settings import Preset
 __all__ = ["report", "reproduce", "study"]
 
 Workers = Annotated[
-    int | None, typer.Option("--workers", help="Processes; by default one a core.", min=1)
+    int | None,
+    typer.Option(
+        "--workers",
+        help="Processes on this machine, each on one core; by default one a core.",
+        min=1,
+        metavar="N",
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        help="Scheduler of a running Dask cluster that does the work instead: tcp://HOST:8786.",
+        metavar="ADDRESS",
+    ),
 ]
 
 
@@ -37,6 +51,7 @@ def study(
         typer.Option("-o", "--out", help="Folder; by default named after the study file."),
     ] = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Run a study: every training set, test window and model; then write its report.
 
@@ -46,8 +61,10 @@ def study(
     """
     asked = read_study(study_file)
     folder = out or study_file.parent / f"{study_file.stem}-results"
+    count = _count(workers, scheduler)
     _run(
-        folder, lambda tell: run_study(asked, folder, workers=worker_count(workers), progress=tell)
+        folder,
+        lambda tell: run_study(asked, folder, workers=count, scheduler=scheduler, progress=tell),
     )
 
 
@@ -65,6 +82,7 @@ def reproduce(
         int, typer.Option("--seed", help="Of waves, noise, windows, draws.", min=0)
     ] = 0,
     workers: Workers = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Play the paper's whole study on the virtual tank; needs no data.
 
@@ -77,10 +95,17 @@ def reproduce(
         raise RequestError(f"--preset must be paper or recommended; received '{preset}'.")
     chosen: Preset = "paper" if preset == "paper" else "recommended"
     size = Size.quick() if quick else Size()
+    count = _count(workers, scheduler)
     _run(
         out,
         lambda tell: reproduce_study(
-            out, chosen, size=size, seed=seed, workers=worker_count(workers), progress=tell
+            out,
+            chosen,
+            size=size,
+            seed=seed,
+            workers=count,
+            scheduler=scheduler,
+            progress=tell,
         ),
     )
 
@@ -96,6 +121,15 @@ def report(
     with _Progress("Report") as tell:
         page = write_report(found, tell)
     typer.echo(str(page))
+
+
+def _count(workers: int | None, scheduler: str | None) -> int:
+    if workers is not None and scheduler is not None:
+        raise RequestError(
+            f"--workers {workers} counts processes on this machine, and --scheduler {scheduler} "
+            "hands all work to a cluster. Give one of the two."
+        )
+    return 1 if scheduler is not None else worker_count(workers)
 
 
 class _Progress:

@@ -23,7 +23,7 @@ Only upper triangles are made; what stands below the diagonal is not meaningful.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -37,8 +37,8 @@ __all__ = ["Piece", "PrimalSystem", "gram_trace", "primal_system", "snapshot_gra
 
 FloatArray = npt.NDArray[np.float64]
 
-PANELS = 4
-"""Pieces in which the upper triangle of a product is made."""
+PANEL = 64
+"""Rows, about, in which a Gram matrix is made: few enough to stay in cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,28 +165,37 @@ def primal_system(
         for row, at in ((edges[2 * number], start - 1), (edges[2 * number + 1], end)):
             row[Q:inputs] = recent(u, at, z)
             row[inputs + N :] = recent(x, at, s)
-    signed = edges.copy()
-    signed[1::2] *= -1.0
     gram = scratch.take((size, size))
-    # The running sums take whole blocks, so the squares on the diagonal must be there.
-    _upper_product(edges.T, signed, gram, below=max(N, Q) - 1)
-    _fill_primal(gram, heads, N, Q, inputs)
+    _fill_primal(gram, heads, edges, N, Q, inputs)
     return PrimalSystem(gram, right, heads, edges, N, Q, inputs)
 
 
-def _fill_primal(gram: FloatArray, heads: FloatArray, N: int, Q: int, inputs: int) -> None:
-    # Heads into the first block rows and columns, then running sums along block diagonals.
-    gram[:Q] = heads[:Q]
-    gram[:inputs, inputs : inputs + N] = heads[Q:, :inputs].T
-    gram[inputs : inputs + N, inputs:] = heads[Q:, inputs:]
+def _fill_primal(
+    gram: FloatArray, heads: FloatArray, edges: FloatArray, N: int, Q: int, inputs: int
+) -> None:
+    # Panel by panel: the product of the edges from the panel's diagonal block on, heads over it,
+    # then the running sums while it is in cache. Sums take whole blocks, so that of the diagonal
+    # blocks the lower halves are made too; what is left of them is memory as it was found, and
+    # must never be read.
     size = len(gram)
-    if Q:
-        for at in range(Q, inputs, Q):
-            row, before = gram[at : at + Q], gram[at - Q : at]
-            row[:, at:inputs] += before[:, at - Q : inputs - Q]
-            row[:, inputs + N :] += before[:, inputs : size - N]
+    signed = edges.copy()
+    signed[1::2] *= -1.0
+    for begin, stop in _panels(0, inputs, Q):
+        np.matmul(edges[:, begin:stop].T, signed[:, begin:], out=gram[begin:stop, begin:])
+        gram[begin:stop, inputs : inputs + N] = heads[Q:, begin:stop].T
+        if begin == 0:
+            gram[:Q] = heads[:Q]
+        for at in range(max(begin, Q), stop, Q):
+            block = gram[at : at + Q, at:inputs]
+            block += gram[at - Q : at, at - Q : inputs - Q]
     for at in range(inputs + N, size, N):
-        gram[at : at + N, at:] += gram[at - N : at, at - N : size - N]
+        gram[Q:inputs, at : at + N] += gram[: max(inputs - Q, 0), at - N : at]
+    for begin, stop in _panels(inputs, size, N):
+        np.matmul(edges[:, begin:stop].T, signed[:, begin:], out=gram[begin:stop, begin:])
+        if begin == inputs:
+            gram[inputs : inputs + N, inputs:] = heads[Q:, inputs:]
+        for at in range(max(begin, inputs + N), stop, N):
+            gram[at : at + N, at:] += gram[at - N : at, at - N : size - N]
 
 
 def snapshot_gram(
@@ -221,32 +230,44 @@ def snapshot_gram(
         rows[1:, 2 * N + Q :] = piece.inputs[first - z : first - z + count - 1]
     signed = steps.copy()
     signed[:, N + Q :] *= -1.0
+    heads = np.empty((len(pieces), len(steps)))
+    for own, head in zip(pieces, heads, strict=True):
+        own_x = recent(own.states, own.first, s + 1)
+        own_u = recent(own.inputs, own.first, z + 1)
+        for piece, begin, stop in zip(pieces, ends[:-1], ends[1:], strict=True):
+            head[begin:stop] = lagged_response(piece.states, own_x, piece.first, piece.count)
+            head[begin:stop] += lagged_response(piece.inputs, own_u, piece.first, piece.count)
     gram = scratch.take((len(steps), len(steps)))
-    _upper_product(steps, signed.T, gram, below=0)
-    for i, piece in enumerate(pieces):
-        own_x = recent(piece.states, piece.first, s + 1)
-        own_u = recent(piece.inputs, piece.first, z + 1)
-        for j, other in enumerate(pieces):
-            head = lagged_response(other.states, own_x, other.first, other.count)
-            head += lagged_response(other.inputs, own_u, other.first, other.count)
-            if i <= j:
-                gram[ends[i], ends[j] : ends[j + 1]] = head
-            else:
-                gram[ends[j] : ends[j + 1], ends[i]] = head
-    for i in range(len(pieces)):
-        for at in range(ends[i] + 1, ends[i + 1]):
-            row = gram[at, at : ends[i + 1]]
-            row += gram[at - 1, at - 1 : ends[i + 1] - 1]
-            for j in range(i + 1, len(pieces)):
-                row = gram[at, ends[j] + 1 : ends[j + 1]]
-                row += gram[at - 1, ends[j] : ends[j + 1] - 1]
+    _fill_snapshots(gram, heads, steps, signed, ends)
     return gram
 
 
-def _upper_product(left: FloatArray, right: FloatArray, out: FloatArray, below: int) -> None:
-    # In panels of rows, each from its diagonal (or `below` it) on: a little more than half of the
-    # product. What is left out is memory as it was found, and must never be read.
-    edges = [len(out) * panel // PANELS for panel in range(PANELS + 1)]
-    for begin, stop in pairwise(edges):
-        first = max(0, begin - below)
-        np.matmul(left[begin:stop], right[:, first:], out=out[begin:stop, first:])
+def _fill_snapshots(
+    gram: FloatArray,
+    heads: FloatArray,
+    steps: FloatArray,
+    signed: FloatArray,
+    ends: npt.NDArray[np.int64],
+) -> None:
+    # As above, with blocks of one; each run has a first row, and a first column above it.
+    runs = list(pairwise(ends.tolist()))
+    for run, (first, last) in enumerate(runs):
+        for begin, stop in _panels(first, last, 1):
+            np.matmul(steps[begin:stop], signed[begin:].T, out=gram[begin:stop, begin:])
+            if begin == first:
+                gram[first, first:] = heads[run, first:]
+            for later in range(run + 1, len(runs)):
+                gram[begin:stop, runs[later][0]] = heads[later, begin:stop]
+            for at in range(max(begin, first + 1), stop):
+                row = gram[at, at:last]
+                row += gram[at - 1, at - 1 : last - 1]
+                for other, end in runs[run + 1 :]:
+                    row = gram[at, other + 1 : end]
+                    row += gram[at - 1, other : end - 1]
+
+
+def _panels(begin: int, end: int, block: int) -> Iterator[tuple[int, int]]:
+    """Ranges of about ``PANEL`` rows, in whole blocks."""
+    height = max(block, PANEL // max(block, 1) * block)
+    for at in range(begin, end, max(height, 1)):
+        yield at, min(at + height, end)

@@ -18,7 +18,7 @@ __all__ = ["lagged_response", "lagged_sums", "recent"]
 
 FloatArray = npt.NDArray[np.float64]
 
-BLOCK_WIDTH = 128
+BLOCK_WIDTH = 96
 """Columns of the block of lags that is laid out: wide enough for BLAS, small enough for cache."""
 
 

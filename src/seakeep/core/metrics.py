@@ -147,7 +147,7 @@ def anrmse(
         As :func:`nrmse`.
     """
     p, m, spread, judged = paired(predicted, measured, training_std)
-    return _over_channels(np.sqrt(np.mean((p - m) ** 2, axis=-2)) / spread, judged)
+    return over_channels(np.sqrt(np.mean((p - m) ** 2, axis=-2)) / spread, judged)
 
 
 def error_over_time(
@@ -174,7 +174,7 @@ def error_over_time(
         As :func:`nrmse`.
     """
     p, m, spread, judged = paired(predicted, measured, training_std)
-    return _over_channels(np.abs(p - m) / spread[..., None, :], judged[..., None, :])
+    return over_channels(np.abs(p - m) / spread[..., None, :], judged[..., None, :])
 
 
 def normalised_extremes_error(
@@ -234,7 +234,7 @@ def nammae(
         predicted=predicted, measured=measured, training_std=training_std
     )
     judged = paired(predicted, measured, training_std)[3]
-    return _over_channels(each, judged)
+    return over_channels(each, judged)
 
 
 def fit_percent(
@@ -268,8 +268,8 @@ def fit_percent(
     return out
 
 
-def _over_channels(values: FloatArray, judged: BoolArray) -> FloatArray:
-    # A slack channel is left out; a diverged one, or one with a gap, must not be.
+def over_channels(values: FloatArray, judged: BoolArray) -> FloatArray:
+    """Average over the judged channels; a diverged one, or one with a gap, is not left out."""
     judged = np.broadcast_to(judged, values.shape)
     count = judged.sum(axis=-1)
     total = np.where(judged, values, 0.0).sum(axis=-1)

@@ -26,9 +26,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.core.scratch import Scratch
+from seakeep.core.scratch import LINE, Scratch
 
-__all__ = ["Propagator", "doublings", "mirrored", "shifting_propagator", "square_propagator"]
+__all__ = [
+    "Propagator",
+    "doublings",
+    "mirrored",
+    "shifting_propagator",
+    "square_propagator",
+    "step_cost",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -110,6 +117,12 @@ def shifting_propagator(a: FloatArray, b: FloatArray, channels: int, steps: int)
     return Propagator(K, output_state, output_input)
 
 
+def step_cost(size: int, windows: int) -> float:
+    """Estimate of the time of one step of `windows` rows with a square matrix, ns."""
+    fixed, entry, row = SKINNY_COST
+    return fixed + size * size * (entry + row * (windows - 1))
+
+
 def doublings(size: int, inputs: int, windows: int, steps: int) -> tuple[int, float]:
     """How often to double the step of a square model so that the free run costs least.
 
@@ -127,8 +140,7 @@ def doublings(size: int, inputs: int, windows: int, steps: int) -> tuple[int, fl
     cost : float
         Estimate of the time, ns.
     """
-    fixed, entry, row = SKINNY_COST
-    once = fixed + size * size * (entry + row * (windows - 1))
+    once = step_cost(size, windows)
     best, least, preparation = 0, np.inf, 0.0
     for count in range(MOST_DOUBLINGS + 1):
         blocks = -(-steps // 2**count)
@@ -156,8 +168,9 @@ def mirrored(
 
     Returns
     -------
-    ndarray, shape (N(s+1), N(s+1)), or None
-        Its first Ns rows; None where Â is not of this kind, or several steps at once cost less.
+    ndarray, shape (padded, padded), or None
+        Its first Ns rows, padded by zeros to whole lines of cache (BLAS is a tenth faster on
+        them); None where Â is not of this kind, or several steps at once cost less.
     """
     size = len(a)
     kept = size - count
@@ -172,8 +185,10 @@ def mirrored(
             tile = block[row : row + TILE, column : column + TILE]
             if not np.array_equal(tile, block[column : column + TILE, row : row + TILE].T):
                 return None
-    out = scratch.take((size, size))
-    out[:kept] = a[count:]
+    padded = size + (-size) % LINE
+    out = scratch.take((padded, padded))
+    out[:kept, :size] = a[count:]
+    out[:kept, size:] = 0.0
     out[kept:] = 0.0
     return out
 

@@ -1,8 +1,9 @@
 r"""Free runs of :math:`\hat x_{k+1} = \hat A \hat x_k + \hat B \hat u_k`, many windows at once.
 
 Windows side by side are rows of one matrix, and several steps are one product
-(:mod:`seakeep.core.propagation`). A long run is taken in pieces, so that what is held beside the
-result does not grow with its length.
+(:mod:`seakeep.core.propagation`). Several windows of a model with a full Â share its response to an
+impulse (:mod:`seakeep.core.superposition`). A long run is taken in pieces, so that what is held
+beside the result does not grow with its length.
 """
 
 from __future__ import annotations
@@ -19,6 +20,13 @@ from seakeep.core.propagation import (
     square_propagator,
 )
 from seakeep.core.scratch import Scratch
+from seakeep.core.superposition import (
+    convolve,
+    grows,
+    impulse_states,
+    state_at_rest,
+    superposition_cost,
+)
 from seakeep.errors import RequestError
 
 __all__ = ["rollout"]
@@ -97,12 +105,54 @@ def rollout(
     channels, steps = _input_steps(b, driving)
     with np.errstate(over="ignore", invalid="ignore"):
         memory = scratch or Scratch()
-        symmetric, propagator = _prepare(a, b, count, channels, len(start), steps, memory)
-        out = _run(propagator, symmetric, start, driving, steps, count, memory)
+        out = None
+        if _superposes(a, b, count, driving, steps):
+            out = _superpose(a, b, count, start, driving, steps, memory)
+        if out is None:
+            symmetric, propagator = _prepare(a, b, count, channels, len(start), steps, memory)
+            out = _run(propagator, symmetric, start, driving, steps, count, memory)
         lost = ~np.isfinite(out).all(axis=2)
     if lost.any():
         out[np.logical_or.accumulate(lost, axis=1)] = np.nan
     return out
+
+
+def _superposes(a: FloatArray, b: FloatArray, count: int, inputs: FloatArray, steps: int) -> bool:
+    """Whether the windows are many enough for the response to an impulse to cost least."""
+    windows, length, channels = inputs.shape
+    size = len(a)
+    if size < a.shape[1] or not channels or windows * count * (length + steps) > PIECE:
+        return False
+    cost = superposition_cost(size, count, channels, length - steps, windows, steps)
+    # A transform would spread a gap over all instants.
+    return cost < doublings(size, b.shape[1], windows, steps)[1] and bool(np.isfinite(inputs).all())
+
+
+def _superpose(
+    a: FloatArray,
+    b: FloatArray,
+    count: int,
+    start: FloatArray,
+    inputs: FloatArray,
+    steps: int,
+    scratch: Scratch,
+) -> FloatArray | None:
+    """Free runs by superposition; None where that would lose digits."""
+    windows, length, channels = inputs.shape
+    memory = scratch.mark()
+    impulse = impulse_states(a, b, channels, scratch)
+    rest = state_at_rest(impulse, inputs)
+    begun = np.concatenate([start - rest, impulse[-1]])
+    silent = np.zeros((len(begun), steps, 0))
+    _, propagator = _prepare(a, b[:, :0], count, 0, len(begun), steps, scratch)
+    free = _run(propagator, None, begun, silent, steps, count, scratch)
+    early = impulse[:, :, :count].copy()
+    scratch.release(memory)
+    kernel = np.concatenate([early, free[windows:].transpose(1, 0, 2)])[:length]
+    if grows(kernel, length - steps):
+        return None
+    forced = convolve(np.ascontiguousarray(kernel.transpose(1, 2, 0)), inputs, steps)
+    return free[:windows] + forced.transpose(0, 2, 1)
 
 
 def _prepare(
@@ -284,18 +334,19 @@ def _run_mirrored(
 ) -> tuple[FloatArray, FloatArray]:
     assert propagator.state_input is not None
     number, size, N = len(rows), start.shape[1], len(propagator.output_state)
+    padded = len(symmetric)
     # A row holds a state and, after it, what the symmetric product says beyond the oldest delay.
-    states = scratch.zeros((number + 1, size + N))
+    states = scratch.zeros((number + 1, padded + N))
     states[number, :size] = start[0]
     np.matmul(rows, propagator.state_input.T, out=states[:number, :size])
     half, newest = symmetric.T, np.ascontiguousarray(propagator.output_state).T
     symv, gemv = blas.dsymv, blas.dgemv
-    state = states[number, :size]
+    before = states[number]
     for block in range(number - 1, -1, -1):
         row = states[block]
-        symv(1.0, half, state, beta=1.0, y=row[N:], overwrite_y=1, lower=1)
-        gemv(1.0, newest, state, beta=1.0, y=row[:N], overwrite_y=1, trans=1)
-        state = row[:size]
+        symv(1.0, half, before[:padded], beta=1.0, y=row[N:], overwrite_y=1, lower=1)
+        gemv(1.0, newest, before[:size], beta=1.0, y=row[:N], overwrite_y=1, trans=1)
+        before = row
     return states[:number, :N].reshape(1, -1), states[:1, :size]
 
 

@@ -13,14 +13,14 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Scratch"]
+__all__ = ["LINE", "Scratch"]
 
 FloatArray = npt.NDArray[np.float64]
 
 PAGE = 2**21
 BLOCK = 2**24
 """Bytes of a block at least; memory that is never written is not taken from the system."""
-ALIGNED = 8
+LINE = 8
 """Numbers to which an array begins: a line of cache."""
 
 
@@ -58,7 +58,7 @@ class Scratch:
         while self._block < len(self._blocks):
             block = self._blocks[self._block]
             if self._at + size <= block.size:
-                begin, self._at = self._at, self._at + size + (-size) % ALIGNED
+                begin, self._at = self._at, self._at + size + (-size) % LINE
                 return block[begin : begin + size].reshape(shape)
             self._block, self._at = self._block + 1, 0
         self._blocks.append(_aligned(max(8 * size, BLOCK)))

@@ -16,7 +16,7 @@ from seakeep.models.forecasting import ForecastWindow, read_window
 from seakeep.models.members import Task, forecast_member
 from seakeep.models.offsets import check_offset
 from seakeep.models.progress import Progress, told
-from seakeep.models.workers import Backend, check_workers, side_by_side
+from seakeep.models.workers import Crew, side_by_side
 
 if TYPE_CHECKING:
     from seakeep.models.fitted_ensemble import HankelEnsemble
@@ -65,8 +65,7 @@ def member_series(
     ensemble: HankelEnsemble,
     run: xr.Dataset,
     windows: Sequence[ForecastWindow],
-    workers: int,
-    backend: Backend,
+    crew: Crew,
     progress: Progress | None = None,
 ) -> Iterator[FloatArray]:
     """Free runs of the members, in their order.
@@ -79,7 +78,9 @@ def member_series(
         The run.
     windows : sequence of ForecastWindow
         From :func:`read_windows`, of one length.
-    workers, backend, progress
+    crew : Crew
+        Who does the work.
+    progress
         As in :meth:`HankelEnsemble.forecast`.
 
     Returns
@@ -87,18 +88,15 @@ def member_series(
     iterator of ndarray, each of shape (window, steps, N)
         States in physical units; NaN from where a window diverges on.
     """
-    check_workers(workers, backend)
     found: Iterator[FloatArray]
     if ensemble.alignment is not None and ensemble.alignment.settings.surge == "predicted":
         loops = [aligned.prepare_loop(ensemble, run, window) for window in windows]
-        found = side_by_side(
-            _closed_loops, (ensemble, loops), range(ensemble.n_members), workers, backend
-        )
+        found = side_by_side(_closed_loops, (ensemble, loops), range(ensemble.n_members), crew)
     else:
         histories = np.stack([window.state_history for window in windows])
         inputs = np.stack([np.concatenate([w.input_history, w.input_future]) for w in windows])
         task = Task(ensemble.arrays, ensemble.settings, histories, inputs, windows[0].steps)
-        found = side_by_side(forecast_member, task, ensemble.members, workers, backend)
+        found = side_by_side(forecast_member, task, ensemble.members, crew)
     return told(found, ensemble.n_members, progress)
 
 

@@ -30,8 +30,14 @@ from seakeep.models.members import (
 from seakeep.models.model import HankelDMDcModel, Training
 from seakeep.models.progress import Progress, told
 from seakeep.models.settings import HankelSettings
-from seakeep.models.summaries import check_level, first_lost, reduce_members, statistic_coordinate
-from seakeep.models.workers import Backend, check_workers, side_by_side
+from seakeep.models.summaries import (
+    check_level,
+    first_lost,
+    reduce_members,
+    stack_members,
+    statistic_coordinate,
+)
+from seakeep.models.workers import Backend, Crew, side_by_side
 
 __all__ = ["HankelEnsemble"]
 
@@ -197,7 +203,8 @@ class HankelEnsemble:
         self,
         *,
         workers: int = 1,
-        backend: Backend = "threads",
+        backend: Backend = "processes",
+        scheduler: str | None = None,
         progress: Progress | None = None,
     ) -> FloatArray:
         """Largest modulus of an eigenvalue of each member; a member is stable below one.
@@ -206,7 +213,7 @@ class HankelEnsemble:
 
         Parameters
         ----------
-        workers, backend, progress
+        workers, backend, scheduler, progress
             As in :meth:`forecast`.
 
         Returns
@@ -219,9 +226,10 @@ class HankelEnsemble:
             When they are found, if one or more are not below one.
         """
         if self.radii is None:
-            check_workers(workers, backend)
             data = (self.arrays, self.settings)
-            found = side_by_side(member_radius, data, self.members, workers, backend)
+            found = side_by_side(
+                member_radius, data, self.members, Crew(workers, backend, scheduler)
+            )
             radii = np.array(list(told(found, self.n_members, progress)))
             radii.flags.writeable = False
             object.__setattr__(self, "radii", radii)
@@ -246,7 +254,8 @@ class HankelEnsemble:
         steps: int | None = None,
         *,
         workers: int = 1,
-        backend: Backend = "threads",
+        backend: Backend = "processes",
+        scheduler: str | None = None,
         progress: Progress | None = None,
     ) -> xr.Dataset:
         """Free runs of all members.
@@ -257,8 +266,13 @@ class HankelEnsemble:
             As in :meth:`HankelDMDcModel.forecast`.
         workers : int, optional
             Members at work at a time; the result does not depend on it.
-        backend : {"threads", "processes"}, optional
-            Kind of worker.
+        backend : {"processes", "threads"}, optional
+            Kind of worker. Processes stay ready for a minute after a call; a script that starts
+            them needs ``if __name__ == "__main__":``. Threads start at once, but most of a
+            member's work holds the interpreter's lock.
+        scheduler : str, optional
+            Address of the scheduler of a running Dask cluster, ``"tcp://host:8786"``, whose
+            workers do the work instead (extra ``cluster``).
         progress : callable, optional
             Called as ``progress(done, total, what)`` after each member.
 
@@ -274,8 +288,9 @@ class HankelEnsemble:
             As :meth:`HankelDMDcModel.forecast`.
         """
         windows = read_windows(self, run, [start], steps)
-        series = member_series(self, run, windows, workers, backend, progress)
-        values = np.stack(list(series))[:, 0]
+        series = member_series(self, run, windows, Crew(workers, backend, scheduler), progress)
+        shape = (1, windows[0].steps, len(self.states))
+        values = stack_members(series, self.n_members, shape)[0]
         lost = first_lost(values)
         variables = self._labelled(values, "member", "time")
         variables["status"] = xr.Variable(("member",), statuses(lost, windows[0].time.values))
@@ -293,14 +308,15 @@ class HankelEnsemble:
         level: float = 0.95,
         *,
         workers: int = 1,
-        backend: Backend = "threads",
+        backend: Backend = "processes",
+        scheduler: str | None = None,
         progress: Progress | None = None,
     ) -> xr.Dataset:
         """Mean, standard deviation and band of the members, never all of them at once.
 
         Parameters
         ----------
-        run, start, steps, workers, backend, progress
+        run, start, steps, workers, backend, scheduler, progress
             As in :meth:`forecast`.
         level : float, optional
             Probability between ``lower`` and ``upper``.
@@ -319,7 +335,7 @@ class HankelEnsemble:
         """
         level = check_level(level)
         (window,) = read_windows(self, run, [start], steps)
-        series = member_series(self, run, [window], workers, backend, progress)
+        series = member_series(self, run, [window], Crew(workers, backend, scheduler), progress)
         shape = (1, window.steps, len(self.states))
         values, lost = reduce_members(series, self.n_members, shape, level)
         variables = label_channels(
@@ -344,13 +360,14 @@ class HankelEnsemble:
         steps: int,
         *,
         workers: int = 1,
-        backend: Backend = "threads",
+        backend: Backend = "processes",
+        scheduler: str | None = None,
     ) -> xr.Dataset:
         """Free runs of all members from several starts side by side.
 
         Parameters
         ----------
-        run, steps, workers, backend
+        run, steps, workers, backend, scheduler
             As in :meth:`forecast`; `steps` holds for all.
         starts : sequence of float
             Instants of the last measured state, s.
@@ -367,7 +384,9 @@ class HankelEnsemble:
             As :meth:`forecast`.
         """
         windows = read_windows(self, run, starts, steps)
-        values = np.stack(list(member_series(self, run, windows, workers, backend)), axis=1)
+        series = member_series(self, run, windows, Crew(workers, backend, scheduler))
+        shape = (len(windows), windows[0].steps, len(self.states))
+        values = stack_members(series, self.n_members, shape)
         first = first_lost(values)
         variables = label_channels(
             self.state_labels, self.state_spread, values, ("window", "member", "lead")
@@ -387,7 +406,8 @@ class HankelEnsemble:
         level: float = 0.95,
         *,
         workers: int = 1,
-        backend: Backend = "threads",
+        backend: Backend = "processes",
+        scheduler: str | None = None,
     ) -> xr.Dataset:
         """Mean, standard deviation and band from several starts, never all members at once.
 
@@ -411,7 +431,7 @@ class HankelEnsemble:
         level = check_level(level)
         windows = read_windows(self, run, starts, steps)
         shape = (len(windows), windows[0].steps, len(self.states))
-        series = member_series(self, run, windows, workers, backend)
+        series = member_series(self, run, windows, Crew(workers, backend, scheduler))
         values, lost = reduce_members(series, self.n_members, shape, level)
         variables = label_channels(
             self.state_labels, self.state_spread, values, ("window", "statistic", "lead")

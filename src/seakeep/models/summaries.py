@@ -14,7 +14,7 @@ import xarray as xr
 
 from seakeep.errors import RequestError
 
-__all__ = ["STATISTICS", "first_lost", "reduce_members", "summarize"]
+__all__ = ["STATISTICS", "first_lost", "reduce_members", "stack_members", "summarize"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -74,6 +74,31 @@ def first_lost(values: FloatArray) -> npt.NDArray[np.int64]:
     gone: npt.NDArray[np.bool_] = np.isnan(values.sum(axis=-1))
     first = np.argmax(gone, axis=-1)
     return np.where(np.take_along_axis(gone, first[..., None], axis=-1)[..., 0], first, -1)
+
+
+def stack_members(
+    series: Iterable[FloatArray], members: int, shape: tuple[int, int, int]
+) -> FloatArray:
+    """Members side by side, each put into its place as it comes.
+
+    Parameters
+    ----------
+    series : iterable of ndarray, each of shape `shape`
+        Members one after the other.
+    members : int
+        Their number.
+    shape : tuple of int
+        (window, steps, N).
+
+    Returns
+    -------
+    ndarray, shape (window, member, steps, N)
+        All of them.
+    """
+    out = np.empty((shape[0], members, *shape[1:]))
+    for member, values in enumerate(series):
+        out[:, member] = values
+    return out
 
 
 def reduce_members(

@@ -1,138 +1,178 @@
-"""Members side by side: on threads, on processes, or on a Dask cluster, each on one BLAS thread."""
+"""Work side by side: in the caller's thread, on threads, on processes, or on a Dask cluster.
+
+One seam for the members of an ensemble and the cells of a study: a function, what all items need,
+and the items. Who does them is a :class:`Crew`; the results do not depend on it. Everywhere BLAS
+has one thread, so that workers do not fight for cores.
+"""
 
 from __future__ import annotations
 
-import multiprocessing
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager
-from functools import partial
-from typing import Any, Literal, TypeVar
+from itertools import islice
+from typing import TypeVar
 
-import threadpoolctl
+from seakeep.models.crew import (
+    Backend,
+    Crew,
+    Desk,
+    Function,
+    Team,
+    WorkerLostError,
+    do_all,
+    one_blas_thread,
+)
 
-from seakeep.core.scratch import Scratch
-from seakeep.errors import RequestError
+__all__ = [
+    "Backend",
+    "Crew",
+    "WorkerLostError",
+    "as_finished",
+    "check_crew",
+    "one_blas_thread",
+    "side_by_side",
+]
 
-__all__ = ["Backend", "check_workers", "one_blas_thread", "side_by_side"]
-
-Backend = Literal["threads", "processes"]
 Data = TypeVar("Data")
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-def one_blas_thread() -> AbstractContextManager[object]:
-    """Limit BLAS to one thread: small products side by side beat products spread over cores."""
-    context: AbstractContextManager[object] = threadpoolctl.threadpool_limits(1, user_api="blas")
-    return context
+def check_crew(crew: Crew) -> None:
+    """Refuse a cluster that cannot be used, before work is prepared for it.
 
+    Parameters
+    ----------
+    crew : Crew
+        Who will do the work.
 
-def check_workers(workers: object, backend: object) -> None:
-    """Refuse a number of workers or a backend that does not exist."""
-    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
-        raise RequestError(f"workers must be a positive integer; received {workers!r}.")
-    if backend not in ("threads", "processes"):
-        raise RequestError(f"backend must be 'threads' or 'processes'; received {backend!r}.")
+    Raises
+    ------
+    RequestError
+        If Dask is not installed here, no scheduler answers, it has no workers, or they have other
+        versions than this process.
+    """
+    if crew.scheduler is not None:
+        from seakeep.models.cluster import check_cluster
+
+        check_cluster(crew.scheduler)
 
 
 def side_by_side(
-    function: Callable[[Data, Item, Scratch], Result],
-    data: Data,
-    items: Sequence[Item],
-    workers: int,
-    backend: Backend,
+    function: Function[Data, Item, Result], data: Data, items: Sequence[Item], crew: Crew
 ) -> Iterator[Result]:
     """Results of `function` for each item, in the order of the items.
 
     Parameters
     ----------
     function : callable
-        Takes `data`, one item, and memory for its work; a function of a module where `backend` is
-        "processes".
+        Takes `data`, one item, and memory for its work; a function of a module, unless the work
+        stays in this process.
     data : object
-        What all items need; sent to each process once.
+        What all items need; it reaches each worker once.
     items : sequence
-        What there is to do.
-    workers : int
-        Number of threads or processes; 1 works in the caller's thread.
-    backend : {"threads", "processes"}
-        Kind of worker.
+        What there is to do, each a small piece of work.
+    crew : Crew
+        Who does it.
 
     Yields
     ------
     object
         Results; no more than a few for each worker wait to be read.
+
+    Raises
+    ------
+    WorkerLostError
+        If a worker process was stopped from outside.
+    RequestError
+        If the cluster cannot be used.
     """
+    if crew == Crew(1, crew.backend):
+        yield from _alone(function, data, items)
+        return
+    with _team(function, data, crew, len(items)) as team:
+        pending: deque[Future[list[Result]]] = deque()
+        for first in range(0, len(items), team.batch):
+            pending.append(team.submit(items[first : first + team.batch]))
+            if len(pending) >= team.ahead:
+                yield from pending.popleft().result()
+        while pending:
+            yield from pending.popleft().result()
+
+
+def as_finished(
+    function: Function[Data, Item, Result], data: Data, items: Sequence[Item], crew: Crew
+) -> Iterator[tuple[int, Result]]:
+    """Results with the numbers of their items, as they are finished; for large pieces of work.
+
+    Parameters
+    ----------
+    function, data, items, crew
+        As in :func:`side_by_side`.
+
+    Yields
+    ------
+    (int, object)
+        Number of the item, and its result.
+
+    Raises
+    ------
+    WorkerLostError, RequestError
+        As :func:`side_by_side`.
+    """
+    if crew == Crew(1, crew.backend):
+        yield from enumerate(_alone(function, data, items))
+        return
+    with _team(function, data, crew, None) as team:
+        waiting = enumerate(items)
+        pending = {team.submit([item]): number for number, item in islice(waiting, team.ahead)}
+        while pending:
+            finished, _ = wait(pending, return_when=FIRST_COMPLETED)
+            for future in finished:
+                number = pending.pop(future)
+                (result,) = future.result()
+                for following, item in islice(waiting, 1):
+                    pending[team.submit([item])] = following
+                yield number, result
+
+
+def _alone(
+    function: Function[Data, Item, Result], data: Data, items: Sequence[Item]
+) -> Iterator[Result]:
+    desk = Desk(data)
     with one_blas_thread():
-        if workers == 1:
-            scratch = Scratch()
-            for item in items:
-                yield function(data, item, scratch)
-            return
-        with _executor(workers, backend, data) as pool:
-            call: Callable[[Item], Result]
-            if backend == "threads":
-                call = partial(_call_with, function, data, [Scratch() for _ in range(workers)])
-            else:
-                call = partial(_call, function)
-            yield from _in_order(pool, call, items, 3 * workers)
+        for item in items:
+            yield desk.do(function, item)
 
 
-def _call_with(
-    function: Callable[[Data, Item, Scratch], Result],
-    data: Data,
-    idle: list[Scratch],
-    item: Item,
-) -> Result:
-    # No more calls run at a time than there are blocks of memory; pop and append are atomic.
-    scratch = idle.pop()
-    try:
-        return function(data, item, scratch)
-    finally:
-        idle.append(scratch)
+def _team(
+    function: Function[Data, Item, Result], data: Data, crew: Crew, small: int | None
+) -> AbstractContextManager[Team[Item, Result]]:
+    """Workers of a crew; `small` is the number of items where each is a small piece of work."""
+    if crew.scheduler is not None:
+        from seakeep.models.cluster import cluster
+
+        return cluster(function, data, crew.scheduler, small)
+    if crew.backend == "threads":
+        return _threads(function, data, crew.workers)
+    from seakeep.models.processes import processes
+
+    return processes(function, data, crew.workers)
 
 
 @contextmanager
-def _executor(workers: int, backend: Backend, data: object) -> Iterator[Executor]:
-    if backend == "threads":
-        with ThreadPoolExecutor(workers) as threads:
-            yield threads
-        return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, initializer=_receive, initargs=(data,)) as pool:
-        yield pool
+def _threads(
+    function: Function[Data, Item, Result], data: Data, workers: int
+) -> Iterator[Team[Item, Result]]:
+    pool, desk = ThreadPoolExecutor(workers), Desk(data)
 
+    def submit(items: Sequence[Item]) -> Future[list[Result]]:
+        return pool.submit(do_all, desk, function, items)
 
-def _in_order(
-    pool: Executor, call: Callable[[Item], Result], items: Sequence[Item], waiting: int
-) -> Iterator[Result]:
-    pending: deque[Future[Result]] = deque()
     try:
-        for item in items:
-            pending.append(pool.submit(call, item))
-            if len(pending) >= waiting:
-                yield pending.popleft().result()
-        while pending:
-            yield pending.popleft().result()
+        with one_blas_thread():
+            yield Team(submit, 3 * workers)
     finally:
-        for future in pending:
-            future.cancel()
-
-
-class _Received:
-    """What a worker process was sent when it started."""
-
-    data: object = None
-    scratch: Scratch
-    limits: object = None
-
-
-def _receive(data: object) -> None:
-    _Received.data, _Received.scratch = data, Scratch()
-    _Received.limits = threadpoolctl.threadpool_limits(1, user_api="blas")
-
-
-def _call(function: Callable[[Any, Item, Scratch], Result], item: Item) -> Result:
-    return function(_Received.data, item, _Received.scratch)
+        pool.shutdown(wait=True, cancel_futures=True)

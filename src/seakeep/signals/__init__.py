@@ -29,6 +29,7 @@ from seakeep.signals.spectra import (
     wave_heights,
     wave_spectrum,
     wave_statistics,
+    waves_part,
     zero_up_crossings,
 )
 from seakeep.signals.synchronise import (
@@ -82,6 +83,7 @@ __all__ = [
     "wave_heights",
     "wave_spectrum",
     "wave_statistics",
+    "waves_part",
     "windowed_lags",
     "zero_up_crossings",
 ]

@@ -213,6 +213,12 @@ def resample(
     return _sinc_sums(array, position, (passband * nyquist, nyquist), attenuation)
 
 
+PHASES = 256
+"""Places between two samples at which the kernel is tabulated."""
+AT_ONCE = 500_000
+"""Weights formed at once: they stay in the processor's cache."""
+
+
 def _sinc_sums(
     array: FloatArray, position: FloatArray, edges: tuple[float, float], attenuation: float
 ) -> FloatArray:
@@ -221,23 +227,57 @@ def _sinc_sums(
     `position` counts in old samples; `edges`, of the pass and stop bands, are cycles a sample.
     """
     attenuation = max(positive("the attenuation", attenuation, "dB"), 50.0)
-    beta = 0.1102 * (attenuation - 8.7)
     width = edges[1] - edges[0]
     half = int(np.ceil((attenuation - 7.95) / (4.57 * np.pi * width) + 1))  # Kaiser's formula
+    bank = _kernels(half, 0.1102 * (attenuation - 8.7), sum(edges))
     base = np.floor(position).astype(int)
-    offsets = np.arange(-half + 1, half + 1)
-    extended = odd_extension(array, half)
-    flat = extended.reshape(extended.shape[0], -1)
-    out = np.empty((position.size, flat.shape[1]))
-    rows_at_once = max(1, 2_000_000 // offsets.size)
+    place = (position - base) * PHASES
+    phase = np.minimum(place.astype(int), PHASES - 1)
+    cubic = _lagrange(place - phase)
+    columns = odd_extension(array, half).reshape(array.shape[0] + 2 * half, -1).T
+    views = [
+        np.lib.stride_tricks.sliding_window_view(np.ascontiguousarray(each), 2 * half)
+        for each in columns
+    ]
+    out = np.empty((position.size, len(views)))
+    rows_at_once = max(1, AT_ONCE // (2 * half))
     for first in range(0, position.size, rows_at_once):
         rows = slice(first, first + rows_at_once)
-        lag = position[rows, None] - (base[rows, None] + offsets)
-        kernel = special.i0(beta * np.sqrt(np.clip(1.0 - (lag / half) ** 2, 0.0, None)))
-        kernel *= np.sinc(sum(edges) * lag)
-        kernel /= kernel.sum(axis=1, keepdims=True)
-        for row, weights in enumerate(kernel, first):
-            begin = base[row] + 1
-            out[row] = weights @ flat[begin : begin + 2 * half]
+        weights = cubic[0, rows, None] * bank[phase[rows]]
+        for each in (1, 2, 3):
+            weights += cubic[each, rows, None] * bank[phase[rows] + each]
+        for column, view in enumerate(views):
+            out[rows, column] = np.einsum("ij,ij->i", weights, view[base[rows] + 1])
     result: FloatArray = out.reshape((position.size, *array.shape[1:]))
     return result
+
+
+def _kernels(half: int, beta: float, band: float) -> FloatArray:
+    """Kaiser-windowed sincs, row by row later by 1 / PHASES of a sample, the first by minus one.
+
+    Each row sums to one, so that constants are kept, between the rows too. A cubic through four
+    rows is the kernel to 1e-9: its fourth derivative is (2 pi 0.55)^4 / 5 at most.
+    """
+    lag = np.arange(-1, PHASES + 2)[:, None] / PHASES - np.arange(-half + 1, half + 1)
+    inside = 1.0 - (lag / half) ** 2
+    # Beyond its ends by a row, the window goes on analytically: I0(i y) is J0(y).
+    window = np.where(
+        inside >= 0,
+        special.i0(beta * np.sqrt(np.maximum(inside, 0.0))),
+        special.j0(beta * np.sqrt(np.maximum(-inside, 0.0))),
+    )
+    kernels: FloatArray = window * np.sinc(band * lag)
+    kernels /= kernels.sum(axis=1, keepdims=True)
+    return kernels
+
+
+def _lagrange(x: FloatArray) -> FloatArray:
+    """Weights of the cubic through values at -1, 0, 1 and 2, at `x` between 0 and 1."""
+    return np.stack(
+        [
+            -x * (x - 1) * (x - 2) / 6,
+            (x + 1) * (x - 1) * (x - 2) / 2,
+            -(x + 1) * x * (x - 2) / 2,
+            (x + 1) * x * (x - 1) / 6,
+        ]
+    )

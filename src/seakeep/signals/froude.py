@@ -114,4 +114,5 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
 
 
 _ATTRIBUTES = {"dt": "s", "start": "s", "encounter_period": "s", "train_span": "s",
-               "test_span": "s", "water_depth": "m"}  # fmt: skip
+               "test_span": "s", "probe_offset_span": "s", "water_depth": "m",
+               "probe_offset": "m", "probe_offset_spread": "m"}  # fmt: skip

@@ -22,6 +22,7 @@ __all__ = [
     "wave_heights",
     "wave_spectrum",
     "wave_statistics",
+    "waves_part",
     "welch_segments",
     "zero_up_crossings",
 ]
@@ -51,7 +52,70 @@ class WaveStatistics:
     moment_period: float
 
 
-def zero_up_crossings(series: npt.ArrayLike, dt: float) -> FloatArray:
+STILL = 0.2
+"""Running standard deviation, as a part of the waves', below which water counts as still."""
+
+
+def waves_part(series: npt.ArrayLike, dt: float, still: float = STILL) -> slice:
+    """Part of a record in which there are waves: still water before and after them is left out.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Wave elevation, uniformly sampled, without gaps.
+    dt : float
+        Time step, s.
+    still : float, optional
+        Water is still where the standard deviation over two dominant periods is below this part
+        of the waves' own; 0 keeps the whole record.
+
+    Returns
+    -------
+    slice
+        Samples. All of them unless the water is still for five dominant periods or more, which
+        is longer than the lulls between groups of a sea.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(0, 100, 0.1)
+    >>> part = waves_part(np.where(t < 40, 0.0, np.sin(2 * np.pi * t / 2)), 0.1)
+    >>> 40 <= part.start * 0.1 <= 41, part.stop
+    (True, 1000)
+    """
+    x = as_series(series)
+    length = round(2.0 * _dominant_period(x) + 0.5)
+    begin, end = 0, x.size
+    if still <= 0 or x.size < 4 * length:
+        return slice(begin, end)
+    x = x - x.mean()
+    sums = [np.concatenate([[0.0], np.cumsum(x**power)]) for power in (1, 2)]
+    mean, square = ((each[length:] - each[:-length]) / length for each in sums)
+    spread = np.sqrt(np.maximum(square - mean**2, 0.0))
+    for _ in range(20):
+        moving = np.flatnonzero(spread > still * x[begin:end].std())
+        if not moving.size:
+            break
+        # The first window that moves holds the waves at its end, the last one at its begin.
+        first, last = int(moving[0]) + length - 1, int(moving[-1]) + 1
+        before = first if first >= 2.5 * length else 0
+        after = last if x.size - last >= 2.5 * length else x.size
+        if (before, after) == (begin, end) or after - before < length:
+            break
+        begin, end = before, after
+    return slice(begin, end)
+
+
+def _dominant_period(x: FloatArray) -> float:
+    """Period at the highest line of the spectrum, in samples; half the record at most."""
+    power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size))) ** 2
+    power[:2] = 0.0
+    return float(x.size / max(int(np.argmax(power)), 2))
+
+
+def zero_up_crossings(
+    series: npt.ArrayLike, dt: float, hysteresis: float = 0.0, still: float = STILL
+) -> FloatArray:
     """Instants at which a series, less its mean, crosses zero upwards.
 
     Parameters
@@ -60,11 +124,23 @@ def zero_up_crossings(series: npt.ArrayLike, dt: float) -> FloatArray:
         Uniformly sampled series without gaps.
     dt : float
         Time step, s.
+    hysteresis : float, optional
+        A crossing counts if the series was below its mean by this part of its standard deviation
+        since the crossing before, and is as much above it before the next one, so that noise on a
+        slow wave is not counted. 0 counts every change of sign, as the paper does.
+    still : float, optional
+        Still water before and after the waves is left out (:func:`waves_part`); 0 counts in the
+        whole record. A record without a still begin or end gives the same either way.
 
     Returns
     -------
     ndarray
         Instants after the first sample, s, by linear interpolation.
+
+    Raises
+    ------
+    RequestError
+        If `hysteresis` or `still` is not in 0 to 1.
 
     Examples
     --------
@@ -73,16 +149,36 @@ def zero_up_crossings(series: npt.ArrayLike, dt: float) -> FloatArray:
     >>> [round(float(c), 2) for c in zero_up_crossings(-np.cos(2 * np.pi * t / 4), 0.01)]
     [1.0, 5.0, 9.0]
     """
-    x = as_series(series)
+    for name, value in (("hysteresis", hysteresis), ("still", still)):
+        if not 0 <= value < 1:
+            raise RequestError(
+                f"{name} is a part of a standard deviation, 0 or more and less than 1; received "
+                f"{value!r}."
+            )
+    part = waves_part(series, dt, still)
+    x = as_series(series)[part]
     x = x - x.mean()
     before = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
-    crossings: FloatArray = (before - x[before] / (x[before + 1] - x[before])) * positive(
-        "the time step", dt, "s"
-    )
+    if hysteresis > 0:
+        before = _clear(x, before, hysteresis * float(x.std()))
+    first = before - x[before] / (x[before + 1] - x[before])
+    crossings: FloatArray = (part.start + first) * positive("the time step", dt, "s")
     return crossings
 
 
-def encounter_period(series: npt.ArrayLike, dt: float) -> float:
+def _clear(x: FloatArray, before: npt.NDArray[np.intp], limit: float) -> npt.NDArray[np.intp]:
+    """Of the crossings between a clear trough and the next clear crest, the middle one."""
+    beyond = np.flatnonzero(np.abs(x) > limit)
+    rising = np.flatnonzero((x[beyond[:-1]] < 0) & (x[beyond[1:]] > 0))
+    lowest = np.searchsorted(before, beyond[rising])
+    highest = np.searchsorted(before, beyond[rising + 1]) - 1
+    middle: npt.NDArray[np.intp] = before[(lowest + highest) // 2]
+    return middle
+
+
+def encounter_period(
+    series: npt.ArrayLike, dt: float, hysteresis: float = 0.0, still: float = STILL
+) -> float:
     r"""Mean zero-up-crossing period of a wave record.
 
     Parameters
@@ -91,6 +187,9 @@ def encounter_period(series: npt.ArrayLike, dt: float) -> float:
         Wave elevation, uniformly sampled, without gaps.
     dt : float
         Time step, s.
+    hysteresis, still : float, optional
+        As in :func:`zero_up_crossings`: what noise must not pass to be counted, and when water
+        counts as still.
 
     Returns
     -------
@@ -101,6 +200,8 @@ def encounter_period(series: npt.ArrayLike, dt: float) -> float:
     ------
     DataError
         If the record crosses zero upwards fewer than twice.
+    RequestError
+        If `hysteresis` or `still` is not in 0 to 1.
 
     Notes
     -----
@@ -115,7 +216,7 @@ def encounter_period(series: npt.ArrayLike, dt: float) -> float:
     >>> round(encounter_period(np.sin(2 * np.pi * t / 1.64), 0.02), 3)
     1.64
     """
-    crossings = zero_up_crossings(series, dt)
+    crossings = zero_up_crossings(series, dt, hysteresis, still)
     if crossings.size < 2:
         raise DataError(
             f"the record of {np.size(series) * dt:g} s crosses its mean upwards {crossings.size} "

@@ -10,6 +10,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.core import metrics
+from seakeep.core.bands import band_error_over_time
 from seakeep.errors import DataError, SeakeepError
 from seakeep.models.fitted_ensemble import HankelEnsemble
 from seakeep.study.cells import (
@@ -26,10 +27,13 @@ from seakeep.study.plan import Plan
 from seakeep.study.settings import Study
 from seakeep.study.store import CellFolder
 
-__all__ = ["merge_cells"]
+__all__ = ["BAND_ERRORS", "merge_cells"]
 
 Runs = Mapping[str, xr.Dataset]
 FloatArray = npt.NDArray[np.float64]
+
+BAND_ERRORS = {"all": "error_over_time", "low": "error_low", "wave": "error_wave"}
+"""Names of ε(t), as a whole and in its two bands."""
 
 CELL_DIMS = {
     "mean": ("time", "channel"),
@@ -122,8 +126,9 @@ def _merge_test(study: Study, plan: Plan, runs: Runs, cells: CellFolder, test: s
             "channel": list(plan.states),
         },
     )
+    frequency = 1.0 / (study.settings.statistics.split_period * plan.encounter_period)
     for model in plan.specs:
-        _add_errors(out, model)
+        _add_errors(out, model, plan.dt, frequency)
     return out
 
 
@@ -156,15 +161,15 @@ def _merge_model(
     return out
 
 
-def _add_errors(out: xr.Dataset, model: str) -> None:
-    """Error measures of a model's (mean) forecast in every cell."""
+def _add_errors(out: xr.Dataset, model: str, dt: float, frequency: float) -> None:
+    """Error measures of a model's (mean) forecast in every cell; bands meet at `frequency`, Hz."""
     predicted = out[f"{model}_mean"].values
     measured = np.broadcast_to(out["measured"].values, predicted.shape)
     shape = predicted.shape
     results = {
         "nrmse": np.full((*shape[:2], shape[3]), np.nan),
         "nammae": np.full((*shape[:2], shape[3]), np.nan),
-        "error_over_time": np.full(shape[:3], np.nan),
+        **{BAND_ERRORS[band]: np.full(shape[:3], np.nan) for band in BAND_ERRORS},
     }
     for training in range(shape[0]):
         pair = {
@@ -175,10 +180,13 @@ def _add_errors(out: xr.Dataset, model: str) -> None:
         results["nrmse"][training] = metrics.nrmse(**pair)
         results["nammae"][training] = metrics.normalised_extremes_error(**pair)
         results["error_over_time"][training] = metrics.error_over_time(**pair)
+        bands = band_error_over_time(**pair, dt=dt, frequency=frequency)
+        results["error_low"][training], results["error_wave"][training] = bands
     dims = ("training", "window")
     out[f"{model}_nrmse"] = ((*dims, "channel"), results["nrmse"])
     out[f"{model}_nammae"] = ((*dims, "channel"), results["nammae"])
-    out[f"{model}_error_over_time"] = ((*dims, "time"), results["error_over_time"])
+    for key in BAND_ERRORS.values():
+        out[f"{model}_{key}"] = ((*dims, "time"), results[key])
 
 
 def true_channels(study: Study, plan: Plan, runs: Runs, test: str) -> FloatArray | None:

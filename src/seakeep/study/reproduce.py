@@ -13,6 +13,7 @@ import xarray as xr
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.files import replacing
+from seakeep.models.workers import Crew, check_crew
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
 from seakeep.study.store import StudyResult, storing, versions
@@ -58,6 +59,7 @@ def reproduce(
     size: Size | None = None,
     seed: int = 0,
     workers: int = 1,
+    scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> StudyResult:
     """Play the virtual campaign and run the paper's study on it.
@@ -73,8 +75,8 @@ def reproduce(
         Counts; the default is the paper's.
     seed : int, optional
         Of the waves, the noise, the windows and the draws.
-    workers : int, optional
-        Processes side by side.
+    workers, scheduler
+        As in :func:`seakeep.study.run_study`.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
 
@@ -86,10 +88,12 @@ def reproduce(
     Raises
     ------
     RequestError
-        If the tank's libraries are not installed, or the folder holds another study.
+        If the tank's libraries are not installed, the folder holds another study, or the cluster
+        cannot be used.
     StorageError
         If the disk is full.
     """
+    check_crew(Crew(workers, scheduler=scheduler))
     out, counts = Path(out), size or Size()
     with storing(out):
         out.mkdir(parents=True, exist_ok=True)
@@ -100,6 +104,7 @@ def reproduce(
         read_study(out / "study.toml"),
         out,
         workers=workers,
+        scheduler=scheduler,
         progress=progress,
         extra={"nominal": nominal},
         notes={"preparation_note": NOTE},

@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
-import os
-import signal
-import threading
-from collections.abc import Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import fields
-from multiprocessing.connection import wait as wait_for
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
 from seakeep.campaign.prepare import Progress
-from seakeep.errors import RequestError, SeakeepError
+from seakeep.core.scratch import Scratch
+from seakeep.models.workers import Crew, WorkerLostError, as_finished, check_crew
 from seakeep.study.cells import Unit, cells_of, compute, units_of
 from seakeep.study.description import describe_study
 from seakeep.study.merge import merge_cells
@@ -36,6 +30,7 @@ def run_study(
     out: Path | str,
     *,
     workers: int = 1,
+    scheduler: str | None = None,
     progress: Progress | None = None,
     extra: Mapping[str, xr.Dataset] | None = None,
     notes: Mapping[str, str] | None = None,
@@ -51,6 +46,10 @@ def run_study(
         the study is run again; at the end all is in ``study.nc``.
     workers : int, optional
         Processes side by side, each on one BLAS thread. The arrays do not depend on it.
+    scheduler : str, optional
+        Address of the scheduler of a running Dask cluster, ``tcp://host:8786``, whose workers
+        compute the cells instead (extra ``cluster``). They need no disk in common: cells come back
+        and are written here.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
     extra : mapping of str to Dataset, optional
@@ -66,15 +65,16 @@ def run_study(
     Raises
     ------
     RequestError
-        If settings leave no feasible window, a channel is missing, or the folder holds another
-        study.
+        If settings leave no feasible window, a channel is missing, the folder holds another
+        study, or the cluster cannot be used.
     DataError
         If a run cannot be read or used.
     StorageError
         If the disk is full; finished cells are kept.
+    WorkerLostError
+        If a worker process was stopped from outside; finished cells are kept.
     """
-    if workers < 1:
-        raise RequestError(f"workers must be 1 or more; received {workers}.")
+    crew = Crew(workers, scheduler=scheduler)
     out = Path(out)
     tell = progress or (lambda done, total, what: None)
     cells = CellFolder(out, study.digest)
@@ -84,10 +84,11 @@ def run_study(
         if found.attrs.get("digest") == study.digest:
             tell(1, 1, "finished before")
             return found
+    check_crew(crew)
     plan, runs = make_plan(study, lambda done, total, name: tell(0, 1, f"preparing {name}"))
     units = units_of(plan, study.settings.output.eigenvalues)
     left = [unit for unit in units if not all(cells.has(name) for name in cells_of(plan, unit))]
-    _compute_all(plan, runs, cells, units, left, workers, tell)
+    _compute_all(plan, runs, cells, units, left, crew, tell)
     tell(len(units), len(units), "statistics and densities")
     groups = {**describe_study(study, plan, runs), **merge_cells(study, plan, runs, cells)}
     groups.update(judge(groups, study.settings, list(plan.states)))
@@ -138,38 +139,24 @@ def _compute_all(
     cells: CellFolder,
     units: list[Unit],
     left: list[Unit],
-    workers: int,
+    crew: Crew,
     tell: Progress,
 ) -> None:
     done, total = len(units) - len(left), len(units)
     tell(done, total, "fitting and forecasting")
     if not left:
         return
-    with _pool(min(workers, len(left)), plan, runs, cells) as pool:
-        pending: dict[Future[None], Unit] = {}
-        waiting = iter(left)
-        try:
-            for unit in _first(waiting, 2 * workers):
-                pending[pool.submit(_work, unit)] = unit
-            while pending:
-                finished, _ = wait(pending, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    unit = pending.pop(future)
-                    future.result()
-                    done += 1
-                    tell(done, total, _words(plan, unit))
-                    for following in _first(waiting, 1):
-                        pending[pool.submit(_work, following)] = following
-        except BrokenProcessPool:
-            raise SeakeepError(
-                "a worker process was stopped from outside (was there not enough memory?). All "
-                "cells that were finished are kept: run the same command again, with fewer "
-                "--workers if memory is short."
-            ) from None
-
-
-def _first(units: Iterator[Unit], count: int) -> list[Unit]:
-    return [unit for _, unit in zip(range(count), units, strict=False)]
+    try:
+        for number, found in as_finished(_work, (plan, dict(runs)), left, crew):
+            for name, arrays in found:
+                cells.write(name, arrays)
+            done += 1
+            tell(done, total, _words(plan, left[number]))
+    except WorkerLostError as error:
+        raise WorkerLostError(
+            f"{error} All cells that were finished are kept: the same command goes on where it "
+            "stopped."
+        ) from None
 
 
 def _words(plan: Plan, unit: Unit) -> str:
@@ -178,51 +165,11 @@ def _words(plan: Plan, unit: Unit) -> str:
     return f"{unit.model}, training set {plan.training[unit.training].name}"
 
 
-@contextmanager
-def _pool(
-    workers: int, plan: Plan, runs: Mapping[str, xr.Dataset], cells: CellFolder
-) -> Iterator[ProcessPoolExecutor]:
-    """Processes that hold the runs; on any error none is left behind."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))  # read by the children when they start
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(
-        workers, context, initializer=_receive, initargs=(plan, dict(runs), cells)
-    )
-    try:
-        yield pool
-    except BaseException:
-        children = list((pool._processes or {}).values())
-        pool.shutdown(wait=False, cancel_futures=True)
-        for child in children:
-            child.terminate()
-        raise
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
-class _Received:
-    """What a worker process was sent when it started."""
-
-    data: tuple[Plan, Mapping[str, xr.Dataset], CellFolder] | None = None
-
-
-def _receive(plan: Plan, runs: dict[str, xr.Dataset], cells: CellFolder) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
-    parent = multiprocessing.parent_process()
-    if parent is not None:  # a parent that was killed leaves no worker behind
-        sentinel = parent.sentinel
-        threading.Thread(target=lambda: (wait_for([sentinel]), os._exit(1)), daemon=True).start()
-    _Received.data = (plan, runs, cells)
-
-
-def _work(unit: Unit) -> None:
-    assert _Received.data is not None
-    plan, runs, cells = _Received.data
-    compute(plan, runs, unit, cells.write)
+def _work(
+    data: tuple[Plan, dict[str, xr.Dataset]], unit: Unit, scratch: Scratch
+) -> list[tuple[str, dict[str, Any]]]:
+    """Cells of a unit; whoever asked for them writes them, for a worker may have another disk."""
+    plan, runs = data
+    found: list[tuple[str, dict[str, Any]]] = []
+    compute(plan, runs, unit, lambda name, arrays: found.append((name, arrays)))
+    return found

@@ -31,7 +31,7 @@ __all__ = [
     "read_study",
 ]
 
-FORMAT = 1
+FORMAT = 2
 """Goes into the digest: raise it when the same settings begin to give other arrays."""
 
 Preset = Literal["paper", "recommended"]
@@ -131,6 +131,11 @@ class StatisticsSettings(Table):
     )
     level: Annotated[float, Field(gt=0, lt=1)] = Field(
         default=0.95, description="probability of the band, such as 0.95"
+    )
+    split_period: Positive = Field(
+        default=3.0,
+        description="period that parts the low-frequency from the wave-frequency band of ε(t), in "
+        "encounter periods",
     )
     densities_of: str | None = Field(
         default=None, description="the test set whose densities are compared; left out, the first"

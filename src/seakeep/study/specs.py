@@ -6,10 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 from seakeep.campaign import ModelSettings, PriorSettings
+from seakeep.campaign.periods import Periods, counted
 from seakeep.errors import RequestError
 from seakeep.models import HankelDMDc
 from seakeep.models.ensemble import BayesianHankelDMDc
 from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform
+from seakeep.models.settings import periods_to_samples
 from seakeep.study.settings import Study, StudyModelSettings
 
 __all__ = ["Spec", "build_spec", "counts_in_periods", "model_settings"]
@@ -54,8 +56,8 @@ def _missing(stated: ModelSettings | StudyModelSettings) -> list[str]:
 
 
 def counts_in_periods(settings: ModelSettings) -> bool:
-    """Whether a model is stated in encounter periods: by a preset, or as an ensemble."""
-    return settings.preset is not None or settings.kind == ENSEMBLE
+    """Whether a model is stated in encounter periods: by a preset, a key, or as an ensemble."""
+    return settings.preset is not None or settings.kind == ENSEMBLE or any(counted(settings))
 
 
 def build_spec(settings: ModelSettings, encounter_period: float | None, dt: float) -> Spec:
@@ -88,12 +90,17 @@ def build_spec(settings: ModelSettings, encounter_period: float | None, dt: floa
         stated |= {key: _prior(stated[key]) for key in PRIORS if key in stated}
     if encounter_period is None:
         if counts_in_periods(settings):
-            what = "an ensemble" if settings.preset is None else f"preset = '{settings.preset}'"
+            what = "an ensemble" if ensemble else "the model"
+            what = what if settings.preset is None else f"preset = '{settings.preset}'"
             raise RequestError(
                 f"{what} counts in encounter periods, and the campaign has none. State "
                 "encounter_period (s) in [campaign]."
             )
-    elif settings.preset is not None:
+    else:
+        for key, value in stated.items():
+            if isinstance(value, Periods):
+                stated[key] = periods_to_samples(value.count, encounter_period, dt)
+    if settings.preset is not None and encounter_period is not None:
         kind: type[Spec] = BayesianHankelDMDc if ensemble else HankelDMDc
         preset = kind.paper if settings.preset == "paper" else kind.recommended
         return replace(preset(encounter_period, dt), **stated)

@@ -18,6 +18,7 @@ import xarray as xr
 
 from seakeep import statistics
 from seakeep.errors import DataError, SeakeepWarning
+from seakeep.study.merge import BAND_ERRORS
 from seakeep.study.settings import StudySettings
 from seakeep.study.windows import random_stream
 
@@ -50,7 +51,7 @@ def judge(
     -------
     dict of str to Dataset
         ``statistics/boxes/TEST`` over (model, measure, channel), ``statistics/coverage/TEST``
-        over (model, against, channel), ``statistics/trend/TEST`` over model,
+        over (model, against, channel), ``statistics/trend/TEST`` over (band, model),
         ``statistics/divergence`` over (model, variant, channel) and ``statistics/densities`` over
         (model, channel, grid).
     """
@@ -194,35 +195,36 @@ def trend_table(test: xr.Dataset, models: Sequence[str], rng: np.random.Generato
     Returns
     -------
     Dataset
-        Over model: ``slope`` (1/s) with ``lower`` and ``upper``, ``change`` over the window,
-        ``kendall_tau``, ``p_value``; over (model, time): ``mean``, ``lower_quartile`` and
-        ``upper_quartile`` of ε over the cells.
+        Over (band, model): ``slope`` (1/s) with ``lower`` and ``upper``, ``change`` over the
+        window, ``kendall_tau``, ``p_value``; over (band, model, time): ``error_mean``,
+        ``lower_quartile`` and ``upper_quartile`` of ε over the cells. Bands are ``all``, ``low``
+        and ``wave``.
     """
     numbers = ("slope", "lower", "upper", "change", "kendall_tau", "p_value", "block_length")
-    found = np.full((len(numbers), len(models)), np.nan)
+    names = ("error_mean", "lower_quartile", "upper_quartile")
+    found = np.full((len(numbers), len(BAND_ERRORS), len(models)), np.nan)
     time = test["time"].values
-    series = np.full((3, len(models), time.size), np.nan)
+    series = np.full((len(names), len(BAND_ERRORS), len(models), time.size), np.nan)
     judged = test["judged"].values
-    for m, model in enumerate(models):
-        cells = test[f"{model}_error_over_time"].values[judged]
-        cells = cells[np.isfinite(cells).all(axis=1)]
-        if not len(cells):
-            continue
-        series[:, m] = cells.mean(axis=0), *np.quantile(cells, [0.25, 0.75], axis=0)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SeakeepWarning)  # the block length is in the table
-            trend = statistics.trend_test(series[0, m], rng=rng, time=time, n_series=TREND_SERIES)
-        found[:, m] = [getattr(trend, number) for number in numbers]
-    names = ("mean", "lower_quartile", "upper_quartile")
+    for b, key in enumerate(BAND_ERRORS.values()):
+        for m, model in enumerate(models):
+            cells = test[f"{model}_{key}"].values[judged]
+            cells = cells[np.isfinite(cells).all(axis=1)]
+            if not len(cells):
+                continue
+            series[:, b, m] = cells.mean(axis=0), *np.quantile(cells, [0.25, 0.75], axis=0)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", SeakeepWarning)  # the block length is in the table
+                trend = statistics.trend_test(
+                    series[0, b, m], rng=rng, time=time, n_series=TREND_SERIES
+                )
+            found[:, b, m] = [getattr(trend, number) for number in numbers]
     return xr.Dataset(
         {
-            **{n: ("model", found[i]) for i, n in enumerate(numbers)},
-            **{
-                f"error_{n}" if n == "mean" else n: (("model", "time"), series[i])
-                for i, n in enumerate(names)
-            },
+            **{n: (("band", "model"), found[i]) for i, n in enumerate(numbers)},
+            **{n: (("band", "model", "time"), series[i]) for i, n in enumerate(names)},
         },
-        coords={"model": list(models), "time": time},
+        coords={"band": list(BAND_ERRORS), "model": list(models), "time": time},
     )
 
 

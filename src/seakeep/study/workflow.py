@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import xarray as xr
 
 from seakeep.campaign import Campaign, load_prepared
+from seakeep.campaign.periods import Periods
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.models import HankelDMDc, HankelDMDcModel, HankelEnsemble
@@ -104,7 +105,10 @@ def fit_campaign(
     period = campaign.encounter_period() if counts_in_periods(settings) else None
     spec = build_spec(settings, period, dt)
     runs = training_runs(prepared, _longest_window(spec, dt))
-    identified = spec.fit(runs, list(settings.states), list(settings.inputs), stop=settings.stop)
+    stop = settings.stop
+    if isinstance(stop, Periods) and period is not None:
+        stop = stop.at(period)
+    identified = spec.fit(runs, list(settings.states), list(settings.inputs), stop=stop)
     both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
     warn_of_repeats(identified, campaign, both)
     return identified

@@ -118,12 +118,14 @@ def _histories(result: StudyResult) -> list[ReportFigure]:
 
 def _judgements(result: StudyResult) -> list[ReportFigure]:
     ensembles = [model for model in result.models if result.is_ensemble(model)]
+    split = float(result.settings["statistics"]["split_period"])
     figures = [
         ReportFigure(
             "error_over_time",
             "time",
             "ε(t): mean over all cells (lines) and quartiles (shaded), with the p-value of its "
-            "trend test.",
+            f"trend test; the error as a whole, and parted at a period of {split:g} T̂ into slow "
+            "drift and waves.",
             partial(error_over_time_figure, result),
         )
     ]

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import spearmanr
 
-from seakeep.report.figures.common import grid_of_axes, line_of, model_colour, model_words
+from seakeep.report.figures.common import line_of, model_colour, model_words
 from seakeep.report.style import figure_style, new_figure
 from seakeep.study import StudyResult
 from seakeep.study.statistics import average_of
@@ -17,9 +17,12 @@ from seakeep.study.statistics import average_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["error_over_time_figure", "hyperparameter_figure", "member_errors"]
+__all__ = ["BAND_WORDS", "error_over_time_figure", "hyperparameter_figure", "member_errors"]
 
 FloatArray = npt.NDArray[np.float64]
+
+BAND_WORDS = {"all": "all frequencies", "low": "low frequencies", "wave": "wave frequencies"}
+"""Bands of ε(t)."""
 
 HYPERPARAMETERS = {
     "train_length": "training length [periods]",
@@ -30,7 +33,7 @@ HYPERPARAMETERS = {
 
 
 def error_over_time_figure(result: StudyResult) -> Figure:
-    """ε(t) of each test set: mean over all cells with its quartiles.
+    """ε(t) of each test set, whole and in bands: mean over all cells with its quartiles.
 
     Parameters
     ----------
@@ -40,34 +43,46 @@ def error_over_time_figure(result: StudyResult) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
+        A row a test set; all frequencies, low frequencies, wave frequencies.
     """
+    from matplotlib.lines import Line2D
+
     with figure_style():
         tests = list(result.tests)
-        columns = min(2, len(tests))
-        figure = new_figure(4.2 * columns, 0.4 + 2.5 * -(-len(tests) // columns))
-        axes = grid_of_axes(figure, len(tests), columns)
-        for each, test in zip(axes, tests, strict=True):
+        figure = new_figure(8.5, 0.7 + 2.1 * len(tests))
+        grid = figure.subplots(len(tests), len(BAND_WORDS), squeeze=False, sharey="row")
+        for row, test in zip(grid, tests, strict=True):
             trend = result.groups[f"statistics/trend/{test}"]
-            time = trend["time"].values / float(result.attrs["encounter_period"])
             tallest = 0.0
-            for model in result.models:
-                at = trend.sel(model=model)
-                style = line_of(result, model)
-                upper = at["upper_quartile"].values
-                each.fill_between(
-                    time, at["lower_quartile"].values, upper, color=style["color"], alpha=0.15, lw=0
-                )
-                p = float(at["p_value"])
-                shown = "p < 0.01" if p < 0.01 else f"p = {p:.2f}"
-                words = f"{model_words(model)} (trend {shown})"
-                each.plot(time, at["error_mean"].values, label=words, **style)
-                tallest = max(tallest, float(np.nanmax(at["error_mean"].values, initial=0.0)))
-            each.set_title(result.label_of(test), loc="left")
-            each.set_ylim(0, 1.6 * tallest if tallest else None)
+            for each, (band, words) in zip(row, BAND_WORDS.items(), strict=True):
+                tallest = max(tallest, _draw_band(each, result, trend.sel(band=band)))
+                each.set_title(words, loc="left", fontsize=8)
+                each.legend(fontsize=6.5, loc="upper left")
+            row[0].set_ylim(0, 1.6 * tallest if tallest else None)
+            row[0].set_ylabel(f"{result.label_of(test)}\nε [measured SD]")
+        for each in grid[-1]:
             each.set_xlabel("time in encounter periods")
-            each.set_ylabel("ε [measured SD]")
-            each.legend(fontsize=7, loc="upper left")
+        handles = [
+            Line2D([], [], **line_of(result, m), label=model_words(m)) for m in result.models
+        ]
+        figure.legend(handles=handles, loc="outside upper right", ncols=len(handles))
         return figure
+
+
+def _draw_band(axes: Any, result: StudyResult, trend: Any) -> float:
+    """Draw ε(t) of a band for all models; return the largest mean."""
+    time = trend["time"].values / float(result.attrs["encounter_period"])
+    tallest = 0.0
+    for model in result.models:
+        at = trend.sel(model=model)
+        style = line_of(result, model)
+        lower, upper = at["lower_quartile"].values, at["upper_quartile"].values
+        axes.fill_between(time, lower, upper, color=style["color"], alpha=0.15, lw=0)
+        p = float(at["p_value"])
+        words = "trend p < 0.01" if p < 0.01 else f"trend p = {p:.2f}"
+        axes.plot(time, at["error_mean"].values, label=words, **style)
+        tallest = max(tallest, float(np.nanmax(at["error_mean"].values, initial=0.0)))
+    return tallest
 
 
 def member_errors(result: StudyResult, test: str, model: str) -> FloatArray:

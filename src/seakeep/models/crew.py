@@ -1,0 +1,165 @@
+"""Who works, where a worker sits, and how many threads BLAS has there."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Generic, Literal, TypeVar
+
+import threadpoolctl
+
+from seakeep.core.scratch import Scratch
+from seakeep.errors import RequestError, SeakeepError
+
+__all__ = [
+    "Backend",
+    "Crew",
+    "Desk",
+    "Function",
+    "Team",
+    "WorkerLostError",
+    "do_all",
+    "one_blas_thread",
+]
+
+Backend = Literal["processes", "threads"]
+Data = TypeVar("Data")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+Function = Callable[[Data, Item, Scratch], Result]
+
+
+class WorkerLostError(SeakeepError):
+    """A worker was stopped from outside, and its work with it."""
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Who does the work.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Workers on this machine; 1 works in the caller's thread.
+    backend : {"processes", "threads"}, optional
+        Their kind.
+    scheduler : str, optional
+        Address of the scheduler of a running Dask cluster, such as ``tcp://host:8786``, whose
+        workers do it instead.
+
+    Raises
+    ------
+    RequestError
+        If a value does not exist, or local workers are asked for beside a cluster.
+    """
+
+    workers: int = 1
+    backend: Backend = "processes"
+    scheduler: str | None = None
+
+    def __post_init__(self) -> None:
+        workers: object = self.workers
+        if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+            raise RequestError(f"workers must be a positive integer; received {workers!r}.")
+        if self.backend not in ("processes", "threads"):
+            raise RequestError(
+                f"backend must be 'processes' or 'threads'; received {self.backend!r}."
+            )
+        if self.scheduler is not None and workers != 1:
+            raise RequestError(
+                f"workers = {workers} counts workers on this machine, and scheduler = "
+                f"{self.scheduler!r} hands all work to a cluster. Give one of the two."
+            )
+
+
+class Desk(Generic[Data]):
+    """What all items need, and memory for each that is at work.
+
+    Parameters
+    ----------
+    data : object
+        What all items need.
+    """
+
+    def __init__(self, data: Data) -> None:
+        self._data = data
+        self._idle: list[Scratch] = []
+
+    def do(self, function: Function[Data, Item, Result], item: Item) -> Result:
+        """Call ``function(data, item, scratch)``; several threads may do so at a time."""
+        try:
+            scratch = self._idle.pop()
+        except IndexError:
+            scratch = Scratch()
+        try:
+            return function(self._data, item, scratch)
+        finally:
+            self._idle.append(scratch)
+
+
+@dataclass(frozen=True)
+class Team(Generic[Item, Result]):
+    """Workers that wait for items.
+
+    Parameters
+    ----------
+    submit : callable
+        Takes an item and gives the future of its result.
+    ahead : int
+        Items handed out at a time: enough that no worker waits, few enough that results that are
+        not yet read stay few.
+    batch : int
+        Items handed out together, where handing out one costs as much as a small one's work.
+    """
+
+    submit: Callable[[Sequence[Item]], Future[list[Result]]]
+    ahead: int
+    batch: int = 1
+
+
+def do_all(
+    desk: Desk[Any], function: Function[Any, Item, Result], items: Sequence[Item]
+) -> list[Result]:
+    """Results of some items at a desk."""
+    return [desk.do(function, item) for item in items]
+
+
+class _OneBlasThread:
+    """One limit for all that work in this process; the last to leave lifts it."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._inside = 0
+        self._limits: Any = None
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._inside == 0:
+                self._limits = threadpoolctl.threadpool_limits(1, user_api="blas")
+            self._inside += 1
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                self._limits.restore_original_limits()
+
+
+_ONE_BLAS_THREAD = _OneBlasThread()
+
+
+def one_blas_thread() -> AbstractContextManager[object]:
+    """Limit BLAS to one thread: small products side by side beat products spread over cores.
+
+    Several threads may be inside at a time.
+    """
+    return _ONE_BLAS_THREAD

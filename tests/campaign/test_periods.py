@@ -1,0 +1,216 @@
+"""Lengths and frequencies in encounter periods, through a whole campaign file."""
+
+import pickle
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
+from small_tank import CAMPAIGN, tank_columns, write_csv
+
+from seakeep.campaign import read_campaign
+from seakeep.campaign.periods import Periods, parse_periods
+from seakeep.errors import RequestError
+from seakeep.models.settings import periods_to_samples
+from seakeep.study import fit_campaign
+
+PERIOD = 1.6
+STATED = ("scale_factor = 30.0", f"encounter_period = {PERIOD}")
+
+
+@pytest.mark.parametrize(
+    ("text", "count", "power"),
+    [("1 T", 1, 1), ("1.5T", 1.5, 1), (" 2e1 T ", 20, 1), ("inf T", np.inf, 1), ("-.5 T", -0.5, 1),
+     ("4 /T", 4, -1), ("4/T", 4, -1), ("4 / T", 4, -1), ("1 T\u0302", 1, 1)],
+)  # fmt: skip
+def test_what_is_written_in_periods(text, count, power):
+    assert parse_periods(text) == Periods(count, power)
+
+
+@pytest.mark.parametrize("text", ["T", "1", "1 s", "1 t", "1 T/2", "one T", "", "1,5 T", "1 T T"])
+def test_what_is_not(text):
+    with pytest.raises(RequestError, match=r"counts in encounter periods, such as '1\.5 T' or '4"):
+        parse_periods(text)
+
+
+@given(st.floats(1e-6, 1e6), st.sampled_from([1, -1]), st.floats(0.1, 20))
+def test_written_and_read_again(count, power, period):
+    stated = Periods(count, power)
+    again = parse_periods(str(stated))
+    assert again.power == power
+    assert again.at(period) == pytest.approx(count * period**power, rel=1e-14)  # 15 digits
+    assert np.isnan(float(stated))  # nobody takes it for seconds
+    assert pickle.loads(pickle.dumps(stated)) == stated
+    assert len({stated, Periods(count, power)}) == 1
+    assert stated != count
+
+
+def in_periods(text, *pairs):
+    for seconds, periods in pairs:
+        assert seconds in text
+        text = text.replace(seconds, periods)
+    return text
+
+
+def test_all_lengths_of_a_campaign(tank):
+    """The same campaign in seconds and in periods gives the same runs."""
+    for seed, name in enumerate(("first", "second")):
+        columns = tank_columns(seed)
+        columns["Heave [mm]"][300:304] = np.nan
+        write_csv(tank / f"{name}.csv", columns)
+    text = CAMPAIGN.replace(*STATED).replace(
+        "[preparation]",
+        "[redundant.motion]\nchannels = ['heave', 'eta_fwd']\nwindow = 4.8\n"
+        "[derived.speed]\nfrom = 'acc'\nstep = 'integrate'\nband = [0.25, 5.0]\n"
+        "[derived.smooth]\nfrom = 'heave'\nstep = 'low_pass'\npassband = 2.5\nstopband = 5.0\n"
+        "[derived.rate]\nfrom = 'acc'\nstep = 'blend'\nposition = 'smooth'\ncrossover = 0.2\n"
+        "[preparation]\ngaps = 'bridge'\nlongest_gap = 0.08\nlow_pass = [10.0, 12.5]\n",
+    )
+    text = text.replace("span = [2, 18]", "span = [3.2, 16]\nprobe_offset_span = [4.8, 8]\n"
+                        "record = [1.6, 19.2]")  # fmt: skip
+    path = tank / "campaign.toml"
+    path.write_text(text)
+    seconds = read_campaign(path)
+    path.write_text(
+        in_periods(
+            text,
+            ("train = [0, 10]", "train = ['0 T', '6.25 T']"),
+            ("test = [10, inf]", "test = ['6.25 T', inf]"),
+            ("span = [3.2, 16]", "span = ['2 T', 16]"),
+            ("[4.8, 8]", "['3 T', '5 T']"),
+            ("record = [1.6, 19.2]", "record = ['1 T', '12 T']"),
+            ("window = 4.8", "window = '3 T'"),
+            ("band = [0.25, 5.0]", "band = ['0.4 /T', '8 /T']"),
+            ("passband = 2.5\nstopband = 5.0", "passband = '4 /T'\nstopband = '8 /T'"),
+            ("crossover = 0.2", "crossover = '0.32 /T'"),
+            ("longest_gap = 0.08", "longest_gap = '0.05 T'"),
+            ("low_pass = [10.0, 12.5]", "low_pass = ['16 /T', '20 /T']"),
+        )
+    )
+    periods = read_campaign(path)
+    assert periods.digest != seconds.digest
+    expected, found = seconds.prepare(), periods.prepare()
+    assert list(found) == list(expected)
+    for name, run in found.items():
+        # 16 / 1.6 and the like differ from what is stated by a rounding, and so may the arrays.
+        xr.testing.assert_allclose(run, expected[name], rtol=1e-10, atol=1e-13)
+        told = {k: v for k, v in run.attrs.items() if k not in ("campaign_digest", "quality")}
+        for key, value in told.items():
+            stated = expected[name].attrs[key]
+            assert value == (stated if isinstance(stated, str) else pytest.approx(stated)), key
+        assert (run["heave_flags"] > 0).any()
+    xr.testing.assert_allclose(periods.read_run("first"), seconds.read_run("first"), atol=1e-13)
+    assert periods.seconds("2.5 T") == 4.0
+    assert periods.seconds(2.5) == 2.5
+
+
+def test_clocks_in_periods(tank):
+    """Windows and lags of a correlation."""
+    columns = tank_columns(0, seconds=60.0)
+    write_csv(tank / "one.csv", {k: columns[k] for k in ("Time [s]", "WP fwd [mm]", "acc [g]")})
+    late = {"Time [s]": columns["Time [s]"] + 0.3} | {
+        k: columns[k] for k in ("Heave [mm]", "Pitch (deg)", "WP fwd [mm]")
+    }
+    late["copy [mm]"] = late.pop("WP fwd [mm]")
+    write_csv(tank / "two.csv", late)
+    text = CAMPAIGN.replace(*STATED)
+    text = text[: text.index("[runs.first]")] + text[text.index("[preparation]") :]
+    clocks = []
+    for window, lag in (("16.0", "1.6"), ("'10 T'", "'1 T'")):
+        (tank / "campaign.toml").write_text(
+            text + f"[instruments.two]\nshared = ['copy', 'WP fwd']\nwindow = {window}\n"
+            f"largest_lag = {lag}\n[instruments.one]\n[instruments]\nreference = 'one'\n"
+            "[runs.r.files]\none = 'one.csv'\ntwo = 'two.csv'\n"
+        )
+        clocks.append(read_campaign(tank / "campaign.toml").clocks()["r"]["two"])
+    assert clocks[0] == clocks[1]
+    assert clocks[0].offset == pytest.approx(0.3, abs=1e-6)  # the same samples, noise-free
+
+
+def test_spans_of_regular_runs_count_in_the_period_that_irregular_ones_give(edited):
+    path = edited(
+        ("train = [0, 10]", 'waves = "irregular"\ntrain = [0, 10]'),
+        ("span = [2, 18]", 'waves = "regular"\nspan = ["1 T", "7.5 T"]'),
+    )
+    campaign = read_campaign(path)
+    period = campaign.encounter_period()
+    run = campaign.prepare(["second"])["second"]
+    # The first and the last instant of a grid of 0.1 s inside the span.
+    assert 0 <= float(run["time"][0]) - period < 0.1
+    assert 0 <= 7.5 * period - float(run["time"][-1]) < 0.1
+    assert run.attrs["encounter_period"] == period
+
+
+@pytest.mark.parametrize(
+    ("pairs", "message"),
+    [
+        (
+            [("span = [2, 18]", 'span = ["1 T", 18]')],
+            r"runs\.second\.span: counts in encounter periods, and the period is measured with "
+            r"it, as the zero-up-crossing period of eta_fwd\. State encounter_period \(s\)",
+        ),
+        (
+            [("[preparation]", '[preparation]\nlongest_gap = "0.1 T"')],
+            r"preparation\.longest_gap: counts in encounter periods, and the period is measured",
+        ),
+        (
+            [("[runs.first]", '[derived.eta_s]\nfrom = "eta_fwd"\nstep = "low_pass"\npassband = "8'
+              ' /T"\n[runs.first]'), ('inputs = ["eta_fwd"]', 'inputs = ["eta_s"]')],
+            r"derived\.eta_s\.passband: counts in encounter periods, and the period is measured "
+            r"with it, as the zero-up-crossing period of eta_s",
+        ),
+        (
+            [("eta_fwd = -2.5", ""), ("[channels.eta_fwd]", "[channels.probe]"),
+             ('inputs = ["eta_fwd"]', ""), ("input_delays = 8", 'input_delays = "5 T"')],
+            r"model\.input_delays: counts in encounter periods, and the campaign has none\. State",
+        ),
+        ([("span = [2, 18]", 'span = ["2 s", 18]')], r"runs\.second\.span.*such as '1\.5 T' or '4"),
+        ([("span = [2, 18]", 'span = ["2 /T", 18]')], r"runs\.second\.span.*written like '1\.5 T'"),
+        ([("state_delays = 4", 'state_delays = "1 /T"')], r"model\.state_delays.*like '1\.5 T', a"),
+        ([("state_delays = 4", 'state_delays = "-1 T"')], "a length is finite, and 0 or more"),
+        ([("ridge = 1", 'ridge = 1\nwindow = "inf T"')], "this is more than nothing, and finite"),
+        ([("ridge = 1", 'ridge = 1\nstop = "inf T"')], r"model\.stop: this is finite; received"),
+        ([("span = [2, 18]", 'span = ["8 T", "2 T"]')], "begin before end"),
+        ([("ridge = 1", 'ridge = "1 T"')], r"model\.ridge: received '1 T', which should be a numb"),
+        ([("sampling_rate = 10", 'dt = "0.1 T"')], r"preparation\.dt: received '0\.1 T', which sh"),
+    ],
+)  # fmt: skip
+def test_what_cannot_count_in_periods(edited, pairs, message):
+    with pytest.raises(RequestError, match=message):
+        read_campaign(edited(*pairs))
+
+
+def test_a_span_of_both_kinds_that_runs_backwards(edited):
+    campaign = read_campaign(edited(STATED, ("span = [2, 18]", 'span = ["8 T", 12]')))
+    with pytest.raises(
+        RequestError,
+        match=r"runs\.second\.span: received \[8 T, 12\.0\], which with an encounter period of "
+        r"1\.6 s is \[12\.8, 12\]\. State the lower one first",
+    ):
+        campaign.prepare()
+
+
+@pytest.mark.parametrize("measured", [False, True])
+def test_delays_window_and_stop_of_a_model(edited, measured):
+    pairs = [] if measured else [STATED]
+    keys = ("state_delays = 4\ninput_delays = 8\nridge = 1\n",)
+    path = edited(*pairs, (keys[0], 'state_delays = "0.5 T"\ninput_delays = "0.75 T"\nridge = 1\n'
+                           'window = "3 T"\nstop = "5 T"\n'))  # fmt: skip
+    campaign = read_campaign(path)
+    period = campaign.encounter_period()
+    s, z, m = (periods_to_samples(n, period, 0.1) for n in (0.5, 0.75, 3))
+    model = fit_campaign(campaign)
+    assert (model.settings.state_delays, model.settings.input_delays, model.settings.window) == (
+        s,
+        z,
+        m,
+    )
+    path = edited(*pairs, (keys[0], f"state_delays = {s}\ninput_delays = {z}\nridge = 1\n"
+                           f"window = {m}\nstop = {5 * period}\n"))  # fmt: skip
+    np.testing.assert_array_equal(model.A, fit_campaign(read_campaign(path)).A)
+
+
+def test_a_frequency_is_no_instant(tank):
+    with pytest.raises(RequestError, match=r"received '4 /T', a frequency\. Give a length such as"):
+        read_campaign(tank / "campaign.toml").seconds("4 /T")

@@ -1,0 +1,300 @@
+"""Steps of the chain through a campaign file, against bodies, tones and clocks that are known."""
+
+import re
+
+import numpy as np
+import pytest
+from small_tank import CAMPAIGN, tank_columns, write_csv
+
+from seakeep.campaign import read_campaign
+from seakeep.campaign.checks import findings_of
+from seakeep.signals import rotation_matrix
+
+G = 9.81
+DT = 0.01
+T = DT * np.arange(3000)
+ARM = np.array([-1.2, 0.3, -0.1])  # from the centre of gravity to the bow, in the body's axes
+
+
+def body(t):
+    """Displacement of the centre of gravity, and roll, pitch and yaw, of a body in waves."""
+    w = 2 * np.pi * np.array([0.45, 0.6, 0.75])
+    position = np.column_stack([0.05 * np.sin(w[0] * t), 0.02 * np.sin(w[1] * t + 1),
+                                0.04 * np.sin(w[2] * t + 2)])  # fmt: skip
+    angles = np.column_stack([0.03 * np.sin(w[2] * t), 0.12 * np.sin(w[1] * t + 0.4),
+                              0.02 * np.sin(w[0] * t + 2)])  # fmt: skip
+    return position, angles
+
+
+def rate(function, order):
+    """Derivatives of a smooth function by differences of eighth order, exact to 1e-8 here."""
+    h, weights = 0.01, [4 / 5, -1 / 5, 4 / 105, -1 / 280]
+    if order == 0:
+        return function
+    lower = rate(function, order - 1)
+    return lambda t: (
+        sum(w * (lower(t + k * h) - lower(t - k * h)) for k, w in enumerate(weights, 1)) / h
+    )
+
+
+def bow(t):
+    """Displacement of the bow from its place at rest."""
+    position, angles = body(t)
+    return position + rotation_matrix(angles) @ ARM - ARM
+
+
+def angular_velocity(t):
+    """About the body's axes: what is antisymmetric in the turning rotation."""
+    turn = rotation_matrix(body(t)[1])
+    by = np.einsum("tji,tjk->tik", turn, rate(lambda s: rotation_matrix(body(s)[1]), 1)(t))
+    return np.column_stack([by[:, 2, 1], by[:, 0, 2], by[:, 1, 0]])
+
+
+def written(folder, columns, text):
+    write_csv(folder / "run.csv", {"time [s]": T, **columns})
+    path = folder / "campaign.toml"
+    path.write_text(text + '\n[runs.r]\nfile = "run.csv"\n')
+    return read_campaign(path)
+
+
+def gyroscope():
+    """Columns of angles, angular velocities and accelerations, and their channels."""
+    omega, alpha = angular_velocity(T), rate(angular_velocity, 1)(T)
+    columns, text = {}, ""
+    for i, name in enumerate(("roll", "pitch", "yaw")):
+        for kind, values, unit in (
+            ("", np.rad2deg(body(T)[1][:, i]), "deg"),
+            ("_rate", np.rad2deg(omega[:, i]), "deg/s"),
+            ("_acceleration", alpha[:, i], "rad/s^2"),
+        ):
+            columns[f"{name}{kind} [{unit}]"] = values
+            text += f"[channels.{name}{kind}]\n"
+    return columns, text
+
+
+def test_motions_are_transferred_to_another_point(tmp_path):
+    """Positions, velocities and accelerations of the bow from those of the centre of gravity."""
+    columns, text = gyroscope()
+    for axis, name in enumerate(("surge", "sway", "heave")):
+        for order, kind, unit in ((0, "", "mm"), (1, "_rate", "m/s"), (2, "_acceleration", "g")):
+            scale = {"mm": 1e3, "m/s": 1.0, "g": 1 / 9.80665}[unit]
+            values = rate(lambda t: body(t)[0], order)(T)[:, axis] * scale
+            columns[f"{name}{kind} [{unit}]"] = values
+            text += (
+                f"[channels.{name}{kind}]\n[derived.bow_{name}{kind}]\nfrom = '{name}{kind}'\n"
+                f"step = 'transfer'\noffset = {ARM.tolist()}\n"
+            )
+    run = written(tmp_path, columns, text).prepare()["r"]
+    for axis, name in enumerate(("surge", "sway", "heave")):
+        for order, kind in enumerate(("", "_rate", "_acceleration")):
+            found = run[f"bow_{name}{kind}"]
+            # Eighth-order differences of differences leave 1e-7 of accelerations of 1 m/s².
+            np.testing.assert_allclose(found, rate(bow, order)(T)[:, axis], atol=1e-6)
+            assert "m from where it was measured" in found.attrs["derived_from"]
+    # The transfer is no trifle: without it heave of the bow would be off by its own size.
+    assert float(abs(run["bow_heave"] - run["heave"]).max()) > 0.1
+
+
+@pytest.mark.parametrize("zeroed", [False, True])
+def test_gravity_is_removed_from_accelerometers(tmp_path, zeroed):
+    """Three accelerometers at the bow of a body that tilts by up to 7 degrees."""
+    acceleration = rate(bow, 2)(T)
+    felt = np.einsum(
+        "tji,tj->ti", rotation_matrix(body(T)[1]), acceleration + np.array([0, 0, G])
+    ) - np.array([0, 0, G * zeroed])
+    columns, text = gyroscope()
+    columns |= {f"a_{axis} [m/s^2]": felt[:, i] for i, axis in enumerate("xyz")}
+    for name, axis in (("surge", "x"), ("sway", "y"), ("heave", "z")):
+        text += (
+            f"[channels.a_{axis}]\n[derived.{name}_acceleration]\nfrom = 'a_{axis}'\n"
+            "step = 'remove_gravity'\ncomponents = ['a_x', 'a_y', 'a_z']\n"
+            f"zeroed = {str(zeroed).lower()}\n"
+        )
+    run = written(tmp_path, columns, text).prepare()["r"]
+    for i, name in enumerate(("surge", "sway", "heave")):
+        found = run[f"{name}_acceleration"]
+        np.testing.assert_allclose(found, acceleration[:, i], atol=1e-6)
+        assert found.attrs["derived_from"] == f"a_{'xyz'[i]}, gravity removed by roll, pitch, yaw"
+    # What gravity adds along the deck, g sin(pitch), is larger than the motion itself.
+    assert float(abs(run["surge_acceleration"] - run["a_x"]).max()) > 1.0
+
+
+@pytest.mark.parametrize("axis", ["x", "z"])
+def test_gravity_is_removed_from_one_accelerometer(tmp_path, axis):
+    """Left is the acceleration along the body's own axis: its turning stays."""
+    i = "xyz".index(axis)
+    acceleration, turn = rate(bow, 2)(T), rotation_matrix(body(T)[1])
+    along = np.einsum("tj,tj->t", turn[:, :, i], acceleration)
+    columns, text = gyroscope()
+    columns["a [m/s^2]"] = along + G * turn[:, 2, i]
+    text += f"[channels.a]\n[derived.free]\nfrom = 'a'\nstep = 'remove_gravity'\naxis = '{axis}'\n"
+    run = written(tmp_path, columns, text).prepare()["r"]
+    np.testing.assert_allclose(run["free"], along, atol=1e-9)
+
+
+class TestOutliers:
+    SPIKES = (400, 401, 777, 900)
+
+    @pytest.fixture
+    def runs(self, tank):
+        columns = tank_columns(0)
+        columns["Heave [mm]"][list(self.SPIKES)] += [900, 900, -700, 500]
+        write_csv(tank / "first.csv", columns)
+
+        def prepare(outliers):
+            path = tank / "campaign.toml"
+            path.write_text(
+                CAMPAIGN.replace("sampling_rate = 10", f'dt = 0.02\noutliers = "{outliers}"')
+            )
+            return read_campaign(path), read_campaign(path).prepare(["first"])["first"]
+
+        return prepare
+
+    def test_replaced_when_asked_and_what_was_replaced_is_recorded(self, runs):
+        _, run = runs("replace")
+        clean = 1e-3 * tank_columns(0)["Heave [mm]"]
+        # One or two samples of a wave of 50: what a monotone cubic puts there is off by 1 %.
+        np.testing.assert_allclose(run["heave"], clean, atol=0.01 * np.ptp(clean))
+        flags = run["heave_flags"]
+        bits = dict(zip(flags.attrs["flag_meanings"].split(), flags.attrs["flag_masks"],
+                        strict=True))  # fmt: skip
+        marked = (flags.values & bits["replaced"]) > 0
+        np.testing.assert_array_equal(marked, (flags.values & bits["outlier"]) > 0)
+        assert set(self.SPIKES) <= set(np.flatnonzero(marked))
+        assert marked.sum() <= 3 * len(self.SPIKES)  # a flag covers half a step on either side
+        assert run["heave"].attrs["repaired"] == "4 outliers replaced by monotone cubics"
+        assert "repaired" not in run["pitch"].attrs
+        told = [each.text for each in findings_of(run) if each.channel == "heave"]
+        assert any(
+            re.match(r"outlier: 4 samples in 3 place\(s\).*; replaced by int", t) for t in told
+        )
+
+    def test_only_flagged_without_a_word(self, runs):
+        _, run = runs("flag")
+        assert float(run["heave"].max()) > 0.8
+        assert "repaired" not in run["heave"].attrs
+        told = [each.text for each in findings_of(run) if each.channel == "heave"]
+        assert any(t.startswith("outlier: 4 samples") and "replaced" not in t for t in told)
+
+    def test_the_sheet_says_what_was_replaced(self, runs, tmp_path):
+        pytest.importorskip("matplotlib", reason="needs the extra figures")
+        from seakeep.report.quality_sheet import write_quality_sheet
+
+        campaign, run = runs("replace")
+        pages = write_quality_sheet({"first": run}, campaign.settings, "tank", tmp_path)
+        page = pages[0].read_text(encoding="utf-8")
+        assert "repaired: 4 outliers replaced by monotone cubics" in page
+
+
+RATE, PERIOD = 500.0, 1.64
+
+
+def tone_campaign(folder, frequencies, preset):
+    t = np.arange(0, 60, 1 / RATE)
+    columns = {"time [s]": t}
+    text = f"[campaign]\nencounter_period = {PERIOD}\n[preparation]\npreset = '{preset}'\n"
+    for f in frequencies:
+        name = f"tone_{f:g}".replace(".", "p")
+        columns[f"{name} [m]"] = np.cos(2 * np.pi * f * t)
+        text += f"[channels.{name}]\n"
+    write_csv(folder / "run.csv", columns)
+    (folder / "campaign.toml").write_text(text + "[runs.r]\nfile = 'run.csv'\n")
+    return read_campaign(folder / "campaign.toml").prepare()["r"]
+
+
+TONES = (0.61, 5.0, 7.7, 9.9, 11.0, 30.0)
+
+
+def amplitudes(run):
+    """Root mean square of each tone, in parts of a cosine's, away from the ends."""
+    inner = run.isel(time=slice(150, -150))
+    return [float(np.sqrt(2 * np.mean(each.values**2))) for each in inner.data_vars.values()]
+
+
+def test_the_paper_preset_of_the_preparation(tmp_path):
+    """Pass 10 Hz, stop 10.75 Hz, then 32 samples a period, and no other filter."""
+    run = tone_campaign(tmp_path, TONES, "paper")
+    assert run.attrs["preparation_preset"] == "paper"
+    assert run.attrs["dt"] == PERIOD / 32
+    assert run["tone_5"].attrs["low_pass"] == (10.0, 10.75)
+    found = amplitudes(run)
+    # 60 dB either way; the mean over a broken number of cycles leaves a part in a hundred.
+    assert found[:3] == pytest.approx([1, 1, 1], abs=0.02)
+    assert max(found[4:]) < 2e-3
+    # 9.9 Hz passes its filter, lies above the new Nyquist frequency (9.76 Hz) and is folded.
+    assert found[3] == pytest.approx(1.0, abs=0.02)
+    time = run["time"].values[150:-150]
+    folded = np.cos(2 * np.pi * (32 / PERIOD - 9.9) * time)
+    # As a cosine of 9.61 Hz: the same samples, within the ripple of 60 dB twice.
+    np.testing.assert_allclose(run["tone_9p9"].values[150:-150], folded, atol=2.5e-3)
+
+
+def test_the_recommended_preset_of_the_preparation(tmp_path):
+    """Below 0.8 of the new Nyquist frequency (7.8 Hz) all passes, above it nothing."""
+    run = tone_campaign(tmp_path, TONES, "recommended")
+    assert run.attrs["dt"] == PERIOD / 32
+    assert "low_pass" not in run["tone_5"].attrs
+    found = amplitudes(run)
+    assert found[:3] == pytest.approx([1, 1, 1], abs=0.02)
+    assert max(found[3:]) < 2e-3
+
+
+def wander(t):
+    """A motion without a period of its own, so that a lag is unique."""
+    rng = np.random.default_rng(5)
+    f, phase = rng.uniform(0.2, 1.0, 40), rng.uniform(0, 2 * np.pi, 40)
+    return np.cos(2 * np.pi * np.outer(t, f) + phase).sum(axis=1)
+
+
+@pytest.mark.parametrize("way", ["shared", "correlated"])
+@pytest.mark.parametrize(("offset", "drift"), [(0.731, 0.0), (-1.204, 60e-6)])
+def test_clocks_from_signals(tmp_path, way, offset, drift):
+    """A camera of 30 Hz beside a logger of 100 Hz: one signal in both, or two that go together."""
+    rng = np.random.default_rng(1)
+    reference = np.arange(0, 200, 0.01)
+    seen = np.arange(0.0, 190, 1 / 30) + max(offset, 0)
+    at = (seen - offset) / (1 + drift)
+    other = wander(at) if way == "shared" else wander(at) + 0.3 * np.cos(2.2 * at)
+    write_csv(tmp_path / "loads.csv", {
+        "time [s]": reference, "draught [m]": 0.1 * wander(reference),
+    })  # fmt: skip
+    write_csv(tmp_path / "camera.csv", {
+        "time [s]": seen, "heave [mm]": 50 * other + 2 * rng.standard_normal(seen.size),
+    })  # fmt: skip
+    path = tmp_path / "campaign.toml"
+    path.write_text(
+        "[channels.draught]\n[channels.heave]\n[instruments]\nreference = 'loads'\n"
+        f"[instruments.loads]\n[instruments.camera]\n{way} = ['heave', 'draught']\n"
+        "[preparation]\nsampling_rate = 20\n[runs.r.files]\nloads = 'loads.csv'\n"
+        "camera = 'camera.csv'\n"
+    )
+    campaign = read_campaign(path)
+    clock = campaign.clocks()["r"]["camera"]
+    # Noise of 1 % of the motion on 5 700 frames; two signals that differ leave windows apart.
+    within = 3e-4 if way == "shared" else 3e-3
+    assert clock.offset == pytest.approx(offset, abs=within)
+    assert abs(clock.drift - drift) < (4e-6 if way == "shared" else 3e-5)
+    assert abs(clock.offset - offset) < 5 * clock.offset_error
+    assert abs(clock.drift - drift) < 5 * clock.drift_error
+    words = {"shared": "shared channel", "correlated": "correlation of windows"}
+    run = campaign.prepare()["r"]
+    assert words[way] in run.attrs["clock_camera"]
+    assert run.attrs["clock_camera_offset"] == pytest.approx(clock.offset)
+    if way == "shared":  # the channels fall together once the clock is turned back
+        pair = run[["draught", "heave"]].isel(time=slice(100, -100))
+        assert float(np.corrcoef(pair["draught"], pair["heave"])[0, 1]) > 0.999
+
+
+def test_clocks_of_signals_that_do_not_go_together(tmp_path):
+    t = np.arange(0, 100, 0.02)
+    rng = np.random.default_rng(0)
+    for name in ("a", "b"):
+        write_csv(tmp_path / f"{name}.csv", {"time [s]": t, f"{name}_x [m]":
+                                             rng.standard_normal(t.size)})  # fmt: skip
+    path = tmp_path / "campaign.toml"
+    path.write_text(
+        "[channels.a_x]\n[channels.b_x]\n[instruments.a]\n[instruments.b]\n"
+        "shared = ['b_x', 'a_x']\n[runs.r.files]\na = 'a.csv'\nb = 'b.csv'\n"
+    )
+    with pytest.raises(Exception, match=r"run 'r', clock of 'b' .*the two signals do not go tog"):
+        read_campaign(path).prepare()

@@ -1,0 +1,55 @@
+"""A Dask cluster as a user starts it: a scheduler and workers, each a process on loopback."""
+
+import contextlib
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+HELPERS = Path(__file__).parent
+
+
+class Cluster:
+    """Started when made, ended by :meth:`close`."""
+
+    def __init__(self, folder, workers):
+        self.processes = []
+        self._folder = folder
+        text = self._start("scheduler", "--port", "0", "--dashboard-address", "127.0.0.1:0")
+        self.address = self._read(text, r"Scheduler at:\s+(tcp://\S+)")
+        worker = ("worker", self.address, "--nthreads", "1", "--no-nanny")
+        logs = [self._start(*worker) for _ in range(workers)]
+        for log in logs:
+            self._read(log, r"Registered to:\s+(tcp://\S+)")
+
+    def _start(self, *arguments):
+        log = self._folder / f"{arguments[0]}{len(self.processes)}.log"
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(HELPERS), *sys.path])}
+        command = [sys.executable, "-m", "dask", *arguments]
+        with log.open("w") as file:
+            self.processes.append(
+                subprocess.Popen(
+                    [*command, "--host", "127.0.0.1", "--no-dashboard"],
+                    stdout=file,
+                    stderr=subprocess.STDOUT,
+                    env=environment,
+                    cwd=self._folder,
+                )
+            )
+        return log
+
+    def _read(self, log, pattern):
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline:
+            if found := re.search(pattern, log.read_text("utf-8")):
+                return found.group(1)
+            time.sleep(0.05)
+        raise AssertionError(log.read_text("utf-8"))
+
+    def close(self):
+        for process in self.processes:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            process.wait()

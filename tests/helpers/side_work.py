@@ -1,0 +1,35 @@
+"""Pieces of work that other processes can import."""
+
+import os
+import signal
+import time
+
+import numpy as np
+import scipy.linalg
+import threadpoolctl
+
+
+def blas_threads(data, item, scratch):
+    np.linalg.norm(scipy.linalg.cholesky(np.eye(3)))  # both libraries are loaded and used
+    found = [each["num_threads"] for each in threadpoolctl.threadpool_info()]
+    return os.getpid(), found
+
+
+def square(data, item, scratch):
+    time.sleep(0.02)
+    return os.getpid(), data * item**2
+
+
+def fall(data, item, scratch):
+    if item == data:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return item
+
+
+def refuse(data, item, scratch):
+    raise ValueError(f"item {item}")
+
+
+def sleep(data, item, scratch):
+    time.sleep(data)
+    return os.getpid()

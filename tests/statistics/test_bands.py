@@ -1,0 +1,78 @@
+"""ε(t) in bands: the parts add up, and each kind of error is found in its own band."""
+
+import numpy as np
+import pytest
+
+from seakeep import metrics, statistics
+from seakeep.errors import RequestError
+
+DT, SPLIT = 0.05, 0.2
+TIME = np.arange(480) * DT
+INNER = slice(200, -200)  # two periods of the split frequency from either end
+
+
+def histories(slow, fast):
+    measured = np.stack([np.sin(2 * np.pi * 0.5 * TIME), np.cos(2 * np.pi * 0.6 * TIME)], axis=1)
+    error = slow * np.sin(2 * np.pi * 0.03 * TIME) + fast * np.sin(2 * np.pi * 0.7 * TIME)
+    return {"predicted": measured + error[:, None], "measured": measured}
+
+
+def test_the_parts_add_up_to_the_series():
+    x = np.random.default_rng(0).standard_normal((3, 480, 2))
+    low, high = statistics.split_bands(x, DT, SPLIT)
+    np.testing.assert_allclose(low + high, x, rtol=0, atol=1e-12)  # rounding
+
+
+def test_the_gain_is_that_of_the_butterworth_filter_both_ways():
+    # Analytic: |H|² of order 4, warped by the bilinear transform, since it runs to and fro.
+    long = np.arange(8000) * DT
+    for frequency in (0.1, 0.2, 0.3):
+        low, _ = statistics.split_bands(np.sin(2 * np.pi * frequency * long)[:, None], DT, SPLIT)
+        ratio = np.tan(np.pi * frequency * DT) / np.tan(np.pi * SPLIT * DT)
+        expected = 1 / (1 + ratio**8)
+        found = np.sqrt(2) * low[2000:6000, 0].std()
+        assert found == pytest.approx(expected, abs=1e-3)  # 4000 samples hold whole periods
+
+
+@pytest.mark.parametrize(("slow", "fast"), [(1.0, 0.0), (0.0, 1.0)])
+def test_an_error_is_found_in_its_own_band(slow, fast):
+    pair = histories(slow, fast)
+    bands = statistics.band_error_over_time(**pair, dt=DT, frequency=SPLIT)
+    whole = metrics.error_over_time(**pair)
+    own, other = (bands.low, bands.wave) if slow else (bands.wave, bands.low)
+    # The gain at 0.03 Hz is 1 − 3e-7 and at 0.7 Hz 4e-5; what the reflections at the ends leave
+    # has died down to 0.5 % of the amplitude two periods on.
+    np.testing.assert_allclose(own[INNER], whole[INNER], rtol=0, atol=0.01)
+    assert other[INNER].max() < 0.01
+
+
+def test_both_together_are_no_less_than_the_whole():
+    pair = histories(0.5, 0.7)
+    low, wave = statistics.band_error_over_time(**pair, dt=DT, frequency=SPLIT)
+    assert np.all(low + wave >= metrics.error_over_time(**pair) - 1e-12)  # rounding
+
+
+def test_a_diverged_forecast_is_nan_and_a_slack_channel_left_out():
+    pair = histories(0.5, 0.5)
+    alone = statistics.band_error_over_time(
+        **{key: value[:, :1] for key, value in pair.items()}, dt=DT, frequency=SPLIT
+    )
+    slack = {key: value.copy() for key, value in pair.items()}
+    slack["measured"][:, 1] *= 1e-4
+    left = statistics.band_error_over_time(**slack, dt=DT, frequency=SPLIT, training_std=np.ones(2))
+    np.testing.assert_allclose(left.low, alone.low, rtol=1e-12)
+    pair["predicted"][300:] = np.nan
+    lost = statistics.band_error_over_time(**pair, dt=DT, frequency=SPLIT)
+    assert np.isnan(lost.low).all()
+    assert np.isnan(lost.wave).all()
+
+
+@pytest.mark.parametrize("frequency", [0.0, 10.0, -1.0])
+def test_a_split_outside_the_sampled_band_is_refused(frequency):
+    with pytest.raises(RequestError, match="between 0 and half the sampling rate"):
+        statistics.split_bands(np.zeros((50, 1)), DT, frequency)
+
+
+def test_a_series_without_samples_is_refused():
+    with pytest.raises(RequestError, match="at least eight samples"):
+        statistics.split_bands(np.zeros((5, 1)), DT, SPLIT)
