@@ -309,9 +309,9 @@ def test_a_predicted_surge_uses_the_workers_and_gives_the_same_arrays(runs, monk
     seen = []
     real = ensemble_series.side_by_side
 
-    def watch(function, data, items, workers, backend):
-        seen.append((workers, backend))
-        return real(function, data, items, workers, backend)
+    def watch(function, data, items, crew):
+        seen.append((crew.workers, crew.backend))
+        return real(function, data, items, crew)
 
     monkeypatch.setattr(ensemble_series, "side_by_side", watch)
     for workers, backend in ((2, "threads"), (2, "processes")):

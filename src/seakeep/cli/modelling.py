@@ -89,7 +89,9 @@ def fit(
     if isinstance(identified, HankelEnsemble):
         with progress_bar("Stability") as progress:
             tell = _quietly(progress)
-            identified.spectral_radii(workers=worker_count(workers), progress=tell)
+            identified.spectral_radii(
+                workers=worker_count(workers), backend="threads", progress=tell
+            )
     typer.echo(identified.summary())
     identified.save(out)
     messages().print(f"Wrote {out}. Judge it with: seakeep compare {out} {campaign}")
@@ -137,6 +139,7 @@ def forecast(
         with progress_bar("Forecasting") as progress:
             how: dict[str, Any] = {
                 "workers": worker_count(workers),
+                "backend": "threads",
                 "progress": _quietly(progress),
             }
             if members:

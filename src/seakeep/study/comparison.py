@@ -209,7 +209,7 @@ def compare(
     level : float, optional
         Probability between the bounds of an ensemble's band.
     workers : int, optional
-        Members of an ensemble at work at a time.
+        Members of an ensemble at work at a time, on threads: they need no time to start.
 
     Returns
     -------
@@ -248,7 +248,9 @@ def compare(
         if isinstance(model, HankelDMDcModel):
             return model.forecast(run, start=start, steps=steps)
         tell = None if members is None else _named(members, str(run.attrs["run"]))
-        return model.forecast_summary(run, start, steps, level, workers=workers, progress=tell)
+        return model.forecast_summary(
+            run, start, steps, level, workers=workers, backend="threads", progress=tell
+        )
 
     return [
         _compare_run(model, forecast, run, name, start, steps) for name, run in prepared.items()
