@@ -113,9 +113,7 @@ def rollout(
             symmetric, propagator = _prepare(a, b, count, channels, len(start), steps, memory)
             out = _run(propagator, symmetric, start, driving, steps, count, memory)
         out = out.astype(float, copy=False)
-        lost = ~(np.abs(out) <= float(np.finfo(kind).max)).all(axis=2)
-    if lost.any():
-        out[np.logical_or.accumulate(lost, axis=1)] = np.nan
+    _cut_lost(out, float(np.finfo(kind).max))
     return out
 
 
@@ -157,6 +155,20 @@ def _superpose(
         return None
     forced = convolve(np.ascontiguousarray(kernel.transpose(1, 2, 0)), inputs, steps)
     return free[:windows] + forced.transpose(0, 2, 1)
+
+
+def _cut_lost(out: FloatArray, most: float) -> None:
+    """NaN from where a window exceeds `most`, or is not finite, on; in pieces of time."""
+    windows, steps, count = out.shape
+    length = max(1, PIECE // (16 * max(1, windows * count)))
+    lost = np.zeros((windows, 1), dtype=bool)
+    for first in range(0, steps, length):
+        piece = out[:, first : first + length]
+        gone: npt.NDArray[np.bool_] = np.any(~(np.abs(piece) <= most), axis=2)
+        gone[:, :1] |= lost
+        if gone.any():
+            piece[np.logical_or.accumulate(gone, axis=1)] = np.nan
+            lost = np.any(gone, axis=1, keepdims=True)
 
 
 def _prepare(

@@ -277,7 +277,7 @@ def closed_loop(model: HankelDMDcModel, loop: Loop) -> FloatArray:
         next_input,
     )
     with np.errstate(over="ignore", invalid="ignore"):
-        values = model.state_scale.physical(deviations)
+        values = model.state_scale.physical(deviations, out=deviations)
     return forecasting.cut_divergence(values, model.state_scale, window.state_history[-1])
 
 

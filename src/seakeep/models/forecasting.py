@@ -23,6 +23,8 @@ FloatArray = npt.NDArray[np.float64]
 
 DIVERGED = 1e6
 """A free run is given up where a state is this many training SDs from where it began."""
+PIECE = 2**18
+"""Numbers that are looked at together, so that a long run takes little beside its result."""
 
 
 DIVERGED_AT = "diverged at t = "
@@ -200,10 +202,16 @@ def cut_divergence(values: FloatArray, scale: Scale, begun: FloatArray) -> Float
         `values`.
     """
     spread = np.where(scale.spread > 0, scale.spread, np.inf)
-    kept = np.isfinite(values) & (np.abs(values - begun) <= DIVERGED * spread)
-    lost = ~np.all(kept, axis=-1)
-    if np.any(lost):
-        values[np.logical_or.accumulate(lost, axis=-1)] = np.nan
+    length = max(1, PIECE // max(1, values[..., 0, :].size))
+    before = np.zeros((*values.shape[:-2], 1), dtype=bool)
+    for first in range(0, values.shape[-2], length):
+        piece = values[..., first : first + length, :]
+        kept = np.isfinite(piece) & (np.abs(piece - begun) <= DIVERGED * spread)
+        lost = ~np.all(kept, axis=-1)
+        lost[..., :1] |= before
+        if np.any(lost):
+            piece[np.logical_or.accumulate(lost, axis=-1)] = np.nan
+            before = np.any(lost, axis=-1, keepdims=True)
     return values
 
 

@@ -51,9 +51,11 @@ class Scale:
         """Standardised deviations of physical values, shape (…, channel)."""
         return (values - self.mean) / self.std
 
-    def physical(self, deviations: FloatArray) -> FloatArray:
-        """Physical values of standardised deviations, shape (…, channel)."""
-        return deviations * self.std + self.mean
+    def physical(self, deviations: FloatArray, out: FloatArray | None = None) -> FloatArray:
+        """Physical values of standardised deviations, shape (…, channel); `out` may be these."""
+        values = np.multiply(deviations, self.std, out=out)
+        values += self.mean
+        return values
 
 
 @dataclass(frozen=True, eq=False)

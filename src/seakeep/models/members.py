@@ -195,7 +195,7 @@ def forecast_member(task: Task, draw: Draw, scratch: Scratch) -> FloatArray:
         scratch=scratch,
     )
     with np.errstate(over="ignore"):  # a run that is lost is cut just below
-        values = member.state_scale.physical(deviations)
+        values = member.state_scale.physical(deviations, out=deviations)
     return cut_divergence(values, member.state_scale, task.histories[:, -1:])
 
 

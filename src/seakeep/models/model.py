@@ -331,7 +331,7 @@ class HankelDMDcModel:
             n_states=len(self.state_labels),
         )[0]
         with np.errstate(over="ignore"):  # a run that is lost is cut just below
-            values = self.state_scale.physical(deviations)
+            values = self.state_scale.physical(deviations, out=deviations)
         return forecasting.cut_divergence(values, self.state_scale, x[-1])
 
     def to_state_space(self) -> signal.StateSpace:

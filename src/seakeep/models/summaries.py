@@ -6,7 +6,7 @@ import math
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -136,26 +136,65 @@ def reduce_members(
     with _store((windows, pieces, members, length, N)) as store:
         for member, values in enumerate(series):
             lost[member] = first_lost(values)
-            for piece in range(pieces):
-                part = values[:, piece * length : (piece + 1) * length]
-                store[:, piece, member, : part.shape[1]] = part
+            for window in range(windows):
+                for piece in range(pieces):
+                    part = values[window, piece * length : (piece + 1) * length]
+                    store.put(window, piece, member, part)
         for window in range(windows):
             kept = lost[:, window] < 0
             for piece in range(pieces):
                 at = slice(piece * length, min((piece + 1) * length, steps))
-                block = store[window, piece][kept, : at.stop - at.start]
+                block = store.get(window, piece)[kept, : at.stop - at.start]
                 out[window, :, at] = statistics_of(block, level)
     return out, lost
 
 
+class _Held:
+    """Members in memory, of shape (window, piece, member, length, N)."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self._values = np.empty(shape)
+
+    def put(self, window: int, piece: int, member: int, part: FloatArray) -> None:
+        """Keep a piece of a member, shape (time, N)."""
+        self._values[window, piece, member, : len(part)] = part
+
+    def get(self, window: int, piece: int) -> FloatArray:
+        """A piece of all members, shape (member, length, N)."""
+        found: FloatArray = self._values[window, piece]
+        return found
+
+
+class _Spilled:
+    """The same in a file; read and written, not mapped, so that memory holds one piece alone."""
+
+    def __init__(self, shape: tuple[int, ...], file: BinaryIO) -> None:
+        self._shape, self._file = shape, file
+        file.truncate(8 * math.prod(shape))
+
+    def _seek(self, window: int, piece: int, member: int) -> None:
+        place = np.ravel_multi_index((window, piece, member), self._shape[:3])
+        self._file.seek(8 * int(place) * math.prod(self._shape[3:]))
+
+    def put(self, window: int, piece: int, member: int, part: FloatArray) -> None:
+        """Keep a piece of a member, shape (time, N)."""
+        self._seek(window, piece, member)
+        self._file.write(np.ascontiguousarray(part).data)
+
+    def get(self, window: int, piece: int) -> FloatArray:
+        """A piece of all members, shape (member, length, N)."""
+        self._seek(window, piece, 0)
+        shape = self._shape[2:]
+        return np.fromfile(self._file, dtype=np.float64, count=math.prod(shape)).reshape(shape)
+
+
 @contextmanager
-def _store(shape: tuple[int, ...]) -> Iterator[FloatArray]:
-    size = 8 * math.prod(shape)
-    if size <= HELD:
-        yield np.empty(shape)
+def _store(shape: tuple[int, ...]) -> Iterator[_Held | _Spilled]:
+    if 8 * math.prod(shape) <= HELD:
+        yield _Held(shape)
         return
-    with tempfile.TemporaryDirectory(prefix="seakeep-") as folder:
-        yield np.memmap(Path(folder) / "members", dtype=np.float64, mode="w+", shape=shape)
+    with tempfile.TemporaryFile(prefix="seakeep-", buffering=0) as file:
+        yield _Spilled(shape, file)
 
 
 def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:

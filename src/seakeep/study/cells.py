@@ -266,7 +266,7 @@ def _forecast(model: HankelDMDcModel, runs: Runs, windows: Windows) -> FloatArra
         n_states=len(model.states),
     )
     with np.errstate(over="ignore"):  # a run that is lost is cut just below
-        values = model.state_scale.physical(deviations)
+        values = model.state_scale.physical(deviations, out=deviations)
     return cut_divergence(values, model.state_scale, windows.histories[:, -1:])
 
 
