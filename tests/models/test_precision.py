@@ -9,7 +9,7 @@ import xarray as xr
 import seakeep
 from seakeep.campaign import ModelSettings
 from seakeep.errors import RequestError
-from seakeep.study.specs import build_model
+from seakeep.study.specs import build_spec
 
 DT = 0.05
 CHANNELS = (["heave", "pitch"], ["eta_fwd"])
@@ -99,6 +99,6 @@ def test_an_ensemble_with_a_small_ridge_among_its_draws_is_refused_at_once(run):
 def test_a_campaign_file_may_ask_for_it():
     stated = {"states": ("heave",), "ridge": 100.0, "precision": "single"}
     one = ModelSettings(**stated, state_delays=3, input_delays=3)
-    assert build_model(one, 1.6, DT).precision == "single"
+    assert build_spec(one, 1.6, DT).precision == "single"
     many = ModelSettings(**stated, kind="bayesian_hankel_dmdc", preset="paper")
-    assert build_model(many, 1.6, DT).precision == "single"
+    assert build_spec(many, 1.6, DT).precision == "single"
