@@ -1,6 +1,7 @@
 """Draw the figures of the documentation and of the measured examples.
 
     python docs/figures/make_figures.py indices     # docs/figures/indices.svg and .png
+    python docs/figures/make_figures.py tutorial    # docs/figures/unseen.png and band.png
     python docs/figures/make_figures.py tank        # the virtual tank's; extras tank and video
     python docs/figures/make_figures.py ntnu sjtu   # examples/*/figures; need SEAKEEP_DATA_DIR
 
@@ -187,6 +188,16 @@ def overlays(campaign_file, model, runs, folder, prefix=""):
         save(overlay_figure(in_degrees(each)), folder / f"{prefix}{each.run}.png")
 
 
+def tutorial():
+    """The tutorial's unseen run, and the ensemble's band around its highest wave."""
+    file = ROOT / "docs" / "tutorial" / "campaign.toml"
+    overlays(file, None, [], HERE)
+    campaign = seakeep.read_campaign(file)
+    ensemble = fit_campaign(campaign, "ensemble")
+    (around,) = compare(ensemble, campaign, start=60.0, steps=200)
+    save(overlay_figure(in_degrees(around)), HERE / "band.png")
+
+
 def ntnu():
     """Motions, sway and tensions of the ship section's test runs."""
     folder = EXAMPLES / "ntnu_ship_section"
@@ -225,7 +236,7 @@ def tank():
     cv2.imwrite(str(HERE / "tank_side_view.jpg"), small, [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 
-DRAWINGS = {each.__name__: each for each in (indices, ntnu, sjtu, tank)}
+DRAWINGS = {each.__name__: each for each in (indices, tutorial, ntnu, sjtu, tank)}
 
 if __name__ == "__main__":
     for wanted in sys.argv[1:] or ["indices"]:

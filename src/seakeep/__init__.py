@@ -2,7 +2,7 @@
 
 from importlib import metadata
 
-from seakeep import core, metrics, signals
+from seakeep import core, metrics, signals, statistics
 from seakeep.campaign import Campaign, read_campaign
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
 from seakeep.models import (
@@ -41,5 +41,6 @@ __all__ = [
     "metrics",
     "read_campaign",
     "signals",
+    "statistics",
     "summarize",
 ]

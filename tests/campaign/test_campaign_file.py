@@ -28,6 +28,14 @@ def test_reads(tank):
         campaign.path = tank
 
 
+def test_a_campaign_is_shown_in_a_line(tank):
+    campaign = read_campaign(tank / "campaign.toml")
+    path = str(tank / "campaign.toml")
+    assert repr(campaign) == (
+        f"Campaign('Small tank', path={path!r}, 2 runs: first, second; models: model)"
+    )
+
+
 def test_byte_order_mark_and_crlf(tank):
     path = tank / "campaign.toml"
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))

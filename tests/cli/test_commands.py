@@ -364,6 +364,30 @@ def test_a_diverging_forecast_is_told_and_ends_with_1(run, place):
     assert "Raise ridge" in err
 
 
+def test_members_that_diverge_are_counted_and_left_out_of_file_and_table(run, place):
+    text = (place / CAMPAIGN).read_text().replace("n_members = 40", "n_members = 8")
+    (place / "docs/tutorial/wild.toml").write_text(
+        text + "state_delay = { uniform = [1.0, 5.0] }\ninput_delay = 0.5\n"
+        "ridge = { log_uniform = [1e-13, 1e-2] }\n"
+    )
+    status, out, err = run("fit docs/tutorial/wild.toml --model ensemble -o wild.nc")
+    assert status == 0
+    unstable = re.search(r"\((\d) of 8 UNSTABLE: their long forecasts diverge\)", out)
+    assert unstable
+    assert f"Note: {unstable[1]} of 8 members have a spectral radius of one or more" in err
+    status, _, err = run(f"forecast wild.nc {CAMPAIGN} --run unseen --start 20 -o wild_band.nc")
+    band = xr.load_dataset(place / "wild_band.nc")
+    lost = int(band.attrs["diverged"])
+    assert 0 < lost < 8
+    assert status == 0
+    assert f"{8 - lost} members at" in err
+    assert f"status {lost} of 8 members diverged" in err
+    assert np.isfinite(band["heave"].values).all()
+    status, out, _ = run(f"compare wild.nc {CAMPAIGN} -o wild --start 20")
+    assert status == 0
+    assert f"{lost} of 8 members diverged and are left out" in out
+
+
 def test_datasets_lists_origin_licence_and_state(run, monkeypatch):
     monkeypatch.delenv("SEAKEEP_DATA_DIR", raising=False)
     status, out, _ = run("datasets")

@@ -2,13 +2,20 @@
 
 import csv
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.report.tables import rich_comparison, write_csv
-from seakeep.study import Comparison, comparison_table, in_degrees
+from seakeep.report.tables import band_findings, rich_bands, rich_comparison, write_csv
+from seakeep.study import (
+    Comparison,
+    at_full_scale,
+    comparison_table,
+    forecast_at_full_scale,
+    in_degrees,
+)
 
 TIME = np.arange(1, 401) * 0.1
 
@@ -32,6 +39,109 @@ def comparison(factor=0.9, status="ok", slack=False):
     forecast.attrs = {"start": 0.0, "status": status}
     inputs = xr.Dataset({"eta_fwd": ("time", heave, {"units": "m"})}, coords={"time": TIME})
     return Comparison("r1", "calm", forecast, measured, inputs)
+
+
+def ensemble(half=0.2, diverged=1, slack=False):
+    """The mean of an ensemble with a band of known width around it."""
+    single = comparison(factor=1.0, slack=slack)
+    mean = single.forecast.assign_attrs(
+        status=f"{diverged} of 5 members diverged", members=5, diverged=diverged, level=0.9
+    )
+    band = xr.concat([mean - half, mean + half], "statistic")
+    band = band.assign_coords(statistic=["lower", "upper"])
+    for name in band.data_vars:
+        band[name].attrs = mean[name].attrs
+    # A sinusoid beside the mean: it leaves the band where its modulus is above `half`.
+    measured = single.measured.copy()
+    measured["heave"] = mean["heave"] + 0.4 * np.sin(7 * mean["time"])
+    measured["heave"].attrs = mean["heave"].attrs
+    return Comparison("r1", "calm", mean, measured, single.inputs, band)
+
+
+def text_of(table):
+    return [str(cell) for column in table.columns for cell in column.cells]
+
+
+def test_the_band_of_an_ensemble_is_judged_by_hand():
+    judged = ensemble()
+    table = comparison_table([judged]).isel(run=0)
+    heave = table.sel(channel="heave")
+    outside = np.mean(np.abs(0.4 * np.sin(7 * TIME)) > 0.2)
+    assert float(heave["coverage"]) == pytest.approx(100 * (1 - outside), rel=1e-12)
+    assert float(heave["band_width"]) == pytest.approx(0.4, rel=1e-12)
+    spread = float(judged.measured["heave"].std(ddof=1))
+    assert float(heave["relative_band_width"]) == pytest.approx(0.4 / spread, rel=1e-12)
+    assert float(table["coverage"].sel(channel="pitch")) == 100.0
+    assert float(table["mean_coverage"]) == pytest.approx(float(table["coverage"].mean()))
+    assert (int(table["members"]), int(table["diverged"]), float(table["level"])) == (5, 1, 0.9)
+    assert judged.complete
+
+
+def test_a_slack_line_is_left_out_of_the_mean_coverage():
+    table = comparison_table([ensemble(slack=True)]).isel(run=0)
+    judged = table["coverage"].sel(channel=["heave", "pitch"]).mean()
+    assert float(table["mean_coverage"]) == pytest.approx(float(judged), rel=1e-12)
+
+
+def test_degrees_widen_a_band_and_leave_its_coverage():
+    radians, degrees = ensemble(), in_degrees(ensemble())
+    before, after = (comparison_table([each]).isel(run=0) for each in (radians, degrees))
+    np.testing.assert_array_equal(before["coverage"], after["coverage"])
+    pitch = after.sel(channel="pitch")
+    assert float(pitch["band_width"]) == pytest.approx(np.degrees(0.4), rel=1e-12)
+    assert float(pitch["relative_band_width"]) == pytest.approx(
+        float(before["relative_band_width"].sel(channel="pitch")), rel=1e-12
+    )
+
+
+def test_tables_and_words_of_a_band(tmp_path):
+    table = comparison_table([ensemble()])
+    shown = rich_bands(table)
+    assert shown.title == "90 % band against measurement"
+    assert "0.4" in text_of(shown)
+    (words,) = band_findings(table)
+    found = float(table["mean_coverage"][0])
+    assert words == (
+        f"r1: the 90 % band of 4 members holds {found:.0f} % of the measured instants, not what "
+        "it claims. It carries the spread of the members, and no noise or model error; 1 of 5 "
+        "members diverged and are left out."
+    )
+    rows = list(csv.DictReader(write_csv(table, tmp_path / "t.csv").read_text().splitlines()))
+    assert float(rows[0]["coverage"]) == float(table["coverage"][0, 0])
+    assert (rows[0]["level"], rows[0]["members"], rows[0]["diverged"]) == ("0.9", "5", "1")
+    single = comparison_table([comparison()])
+    assert band_findings(single) == []
+    assert "coverage" not in write_csv(single, tmp_path / "s.csv").read_text()
+
+
+def test_a_band_that_is_lost_altogether_is_said_to_be():
+    judged = ensemble(diverged=5)
+    lost = replace(judged, forecast=judged.forecast * np.nan, band=judged.band * np.nan)
+    lost.forecast.attrs = judged.forecast.attrs
+    assert not lost.complete
+    (words,) = band_findings(comparison_table([lost]))
+    assert words == ("r1: there is no band to judge; 5 of 5 members diverged and are left out.")
+
+
+def test_the_figure_of_an_ensemble_shows_mean_and_band():
+    pytest.importorskip("matplotlib")
+    from seakeep.report.overlay import overlay_figure
+
+    judged = in_degrees(ensemble())
+    figure = overlay_figure(judged)
+    (legend,) = figure.legends
+    labels = [text.get_text() for text in legend.get_texts()]
+    assert sorted(labels) == ["90 % band", "ensemble mean", "measured"]
+    (fill,) = figure.axes[1].collections
+    heights = fill.get_paths()[0].vertices[:, 1]
+    pitch = judged.band["pitch"]
+    assert heights.min() == pytest.approx(float(pitch.min()))
+    assert heights.max() == pytest.approx(float(pitch.max()))
+    inside = float(comparison_table([judged]).isel(run=0)["coverage"].sel(channel="heave"))
+    assert figure.axes[0].get_title("right").endswith(f"{inside:.0f} % in the band")
+    figure.draw_without_rendering()
+    box = legend.get_window_extent()
+    assert box.y1 <= figure.axes[-1].get_tightbbox().y0 + 1  # below the panels, over none
 
 
 def test_table_holds_what_can_be_computed_by_hand():
@@ -100,25 +210,68 @@ def test_figure_has_a_row_a_channel_with_units_and_no_overlap():
     assert figure.axes[-1].get_xlabel() == "time [s]"
 
 
-def test_long_records_get_an_enlarged_part():
+def lengthened(short):
+    """The same, repeated over 600 s."""
+    time = np.arange(1, 6001) * 0.1
+    parts = {}
+    for key in ("forecast", "measured", "inputs", "band"):
+        each = getattr(short, key)
+        if each is not None:
+            parts[key] = each.interp(time=np.mod(time, 39.0) + 0.5).assign_coords(time=time)
+            parts[key].attrs = each.attrs
+    return replace(short, **parts)
+
+
+@pytest.mark.parametrize("make", [comparison, ensemble])
+def test_long_records_get_envelopes_and_an_enlarged_part(make):
     pytest.importorskip("matplotlib")
     from seakeep.report.overlay import overlay_figure
 
-    short = comparison()
-    time = np.arange(1, 6001) * 0.1
-    long = Comparison(
-        "r",
-        "",
-        *(
-            each.interp(time=np.mod(time, 39.0) + 0.5).assign_coords(time=time)
-            for each in (short.forecast, short.measured, short.inputs)
-        ),
-    )
-    long.forecast.attrs = short.forecast.attrs
+    long = lengthened(make())
     figure = overlay_figure(long)
     assert len(figure.axes) == 8
     low, high = figure.axes[1].get_xlim()
     assert high - low < 0.4 * 600
+    # Nothing of the whole record is drawn as a line: a step a period, from its least to its most.
+    assert not figure.axes[0].lines
+    measured = figure.axes[0].patches[0].get_data()
+    assert 80 < len(measured.values) <= 150
+    assert measured.values.max() == pytest.approx(float(long.measured["heave"].max()))
+    assert measured.baseline.min() == pytest.approx(float(long.measured["heave"].min()))
+    assert np.all(measured.values >= measured.baseline)
+
+
+def test_an_envelope_ends_where_a_forecast_is_lost():
+    pytest.importorskip("matplotlib")
+    from seakeep.report.overlay import overlay_figure
+
+    long = lengthened(comparison(status="diverged at t = 300 s"))
+    lost = long.forecast.where(long.forecast["time"] < 300.0)
+    lost.attrs = long.forecast.attrs
+    figure = overlay_figure(replace(long, forecast=lost))
+    figure.draw_without_rendering()
+    reached = figure.axes[0].patches[1].get_data()
+    known = np.isfinite(reached.values)
+    assert 0.4 < known.mean() < 0.6
+    assert not np.any(known[np.argmin(known) :])
+
+
+def test_statuses_follow_the_clock_of_full_scale():
+    single = comparison(status="diverged at t = 3.5 s")
+    assert at_full_scale(single, 4.0).status == "diverged at t = 7 s"
+    assert at_full_scale(comparison(), 4.0).status == "ok"
+    members = xr.Dataset(
+        {
+            "heave": (("member", "time"), np.ones((2, 3)), {"units": "m"}),
+            "status": ("member", np.array(["ok", "diverged at t = 2 s"])),
+        },
+        coords={"time": [1.0, 2.0, 3.0]},
+        attrs={"status": "1 of 2 members diverged", "start": 0.5},
+    )
+    full = forecast_at_full_scale(members, 4.0)
+    assert list(full["status"].values) == ["ok", "diverged at t = 4 s"]
+    assert full.attrs["status"] == "1 of 2 members diverged"
+    assert full.attrs["start"] == 1.0
 
 
 def test_without_matplotlib_the_message_names_the_extra(monkeypatch):
