@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
@@ -134,12 +135,17 @@ class _OneBlasThread:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._inside = 0
+        self._controller: Any = None
+        self._modules = 0
         self._limits: Any = None
 
     def __enter__(self) -> None:
         with self._lock:
             if self._inside == 0:
-                self._limits = threadpoolctl.threadpool_limits(1, user_api="blas")
+                if self._modules != len(sys.modules):  # a library may have come with a module
+                    self._controller = threadpoolctl.ThreadpoolController()
+                    self._modules = len(sys.modules)
+                self._limits = self._controller.limit(limits=1, user_api="blas")
             self._inside += 1
 
     def __exit__(
