@@ -1,10 +1,10 @@
 """Growth of time and memory against the count of operations and bytes: ``run.py --only scaling``.
 
 One length at a time is varied around the problem of the paper's size, on one BLAS thread. Times are
-the least processor time of a few repetitions (what the machine does when little disturbs it); memory is the peak
-of what Python and NumPy hold, with temporary blocks cut to what is used of them. Beside each
-measured line stands its model: operations at the rate of a large matrix product on this machine,
-the limit of the core, and numbers held times eight bytes.
+the least processor time of a few repetitions; memory is the peak of what Python and NumPy hold,
+with temporary blocks cut to what is used of them. Beside each measured line stands its model:
+operations at the rate of a large matrix product on this machine, the limit of the core, and numbers
+held times eight bytes.
 """
 
 from __future__ import annotations
