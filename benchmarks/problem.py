@@ -13,6 +13,12 @@ STATE_DELAYS, INPUT_DELAYS, SNAPSHOTS, RIDGE = 32, 160, 640, 100.0
 STEPS = 480
 DT = 1.64 / 32
 NOISE = 0.05
+"""White noise on the states, standard deviations."""
+INPUT_NOISE = 0.01
+"""The same on the measured inputs, as a wave probe has it.
+
+Without any, a narrow-banded sea tells its own future from its past, and subspace methods (N4SID),
+which take the future input out of the future output, are left with nothing to identify."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +44,7 @@ def linear_system(samples: int = 4096, states: int = STATES, inputs: int = INPUT
     Returns
     -------
     Problem
-        Unit-variance states with white noise of 0.05 standard deviations on top.
+        Unit-variance states and inputs, with white noise on top.
     """
     rng = np.random.default_rng(seed)
     time = np.arange(samples + 512) * DT
@@ -67,6 +73,7 @@ def linear_system(samples: int = 4096, states: int = STATES, inputs: int = INPUT
     motions = modal @ rng.normal(size=(2 * modes, states))
     motions, sea = motions[512:], sea[512:]
     motions = motions / motions.std(axis=0) + NOISE * rng.normal(size=motions.shape)
+    sea = sea + INPUT_NOISE * rng.normal(size=sea.shape)
     return Problem(np.ascontiguousarray(motions), np.ascontiguousarray(sea), samples // 2)
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import threadpoolctl
 
-PACKAGES = ("seakeep", "numpy", "scipy", "xarray", "scikit-learn", "pykoop", "nfoursid", "dask")
+PACKAGES = ("seakeep", "numpy", "scipy", "xarray", "scikit-learn", "pykoop", "nfoursid")
 
 
 @dataclass(frozen=True)
@@ -144,35 +144,67 @@ def _rate(dtype: type) -> float:
     return 2 * 768**3 / best / 1e9
 
 
-def write(path: Path, sections: Mapping[str, list[Timing]], notes: Mapping[str, object]) -> str:
-    """Write the tables as JSON and Markdown beside each other, and return the Markdown."""
+def write(
+    path: Path,
+    sections: Mapping[str, list[Timing]],
+    notes: Mapping[str, Mapping[str, float]],
+    survey: Mapping[str, Mapping[str, float]],
+) -> str:
+    """Write the tables as JSON and Markdown beside each other, and return the Markdown.
+
+    Parameters
+    ----------
+    path : Path
+        Folder.
+    sections : mapping of str to list of Timing
+        Tables by title.
+    notes : mapping of str to mapping of str to float
+        A number more a contender, by the title of its table: the accuracy.
+    survey : mapping of str to mapping of str to float
+        Milliseconds on another machine, by the title of their table.
+
+    Returns
+    -------
+    str
+        The Markdown.
+    """
     facts = machine()
     path.mkdir(parents=True, exist_ok=True)
     data = {name: [asdict(row) for row in rows] for name, rows in sections.items()}
-    (path / "benchmark.json").write_text(
-        json.dumps({"machine": facts, "notes": dict(notes), "tables": data}, indent=1), "utf-8"
-    )
-    text = [f"Processor {facts['processor']}, {facts['cores']} cores; {', '.join(facts['blas'])};"]
-    text.append(
-        f"one BLAS thread: {facts['gemm_gflops']} GFLOP/s double, {facts['gemm_gflops_single']} "
-        f"single; Python {facts['python']}; "
-        + ", ".join(f"{k} {v}" for k, v in facts["versions"].items())
-        + "."
-    )
-    text += ["", *(f"{key}: {value}" for key, value in notes.items())]
+    everything = {"machine": facts, "accuracy": dict(notes), "survey": dict(survey), "tables": data}
+    (path / "benchmark.json").write_text(json.dumps(everything, indent=1), "utf-8")
+    text = [describe(facts)]
     for name, rows in sections.items():
+        beside, accuracy = survey.get(name, {}), notes.get(name, {})
+        heads = ["", "ms (median)", "ms (least)", "ratio (median)", "range", "peak MiB"]
+        heads += ["survey, ms"] * bool(beside) + ["ANRMSE"] * bool(accuracy)
+        text += ["", f"### {name}", "", f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+        for r in rows:
+            cells = [
+                *(r.name, f"{r.milliseconds:.2f}", f"{r.fastest:.2f}", f"{r.ratio:.3f}"),
+                *(f"{r.ratio_low:.3f}–{r.ratio_high:.3f}", f"{r.peak_mib:.1f}"),
+            ]
+            if beside:
+                cells.append(f"{beside[r.name]:.0f}" if r.name in beside else "–")
+            if accuracy:
+                cells.append(f"{accuracy[r.name]:.3f}" if r.name in accuracy else "–")
+            text.append(f"| {' | '.join(cells)} |")
+    if survey:
         text += [
             "",
-            f"### {name}",
-            "",
-            "| | ms (median) | ms (least) | ratio (median) | range | peak MiB |",
-        ]
-        text.append("|---|---|---|---|---|---|")
-        text += [
-            f"| {r.name} | {r.milliseconds:.2f} | {r.fastest:.2f} | {r.ratio:.3f} | "
-            f"{r.ratio_low:.3f}–{r.ratio_high:.3f} | {r.peak_mib:.1f} |"
-            for r in rows
+            "Survey: milliseconds of an earlier comparison on another machine (54 GFLOP/s "
+            "double); those of seakeep are of its prototype. Compare ratios, not times.",
         ]
     markdown = "\n".join(text) + "\n"
     (path / "benchmark.md").write_text(markdown, "utf-8")
     return markdown
+
+
+def describe(facts: Mapping[str, object]) -> str:
+    """One paragraph: processor, rates, versions."""
+    versions = ", ".join(f"{name} {version}" for name, version in facts["versions"].items())
+    return (
+        f"Processor {facts['processor']}, {facts['cores']} cores; {', '.join(facts['blas'])}; one "
+        f"BLAS thread: {facts['gemm_gflops']} GFLOP/s double, {facts['gemm_gflops_single']} "
+        f"single; Python {facts['python']}; {versions}."
+    )

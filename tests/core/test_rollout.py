@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from seakeep.core import embed, rollout
+from seakeep.core import embed, rollout, snapshot_matrices, solve, training_window
 from seakeep.errors import RequestError
 
 
@@ -137,3 +137,46 @@ def test_shapes_that_do_not_fit_are_named(change, message):
     arguments = {"A": a, "B": b, "histories": histories, "inputs": inputs, **change}
     with pytest.raises(RequestError, match=message):
         rollout(**arguments)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    n=st.integers(1, 4),
+    q=st.integers(0, 2),
+    s=st.integers(1, 5),
+    z=st.integers(0, 5),
+    ridge=st.floats(1e-3, 1e3),
+    seed=st.integers(0, 99),
+)
+def test_the_states_of_a_regressed_matrix_are_told_from_its_lower_rows(n, q, s, z, ridge, seed):
+    assume(n * s > 1)  # one number is always symmetric
+    rng = np.random.default_rng(seed)
+    series, driving = rng.standard_normal((120, n)), rng.standard_normal((120, q))
+    window = training_window(119, None, s, z, "before")
+    y, target = snapshot_matrices(series, driving, window, s, z, all_rows=True)
+    size = n * (s + 1)
+    for fit in (
+        np.linalg.solve(y @ y.T + ridge * np.eye(len(y)), y @ target.T).T,  # the paper's formula
+        solve(y, target, 0.0).coefficients,
+        solve(y, target, 0.0, rank=2 * n).coefficients,
+    ):
+        a, b = fit[:, :size], fit[:, size:]
+        x, u = rng.standard_normal((2, size)), rng.standard_normal((2, 7, q * (z + 1)))
+        assert rollout(a, b, x, u).shape == (2, 7, n)
+        np.testing.assert_array_equal(rollout(a, b, x, u), rollout(a, b, x, u, n_states=n))
+
+
+@pytest.mark.parametrize(
+    "a",
+    [
+        np.random.default_rng(0).standard_normal((6, 6)) / 6,
+        0.5 * np.eye(4),
+        np.diag([0.9, 0.8, 0.7, 0.6, 0.5, 0.4]),
+        [[0.5, 0.1], [0.3, 0.4]],
+    ],
+    ids=["random", "half the identity", "diagonal", "two rows"],
+)
+def test_a_square_matrix_without_delays_returns_its_whole_state(a):
+    size = len(a)
+    out = rollout(a, np.ones((size, 1)), np.ones((1, size)), np.zeros((1, 3, 1)))
+    assert out.shape == (1, 3, size)

@@ -35,6 +35,8 @@ FloatArray = npt.NDArray[np.float64]
 
 PIECE = 4_000_000
 """Numbers, about, that a piece of a long run holds at once."""
+SYMMETRIC = 1e-8
+"""Part of its largest entry by which a symmetric matrix may differ from its mirror image."""
 
 
 def rollout(
@@ -62,10 +64,11 @@ def rollout(
         Extended inputs :math:`\hat u_0 … \hat u_{steps-1}`, newest block first; or the samples
         themselves, oldest first. A model without input takes shape (window, steps, 0).
     n_states : int, optional
-        N. By default it is read from `histories` with three axes, or from an `A` with N rows. A
-        square `A` with extended `histories` leaves it open: lower rows that are an exact shift are
-        read as delays, and any other square `A` as N = N(s+1), so that the whole extended state
-        is returned.
+        N. By default it is read from `histories` with three axes, or from an `A` with N rows, or
+        from the lower rows of a square `A`: an exact shift, or regressed rows, which are a
+        symmetric matrix but for their last N columns. A square `A` that is neither has no delays
+        that could be told, and its whole state is returned. Give N where `A` has two rows and was
+        regressed: one number is always symmetric.
     scratch : Scratch, optional
         Memory of an earlier call to use again.
 
@@ -208,13 +211,31 @@ def _count_states(a: FloatArray, b: FloatArray, start: FloatArray, given: int | 
         count = rows
     else:
         divisors = (n for n in range(1, size + 1) if size % n == 0)
-        count = next(n for n in divisors if _shifts_exactly(a, b, n))
+        count = next(n for n in divisors if _shifts_exactly(a, b, n) or _is_regressed(a, n))
     if count < 1 or size % count or rows not in (count, size):
         raise RequestError(
             f"A of shape {a.shape} does not belong to {count} states: its columns must be a "
             "multiple of N, and its rows N or all of them."
         )
     return count
+
+
+def _is_regressed(a: FloatArray, count: int) -> bool:
+    """Whether the lower rows are those of a least-squares fit to delayed states.
+
+    Their targets are rows P of the regressors themselves, so the fit is P times a smoother of the
+    regressors onto themselves, with ridge or without, which is symmetric and not negative.
+    """
+    kept = len(a) - count
+    block = a[count:, :kept]
+    if kept < 2 or not np.all(np.diagonal(block) > 0):
+        return False
+    tolerance = SYMMETRIC * np.abs(block).max()
+    # The first row tells most other matrices apart.
+    return bool(
+        np.all(np.abs(block[0] - block[:, 0]) <= tolerance)
+        and np.all(np.abs(block - block.T) <= tolerance)
+    )
 
 
 def _shifts_exactly(a: FloatArray, b: FloatArray, count: int) -> bool:
