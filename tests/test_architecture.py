@@ -11,6 +11,7 @@ SOURCE = Path(__file__).parents[1] / "src" / "seakeep"
 FLOORS = {
     "errors": 0,
     "files": 1,
+    "interruption": 1,
     "waves": 1,
     "conventions": 2,
     "signals": 2,

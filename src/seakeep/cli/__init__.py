@@ -13,6 +13,7 @@ from seakeep.cli import campaigns, information, modelling, tank, tracking
 from seakeep.cli import study as studying
 from seakeep.cli.console import messages, tell_warnings
 from seakeep.errors import SeakeepError
+from seakeep.interruption import interruptible
 
 __all__ = ["app", "main"]
 
@@ -81,7 +82,7 @@ def main(arguments: list[str] | None = None) -> int:
     received = [each for each in received if each != "--debug"]
     command = typer.main.get_command(app)
     try:
-        with tell_warnings():
+        with tell_warnings(), interruptible():
             command.main(args=received, prog_name="seakeep")
     except SystemExit as leaving:
         status = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)

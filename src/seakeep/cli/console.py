@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from seakeep.campaign.prepare import Progress as Report
 from seakeep.errors import SeakeepWarning
+from seakeep.interruption import check_interrupted
 
 __all__ = ["messages", "progress_bar", "results", "tell_warnings", "worker_count"]
 
@@ -47,6 +48,7 @@ def progress_bar(what: str) -> Iterator[Report]:
     if not console.is_terminal:
 
         def line(done: int, total: int, name: str) -> None:
+            check_interrupted()
             console.print(f"{what} {done}/{total}: {name}")
 
         yield line
@@ -63,6 +65,7 @@ def progress_bar(what: str) -> Iterator[Report]:
         task = bar.add_task(what, total=None)
 
         def advance(done: int, total: int, name: str) -> None:
+            check_interrupted()
             bar.update(task, total=total, completed=done, description=f"{what}: {name}")
 
         yield advance

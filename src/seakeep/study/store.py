@@ -18,6 +18,7 @@ import xarray as xr
 
 from seakeep.errors import DataError, RequestError, SeakeepError
 from seakeep.files import replacing
+from seakeep.interruption import uninterrupted
 
 __all__ = [
     "RESULT",
@@ -126,6 +127,7 @@ class CellFolder:
         """
         kept: dict[str, Any] = {key: np.asarray(value) for key, value in arrays.items()}
         with (
+            uninterrupted(),
             storing(self.folder),
             replacing(self._path(name)) as temporary,
             temporary.open("wb") as file,
@@ -148,6 +150,7 @@ class CellFolder:
         try:
             # numpy leaves a damaged file open that it opened itself
             with (
+                uninterrupted(),
                 self._path(name).open("rb") as opened,
                 np.load(opened, allow_pickle=False) as file,
             ):
@@ -277,7 +280,7 @@ def write_result(
         If the file cannot be written.
     """
     kept = {**attrs, "format": FORMAT, "created": datetime.now(UTC).isoformat(timespec="seconds")}
-    with storing(folder), replacing(folder / RESULT) as temporary:
+    with uninterrupted(), storing(folder), replacing(folder / RESULT) as temporary:
         xr.Dataset(attrs=kept).to_netcdf(temporary, engine="h5netcdf", mode="w")
         for name, group in groups.items():
             packed = {
