@@ -84,7 +84,9 @@ def test_the_truth_is_read_at_the_instants_of_the_windows(found):
 def test_a_truth_that_is_missing_is_named(place, tmp_path):
     path = place / "study.toml"
     other = tmp_path / "study.toml"
-    text = path.read_text("utf-8").replace('"campaign.toml"', f'"{(place / "campaign.toml").as_posix()}"')
+    text = path.read_text("utf-8").replace(
+        '"campaign.toml"', f'"{(place / "campaign.toml").as_posix()}"'
+    )
     other.write_text(text, "utf-8")
     with pytest.raises(DataError, match=r"truth of true channels, and unseen.nc is not in it"):
         run_study(read_study(other), tmp_path / "out")
