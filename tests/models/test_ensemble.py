@@ -456,7 +456,7 @@ def test_messages_of_forecasts(run):
     with pytest.raises(RequestError, match="workers must be a positive integer; received 0"):
         ensemble.forecast(run, start=65.0, steps=5, workers=0)
     with pytest.raises(
-        RequestError, match="backend must be 'processes' or 'threads'; received 'x'"
+        RequestError, match="backend must be 'processes', 'threads' or 'auto'; received 'x'"
     ):
         ensemble.forecast(run, start=65.0, steps=5, backend="x")
     with pytest.raises(RequestError, match="level must lie between 0 and 1; received 95"):
