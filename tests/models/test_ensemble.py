@@ -1,4 +1,5 @@
 import dataclasses
+import signal
 
 import numpy as np
 import pytest
@@ -199,6 +200,23 @@ def test_the_summary_is_that_of_the_members(run, monkeypatch):
         for name in STATES:
             np.testing.assert_array_equal(found[name], expected[name])
     assert (found.members, found.diverged, found.level) == (6, 0, 0.9)
+
+
+def test_no_room_for_spilled_members_is_told(run, monkeypatch):
+    resource = pytest.importorskip("resource", reason="file sizes are limited on POSIX alone")
+    monkeypatch.setattr(summaries, "HELD", 0)
+    ensemble = fitted(run)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        with pytest.raises(seakeep.RequestError) as told:
+            ensemble.forecast_summary(run, start=65.0, steps=77)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, ignored)
+    assert "cannot keep 0 MiB of members in the temporary folder" in str(told.value)
+    assert "Free space there, name a folder on another disk" in str(told.value)
 
 
 def test_windows_side_by_side_equal_single_forecasts(run):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import math
+import os
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -170,7 +172,18 @@ class _Spilled:
 
     def __init__(self, shape: tuple[int, ...], file: BinaryIO) -> None:
         self._shape, self._file = shape, file
-        file.truncate(8 * math.prod(shape))
+        self._size = 8 * math.prod(shape)
+        with _spilling(self._size):
+            self._reserve()
+
+    def _reserve(self) -> None:
+        """Take the room now where that can be done: a full disk is told before the work."""
+        try:
+            os.posix_fallocate(self._file.fileno(), 0, self._size)
+        except (AttributeError, OSError) as error:
+            if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+                raise
+            self._file.truncate(self._size)
 
     def _seek(self, window: int, piece: int, member: int) -> None:
         place = np.ravel_multi_index((window, piece, member), self._shape[:3])
@@ -178,14 +191,30 @@ class _Spilled:
 
     def put(self, window: int, piece: int, member: int, part: FloatArray) -> None:
         """Keep a piece of a member, shape (time, N)."""
-        self._seek(window, piece, member)
-        self._file.write(np.ascontiguousarray(part).data)
+        left = np.ascontiguousarray(part).data.cast("B")
+        with _spilling(self._size):
+            self._seek(window, piece, member)
+            while left:
+                left = left[self._file.write(left) :]
 
     def get(self, window: int, piece: int) -> FloatArray:
         """A piece of all members, shape (member, length, N)."""
         self._seek(window, piece, 0)
         shape = self._shape[2:]
         return np.fromfile(self._file, dtype=np.float64, count=math.prod(shape)).reshape(shape)
+
+
+@contextmanager
+def _spilling(size: int) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise RequestError(
+            f"cannot keep {size / 2**20:.0f} MiB of members in the temporary folder "
+            f"{tempfile.gettempdir()}: {error.strerror or error}. Free space there, name a folder "
+            "on another disk in the environment variable TMPDIR, or ask for fewer steps, windows "
+            "or members at a time."
+        ) from error
 
 
 @contextmanager
