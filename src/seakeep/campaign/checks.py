@@ -50,7 +50,7 @@ class Finding:
         Channel, or the logger for a clock.
     kind : str
         ``constant``, ``missing``, ``outliers``, ``saturated``, ``stuck``, ``drift``, ``lag``,
-        ``resolution``, ``agreement`` or ``clock``.
+        ``resolution``, ``agreement``, ``clock`` or ``left out``.
     text : str
         What, how much, and what was done about it.
     """
@@ -126,11 +126,13 @@ def checked(
     whole: xr.Dataset,
     clocks: Mapping[str, Clock],
     settings: CampaignSettings,
+    left_out: Mapping[str, str],
 ) -> str:
     """All findings of a run, as the attribute ``quality`` holds them."""
     pairs, _ = check_pairs(whole, settings)
     every = told_samples(groups) + check_levels(whole) + pairs
-    return as_attribute(every + check_clocks(clocks, groups, settings))
+    others = [Finding("other runs", "left out", words) for words in left_out.values()]
+    return as_attribute(every + check_clocks(clocks, groups, settings) + others)
 
 
 _KINDS = {MISSING: "missing", OUTLIER: "outliers", SATURATED: "saturated", STUCK: "stuck",
