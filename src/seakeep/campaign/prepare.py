@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.channels import Group, read_groups
-from seakeep.campaign.checks import checked
+from seakeep.campaign.checks import as_attribute, checked, warn_of_positions
 from seakeep.campaign.instruments import open_loggers
 from seakeep.campaign.labels import attributes_of, cropped, role_of
 from seakeep.campaign.periods import counted, in_seconds, parse_periods
@@ -395,7 +395,7 @@ class Campaign:
         for name in wanted:
             self._run(name)
         found, settings, period, dt = self._whole(wanted, progress)
-        stated = dt is not None
+        stated, misplaced = dt is not None, set[str]()
         for done, name in enumerate(wanted, 1):
             groups = self._groups(name, found, settings)
             reference = _reference_time(groups)
@@ -407,11 +407,12 @@ class Campaign:
                     f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                 )
             whole = on_one_axis(groups, dt, settings, name)
-            findings = checked(groups, whole, found.clocks[name], settings)
+            findings = checked(name, groups, whole, found.clocks[name], settings)
+            warn_of_positions(findings, name, misplaced)
             record = (float(reference[0]), float(reference[-1]))
             run = cropped(whole, name, settings.runs[name], record)
             run.attrs.update(self._attributes(name, run, dt, found, settings))
-            run.attrs["quality"] = findings
+            run.attrs["quality"] = as_attribute(findings)
             if period is not None:
                 run.attrs["encounter_period"] = period
             if progress is not None:
