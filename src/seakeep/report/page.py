@@ -142,9 +142,11 @@ def write_report(result: StudyResult, progress: Progress | None = None) -> Path:
         for number, each in enumerate(figures):
             tell(number, len(figures), f"drawing {each.name.replace('_', ' ')}")
             figure = each.draw()
+            if each.raster:
+                figure.set_dpi(RASTER_DPI)
             _lay_out(figure)
             picture = result.folder / "figures" / f"{each.name}.png"
-            save_figure(figure, picture, RASTER_DPI if each.raster else None)
+            save_figure(figure, picture, figure.dpi)
             if each.raster:
                 drawn.setdefault(each.section, []).append((each, inline_png(picture, each.name)))
                 continue

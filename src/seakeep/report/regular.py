@@ -141,7 +141,10 @@ def _celerity_words(at: xr.Dataset, facts: dict[str, float]) -> list[str]:
         f"forecast {abs(lead):.0f}° {sense}."
     )
     if abs(lead) > PHASE:
-        said += " Alignment by linear dispersion (mode = 'dispersion') has no such error."
+        said += (
+            " Alignment by linear dispersion (mode = 'dispersion') has none of this error of one "
+            "celerity; the other causes of error remain."
+        )
     return [said]
 
 
