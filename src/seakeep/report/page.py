@@ -374,9 +374,13 @@ def _table(table: ReportTable) -> str:
         cells = "".join(cell("td", text, k) for k, text in enumerate(row))
         rows.append(f"<tr{attribute}>{cells}</tr>")
     note = f'<p class="note">{html.escape(table.note)}</p>' if table.note else ""
-    return (
+    text = (
         f'<div class="table" id="table-{table.name}"><button class="copy">Copy table</button>'
         f'<div class="scroll"><table><caption>{html.escape(table.title)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>{note}"
         f"<p class='note only-screen'>Files: tables/{table.name}.csv, .tex.</p></div>"
     )
+    if not table.folded:
+        return text
+    title = html.escape(table.title)
+    return f'<details class="only-screen"><summary>{title}</summary>\n{text}</details>'

@@ -226,6 +226,7 @@ def quality_table(result: StudyResult, name: str) -> ReportTable:
         "run. Frozen: samples equal to both neighbours. Slack: a load below 0.1 % of its largest. "
         "Flagged: part of the samples.",
         (3, 4, 5, 6, 7, 8),
+        folded=True,
     )  # fmt: skip
 
 
