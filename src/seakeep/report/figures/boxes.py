@@ -110,7 +110,7 @@ def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
                 for number, model in enumerate(result.models):
                     values = average_of(_cells(result, test, model, measure))
                     _draw_beside(axes, result, values, place, number, model)
-            labels = [textwrap.fill(result.label_of(test), NARROW) for test in tests]
+            labels = [_narrow(result.label_of(test)) for test in tests]
             _finish(axes, labels, heading)
             axes.set_xlim(-0.6, len(tests) - 0.4)
         _legend(figure, result)
@@ -158,6 +158,13 @@ def _draw_beside(
     width = 0.84 / len(result.models)
     centre = place + width * (number - 0.5 * (len(result.models) - 1))
     draw_box_violin(axes, values, centre, 0.92 * width, model_colour(result, model))
+
+
+def _narrow(label: str) -> str:
+    """A label in lines, parted behind its commas first."""
+    if len(label) <= NARROW:
+        return label
+    return "\n".join(textwrap.fill(part, NARROW) for part in label.replace(", ", ",\n").split("\n"))
 
 
 def _finish(axes: Any, labels: Sequence[str], heading: str) -> None:
