@@ -357,6 +357,8 @@ def test_the_summary_says_what_the_members_are(run):
     assert "2 runs, a window of one of them a member, drawn" in windows.summary()
     whole = small(train_length=None, ridge=STABLE).fit(run, STATES, INPUTS)
     assert "window        all of a run" in whole.summary()
+    single = small(state_delay=Fixed(1.0), ridge=STABLE).fit(run, STATES, INPUTS)
+    assert "state delay   1 encounter period (" in single.summary()
 
 
 def test_spectral_radii_are_those_of_the_members_for_any_workers(run, tmp_path):
