@@ -2,24 +2,30 @@
 
     python docs/figures/make_figures.py indices     # docs/figures/indices.svg and .png
     python docs/figures/make_figures.py tutorial    # docs/figures/unseen.png and band.png
+    python docs/figures/make_figures.py study       # the report of the tutorial's study; needs Chromium
     python docs/figures/make_figures.py tank        # the virtual tank's; extras tank and video
     python docs/figures/make_figures.py ntnu sjtu   # examples/*/figures; need SEAKEEP_DATA_DIR
 
 Figures of results are drawn small and in few colours, so that the repository stays light.
 """
 
+import shutil
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from PIL import Image
 
 import seakeep
 from seakeep.report.overlay import overlay_figure
+from seakeep.report.page import write_report
 from seakeep.report.style import save_figure
-from seakeep.study import compare, fit_campaign, in_degrees
+from seakeep.study import compare, fit_campaign, in_degrees, read_study, run_study
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -198,6 +204,24 @@ def tutorial():
     save(overlay_figure(in_degrees(around)), HERE / "band.png")
 
 
+def study():
+    """Top of the report of the tutorial's study, as a browser shows it, and one of its figures."""
+    browsers = ("chromium", "chromium-browser", "google-chrome")
+    browser = next((found for name in browsers if (found := shutil.which(name))), None)
+    if browser is None:
+        sys.exit(f"no browser: install one of {', '.join(browsers)}")
+    asked = read_study(ROOT / "docs" / "tutorial" / "study.toml")
+    with tempfile.TemporaryDirectory() as folder:
+        page = write_report(run_study(asked, Path(folder) / "study"))
+        shot = Path(folder) / "report.png"
+        options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]
+        size = ["--window-size=1200,1000", f"--screenshot={shot}"]
+        subprocess.run([browser, *options, *size, page.as_uri()], check=True, capture_output=True)
+        with Image.open(shot) as picture:
+            picture.convert("RGB").quantize(32).save(HERE / "report.png", optimize=True)
+        shutil.copy(page.parent / "figures" / "error_over_time.png", HERE / "report_age.png")
+
+
 def ntnu():
     """Motions, sway and tensions of the ship section's test runs."""
     folder = EXAMPLES / "ntnu_ship_section"
@@ -236,7 +260,7 @@ def tank():
     cv2.imwrite(str(HERE / "tank_side_view.jpg"), small, [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 
-DRAWINGS = {each.__name__: each for each in (indices, tutorial, ntnu, sjtu, tank)}
+DRAWINGS = {each.__name__: each for each in (indices, tutorial, study, ntnu, sjtu, tank)}
 
 if __name__ == "__main__":
     for wanted in sys.argv[1:] or ["indices"]:

@@ -9,7 +9,14 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-__all__ = ["DataError", "RequestError", "SeakeepError", "SeakeepWarning", "did_you_mean"]
+__all__ = [
+    "DataError",
+    "MissingFileError",
+    "RequestError",
+    "SeakeepError",
+    "SeakeepWarning",
+    "did_you_mean",
+]
 
 
 class SeakeepError(Exception):
@@ -22,6 +29,10 @@ class RequestError(SeakeepError, ValueError):
     """The request is wrong: an unknown name, a setting out of range, a key that does not exist."""
 
     exit_status = 2
+
+
+class MissingFileError(RequestError):
+    """A file that the request names is not there."""
 
 
 class DataError(SeakeepError, ValueError):

@@ -2,8 +2,10 @@
 
 import re
 import shutil
+import sqlite3
 import struct
 import zlib
+from contextlib import closing
 from functools import cache
 
 import h5py
@@ -56,19 +58,24 @@ def tdms(path):
 
 
 def mcap(path):
+    folder = bag(path.with_name("bag"), "MCAP")
+    shutil.move(next(folder.glob("*.mcap")), path)
+    shutil.rmtree(folder)
+
+
+def bag(folder, storage="SQLITE3"):
+    """A bag of ROS 2: a folder with metadata.yaml and its recording."""
     pytest.importorskip("rosbags")
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    kind, folder = "std_msgs/msg/Float64", path.with_name("bag")
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+    store, kind = get_typestore(Stores.ROS2_HUMBLE), "std_msgs/msg/Float64"
+    with Writer(folder, version=9, storage_plugin=StoragePlugin[storage]) as writer:
         topic = writer.add_connection("/heave", kind, typestore=store)
         for t, x in zip(T, HEAVE, strict=True):
             message = store.types[kind](data=float(x))
             writer.write(topic, int(1e9 * t), store.serialize_cdr(message, kind))
-    shutil.move(next(folder.glob("*.mcap")), path)
-    shutil.rmtree(folder)
+    return folder
 
 
 def read_table_of():
@@ -192,6 +199,71 @@ def test_a_sound_file_under_another_name_is_recognised(tmp_path, make, suffix):
     make(path)
     path = path.rename(tmp_path / f"run{suffix}")
     np.testing.assert_array_equal(read_table(path)["heave"], HEAVE)
+
+
+class TestBagFolder:
+    """A ROS 2 bag as it lies on disk: metadata.yaml beside a ``.db3``, either of them bad."""
+
+    @pytest.fixture
+    def folder(self, tmp_path):
+        made = bag(tmp_path / "bag")
+        database = next(made.glob("*.db3"))
+        for path in (made, database):
+            assert read_table(path).sizes["time"] == T.size
+        return made
+
+    @staticmethod
+    def refused(path, message=r"ROS 2: cut off, damaged or of another kind \(.+\)\. Copy it again"):
+        with pytest.raises(DataError, match=rf"{re.escape(str(path))} .*{message}"):
+            read_table(path)
+
+    def test_empty(self, folder):
+        database = next(folder.glob("*.db3"))
+        database.write_bytes(b"")
+        self.refused(folder)
+        self.refused(database, r"is empty \(0 bytes\)\. Export the run again")
+
+    @pytest.mark.parametrize("part", [0.01, 0.15, 0.5, 0.9, 0.999])
+    def test_truncated(self, folder, part):
+        database = next(folder.glob("*.db3"))
+        whole = database.read_bytes()
+        database.write_bytes(whole[: int(part * len(whole))])
+        self.refused(folder)
+        self.refused(database)
+
+    @pytest.mark.parametrize(
+        "content",
+        [png(), b"time,heave\n0,1\n1,2\n", "é°".encode("latin-1") * 9, bytes(range(256))],
+    )
+    def test_foreign(self, folder, content):
+        database = next(folder.glob("*.db3"))
+        database.write_bytes(content)
+        self.refused(folder)
+        self.refused(database, "is a PNG|holds text and begins with|cannot be read as a recording")
+
+    def test_a_database_of_another_kind(self, folder):
+        database = next(folder.glob("*.db3"))
+        database.unlink()
+        with closing(sqlite3.connect(database)) as made:
+            made.execute("create table samples (heave real)")
+        self.refused(folder)
+        self.refused(database)
+
+    @pytest.mark.parametrize("content", [b"", b"- 1\n- 2\n", "é: [".encode("latin-1"), png(), None])
+    def test_metadata(self, folder, content):
+        metadata = folder / "metadata.yaml"
+        whole = metadata.read_bytes()
+        metadata.write_bytes(whole[: len(whole) // 2] if content is None else content)
+        self.refused(folder)
+
+    def test_missing_parts(self, folder):
+        database = next(folder.glob("*.db3"))
+        moved = database.rename(folder.with_name("alone.db3"))
+        self.refused(folder, r"Some database files are missing")
+        assert read_table(moved).sizes["time"] == T.size  # the recording knows its own topics
+        (folder / "metadata.yaml").unlink()
+        with pytest.raises(RequestError, match="is a folder; give the file in it"):
+            read_table(folder)
 
 
 def test_units_of_an_attribute_that_is_not_utf_8(tmp_path):

@@ -9,7 +9,8 @@ from scipy import io
 from small_tank import tank_columns, write_csv
 
 from seakeep.campaign import read_campaign
-from seakeep.campaign.drafts import draft_campaign, suggest_channel
+from seakeep.campaign.drafts import draft_campaign
+from seakeep.campaign.guesses import suggest_channel
 from seakeep.errors import DataError, RequestError
 
 
@@ -58,6 +59,22 @@ def drafted(folder, files):
 )
 def test_guesses(column, unit, channel):
     assert suggest_channel(column, unit) == channel
+
+
+@pytest.mark.parametrize(
+    ("column", "unit", "logger", "channel"),
+    [
+        ("us_fwd", "mm", "wave_probes", "eta_us_fwd"),
+        ("carriage", "V", "wave_probes", "carriage"),
+        ("us_fwd", "mm", "mru", "us_fwd"),
+        ("rate_x", "deg/s", "mru", "roll_rate"),
+        ("rate_y", "deg/s", "mru", "pitch_rate"),
+        ("gyro z", "rad/s", "imu", "yaw_rate"),
+        ("acc x", "g", "imu", "surge_acceleration"),
+    ],
+)
+def test_guesses_of_loggers(column, unit, logger, channel):
+    assert suggest_channel(column, unit, logger) == channel
 
 
 def test_draft_of_a_tank(tmp_path):
@@ -194,3 +211,139 @@ def test_nothing_to_draft_from(tmp_path):
     path.write_text("")
     with pytest.raises(DataError, match="is empty"):
         draft_campaign([path])
+
+
+def switched_on(text):
+    """The draft with its proposals of derived channels in use."""
+    lines = text.splitlines()
+    begin = lines.index("# Channels may be made from others, such as:") + 1
+    end = next(i for i in range(begin, len(lines)) if not lines[i].startswith("# "))
+    return "\n".join([*lines[:begin], *(line[2:] for line in lines[begin:end]), *lines[end:]])
+
+
+def accelerations(columns):
+    columns["ACC_Heave_SB [m/s2]"] = columns["ACC_Heave_PS [m/s2]"] = 9.81 * columns.pop("acc [g]")
+
+
+@pytest.mark.parametrize(
+    ("change", "made"),
+    [
+        (lambda columns: None, {"heave_rate"}),
+        (lambda columns: columns.update({"acc heave [g]": columns.pop("acc [g]")}),
+         {"heave_rate", "heave_of_acceleration"}),
+        (accelerations, {"heave_acceleration", "heave_rate", "heave_of_acceleration"}),
+        (lambda columns: columns.update({"acc heave [g]": columns.pop("Heave [mm]")}),
+         {"heave_rate", "heave"}),
+        (lambda columns: columns.update({"heave rate [m/s]": columns.pop("Pitch (deg)")}), None),
+    ],
+)  # fmt: skip
+def test_proposed_channels_clash_with_none_and_can_be_switched_on(tmp_path, change, made):
+    columns = tank_columns()
+    change(columns)
+    text, _ = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
+    if made is None:
+        assert "# [derived" not in text
+        return
+    (tmp_path / "campaign.toml").write_text(switched_on(text))
+    found = read_campaign(tmp_path / "campaign.toml")
+    assert set(found.settings.derived) == made
+    assert made <= set(found.prepare()["run"])
+
+
+def test_motions_are_the_states_and_loads_are_named_beside_them(tmp_path):
+    columns = tank_columns()
+    columns["Tension_SB [N]"] = columns["Heave [mm]"]
+    columns["Acc z [g]"] = columns.pop("acc [g]")
+    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
+    assert campaign.model().states == ("heave", "pitch")
+    assert "# Loads (mooring_starboard) may be added to the states" in text
+    only = {k: v for k, v in columns.items() if k.split()[0] in ("Time", "WP", "Acc", "Tension_SB")}
+    _, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", only)])
+    assert campaign.model().states == ("heave_acceleration",)
+    only.pop("Acc z [g]")
+    _, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", only)])
+    assert campaign.model().states == ("mooring_starboard",)
+
+
+def test_delays_count_in_periods_and_say_how_many_samples_they_are(tmp_path):
+    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", tank_columns())])
+    said = re.search(r'^# input_delays = "5 T"  # about (\d+) samples$', text, flags=re.M)
+    switched = re.sub(r"^# (state|input)_delays", r"\1_delays", text, flags=re.M)
+    (tmp_path / "campaign.toml").write_text(switched)
+    assert str(read_campaign(tmp_path / "campaign.toml").model().input_delays) == "5 T"
+    # The spectral peak of the drafted hint and the mean period of the campaign are two things.
+    dt = campaign.prepare()["run"].attrs["dt"]
+    assert int(said[1]) == pytest.approx(5 * campaign.encounter_period() / dt, rel=0.4)
+
+
+def loggers(folder, run, seed, pattern, gap=False):
+    """Files of two loggers of a run, with a trigger; the second clock is 0.5 s late."""
+    columns = tank_columns(seed)
+    time = columns["Time [s]"]
+
+    def pulses(t):
+        return np.where(np.modf(t / 4.0)[0] < 0.05, 5.0, 0.0)
+
+    waves = {"t [s]": time, "trig [V]": pulses(time), "us 1 [mm]": columns["WP fwd [mm]"].copy(),
+             "us 2 [mm]": columns["WP fwd [mm]"]}  # fmt: skip
+    if gap:
+        waves["us 1 [mm]"][100:105] = np.nan
+    vessel = {"t [s]": time, "trig [V]": pulses(time + 0.5), "z [mm]": columns["Heave [mm]"],
+              "rate y [deg/s]": columns["Pitch (deg)"]}  # fmt: skip
+    out = []
+    for logger, content in (("wave_probes", waves), ("mru", vessel)):
+        path = folder / pattern.format(run=run, logger=logger)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        out.append(write_csv(path, content))
+    return out
+
+
+@pytest.mark.parametrize(
+    "pattern", ["{run}/{logger}.csv", "{run}/{run}_{logger}.csv", "{run}_{logger}.csv"]
+)
+@pytest.mark.parametrize("runs", [("a1", "b2", "regular_3"), ("a1",)])
+def test_files_of_several_loggers(tmp_path, pattern, runs):
+    if len(runs) == 1 and pattern == "{run}_{logger}.csv":
+        runs = ("a1", "a2")
+    files = [f for i, run in enumerate(runs) for f in loggers(tmp_path, run, i, pattern, gap=True)]
+    text, campaign = drafted(tmp_path, files)
+    assert campaign.runs == list(runs)
+    assert set(campaign.files_of("a1")) == {"wave_probes", "mru"}
+    assert list(campaign.settings.channels) == ["eta_us_1", "eta_us_2", "heave", "pitch_rate"]
+    assert campaign.model().inputs == ("eta_us_2",)  # the other one has gaps
+    assert campaign.model().states == ("heave", "pitch_rate")
+    assert campaign.settings.preparation.gaps == "mask"
+    assert campaign.settings.instruments.reference == "wave_probes"
+    assert ('waves = "regular" # guessed' in text) is ("regular_3" in runs)
+    prepared = campaign.prepare()
+    assert list(prepared) == list(runs)
+    # Half of a sample: the pulses' edges lie between samples.
+    assert abs(prepared["a1"].attrs["clock_mru_offset"]) == pytest.approx(0.5, abs=0.01)
+
+
+def test_loggers_without_a_trigger_or_a_file(tmp_path):
+    files = []
+    for i, run in enumerate(("a", "b", "c")):
+        files += loggers(tmp_path, run, i, "{run}/{logger}.csv")
+    for path in files:
+        path.write_text(
+            path.read_text().replace("trig [V]", "volts [V]" if "mru" in str(path) else "v2 [V]")
+        )
+    text, campaign = drafted(tmp_path, files[:-1])
+    assert "# no trigger was found in all files: clocks are taken as they are." in text
+    assert 'role = "unused" # it has no file of mru' in text
+    assert campaign.runs == ["a", "b"]
+    assert set(campaign.prepare()) == {"a", "b"}
+
+
+def test_files_that_have_nothing_in_common(tmp_path):
+    (tmp_path / "first.csv").write_text("t [s],heave [m]\n0,1\n1,2\n2,3\n")
+    (tmp_path / "second.csv").write_text("t [s],load [N]\n0,1\n1,2\n2,3\n")
+    other = tmp_path / "other"
+    other.mkdir()
+    moved = (tmp_path / "second.csv").rename(other / "first.csv")
+    with pytest.raises(
+        RequestError,
+        match=r"first\.csv and .*first\.csv have no column in common\. .* as RUN/LOGGER\.csv or",
+    ):
+        draft_campaign([tmp_path / "first.csv", moved])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.campaign import load_prepared, read_campaign, write_prepared
+from seakeep.campaign import draft_campaign, load_prepared, read_campaign, write_prepared
 from seakeep.errors import DataError, RequestError
 
 pytest.importorskip("numba", reason="needs the extra tank")
@@ -135,3 +135,19 @@ def test_files_that_are_damaged(copied):
         raw.write_bytes(content)
         with pytest.raises((DataError, RequestError), match=message):
             read_campaign(path).prepare(["regular_2"])
+
+
+def test_the_draft_of_the_raw_files_prepares_as_it_stands(copied):
+    """What `seakeep init` makes of the tank's raw files, without its campaign file."""
+    folder = copied().parent
+    files = sorted((folder / "raw").glob("*/*.csv"))
+    draft = folder / "draft.toml"
+    draft.write_text(draft_campaign(files, folder), encoding="utf-8")
+    campaign = read_campaign(draft)
+    assert campaign.runs == list(RUNS)
+    assert campaign.model().states[:2] == ("heave", "roll")
+    assert campaign.model().inputs == ("eta_kn_fwd", "eta_kn_cog")
+    run = campaign.prepare(["regular_2"])["regular_2"]
+    # The clock of the camera, as the tank's own campaign file has it: within a tenth of a frame.
+    assert run.attrs["clock_video_offset"] == pytest.approx(-1.2, abs=1 / 300)
+    assert np.isfinite(run[["eta_kn_fwd", "heave", "surge", "mooring_bow"]].to_array()).all()

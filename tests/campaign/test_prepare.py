@@ -272,7 +272,8 @@ class TestEncounterPeriod:
             read_campaign(path).encounter_period()
 
     def test_still_water(self, tank):
-        campaign = rewrite(tank, lambda c: c["WP fwd [mm]"].fill(0.0), "first.csv")
+        for name in ("first.csv", "second.csv"):
+            campaign = rewrite(tank, lambda c: c["WP fwd [mm]"].fill(0.0), name)
         with pytest.raises(DataError, match="run 'first', channel 'eta_fwd': the record of 20"):
             campaign.encounter_period()
         # A constant channel is kept all the same: whether it serves is the model's business.

@@ -110,6 +110,44 @@ def test_forecast_writes_netcdf_and_csv_alike(run, place):
     np.testing.assert_array_equal(table["heave_[m]"], heave)  # CSV keeps all digits
 
 
+@pytest.mark.parametrize("model", ["model.nc", "ensemble.nc"])
+def test_lengths_in_encounter_periods(run, place, model):
+    """`T` is the period of the campaign, prepared or not; instants and steps are rounded."""
+    campaign = seakeep.read_campaign(place / CAMPAIGN)
+    period = campaign.encounter_period()
+    status, _, err = run(
+        f"forecast {model} {CAMPAIGN} --run unseen --start '20 T' --steps '15 T' -o periods.nc"
+    )
+    assert status == 0
+    start, steps = round(20 * period / 0.08) * 0.08, round(15 * period / 0.08)
+    assert f"{steps} instants after t = {start:.10g} s, status ok" in err
+    status, _, _ = run(
+        f"forecast {model} {CAMPAIGN} --run unseen --start {20 * period} --steps {steps} -o s.nc"
+    )
+    with (
+        xr.open_dataset(place / "periods.nc", engine="h5netcdf") as one,
+        xr.open_dataset(place / "s.nc", engine="h5netcdf") as other,
+    ):
+        xr.testing.assert_equal(one, other)
+    pytest.importorskip("matplotlib")
+    assert run(f"compare {model} {CAMPAIGN} --start '20 T' --steps '15 T' -o in_periods")[0] == 0
+    assert run(f"compare {model} {CAMPAIGN} --start {start} --steps {steps} -o in_s")[0] == 0
+    tables = [(place / folder / "comparison.csv").read_text() for folder in ("in_periods", "in_s")]
+    assert tables[0] == tables[1]
+
+
+def test_a_stated_period_counts(run, place):
+    stated = (
+        (place / CAMPAIGN)
+        .read_text()
+        .replace("[campaign]\n", "[campaign]\nencounter_period = 2.0\n")
+    )
+    (place / "docs/tutorial/stated.toml").write_text(stated)
+    command = "forecast model.nc docs/tutorial/stated.toml --run unseen -o stated.nc"
+    _, _, err = run(f"{command} --start '10T' --steps '4 T'")
+    assert "100 instants after t = 20 s, status ok" in err
+
+
 def test_fit_says_what_an_ensemble_is_made_of(run, place):
     status, out, _ = run(f"fit {CAMPAIGN} --model ensemble -o again.nc --workers 2")
     assert status == 0
@@ -299,6 +337,26 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
             f"forecast ensemble.nc {FROM_20} --level 95 -o f.nc",
             2,
             r"level must lie between 0 and 1",
+        ),
+        (
+            f"forecast model.nc {CAMPAIGN} --run unseen --start soon -o f.nc",
+            2,
+            r"--start: received 'soon'\. Give seconds such as 20, or encounter periods such as",
+        ),
+        (
+            f"forecast model.nc {CAMPAIGN} --run unseen --start '4 /T' -o f.nc",
+            2,
+            r"--start: received '4 /T'\. Give seconds",
+        ),
+        (
+            f"compare model.nc {CAMPAIGN} --steps 12.5",
+            2,
+            r"steps: received '12\.5'\. Give a whole number such as 400, or encounter periods",
+        ),
+        (
+            f"forecast model.nc {CAMPAIGN} --run unseen --start '900 T' -o f.nc",
+            2,
+            r"start",
         ),
         (f"forecast ensemble.nc {FROM_20} -o no/f.nc", 2, r"the folder no does not exist"),
         (f"fit {CAMPAIGN} -o m.nc --workers 0", 2, r"Invalid value for '--workers'"),

@@ -188,7 +188,7 @@ class RedundantSettings(Table):
     channels: Names = Field(description="two channels or more of one unit, the trusted one first")
     window: Interval | None = Field(
         default=None,
-        description="length of the windows compared, s or periods; by default 5 dominant periods",
+        description="length of the windows compared, s or periods; by default 4 dominant periods",
     )
 
     @model_validator(mode="after")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +13,16 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.channels import Group, read_groups
-from seakeep.campaign.checks import checked
+from seakeep.campaign.checks import as_attribute, checked, warn_of_positions
 from seakeep.campaign.instruments import open_loggers
 from seakeep.campaign.labels import attributes_of, cropped, role_of
 from seakeep.campaign.periods import counted, in_seconds, parse_periods
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.resampling import on_one_axis, strays
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
-from seakeep.campaign.survey import Survey, survey
+from seakeep.campaign.survey import Failures, Survey, spare, survey
 from seakeep.campaign.validation import read_settings
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
 from seakeep.signals import Clock, uniform_step
 
 __all__ = ["Campaign", "Progress", "read_campaign"]
@@ -186,7 +186,14 @@ class Campaign:
         settings = self.settings
         pooled = settings.instruments.pool_drift and bool(settings.runs[name].files)
         names = dict.fromkeys([name, *(self.runs if pooled or self._measures_period else [])])
-        return hashlib.sha256(" ".join(map(self.checksum_of, names)).encode()).hexdigest()
+        return hashlib.sha256(" ".join(map(self._sum_of, names)).encode()).hexdigest()
+
+    def _sum_of(self, name: str) -> str:
+        """Checksum of a run's files, or a word where one is not there or cannot be read."""
+        try:
+            return self.checksum_of(name)
+        except (MissingFileError, OSError):
+            return "unreadable"
 
     def _run(self, name: str) -> RunSettings:
         runs = self.settings.runs
@@ -247,13 +254,20 @@ class Campaign:
         Raises
         ------
         RequestError, DataError
-            If a file cannot be read or a clock not found.
+            If a file of a wanted run cannot be read or a clock not found. Others that cannot be
+            read are left out of the pooled drifts, with a warning.
         """
         wanted = list(self.runs if names is None else names)
         found = self._survey(wanted, periods=False)
         return {name: dict(found.clocks[name]) for name in wanted}
 
-    def _survey(self, wanted: list[str], periods: bool, progress: Progress | None = None) -> Survey:
+    def _survey(
+        self,
+        wanted: list[str],
+        periods: bool,
+        progress: Progress | None = None,
+        failures: Failures | None = None,
+    ) -> Survey:
         """Clocks of the wanted runs and, if asked for, periods of the irregular ones."""
         several = [n for n in dict.fromkeys([*wanted, *self.runs]) if self._run(n).files]
         pooled = self.settings.instruments.pool_drift and set(wanted) & set(several)
@@ -261,9 +275,9 @@ class Campaign:
         waves = self.settings.period_runs if periods else ()
         channel = self.period_channel() if periods else ""
         settings = self._in_seconds(self.settings.campaign.encounter_period)
-        found = survey(settings, self.files_of, timed, waves, channel, progress)
+        found = survey(settings, self.files_of, timed, waves, channel, progress, wanted, failures)
         one = {n: {"": Clock()} for n in wanted if n not in several}
-        return Survey({**one, **found.clocks}, found.periods)
+        return replace(found, clocks={**one, **found.clocks})
 
     def period_channel(self) -> str:
         """Name of the wave channel that defines the encounter period.
@@ -295,14 +309,15 @@ class Campaign:
         float
             The period stated in ``[campaign]``, s; without it, the mean over the irregular runs
             (all used runs if none is marked irregular) of the zero-up-crossing period of
-            :meth:`period_channel`, each over the run's span, at the file's own rate.
+            :meth:`period_channel`, each over the run's span, at the file's own rate. A run that
+            cannot be read, or holds fewer than two crossings, is left out with a warning.
 
         Raises
         ------
         RequestError
             If there is no wave channel.
         DataError
-            If a record holds fewer than two crossings.
+            If no run is left.
         """
         stated = self.settings.campaign.encounter_period
         if stated is not None:
@@ -372,7 +387,10 @@ class Campaign:
         return dict(self.each_prepared(names, progress))
 
     def each_prepared(
-        self, names: Iterable[str] | None = None, progress: Progress | None = None
+        self,
+        names: Iterable[str] | None = None,
+        progress: Progress | None = None,
+        failures: Failures | None = None,
     ) -> Iterator[tuple[str, xr.Dataset]]:
         """Prepare runs one after the other, as :meth:`prepare` does; only one is held at a time.
 
@@ -380,6 +398,8 @@ class Campaign:
         ----------
         names, progress
             As in :meth:`prepare`.
+        failures : dict of str to SeakeepError, optional
+            Takes the errors of runs that cannot be read, by run, in place of raising them.
 
         Yields
         ------
@@ -394,38 +414,64 @@ class Campaign:
         wanted = list(self.runs if names is None else names)
         for name in wanted:
             self._run(name)
-        found, settings, period, dt = self._whole(wanted, progress)
-        stated = dt is not None
+        found, settings, period, dt = self._whole(wanted, progress, failures=failures)
+        stated, first, misplaced = dt is not None, "", set[str]()
         for done, name in enumerate(wanted, 1):
-            groups = self._groups(name, found, settings)
-            reference = _reference_time(groups)
-            own = uniform_step(reference, f"run '{name}'")
-            dt = own if dt is None else dt
-            if not stated and strays(own, reference.size, dt):
-                raise RequestError(
-                    f"the runs differ in rate: '{wanted[0]}' has a step of {dt:g} s and '{name}' "
-                    f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
-                )
-            whole = on_one_axis(groups, dt, settings, name)
-            findings = checked(groups, whole, found.clocks[name], settings)
-            record = (float(reference[0]), float(reference[-1]))
-            run = cropped(whole, name, settings.runs[name], record)
-            run.attrs.update(self._attributes(name, run, dt, found, settings))
-            run.attrs["quality"] = findings
+            try:
+                if failures is not None and name in failures:
+                    raise failures[name]
+                groups = self._groups(name, found, settings)
+                reference = _reference_time(groups)
+                own = uniform_step(reference, f"run '{name}'")
+                dt, first = own if dt is None else dt, first or name
+                if not stated and strays(own, reference.size, dt):
+                    raise RequestError(
+                        f"the runs differ in rate: '{first}' has a step of {dt:g} s and '{name}' "
+                        f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
+                    )
+                run = self._finished(name, groups, dt, found, settings, misplaced)
+            except SeakeepError as error:
+                spare(failures, name, error)
+                if progress is not None:
+                    progress(done, len(wanted), f"{name} cannot be prepared")
+                continue
             if period is not None:
                 run.attrs["encounter_period"] = period
             if progress is not None:
                 progress(done, len(wanted), name)
             yield name, run
 
+    def _finished(
+        self,
+        name: str,
+        groups: Group,
+        dt: float,
+        found: Survey,
+        settings: CampaignSettings,
+        misplaced: set[str],
+    ) -> xr.Dataset:
+        whole = on_one_axis(groups, dt, settings, name)
+        findings = checked(name, groups, whole, found.clocks[name], settings, found.left_out)
+        warn_of_positions(findings, name, misplaced)
+        reference = _reference_time(groups)
+        record = (float(reference[0]), float(reference[-1]))
+        run = cropped(whole, name, settings.runs[name], record)
+        run.attrs.update(self._attributes(name, run, dt, found, settings))
+        run.attrs["quality"] = as_attribute(findings)
+        return run
+
     def _whole(
-        self, wanted: list[str], progress: Progress | None, steps: bool = True
+        self,
+        wanted: list[str],
+        progress: Progress | None,
+        steps: bool = True,
+        failures: Failures | None = None,
     ) -> tuple[Survey, CampaignSettings, float | None, float | None]:
         """Clocks, settings in seconds, encounter period if it is needed, common step if stated."""
         preparation, period = self.settings.preparation, self.settings.campaign.encounter_period
         counting = steps and preparation.steps_per_period is not None
         needed = counting or self._counts_in_periods
-        found = self._survey(wanted, needed and period is None, progress)
+        found = self._survey(wanted, needed and period is None, progress, failures)
         if needed and period is None:
             period = self._mean_period(found)
         dt = preparation.dt

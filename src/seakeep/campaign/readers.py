@@ -21,7 +21,7 @@ from seakeep.campaign.settings import FileSettings
 from seakeep.campaign.tdms import read_tdms
 from seakeep.campaign.text import read_text
 from seakeep.conventions import conversion
-from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
 from seakeep.signals.clocks import check_order
 
 __all__ = ["expand", "read_columns", "read_table"]
@@ -84,7 +84,7 @@ def _check_there(path: Path) -> None:
     if path.exists():
         return
     if not path.parent.is_dir():
-        raise RequestError(
+        raise MissingFileError(
             f"{path} does not exist: there is no folder {path.parent}. Paths are relative to the "
             "campaign file; ${NAME} stands for an environment variable."
         )
@@ -95,7 +95,9 @@ def _check_there(path: Path) -> None:
     shown = ", ".join(nearest) or "nothing"
     if len(beside) > SHOWN:
         shown = f"{len(beside)} names, the nearest of them {shown}"
-    raise RequestError(f"{path} does not exist.{near} Its folder holds {shown}. Correct the name.")
+    raise MissingFileError(
+        f"{path} does not exist.{near} Its folder holds {shown}. Correct the name."
+    )
 
 
 def read_columns(path: Path, options: FileSettings | None = None) -> Columns:

@@ -12,6 +12,7 @@ import xarray as xr
 
 from seakeep.campaign.labels import version
 from seakeep.campaign.prepare import Campaign, Progress
+from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepWarning
 from seakeep.files import make_folder, replacing
 
@@ -24,10 +25,12 @@ def write_prepared(
     names: Iterable[str] | None = None,
     progress: Progress | None = None,
     anew: bool = False,
+    failures: Failures | None = None,
 ) -> dict[str, Path]:
     """Prepare runs and write each to a NetCDF file as soon as it is done.
 
-    Files that are fresh stay: interrupted half-way, a second call continues.
+    Files that are fresh stay: interrupted half-way, a second call continues. A run that cannot be
+    read does not keep the others from being written.
 
     Parameters
     ----------
@@ -39,17 +42,21 @@ def write_prepared(
         As in :meth:`Campaign.prepare`.
     anew : bool, optional
         Prepare fresh files again too.
+    failures : dict of str to SeakeepError, optional
+        Takes the errors of runs that cannot be read, by run; without it they are raised as one
+        error after the other runs have been written.
 
     Returns
     -------
     dict of str to Path
-        File of each run: ``NAME.nc``, written to a temporary name and renamed.
+        File of each prepared run: ``NAME.nc``, written to a temporary name and renamed.
 
     Raises
     ------
     RequestError, DataError
         As :meth:`Campaign.prepare`.
     """
+    failed: Failures = {} if failures is None else failures
     folder = _folder(campaign, out_dir)
     make_folder(folder)
     wanted = list(campaign.runs if names is None else names)
@@ -63,13 +70,15 @@ def write_prepared(
         if progress is not None:
             progress(done + count if count else 0, done + total, name)
 
-    for name, run in campaign.each_prepared(missing, told):
+    for name, run in campaign.each_prepared(missing, told, failed):
         _write(run, files[name])
         steps.add(float(run.attrs["dt"]))
     if len(steps) > 1:  # runs that were fresh by themselves had another step: only the whole tells
-        for name, run in campaign.each_prepared(wanted, progress):
+        for name, run in campaign.each_prepared(wanted, progress, failed):
             _write(run, files[name])
-    return files
+    if failed and failures is None:
+        raise as_one(failed)
+    return {name: file for name, file in files.items() if name not in failed}
 
 
 def _write(run: xr.Dataset, path: Path) -> None:

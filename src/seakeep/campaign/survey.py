@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import warnings
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from seakeep.campaign.channels import read_groups
-from seakeep.campaign.instruments import clocks_of, open_loggers
+from seakeep.campaign.instruments import Logger, clocks_of, open_loggers
 from seakeep.campaign.resampling import inside, on_one_axis
 from seakeep.campaign.settings import CampaignSettings, RunSettings
-from seakeep.errors import DataError
+from seakeep.errors import DataError, MissingFileError, SeakeepError, SeakeepWarning
 from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step
 from seakeep.signals.synchronise import without_doubtful_drift
 
-__all__ = ["Survey", "survey"]
+__all__ = ["Failures", "Survey", "as_one", "spare", "survey"]
+
+Failures = dict[str, SeakeepError]
+"""Errors by run, where runs that cannot be read shall not stop the others."""
+
+LISTED = 6
+"""Errors of runs that one message holds at most."""
 
 
 @dataclass(frozen=True)
@@ -30,10 +37,45 @@ class Survey:
         By run and logger.
     periods : dict of str to float
         Zero-up-crossing period of the wave channel by run, s.
+    left_out : dict of str to str
+        By run, of what it is no part because it cannot be read, and why.
     """
 
     clocks: Mapping[str, Mapping[str, Clock]]
     periods: Mapping[str, float]
+    left_out: Mapping[str, str] = field(default_factory=dict)
+
+
+def spare(failures: Failures | None, run: str, error: SeakeepError) -> None:
+    """Note the error of a run whose files cannot be read, or raise it.
+
+    Parameters
+    ----------
+    failures : dict of str to SeakeepError, or None
+        Takes the error; None raises it.
+    run : str
+        Name of the run.
+    error : SeakeepError
+        What was wrong. A request that is wrong is so for all runs, and raised anyway.
+
+    Raises
+    ------
+    SeakeepError
+        The error, if it is not to be noted.
+    """
+    if failures is None or not isinstance(error, DataError | MissingFileError):
+        raise error
+    failures[run] = error
+
+
+def as_one(errors: Mapping[str, SeakeepError]) -> SeakeepError:
+    """One error for those of several runs; that of a single run as it is."""
+    if len(errors) == 1:
+        return next(iter(errors.values()))
+    lines = [f"'{run}': {error}" for run, error in list(errors.items())[:LISTED]]
+    if len(errors) > LISTED:
+        lines.append(f"and {len(errors) - LISTED} more")
+    return DataError(f"{len(errors)} runs cannot be read:\n" + "\n".join(lines))
 
 
 def survey(
@@ -43,6 +85,8 @@ def survey(
     period_runs: Sequence[str],
     channel: str,
     progress: Callable[[int, int, str], None] | None = None,
+    asked: Collection[str] = (),
+    failures: Failures | None = None,
 ) -> Survey:
     """Read each run once for its clocks and its period; only one is held at a time.
 
@@ -58,45 +102,88 @@ def survey(
         The wave channel.
     progress : callable, optional
         Called as ``progress(0, total, words)`` before each run.
+    asked : collection of str, optional
+        Runs that are wanted for themselves. Of the others, those that cannot be read are left out
+        of what is pooled, with a warning.
+    failures : dict of str to SeakeepError, optional
+        Takes the errors of runs in `asked` that cannot be read, in place of raising them.
 
     Returns
     -------
     Survey
-        Drifts are pooled over the runs, where the campaign does not say otherwise, and one that
-        is not certain is left out.
+        Drifts are pooled over the runs that can be read, where the campaign does not say
+        otherwise, and one that is not certain is left out.
 
     Raises
     ------
     RequestError, DataError
-        If a file cannot be read, a clock not found, or a record holds fewer than two waves.
+        If a file of a run in `asked` cannot be read, a clock not found, or its record holds fewer
+        than two waves; or if that is so of every run.
     """
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
     clocks: dict[str, dict[str, Clock]] = {}
     periods: dict[str, float] = {}
+    bad: Failures = {}
     for number, run in enumerate(runs, 1):
         if progress is not None:
             progress(0, len(runs), f"clocks and waves of {run} ({number} of {len(runs)})")
-        loggers = open_loggers(files_of(run), settings)
-        clocks[run] = clocks_of(loggers, settings.instruments, run)
-        if run in period_runs:
-            groups = read_groups(loggers, clocks[run], settings, run, [channel])
-            holder = [each for each in groups.values() if channel in each]
-            if holder:
-                waves = holder[0]
-            else:
-                dt = uniform_step(next(iter(groups.values()))["time"].to_numpy())
-                waves = on_one_axis(groups, dt, settings, run)
-            least = settings.campaign.period_hysteresis
-            periods[run] = _period(waves, channel, settings.runs[run], run, least)
+        try:
+            loggers = open_loggers(files_of(run), settings)
+            clocks[run] = clocks_of(loggers, settings.instruments, run)
+            if run in period_runs:
+                periods[run] = _period_of(run, loggers, clocks[run], settings, channel)
+        except SeakeepError as error:
+            if run in asked:
+                spare(failures, run, error)
+            bad[run] = error
+    if bad and (not clocks or (period_runs and not periods)):
+        raise as_one(bad)
+    left_out = {
+        run: _left_out(run, error, run in period_runs, run in clock_runs and run not in clocks)
+        for run, error in bad.items()
+    }
+    for run in [each for each in left_out if each not in asked]:
+        warnings.warn(left_out[run], SeakeepWarning, stacklevel=3)
     if settings.instruments.pool_drift:
-        for logger in {name for each in clocks.values() for name in each}:
-            having = [run for run in clocks if logger in clocks[run]]
-            pooled = pool_drift([clocks[run][logger] for run in having])
-            for run, clock in zip(having, pooled, strict=True):
-                clocks[run][logger] = clock
+        _pool(clocks)
     for each in clocks.values():
         each.update({logger: without_doubtful_drift(clock) for logger, clock in each.items()})
-    return Survey(clocks, periods)
+    return Survey(clocks, periods, left_out)
+
+
+def _pool(clocks: Mapping[str, dict[str, Clock]]) -> None:
+    """Give each logger one drift in all runs whose clocks agree."""
+    for logger in {name for each in clocks.values() for name in each}:
+        having = [run for run in clocks if logger in clocks[run]]
+        pooled = pool_drift([clocks[run][logger] for run in having])
+        for run, clock in zip(having, pooled, strict=True):
+            clocks[run][logger] = clock
+
+
+def _left_out(run: str, error: SeakeepError, period: bool, drift: bool) -> str:
+    pooled = ["the encounter period"] * period + ["the pooled clock drifts"] * drift
+    return (
+        f"run '{run}' is left out of {' and of '.join(pooled) or 'the clocks'}: {error} "
+        f"Once it is mended, prepare again; or state role = 'unused' in [runs.{run}]."
+    )
+
+
+def _period_of(
+    run: str,
+    loggers: Mapping[str, Logger],
+    clocks: Mapping[str, Clock],
+    settings: CampaignSettings,
+    channel: str,
+) -> float:
+    groups = read_groups(loggers, clocks, settings, run, [channel])
+    holder = [each for each in groups.values() if channel in each]
+    if holder:
+        waves = holder[0]
+    else:
+        dt = uniform_step(next(iter(groups.values()))["time"].to_numpy())
+        waves = on_one_axis(groups, dt, settings, run)
+    least = settings.campaign.period_hysteresis
+    return _period(waves, channel, settings.runs[run], run, least)
 
 
 def _period(

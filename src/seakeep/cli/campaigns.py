@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -9,10 +10,17 @@ import typer
 from rich import box
 from rich.table import Table
 
-from seakeep.campaign import draft_campaign, load_prepared, read_campaign, write_prepared
+from seakeep.campaign import (
+    Campaign,
+    draft_campaign,
+    load_prepared,
+    read_campaign,
+    write_prepared,
+)
 from seakeep.campaign.datasets import DATASETS, data_folder, fetch, find_dataset, state_of
+from seakeep.campaign.survey import as_one
 from seakeep.cli.console import messages, progress_bar, results
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import replacing
 from seakeep.report.quality_sheet import write_quality_sheet
 
@@ -60,7 +68,8 @@ def prepare(
 ) -> None:
     """Turn raw files into analysis-ready runs, one NetCDF file each, and a data-quality sheet.
 
-    Each run is written as soon as it is done: interrupted, a second call continues.
+    Each run is written as soon as it is done: interrupted, a second call continues. A run that
+    cannot be read does not keep the others from being prepared; at the end it is an error.
 
     fit, forecast and compare use these files while they are fresh (same settings, same raw
     files), and prepare in memory what is missing.
@@ -69,15 +78,24 @@ def prepare(
     """
     read = read_campaign(campaign)
     with progress_bar("Preparing") as progress:
-        files = write_prepared(read, out, progress=progress, anew=anew)
+        failures: dict[str, SeakeepError] = {}
+        files = write_prepared(read, out, progress=progress, anew=anew, failures=failures)
     for path in files.values():
         typer.echo(str(path))
-    if not sheet:
-        return
+    if sheet and files:
+        _write_sheet(read, files, failures)
+    if failures:
+        raise as_one(failures)
+
+
+def _write_sheet(
+    read: Campaign, files: Mapping[str, Path], failures: Mapping[str, SeakeepError]
+) -> None:
+    folder = next(iter(files.values())).parent
+    runs = load_prepared(read, folder, list(files))
+    unread = {name: str(error) for name, error in failures.items()}
     try:
-        pages = write_quality_sheet(
-            load_prepared(read, out), read.settings, read.name, next(iter(files.values())).parent
-        )
+        pages = write_quality_sheet(runs, read.settings, read.name, folder, unread)
     except RequestError as error:
         messages().print(f"Note: no data-quality sheet: {error}", style="yellow")
         return

@@ -35,6 +35,7 @@ from seakeep.study import (
     in_degrees,
 )
 from seakeep.study import compare as compare_runs
+from seakeep.study.lengths import instant_of, samples_of
 
 __all__ = ["compare", "fit", "forecast"]
 
@@ -53,6 +54,13 @@ Level = Annotated[
     typer.Option(
         "--level",
         help="Of an ensemble: probability between the bounds of the band; by default 0.95.",
+    ),
+]
+Steps = Annotated[
+    str | None,
+    typer.Option(
+        "--steps",
+        help="Number of instants, or encounter periods such as '15 T'; by default to the end.",
     ),
 ]
 Workers = Annotated[
@@ -101,11 +109,15 @@ def forecast(
     model: ModelFile,
     campaign: CampaignFile,
     run: Annotated[str, typer.Option("--run", help="Name of the run.")],
-    start: Annotated[float, typer.Option("--start", help="Instant of the last measured state, s.")],
+    start: Annotated[
+        str,
+        typer.Option(
+            "--start",
+            help="Instant of the last measured state, s or encounter periods such as '20 T'.",
+        ),
+    ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Result: .nc or .csv.")],
-    steps: Annotated[
-        int | None, typer.Option("--steps", help="Number of instants; by default to the end.")
-    ] = None,
+    steps: Steps = None,
     level: Level = None,
     members: Annotated[
         bool,
@@ -121,6 +133,9 @@ def forecast(
     Example: seakeep forecast model.nc docs/tutorial/campaign.toml --run unseen --start 20
     --steps 400 -o forecast.csv
 
+    In encounter periods: seakeep forecast model.nc docs/tutorial/campaign.toml --run unseen
+    --start '20 T' --steps '15 T' -o periods.csv
+
     An ensemble: seakeep forecast ensemble.nc docs/tutorial/campaign.toml --run unseen --start 20
     --steps 400 --level 0.9 -o band.csv
     """
@@ -129,13 +144,17 @@ def forecast(
     check_place(out)
     identified = load_model(model)
     read = read_campaign(campaign)
+    if isinstance(identified, HankelDMDcModel):
+        _refuse_for_one(model, {"--level": level is not None, "--members": members})
+    elif members and level is not None:
+        raise RequestError(
+            "--level belongs to the band, and --members writes the members without it. Leave one "
+            "of them out."
+        )
+    prepared = _prepared(read, run)
+    first = instant_of(start, read, [prepared], "--start")
+    count = None if steps is None else samples_of(steps, read, [prepared], identified.dt, "--steps")
     if isinstance(identified, HankelEnsemble):
-        if members and level is not None:
-            raise RequestError(
-                "--level belongs to the band, and --members writes the members without it. Leave "
-                "one of them out."
-            )
-        prepared = _prepared(read, run)
         with progress_bar("Forecasting") as progress:
             how: dict[str, Any] = {
                 "workers": worker_count(workers),
@@ -143,14 +162,13 @@ def forecast(
                 "progress": _quietly(progress),
             }
             if members:
-                result = identified.forecast(prepared, start, steps, **how)
+                result = identified.forecast(prepared, first, count, **how)
             else:
                 result = identified.forecast_summary(
-                    prepared, start, steps, DEFAULT_LEVEL if level is None else level, **how
+                    prepared, first, count, DEFAULT_LEVEL if level is None else level, **how
                 )
     else:
-        _refuse_for_one(model, {"--level": level is not None, "--members": members})
-        result = identified.forecast(_prepared(read, run), start=start, steps=steps)
+        result = identified.forecast(prepared, start=first, steps=count)
     if full_scale:
         result = forecast_at_full_scale(result, _scale(read))
     write_forecast(result, out)
@@ -171,15 +189,14 @@ def compare(
         typer.Option("--run", help="Name of a run (repeatable); by default the test runs."),
     ] = None,
     start: Annotated[
-        float | None,
+        str | None,
         typer.Option(
             "--start",
-            help="Instant of the last measured state, s; by default the first possible one.",
+            help="Instant of the last measured state, s or encounter periods such as '20 T'; by "
+            "default the first possible one.",
         ),
     ] = None,
-    steps: Annotated[
-        int | None, typer.Option("--steps", help="Number of instants; by default to the end.")
-    ] = None,
+    steps: Steps = None,
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Folder for the table and the figures.")
     ] = Path("comparison"),

@@ -356,7 +356,7 @@ class HankelEnsemble:
         (window,) = read_windows(self, run, [start], steps)
         series = member_series(self, run, [window], Crew(workers, backend, scheduler), progress)
         shape = (1, window.steps, len(self.states))
-        values, lost = reduce_members(series, self.n_members, shape, level)
+        values, lost = reduce_members(series, self.n_members, shape, level, workers)
         values = widened(self, values, band)
         variables = label_channels(
             self.state_labels, self.state_spread, values[0], ("statistic", "time")
@@ -497,7 +497,7 @@ class HankelEnsemble:
         windows = read_windows(self, run, starts, steps)
         shape = (len(windows), windows[0].steps, len(self.states))
         series = member_series(self, run, windows, Crew(workers, backend, scheduler))
-        values, lost = reduce_members(series, self.n_members, shape, level)
+        values, lost = reduce_members(series, self.n_members, shape, level, workers)
         variables = label_channels(
             self.state_labels, self.state_spread, values, ("window", "statistic", "lead")
         )

@@ -144,7 +144,11 @@ def _mark(at: Any, time: Any, x: Any, flags: Any) -> None:
 
 
 def write_quality_sheet(
-    runs: Mapping[str, xr.Dataset], settings: CampaignSettings, title: str, folder: Path
+    runs: Mapping[str, xr.Dataset],
+    settings: CampaignSettings,
+    title: str,
+    folder: Path,
+    unread: Mapping[str, str] | None = None,
 ) -> list[Path]:
     """Write the sheet of prepared runs: one self-contained page, and a PNG a run.
 
@@ -158,6 +162,8 @@ def write_quality_sheet(
         Name of the campaign.
     folder : Path
         Where to; it exists.
+    unread : mapping of str to str, optional
+        Runs that could not be prepared, and why.
 
     Returns
     -------
@@ -180,7 +186,7 @@ def write_quality_sheet(
         parts.append(_section(name, run, picture))
     page = folder / "quality.html"
     with replacing(page) as temporary:
-        temporary.write_text(_page(title, runs, parts), encoding="utf-8")
+        temporary.write_text(_page(title, runs, parts, unread or {}), encoding="utf-8")
     return [page, *written]
 
 
@@ -191,7 +197,12 @@ def _png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def _page(title: str, runs: Mapping[str, xr.Dataset], parts: Sequence[str]) -> str:
+def _page(
+    title: str,
+    runs: Mapping[str, xr.Dataset],
+    parts: Sequence[str],
+    unread: Mapping[str, str],
+) -> str:
     lines = []
     for name, run in runs.items():
         found = findings_of(run)
@@ -202,6 +213,11 @@ def _page(title: str, runs: Mapping[str, xr.Dataset], parts: Sequence[str]) -> s
             f'<td class="n">{float(run["time"][0]):.2f} to {float(run["time"][-1]):.2f} s</td>'
             f'<td class="n">{len(found)}</td><td>{html.escape(words) or "nothing found"}</td></tr>'
         )
+    lines += [
+        f'<tr class="bad"><td>{html.escape(name)}</td><td>not prepared</td><td class="n">–</td>'
+        f"<td>{html.escape(why)}</td></tr>"
+        for name, why in unread.items()
+    ]
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         f"<title>Data quality: {html.escape(title)}</title><style>{_STYLE}</style></head><body>"

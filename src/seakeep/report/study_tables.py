@@ -54,6 +54,8 @@ class ReportTable:
         Columns that come from another data set.
     averages : tuple of int
         Rows that are averages of others.
+    folded : bool
+        Whether a page folds it away until it is wanted.
     """
 
     name: str
@@ -64,6 +66,7 @@ class ReportTable:
     numeric: tuple[int, ...] = ()
     elsewhere: tuple[int, ...] = ()
     averages: tuple[int, ...] = ()
+    folded: bool = False
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -218,8 +221,8 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> ReportTab
     )
 
 
-def coverage_table(result: StudyResult, model: str) -> ReportTable:
-    """Coverage and width of the band of an ensemble, each test set, each channel.
+def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> ReportTable:
+    """Coverage and width of a band of an ensemble, each test set, each channel.
 
     Parameters
     ----------
@@ -227,50 +230,51 @@ def coverage_table(result: StudyResult, model: str) -> ReportTable:
         The study.
     model : str
         An ensemble.
+    calibrated : bool, optional
+        Its calibrated band, where the study has one, in place of the members' own.
 
     Returns
     -------
     ReportTable
     """
+    prefix, words = ("calibrated_", "calibrated ") if calibrated else ("", "")
     columns = ["channel"]
     tables = {test: result.groups[f"statistics/coverage/{test}"].sel(model=model)
               for test in result.tests}  # fmt: skip
-    for test, data in tables.items():
-        for side in data["against"].values:
-            columns.append(f"{result.label_of(test)}: inside, {side}")
+    true = any("truth" in data["against"].values for data in tables.values())
+    for test in tables:
+        columns.append(f"{result.label_of(test)}: inside" + (" [of the truth]" if true else ""))
         columns.append(f"{result.label_of(test)}: width [SD]")
-        if "calibrated_inside" in data:
-            columns.append(f"{result.label_of(test)}: inside, measured, calibrated")
-            columns.append(f"{result.label_of(test)}: width, calibrated [SD]")
     names = [*result.channels, "average"]
     rows = []
     for name in names:
         row = ["average" if name == "average" else channel_words(name)]
         for data in tables.values():
             at = data.sel(channel=name)
-            row += [number(float(v), 2) for v in at["inside"].values]
-            row.append(number(float(at["relative_width"].sel(against="measured")), 2))
-            if "calibrated_inside" in data:
-                calibrated = at.sel(against="measured")
-                row.append(number(float(calibrated["calibrated_inside"]), 2))
-                row.append(number(float(calibrated["calibrated_relative_width"]), 2))
+            first, *others = (number(float(v), 2) for v in at[f"{prefix}inside"].values)
+            row.append(first + "".join(f" [{each}]" for each in others))
+            width = at[f"{prefix}relative_width"].sel(against="measured")
+            row.append(number(float(width), 2))
         rows.append(tuple(row))
     level = float(result.settings["statistics"]["level"])
     note = (
-        f"Part of the instants inside the band of nominally {level:g} (quantiles of the members), "
-        "and its mean width in measured SD; means over all cells."
+        f"Part of the measured instants inside the band of nominally {level:g} (quantiles of the "
+        "members), and its mean width in measured SD; means over all cells."
     )
-    if any("truth" in data["against"].values for data in tables.values()):
-        note += " The truth is the virtual tank's, without noise or slap; rates are not filtered."
-    if any("calibrated_inside" in data for data in tables.values()):
+    if calibrated:
         note += (
-            " Calibrated: moved outwards by a margin found on training data that the members had "
-            "not read, in windows as long as the first test set's; it warrants nothing in a sea "
-            "of another kind."
+            " Calibrated: these quantiles, moved outwards by a margin found on training data that "
+            "the members had not read, in windows as long as the first test set's. The margin "
+            "warrants nothing in a sea of another kind."
+        )
+    if true:
+        note += (
+            " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
+            "slap; rates are not filtered."
         )
     return ReportTable(
-        f"coverage_{model}",
-        f"Coverage of the {100 * level:g} % band, {model_words(model)}",
+        f"coverage_{prefix}{model}",
+        f"Coverage of the {words}{100 * level:g} % band, {model_words(model)}",
         tuple(columns),
         tuple(rows),
         note + conditional(result),

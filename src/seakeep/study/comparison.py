@@ -19,6 +19,7 @@ from seakeep.models import HankelDMDcModel, HankelEnsemble
 from seakeep.models.forecasting import status_at_clock
 from seakeep.models.identification import is_constant
 from seakeep.signals import froude_factor, to_full_scale
+from seakeep.study.lengths import instant_of, samples_of
 from seakeep.study.repeats import warn_of_repeats
 
 __all__ = [
@@ -179,8 +180,8 @@ def compare(
     model: HankelDMDcModel | HankelEnsemble,
     campaign: Campaign,
     runs: Sequence[str] = (),
-    start: float | None = None,
-    steps: int | None = None,
+    start: float | str | None = None,
+    steps: int | str | None = None,
     progress: Progress | None = None,
     *,
     members: Progress | None = None,
@@ -197,11 +198,12 @@ def compare(
         The campaign.
     runs : sequence of str, optional
         Runs; by default those that test.
-    start : float, optional
-        Instant of the last measured state, s; by default the first possible one of the run's
-        test span, its delay history read from before the span where the run has it.
-    steps : int, optional
-        Number of instants; by default to the end of the test span.
+    start : float or str, optional
+        Instant of the last measured state, s or encounter periods (``"20 T"``); by default the
+        first possible one of the run's test span, its delay history read from before the span
+        where the run has it.
+    steps : int or str, optional
+        Number of instants, or a length (``"15 T"``); by default to the end of the test span.
     progress : callable, optional
         Called as ``progress(done, total, run)`` while runs are prepared.
     members : callable, optional
@@ -244,6 +246,9 @@ def compare(
         )
     prepared = load_prepared(campaign, names=wanted, progress=progress)
     warn_of_repeats(model, campaign, prepared)
+    known_runs = list(prepared.values())
+    first = None if start is None else instant_of(start, campaign, known_runs, "start")
+    count = None if steps is None else samples_of(steps, campaign, known_runs, model.dt, "steps")
 
     def forecast(run: xr.Dataset, start: float, steps: int) -> xr.Dataset:
         if isinstance(model, HankelDMDcModel):
@@ -254,7 +259,7 @@ def compare(
         )
 
     return [
-        _compare_run(model, forecast, run, name, start, steps) for name, run in prepared.items()
+        _compare_run(model, forecast, run, name, first, count) for name, run in prepared.items()
     ]
 
 

@@ -1,0 +1,182 @@
+"""A run that cannot be read keeps no other from its work, though clocks and periods pool all."""
+
+import numpy as np
+import pytest
+from small_tank import DT, tank_columns, write_csv
+
+from seakeep import cli
+from seakeep.campaign import load_prepared, read_campaign, write_prepared
+from seakeep.campaign.checks import findings_of
+from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.signals import encounter_period
+
+POOLED = ("sampling_rate = 10", "steps_per_period = 12")
+CUT = "Time [s],WP fwd [mm],Heave [mm],Pitch (deg),acc [g]\n0.0,1.0,2.0\n"
+NOTE = (
+    r"run 'second' is left out of the encounter period: .*second\.csv.*"
+    r"Once it is mended, prepare again; or state role = 'unused' in \[runs\.second\]"
+)
+
+
+def damage(tank, how):
+    path = tank / "second.csv"
+    if how == "missing":
+        path.unlink()
+    else:
+        path.write_bytes({"cut": CUT.encode(), "empty": b"", "noise": bytes(range(256))}[how])
+
+
+@pytest.mark.parametrize("how", ["cut", "empty", "noise", "missing"])
+class TestPeriod:
+    def test_another_run_is_prepared_with_the_period_of_those_that_can_be_read(
+        self, edited, tank, how
+    ):
+        campaign = read_campaign(edited(POOLED))
+        both = campaign.encounter_period()
+        damage(tank, how)
+        with pytest.warns(SeakeepWarning, match=NOTE):
+            run = campaign.prepare(["first"])["first"]
+        alone = encounter_period(1e-3 * tank_columns(0)["WP fwd [mm]"], DT)
+        assert run.attrs["encounter_period"] == pytest.approx(alone, rel=1e-12)  # unit conversion
+        assert abs(alone / both - 1) > 1e-3
+        told = [each for each in findings_of(run) if each.kind == "left out"]
+        assert [each.channel for each in told] == ["other runs"]
+        assert "run 'second' is left out of the encounter period" in told[0].text
+
+    def test_asked_for_it_is_an_error_still(self, edited, tank, how):
+        campaign = read_campaign(edited(POOLED))
+        damage(tank, how)
+        with pytest.raises(RequestError if how == "missing" else DataError, match=r"second\.csv"):
+            campaign.prepare(["second"])
+        with pytest.raises(RequestError if how == "missing" else DataError, match=r"second\.csv"):
+            load_prepared(campaign)
+
+    def test_all_asked_for_the_others_are_kept_and_the_bad_file_is_named(self, edited, tank, how):
+        campaign = read_campaign(edited(POOLED))
+        damage(tank, how)
+        with pytest.raises(RequestError if how == "missing" else DataError, match=r"second\.csv"):
+            write_prepared(campaign)
+        kept = tank / "prepared" / "first.nc"
+        written = kept.stat().st_mtime_ns
+        # Fresh as long as the damage is the same; prepared anew once the file is mended.
+        with pytest.raises((RequestError, DataError)):
+            write_prepared(campaign)
+        assert kept.stat().st_mtime_ns == written
+        write_csv(tank / "second.csv", tank_columns(1))
+        write_prepared(campaign)
+        assert kept.stat().st_mtime_ns > written
+        assert not [
+            e for e in findings_of(load_prepared(campaign)["first"]) if e.kind == "left out"
+        ]
+
+
+def test_the_commands(edited, tank, capsys):
+    """prepare keeps what it can and ends with the error; fit and forecast of others run."""
+    pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
+    path = edited(POOLED)
+    damage(tank, "cut")
+    assert cli.main(["prepare", str(path)]) == 1
+    captured = capsys.readouterr()
+    assert "prepared/first.nc" in captured.out
+    assert "second.nc" not in captured.out
+    assert captured.err.count("Error:") == 1
+    assert "second.csv" in captured.err.split("Error:")[1]
+    assert "Traceback" not in captured.err
+    page = (tank / "prepared" / "quality.html").read_text(encoding="utf-8")
+    assert "<td>second</td><td>not prepared</td>" in page
+    assert "is left out of the encounter period" in page
+    for prepared in (True, False):
+        if not prepared:
+            (tank / "prepared" / "first.nc").unlink()
+        model = str(tank / "model.nc")
+        assert cli.main(["fit", str(path), "-o", model]) == 0
+        assert ("Note: run 'second' is left out" in capsys.readouterr().err) is not prepared
+        command = ["forecast", model, str(path), "--run", "first", "--start", "12", "--steps", "9"]
+        assert cli.main([*command, "-o", str(tank / "out.csv")]) == 0
+        capsys.readouterr()
+    command[command.index("first")] = "second"
+    assert cli.main([*command, "-o", str(tank / "out.csv")]) == 1
+    assert "second.csv" in capsys.readouterr().err
+
+
+def test_every_bad_file_is_named(edited, tank):
+    campaign = read_campaign(edited())
+    (tank / "first.csv").write_text("")
+    damage(tank, "cut")
+    with pytest.raises(DataError, match=r"(?s)^2 runs cannot be read:\n'first': .*'second': "):
+        write_prepared(campaign)
+    campaign = read_campaign(edited(POOLED))
+    with pytest.raises(DataError, match=r"(?s)^2 runs cannot be read:\n'first': .*'second': "):
+        campaign.encounter_period()
+
+
+def test_a_mistake_in_the_campaign_stops_at_once(edited):
+    campaign = read_campaign(edited(('column = "Heave"', 'column = "Heaven"')))
+    seen = []
+    with pytest.raises(RequestError, match="Heaven"):
+        write_prepared(campaign, progress=lambda *call: seen.append(call))
+    assert seen == []
+
+
+def test_a_probe_that_saw_no_wave_is_left_out(edited, tank):
+    still = tank_columns(1)
+    still["WP fwd [mm]"][:] = 3.0
+    write_csv(tank / "second.csv", still)
+    campaign = read_campaign(edited(POOLED))
+    with pytest.warns(SeakeepWarning, match="run 'second' is left out of the encounter period"):
+        campaign.prepare(["first"])
+
+
+LOGGERS = """
+[channels.heave]
+unit = "m"
+[channels.load]
+unit = "N"
+[instruments]
+reference = "mru"
+[instruments.mru]
+[instruments.loads]
+shared = ["wave", "wave"]
+[preparation]
+sampling_rate = 10
+"""
+
+
+def two_loggers(folder, seed):
+    """A run of two loggers that both recorded the wave; the second's clock gains 400 ppm."""
+    rng = np.random.default_rng(seed)
+    phase = rng.uniform(0, 2 * np.pi, 20)
+    frequency = np.linspace(0.3, 1.2, 20)
+
+    def wave(t):
+        return np.cos(2 * np.pi * np.outer(t, frequency) + phase).sum(axis=1)
+
+    t = 0.02 * np.arange(3000)
+    write_csv(folder / f"mru_{seed}.csv", {"time": t, "wave": wave(t), "heave": wave(t)})
+    own = 0.01 * np.arange(5900)
+    true = (own + 0.3) * (1 - 4e-4)
+    write_csv(folder / f"loads_{seed}.csv", {"time": own, "wave": wave(true), "load": wave(true)})
+    return (
+        f'[runs.r{seed}.files]\nmru = "mru_{seed}.csv"\nloads = "loads_{seed}.csv"\n'
+        f'[runs.r{seed}]\nrole = "train"\n'
+    )
+
+
+def test_pooled_drifts(tmp_path):
+    runs = "".join(two_loggers(tmp_path, seed) for seed in range(3))
+    path = tmp_path / "campaign.toml"
+    path.write_text(LOGGERS + runs)
+    campaign = read_campaign(path)
+    whole = campaign.clocks()["r0"]["loads"]
+    (tmp_path / "loads_2.csv").write_text("time,wave,load\n0.0,1.0\n")
+    with pytest.warns(
+        SeakeepWarning, match=r"run 'r2' is left out of the pooled clock drifts: .*loads_2\.csv"
+    ):
+        left = campaign.clocks(["r0"])["r0"]["loads"]
+    assert "drift of 3 runs" in whole.describe()
+    assert "drift of 2 runs" in left.describe()
+    with pytest.warns(SeakeepWarning, match="'r2' is left out"):
+        run = campaign.prepare(["r0"])["r0"]
+    assert "run 'r2' is left out of the pooled clock drifts" in run.attrs["quality"]
+    with pytest.raises(DataError, match=r"loads_2\.csv"):
+        campaign.clocks()
