@@ -101,6 +101,19 @@ def test_figures_and_tables_are_files_too(page):
     assert r"\toprule" in latex
 
 
+def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page):
+    found = read_result(page.parent)
+    path = page.parent / "tables" / "coverage_calibrated_bayesian.csv"
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    table = found.groups["statistics/coverage/unseen"].sel(model="bayesian", against="measured")
+    average = table.sel(channel="average")
+    expected = [average["calibrated_inside"], average["calibrated_relative_width"]]
+    assert rows[-1] == ["average", *(f"{float(value):.2f}" for value in expected)]
+    windows = found.groups["calibration/bayesian"]["windows"].values
+    assert f"A training set had {windows.min()}" in page.read_text("utf-8")
+
+
 def test_the_data_quality_is_in_the_page_for_every_run_and_channel(page):
     text, result = page.read_text("utf-8"), read_result(page.parent)
     assert len(result.prepared) == 3

@@ -7,6 +7,7 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -264,8 +265,9 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
     if calibrated:
         note += (
             " Calibrated: these quantiles, moved outwards by a margin found on training data that "
-            "the members had not read, in windows as long as the first test set's. The margin "
-            "warrants nothing in a sea of another kind."
+            "the members had not read, in windows as long as the first test set's. "
+            + _calibrated_on(result.groups[f"calibration/{model}"], level)
+            + "The margin warrants nothing in a sea of another kind."
         )
     if true:
         note += (
@@ -281,6 +283,27 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
         tuple(range(1, len(columns))),
         averages=(len(rows) - 1,),
     )
+
+
+def _calibrated_on(found: xr.Dataset, level: float) -> str:
+    """Sentence on how much the calibration of a study rests on."""
+    windows = found["windows"].values
+    if not windows.all():
+        return "Some training sets hold no such window. "
+    worth = found["blocks"].values
+    said = (
+        f"A training set had {_span_of(windows)} of them; allowing for their dependence, their "
+        f"scores are worth {_span_of(worth)} independent ones. "
+    )
+    warranted = float(found["warranted"].min())
+    if warranted < level:
+        said += f"Of some channels that is too few: {warranted:.2f} is warranted there. "
+    return said
+
+
+def _span_of(values: np.ndarray[Any, Any]) -> str:
+    low, high = (f"{float(each):.0f}" for each in (values.min(), values.max()))
+    return low if low == high else f"{low} to {high}"
 
 
 def trend_table(result: StudyResult) -> ReportTable:
