@@ -142,9 +142,11 @@ def undisturbed(tmp_path_factory):
     return run_study(read_study(place / "study.toml"), place / "out")
 
 
-# Two training windows, two models, two test windows: 8 cells, in units of two.
-@pytest.mark.parametrize("room", [0, 3])
-def test_a_disk_that_fills_up_loses_no_finished_cell(folder, room, undisturbed, monkeypatch, capfd):
+# Two training windows, two models: units of two test windows, and of a calibration in every other.
+@pytest.mark.parametrize(("room", "whole"), [(0, 0), (3, 2)])
+def test_a_disk_that_fills_up_loses_no_finished_cell(
+    folder, room, whole, undisturbed, monkeypatch, capfd
+):
     with monkeypatch.context() as patch:
         patch.setattr(np, "savez", filling(room, np.savez))
         assert study(folder) == 1
@@ -160,9 +162,9 @@ def test_a_disk_that_fills_up_loses_no_finished_cell(folder, room, undisturbed, 
     assert "No space left on device. All cells that were" in capfd.readouterr().err
     assert not (folder / "out" / "study.nc").exists()
     after = {path.name: path.stat().st_mtime_ns for path in cells_in(folder)}
-    assert len(after) == 8
+    assert len(after) == 2 + 3 + 2 + 3
     # A unit of which a cell is missing is done again as a whole.
-    assert sum(after[name] == clock for name, clock in before.items()) == room // 2 * 2
+    assert sum(after[name] == clock for name, clock in before.items()) == whole
     found = run_study(read_study(folder / "study.toml"), folder / "out")
     assert found.groups.keys() == undisturbed.groups.keys()
     for name, group in undisturbed.groups.items():
