@@ -1,61 +1,15 @@
 """Every command and every Python block of the tutorial runs and prints what the page shows."""
 
-import contextlib
-import io
-import re
-import shlex
 import shutil
-import warnings
 from pathlib import Path
 
 import pytest
+from pages import run_page
 
 from seakeep.cli import main
-from seakeep.errors import SeakeepWarning
 
 FOLDER = Path(__file__).parents[2] / "docs/tutorial"
 PAGE = (FOLDER / "tutorial.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"^```(console|python|text)\n(.*?)^```$", PAGE, flags=re.M | re.S)
-NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-
-
-def shown(text):
-    """Lines with single blanks, without rules and empty lines."""
-    lines = (" ".join(re.sub("[─━]", "", line).split()) for line in text.splitlines())
-    return [line for line in lines if line]
-
-
-def alike(expected, found):
-    """The same words, and numbers equal to one unit of the last printed place.
-
-    The unit covers other linear algebra libraries: it moves the third decimal of an NRMSE only
-    where that was about to round the other way.
-    """
-    if NUMBER.sub("#", expected) != NUMBER.sub("#", found):
-        return False
-    for one, other in zip(NUMBER.findall(expected), NUMBER.findall(found), strict=True):
-        decimals = len(one.partition(".")[2])
-        if abs(float(one) - float(other)) > 1.01 * 10.0**-decimals * (decimals > 0):
-            return False
-    return True
-
-
-def check(expected, printed):
-    found = shown(printed)
-    for line in shown(expected):
-        if line != "…":
-            assert any(alike(line, each) for each in found), f"{line!r} is not in {found}"
-
-
-def run_console(block):
-    out = io.StringIO()
-    for line in block.splitlines():
-        words = shlex.split(line.removeprefix("$ "))
-        assert words[0] == "seakeep"
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
-            status = main(words[1:])
-        assert (status != 0) == ("Error:" in out.getvalue()), out.getvalue()
-    return out.getvalue()
 
 
 def test_the_tutorial_runs_and_prints_what_it_shows(tmp_path, monkeypatch):
@@ -64,19 +18,7 @@ def test_the_tutorial_runs_and_prints_what_it_shows(tmp_path, monkeypatch):
     folder = tmp_path / "tutorial"
     shutil.copytree(FOLDER, folder)
     monkeypatch.chdir(folder)
-    printed, names = "", {}
-    for kind, content in BLOCKS:
-        if kind == "console":
-            printed = run_console(content)
-        elif kind == "python":
-            out = io.StringIO()
-            with contextlib.redirect_stdout(out), warnings.catch_warnings():
-                warnings.simplefilter("ignore", SeakeepWarning)  # of the unstable model
-                exec(compile(content, "tutorial.md", "exec"), names)  # the page is ours
-            printed = out.getvalue()
-        elif printed:
-            check(content, printed)
-            printed = ""
+    run_page(PAGE, "tutorial.md")
     assert (folder / "comparison/unseen.png").stat().st_size > 10_000
     assert (folder / "rom.mat").exists()
 

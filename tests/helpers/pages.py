@@ -1,0 +1,73 @@
+"""What the tests of the documentation share: running a page's blocks, comparing what they print."""
+
+import contextlib
+import io
+import re
+import shlex
+import warnings
+
+from seakeep.cli import main
+from seakeep.errors import SeakeepWarning
+
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+
+def shown(text):
+    """Lines with single blanks, without rules and empty lines."""
+    lines = (" ".join(re.sub("[─━]", "", line).split()) for line in text.splitlines())
+    return [line for line in lines if line]
+
+
+def alike(expected, found):
+    """The same words, and numbers equal to one unit of the last printed place.
+
+    The unit covers other linear algebra libraries: it moves the third decimal of an NRMSE only
+    where that was about to round the other way.
+    """
+    if NUMBER.sub("#", expected) != NUMBER.sub("#", found):
+        return False
+    for one, other in zip(NUMBER.findall(expected), NUMBER.findall(found), strict=True):
+        decimals = len(one.partition(".")[2])
+        if abs(float(one) - float(other)) > 1.01 * 10.0**-decimals * (decimals > 0):
+            return False
+    return True
+
+
+def check(expected, printed):
+    found = shown(printed)
+    for line in shown(expected):
+        if line != "…":
+            assert any(alike(line, each) for each in found), f"{line!r} is not in {found}"
+
+
+def run_console(block):
+    out = io.StringIO()
+    for line in block.splitlines():
+        words = shlex.split(line.removeprefix("$ "))
+        assert words[0] == "seakeep"
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
+            status = main(words[1:])
+        assert (status != 0) == ("Error:" in out.getvalue()), out.getvalue()
+    return out.getvalue()
+
+
+def blocks_of(page):
+    """Kind and content of a page's blocks."""
+    return re.findall(r"^```(console|python|text)\n(.*?)^```$", page, flags=re.M | re.S)
+
+
+def run_page(page, name):
+    """Run the blocks of a page in the working folder; each `text` block shows what went before."""
+    printed, names = "", {}
+    for kind, content in blocks_of(page):
+        if kind == "console":
+            printed = run_console(content)
+        elif kind == "python":
+            out = io.StringIO()
+            with contextlib.redirect_stdout(out), warnings.catch_warnings():
+                warnings.simplefilter("ignore", SeakeepWarning)  # of what the page breaks
+                exec(compile(content, name, "exec"), names)  # the page is ours
+            printed = out.getvalue()
+        elif printed:
+            check(content, printed)
+            printed = ""
