@@ -2,6 +2,7 @@
 
     python docs/figures/make_figures.py indices     # docs/figures/indices.svg and .png
     python docs/figures/make_figures.py tutorial    # docs/figures/unseen.png and band.png
+    python docs/figures/make_figures.py study       # the tutorial's study report; needs Chromium
     python docs/figures/make_figures.py tank        # the virtual tank's; extras tank and video
     python docs/figures/make_figures.py chain       # docs/figures/quality_sheet.png; extra tank
     python docs/figures/make_figures.py ntnu sjtu   # examples/*/figures; need SEAKEEP_DATA_DIR
@@ -11,19 +12,23 @@ Figures of results are drawn small and in few colours, so that the repository st
 
 import contextlib
 import re
+import shutil
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from PIL import Image
 
 import seakeep
 from seakeep.report.overlay import overlay_figure
+from seakeep.report.page import write_report
 from seakeep.report.style import figure_style, save_figure
-from seakeep.study import compare, fit_campaign, in_degrees
+from seakeep.study import compare, fit_campaign, in_degrees, read_study, run_study
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -202,6 +207,24 @@ def tutorial():
     save(overlay_figure(in_degrees(around)), HERE / "band.png")
 
 
+def study():
+    """Top of the report of the tutorial's study, as a browser shows it, and one of its figures."""
+    browsers = ("chromium", "chromium-browser", "google-chrome")
+    browser = next((found for name in browsers if (found := shutil.which(name))), None)
+    if browser is None:
+        sys.exit(f"no browser: install one of {', '.join(browsers)}")
+    asked = read_study(ROOT / "docs" / "tutorial" / "study.toml")
+    with tempfile.TemporaryDirectory() as folder:
+        page = write_report(run_study(asked, Path(folder) / "study"))
+        shot = Path(folder) / "report.png"
+        options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]
+        size = ["--window-size=1200,1000", f"--screenshot={shot}"]
+        subprocess.run([browser, *options, *size, page.as_uri()], check=True, capture_output=True)
+        with Image.open(shot) as picture:
+            picture.convert("RGB").quantize(32).save(HERE / "report.png", optimize=True)
+        shutil.copy(page.parent / "figures" / "error_over_time.png", HERE / "report_age.png")
+
+
 def ntnu():
     """Motions, sway and tensions of the ship section's test runs."""
     folder = EXAMPLES / "ntnu_ship_section"
@@ -249,7 +272,7 @@ def chain():
 
     page = (ROOT / "docs" / "measurement_chain.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```python\n(.*?)^```$", page, flags=re.M | re.S)
-    with TemporaryDirectory() as folder, contextlib.chdir(folder):
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         play(default_settings(), Path("virtual"), names=("irregular_1", "regular_2"))
         faults = next(block for block in blocks if "file.write" in block)
         exec(compile(faults, "measurement_chain.md", "exec"), {"Path": Path})  # the page is ours
@@ -261,7 +284,7 @@ def chain():
         quality_figure(shown, agreements).savefig(HERE / "quality_sheet.png", dpi=90)
 
 
-DRAWINGS = {each.__name__: each for each in (indices, tutorial, ntnu, sjtu, tank, chain)}
+DRAWINGS = {each.__name__: each for each in (indices, tutorial, study, ntnu, sjtu, tank, chain)}
 
 if __name__ == "__main__":
     for wanted in sys.argv[1:] or ["indices"]:

@@ -5,11 +5,11 @@ import re
 from pathlib import Path
 
 import pytest
-from pages import run_page
+from pages import play
 
 from seakeep import signals
 from seakeep.campaign.chain_settings import DerivedSettings, InstrumentSettings, PreparationSettings
-from seakeep.campaign.settings import GeneralSettings, RunSettings
+from seakeep.campaign.settings import GeneralSettings, RigSettings, RunSettings
 
 PAGE = (Path(__file__).parents[2] / "docs/measurement_chain.md").read_text(encoding="utf-8")
 
@@ -18,7 +18,7 @@ def test_the_page_runs_and_prints_what_it_shows(tmp_path, monkeypatch):
     pytest.importorskip("numba", reason="the page plays the tank")
     pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
     monkeypatch.chdir(tmp_path)
-    run_page(PAGE, "measurement_chain.md")
+    play(PAGE, "measurement_chain.md")
     sheet = (tmp_path / "virtual/prepared/quality.html").read_text(encoding="utf-8")
     assert "<td>regular_2</td><td>not prepared</td>" in sheet
 
@@ -28,11 +28,8 @@ def test_functions_and_keys_of_the_table_exist():
     rows = [line.split("|")[1:-1] for line in table.splitlines()[2:] if line.startswith("|")]
     assert len(rows) > 12
     models = (
-        DerivedSettings,
-        InstrumentSettings,
-        PreparationSettings,
-        GeneralSettings,
-        RunSettings,
+        *(DerivedSettings, InstrumentSettings, PreparationSettings),
+        *(GeneralSettings, RigSettings, RunSettings),
     )
     keys = {key for model in models for key in model.model_fields} | {"alignment"}
     steps = {"low_pass", "integrate", "blend", "differentiate", "transfer", "remove_gravity"}

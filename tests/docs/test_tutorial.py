@@ -4,7 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from pages import run_page
+from pages import play
 
 from seakeep.cli import main
 
@@ -18,7 +18,7 @@ def test_the_tutorial_runs_and_prints_what_it_shows(tmp_path, monkeypatch):
     folder = tmp_path / "tutorial"
     shutil.copytree(FOLDER, folder)
     monkeypatch.chdir(folder)
-    run_page(PAGE, "tutorial.md")
+    play(PAGE, "tutorial.md")
     assert (folder / "comparison/unseen.png").stat().st_size > 10_000
     assert (folder / "rom.mat").exists()
 

@@ -1,4 +1,4 @@
-"""What the tests of the documentation share: running a page's blocks, comparing what they print."""
+"""Pages whose commands and blocks are run, and what these print against what the page shows."""
 
 import contextlib
 import io
@@ -10,6 +10,11 @@ from seakeep.cli import main
 from seakeep.errors import SeakeepWarning
 
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+
+def blocks_of(page):
+    """Console, Python and text blocks of a page, in its order."""
+    return re.findall(r"^```(console|python|text)\n(.*?)^```$", page, flags=re.M | re.S)
 
 
 def shown(text):
@@ -51,13 +56,8 @@ def run_console(block):
     return out.getvalue()
 
 
-def blocks_of(page):
-    """Kind and content of a page's blocks."""
-    return re.findall(r"^```(console|python|text)\n(.*?)^```$", page, flags=re.M | re.S)
-
-
-def run_page(page, name):
-    """Run the blocks of a page in the working folder; each `text` block shows what went before."""
+def play(page, name):
+    """Run the console and Python blocks of a page; a text block after one must show its output."""
     printed, names = "", {}
     for kind, content in blocks_of(page):
         if kind == "console":
@@ -65,7 +65,7 @@ def run_page(page, name):
         elif kind == "python":
             out = io.StringIO()
             with contextlib.redirect_stdout(out), warnings.catch_warnings():
-                warnings.simplefilter("ignore", SeakeepWarning)  # of what the page breaks
+                warnings.simplefilter("ignore", SeakeepWarning)  # of an unstable model
                 exec(compile(content, name, "exec"), names)  # the page is ours
             printed = out.getvalue()
         elif printed:

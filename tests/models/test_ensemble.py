@@ -1,4 +1,5 @@
 import dataclasses
+import signal
 
 import numpy as np
 import pytest
@@ -92,9 +93,9 @@ def test_members_equal_the_deterministic_model(run, delay_rows, history, ridge_s
         ).fit(run, STATES, INPUTS, stop=60.0)
         alone = model.forecast(run, start=65.0, steps=120)
         # One arithmetic in another order: the house rule for results.
-        np.testing.assert_allclose(arrays(forecast)[number], arrays(alone), atol=1e-10)
+        np.testing.assert_allclose(arrays(forecast)[number], arrays(alone), rtol=0, atol=1e-10)
         member = ensemble.member(number)
-        np.testing.assert_allclose(member.A, model.A, atol=1e-10)
+        np.testing.assert_allclose(member.A, model.A, rtol=0, atol=1e-10)
         np.testing.assert_array_equal(member.state_mean, model.state_mean)
         assert member.training.columns == model.training.columns
         assert member.training.stop == pytest.approx(model.training.stop)
@@ -199,6 +200,23 @@ def test_the_summary_is_that_of_the_members(run, monkeypatch):
         for name in STATES:
             np.testing.assert_array_equal(found[name], expected[name])
     assert (found.members, found.diverged, found.level) == (6, 0, 0.9)
+
+
+def test_no_room_for_spilled_members_is_told(run, monkeypatch):
+    resource = pytest.importorskip("resource", reason="file sizes are limited on POSIX alone")
+    monkeypatch.setattr(summaries, "HELD", 0)
+    ensemble = fitted(run)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        with pytest.raises(seakeep.RequestError) as told:
+            ensemble.forecast_summary(run, start=65.0, steps=77)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, ignored)
+    assert "cannot keep 0 MiB of members in the temporary folder" in str(told.value)
+    assert "Free space there, name a folder on another disk" in str(told.value)
 
 
 def test_windows_side_by_side_equal_single_forecasts(run):
@@ -339,6 +357,8 @@ def test_the_summary_says_what_the_members_are(run):
     assert "2 runs, a window of one of them a member, drawn" in windows.summary()
     whole = small(train_length=None, ridge=STABLE).fit(run, STATES, INPUTS)
     assert "window        all of a run" in whole.summary()
+    single = small(state_delay=Fixed(1.0), ridge=STABLE).fit(run, STATES, INPUTS)
+    assert "state delay   1 encounter period (" in single.summary()
 
 
 def test_spectral_radii_are_those_of_the_members_for_any_workers(run, tmp_path):
@@ -456,7 +476,7 @@ def test_messages_of_forecasts(run):
     with pytest.raises(RequestError, match="workers must be a positive integer; received 0"):
         ensemble.forecast(run, start=65.0, steps=5, workers=0)
     with pytest.raises(
-        RequestError, match="backend must be 'processes' or 'threads'; received 'x'"
+        RequestError, match="backend must be 'processes', 'threads' or 'auto'; received 'x'"
     ):
         ensemble.forecast(run, start=65.0, steps=5, backend="x")
     with pytest.raises(RequestError, match="level must lie between 0 and 1; received 95"):

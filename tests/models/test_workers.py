@@ -20,12 +20,12 @@ from hypothesis import strategies as st
 import seakeep
 from seakeep.core.scratch import Scratch
 from seakeep.errors import RequestError
-from seakeep.models import processes
+from seakeep.models import processes, workers
 from seakeep.models.ensemble_series import read_windows
 from seakeep.models.members import TrainingArrays, forecast_member, member_radius
 from seakeep.models.workers import Crew, WorkerLostError, as_finished, side_by_side
 
-CREWS = [Crew(1), Crew(2, "threads"), Crew(3, "threads"), Crew(2, "processes")]
+CREWS = [Crew(1), Crew(2, "threads"), Crew(3, "threads"), Crew(2, "processes"), Crew(2, "auto")]
 posix = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system knows no SIGKILL")
 
 
@@ -100,7 +100,7 @@ def _task(ensemble, run, starts):
 @pytest.mark.parametrize("crew", CREWS, ids=str)
 def test_blas_has_one_thread_wherever_members_work(crew):
     for process, found in side_by_side(side_work.blas_threads, None, range(4), crew):
-        assert (process == os.getpid()) == (crew.workers == 1 or crew.backend == "threads")
+        assert (process == os.getpid()) == (crew.workers == 1 or crew.backend != "processes")
         assert set(found) == {1}
 
 
@@ -120,6 +120,27 @@ def test_the_limit_of_blas_is_lifted_when_the_last_one_leaves():
         assert threads() == {1}
         second.close()
         assert threads() == before
+
+
+def test_little_work_stays_in_this_process_and_much_goes_to_others(monkeypatch):
+    def where():
+        return [process for process, _ in side_by_side(side_work.square, 1, range(6), crew)]
+
+    crew = Crew(2, "auto")
+    assert set(where()) == {os.getpid()}  # 6 x 20 ms, and processes must save 6 s
+    # Of 6 x 20 ms half of the last three are saved: 30 ms.
+    monkeypatch.setattr(workers, "WORTH", 0.01)
+    found = where()
+    assert found[:3] == [os.getpid()] * 3
+    assert os.getpid() not in found[3:]
+
+
+def test_work_that_is_handed_over_gives_the_same_arrays(ensemble_of, monkeypatch):
+    ensemble, run = ensemble_of(7, 2, "ridge")
+    alone = ensemble.forecast_summary(run, 31.0, 40)
+    monkeypatch.setattr(workers, "WORTH", 0.0)
+    handed = ensemble.forecast_summary(run, 31.0, 40, workers=2, backend="auto")
+    xr.testing.assert_identical(alone, handed)
 
 
 def test_data_are_pickled_once_and_read_once_by_each_process(ensemble_of, monkeypatch):
@@ -232,7 +253,7 @@ def _ends(pid):
     [
         ({"workers": 0}, "workers must be a positive integer; received 0"),
         ({"workers": True}, "workers must be a positive integer; received True"),
-        ({"backend": "gpu"}, "backend must be 'processes' or 'threads'; received 'gpu'"),
+        ({"backend": "gpu"}, "backend must be 'processes', 'threads' or 'auto'; received 'gpu'"),
         ({"workers": 2, "scheduler": "tcp://a:1"}, "hands all work to a cluster. Give one"),
     ],
 )

@@ -136,6 +136,47 @@ def test_calibration_from_the_size_of_the_panel(tracked):
     assert tracked.attrs["calibration"] == "size of the panel"
 
 
+def hide_corner(i, lit, corner, leg):
+    """A dark triangle of two legs along the panel's sides (pixels), over one of its corners."""
+    surge, heave, pitch = motion(i / RATE)
+    half = 0.5 * np.array(tank_video.PANEL)
+    panel = half * [[-1, 1], [1, 1], [1, -1], [-1, -1]] + [0, tank_video.PANEL_HEIGHT]
+    places = tank_video._turned(panel, (surge, heave + COG), pitch)
+    here = places[corner]
+    along, across = (
+        (places[(corner + step) % 4] - here) / np.hypot(*(places[(corner + step) % 4] - here))
+        for step in (1, -1)
+    )
+    out = here - 2 * (along + across)
+    points = np.array([out, out + (leg + 4) * along, out + (leg + 4) * across])
+    hidden = np.ascontiguousarray(lit)
+    cv2.fillPoly(
+        hidden, [tank_video._corners(points)], (60, 60, 60), cv2.LINE_AA, tank_video.FRACTION_BITS
+    )
+    return hidden
+
+
+@pytest.mark.parametrize(("refine", "leg"), [(True, 10), (False, 18)])
+def test_a_hidden_corner_is_flagged_before_it_spoils_the_pitch(tmp_path, refine, leg):
+    """Every third frame hides a corner, each of the four in turn; the others are sound."""
+    hidden = range(1, 60, 3)
+
+    def hook(i, lit):
+        return hide_corner(i, lit, i // 3 % 4, leg) if i in hidden else lit
+
+    path = tmp_path / "corners.mp4"
+    place = render(path, hook, frames=60)
+    out = track_video(path, TrackingSettings(refine=refine))
+    bad = np.isin(np.arange(60), hidden)
+    np.testing.assert_array_equal(out["flag"] == FLAGS["occluded"], bad)
+    assert np.all(out["flag"][~bad] == FLAGS["good"])
+    # What is flagged here was wrong by more than what is asked for, and looks sound otherwise.
+    _, _, pitch = motion(out["time"].to_numpy())
+    assert np.all(np.rad2deg(np.abs(out["panel_angle"] - pitch))[bad] > 0.2)
+    assert np.all(out["panel_fill"][bad] > 0.93)
+    assert np.all(centroid_error(out, place)[~bad] < 0.5)
+
+
 def test_a_stated_origin_gives_absolute_motions(plain):
     x, y = tank_video.pixel_of(0.0, COG + tank_video.PANEL_HEIGHT)
     how = TrackingSettings(metres_per_pixel=0.0025, origin=(float(x), float(y)))

@@ -1,6 +1,7 @@
 """A small study on the tutorial's campaign: seconds, and all of its parts."""
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -34,11 +35,22 @@ n_series = 8
 """
 
 
+@pytest.fixture(scope="session")
+def put_study() -> Callable[[Path], str]:
+    """Put the tutorial's campaign and a study of it into a folder; gives the study's text."""
+
+    def put(folder: Path) -> str:
+        for path in TUTORIAL.glob("*"):
+            if path.suffix in (".toml", ".csv"):
+                shutil.copy(path, folder)
+        (folder / "study.toml").write_text(STUDY, encoding="utf-8")
+        return STUDY
+
+    return put
+
+
 @pytest.fixture
-def study_folder(tmp_path: Path) -> Path:
+def study_folder(tmp_path: Path, put_study: Callable[[Path], str]) -> Path:
     """A folder with the tutorial's campaign and a study of it."""
-    for path in TUTORIAL.glob("*"):
-        if path.suffix in (".toml", ".csv"):
-            shutil.copy(path, tmp_path)
-    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    put_study(tmp_path)
     return tmp_path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
@@ -11,7 +12,8 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.campaign.settings import CampaignSettings
-from seakeep.signals import Clock, bridge
+from seakeep.errors import SeakeepWarning
+from seakeep.signals import Clock, bridge, misplaced_probes
 from seakeep.signals.gaps import stretches
 from seakeep.signals.quality import (
     BRIDGED,
@@ -32,7 +34,18 @@ from seakeep.signals.quality import (
 )
 from seakeep.signals.resolution import reading_step
 
-__all__ = ["Finding", "check_clocks", "check_levels", "check_pairs", "check_samples", "findings_of"]
+__all__ = [
+    "Finding",
+    "as_attribute",
+    "check_clocks",
+    "check_levels",
+    "check_pairs",
+    "check_positions",
+    "check_samples",
+    "checked",
+    "findings_of",
+    "warn_of_positions",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -50,7 +63,7 @@ class Finding:
         Channel, or the logger for a clock.
     kind : str
         ``constant``, ``missing``, ``outliers``, ``saturated``, ``stuck``, ``drift``, ``lag``,
-        ``resolution``, ``agreement``, ``clock`` or ``left out``.
+        ``resolution``, ``agreement``, ``position``, ``clock`` or ``left out``.
     text : str
         What, how much, and what was done about it.
     """
@@ -122,17 +135,19 @@ def _repaired(channel: xr.DataArray, words: str) -> None:
 
 
 def checked(
+    run: str,
     groups: Mapping[str, xr.Dataset],
     whole: xr.Dataset,
     clocks: Mapping[str, Clock],
     settings: CampaignSettings,
     left_out: Mapping[str, str],
-) -> str:
-    """All findings of a run, as the attribute ``quality`` holds them."""
+) -> list[Finding]:
+    """All findings of a run."""
     pairs, _ = check_pairs(whole, settings)
     every = told_samples(groups) + check_levels(whole) + pairs
+    every += check_positions(whole, settings.rig.water_depth, settings.runs[run].waves)
     others = [Finding("other runs", "left out", words) for words in left_out.values()]
-    return as_attribute(every + check_clocks(clocks, groups, settings) + others)
+    return every + check_clocks(clocks, groups, settings) + others
 
 
 _KINDS = {MISSING: "missing", OUTLIER: "outliers", SATURATED: "saturated", STUCK: "stuck",
@@ -250,6 +265,63 @@ def _kind(fault: str) -> str:
     """Kind of finding that a fault of :meth:`Agreement.faults` is."""
     starts = {"lag": "lag", "constant": "constant", "motion below": "resolution"}
     return next((kind for start, kind in starts.items() if fault.startswith(start)), "agreement")
+
+
+def check_positions(run: xr.Dataset, depth: float | None, waves: str | None) -> list[Finding]:
+    """Stated positions of wave probes against the phases of the waves that passed them.
+
+    Parameters
+    ----------
+    run : Dataset
+        All channels on one axis; elevations have the attribute ``x_position``.
+    depth : float or None
+        Water depth, m; without it nothing can be said.
+    waves : str or None
+        What the campaign says the waves are; regular ones say nothing of positions.
+
+    Returns
+    -------
+    list of Finding
+        See :func:`seakeep.signals.misplaced_probes`.
+    """
+    places = {
+        str(name): float(run[name].attrs["x_position"])
+        for name in run.data_vars
+        if "x_position" in run[name].attrs
+    }
+    if depth is None or waves == "regular" or len(places) < 2:
+        return []
+    dt = float(run["time"][1] - run["time"][0])
+    found = misplaced_probes({name: _filled(run[name]) for name in places}, places, dt, depth)
+    return [Finding(each.probe, "position", each.describe()) for each in found]
+
+
+def warn_of_positions(findings: list[Finding], run: str, told: set[str]) -> None:
+    """Warn of probes that stand elsewhere than stated, of each only in the first run.
+
+    Parameters
+    ----------
+    findings : list of Finding
+        Of the run.
+    run : str
+        Its name.
+    told : set of str
+        Probes of which a warning was given; grows.
+
+    Warns
+    -----
+    SeakeepWarning
+        One for each probe that is not in `told`.
+    """
+    for each in findings:
+        if each.kind == "position" and each.channel not in told:
+            told.add(each.channel)
+            warnings.warn(
+                f"{run}: {each.channel} is {each.text}. Check [rig.positions] of the campaign, the "
+                "water depth and the probes' clocks.",
+                SeakeepWarning,
+                stacklevel=3,
+            )
 
 
 def check_clocks(

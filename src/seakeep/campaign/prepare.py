@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.channels import Group, read_groups
-from seakeep.campaign.checks import checked
+from seakeep.campaign.checks import as_attribute, checked, warn_of_positions
 from seakeep.campaign.instruments import open_loggers
 from seakeep.campaign.labels import attributes_of, cropped, role_of
 from seakeep.campaign.periods import counted, in_seconds, parse_periods
@@ -415,7 +415,7 @@ class Campaign:
         for name in wanted:
             self._run(name)
         found, settings, period, dt = self._whole(wanted, progress, failures=failures)
-        stated, first = dt is not None, ""
+        stated, first, misplaced = dt is not None, "", set[str]()
         for done, name in enumerate(wanted, 1):
             try:
                 if failures is not None and name in failures:
@@ -429,7 +429,7 @@ class Campaign:
                         f"the runs differ in rate: '{first}' has a step of {dt:g} s and '{name}' "
                         f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                     )
-                run = self._finished(name, groups, dt, found, settings)
+                run = self._finished(name, groups, dt, found, settings, misplaced)
             except SeakeepError as error:
                 spare(failures, name, error)
                 if progress is not None:
@@ -442,15 +442,22 @@ class Campaign:
             yield name, run
 
     def _finished(
-        self, name: str, groups: Group, dt: float, found: Survey, settings: CampaignSettings
+        self,
+        name: str,
+        groups: Group,
+        dt: float,
+        found: Survey,
+        settings: CampaignSettings,
+        misplaced: set[str],
     ) -> xr.Dataset:
         whole = on_one_axis(groups, dt, settings, name)
-        findings = checked(groups, whole, found.clocks[name], settings, found.left_out)
+        findings = checked(name, groups, whole, found.clocks[name], settings, found.left_out)
+        warn_of_positions(findings, name, misplaced)
         reference = _reference_time(groups)
         record = (float(reference[0]), float(reference[-1]))
         run = cropped(whole, name, settings.runs[name], record)
         run.attrs.update(self._attributes(name, run, dt, found, settings))
-        run.attrs["quality"] = findings
+        run.attrs["quality"] = as_attribute(findings)
         return run
 
     def _whole(

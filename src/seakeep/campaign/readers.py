@@ -212,7 +212,7 @@ def find_column(path: Path, table: Columns, wanted: str) -> str:
     if name is None:
         raise RequestError(
             f"{path} has no column '{wanted}'.{did_you_mean(wanted, table.names)} "
-            f"Its columns: {', '.join(table.names)}."
+            f"Its columns: {', '.join(table.names)}. Name one of these, or give another file."
         )
     if name in table.faults:
         raise DataError(table.faults[name])

@@ -89,7 +89,7 @@ def _rising_band(band: tuple[float, float]) -> tuple[float, float]:
     return band
 
 
-def _as_written(value: float) -> float | str:
+def _as_written(value: int | float) -> int | float | str:
     return str(value) if isinstance(value, Periods) else value
 
 

@@ -58,7 +58,7 @@ def read_text(path: Path, options: FileSettings) -> Columns:
     """
     text = _text(path, options)
     # Not splitlines: it would break lines at form feeds and other marks inside a cell.
-    lines = re.split(r"\r\n|\r|\n", text)
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     layout = _layout(path, lines if lines[-1] else lines[:-1], options)
     _check_widths(path, layout)
     if lines[-1]:
@@ -308,7 +308,7 @@ def _numbers(
         "skipinitialspace": True,
     }
     try:
-        if _TRUTH.search(text):
+        if _has_truth(text):
             raise ValueError("truth values are no numbers")
         frame = pd.read_csv(
             io.StringIO(text),
@@ -337,6 +337,12 @@ def _numbers(
         else:
             values[names[i]] = out
     return values, faults
+
+
+def _has_truth(text: str) -> bool:
+    """Whether a cell says true or false, which pandas would take for 1 and 0."""
+    # Numbers have no u and no s: without them the slow search is spared.
+    return any(letter in text for letter in "uUsS") and _TRUTH.search(text) is not None
 
 
 def _number(cell: str, decimal: str) -> float:

@@ -66,7 +66,9 @@ Steps = Annotated[
 Workers = Annotated[
     int | None,
     typer.Option(
-        "--workers", help="Members of an ensemble side by side; by default one a core.", min=1
+        "--workers",
+        help="Processes for members of a large ensemble; by default one a core.",
+        min=1,
     ),
 ]
 ModelFile = Annotated[
@@ -97,9 +99,7 @@ def fit(
     if isinstance(identified, HankelEnsemble):
         with progress_bar("Stability") as progress:
             tell = _quietly(progress)
-            identified.spectral_radii(
-                workers=worker_count(workers), backend="threads", progress=tell
-            )
+            identified.spectral_radii(workers=worker_count(workers), backend="auto", progress=tell)
     typer.echo(identified.summary())
     identified.save(out)
     messages().print(f"Wrote {out}. Judge it with: seakeep compare {out} {campaign}")
@@ -158,7 +158,7 @@ def forecast(
         with progress_bar("Forecasting") as progress:
             how: dict[str, Any] = {
                 "workers": worker_count(workers),
-                "backend": "threads",
+                "backend": "auto",
                 "progress": _quietly(progress),
             }
             if members:

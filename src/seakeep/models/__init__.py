@@ -7,6 +7,7 @@ from pathlib import Path
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.models import ensemble_store, store
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
+from seakeep.models.choice import AlignmentChoice, choose_alignment
 from seakeep.models.ensemble import BayesianHankelDMDc
 from seakeep.models.fitted_ensemble import HankelEnsemble
 from seakeep.models.hankel import HankelDMDc
@@ -16,6 +17,7 @@ from seakeep.models.priors import Fixed, LogUniform, Uniform
 from seakeep.models.summaries import summarize
 
 __all__ = [
+    "AlignmentChoice",
     "BayesianHankelDMDc",
     "FittedAlignment",
     "Fixed",
@@ -26,6 +28,7 @@ __all__ = [
     "ProbeAlignment",
     "ProbeOffset",
     "Uniform",
+    "choose_alignment",
     "estimate_probe_offset",
     "load_model",
     "summarize",

@@ -9,7 +9,7 @@ from concurrent.futures import Future
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, TypeVar, get_args
 
 import threadpoolctl
 
@@ -27,7 +27,7 @@ __all__ = [
     "one_blas_thread",
 ]
 
-Backend = Literal["processes", "threads"]
+Backend = Literal["processes", "threads", "auto"]
 Data = TypeVar("Data")
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -46,8 +46,9 @@ class Crew:
     ----------
     workers : int, optional
         Workers on this machine; 1 works in the caller's thread.
-    backend : {"processes", "threads"}, optional
-        Their kind.
+    backend : {"processes", "threads", "auto"}, optional
+        Their kind. With "auto" the caller's thread begins, and what is left goes to processes
+        where they save more time than they may take to start.
     scheduler : str, optional
         Address of the scheduler of a running Dask cluster, such as ``tcp://host:8786``, whose
         workers do it instead.
@@ -66,9 +67,9 @@ class Crew:
         workers: object = self.workers
         if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
             raise RequestError(f"workers must be a positive integer; received {workers!r}.")
-        if self.backend not in ("processes", "threads"):
+        if self.backend not in get_args(Backend):
             raise RequestError(
-                f"backend must be 'processes' or 'threads'; received {self.backend!r}."
+                f"backend must be 'processes', 'threads' or 'auto'; received {self.backend!r}."
             )
         if self.scheduler is not None and workers != 1:
             raise RequestError(

@@ -96,8 +96,12 @@ def _range(values: Sequence[float] | FloatArray, form: str) -> str:
 
 
 def _periods(values: Sequence[float]) -> str:
-    return f"{_range(values, '.4g')} encounter periods"
+    return _of(_range(values, ".4g"), "encounter period")
 
 
 def _samples(values: Sequence[int]) -> str:
-    return f"{_range(values, 'd')} samples"
+    return _of(_range(values, "d"), "sample")
+
+
+def _of(count: str, unit: str) -> str:
+    return f"{count} {unit}" if count == "1" else f"{count} {unit}s"

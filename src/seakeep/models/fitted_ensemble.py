@@ -266,10 +266,11 @@ class HankelEnsemble:
             As in :meth:`HankelDMDcModel.forecast`.
         workers : int, optional
             Members at work at a time; the result does not depend on it.
-        backend : {"processes", "threads"}, optional
+        backend : {"processes", "threads", "auto"}, optional
             Kind of worker. Processes stay ready for a minute after a call; a script that starts
             them needs ``if __name__ == "__main__":``. Threads start at once, but most of a
-            member's work holds the interpreter's lock.
+            member's work holds the interpreter's lock. "auto" begins without either, and starts
+            processes where they save more time than they take to start.
         scheduler : str, optional
             Address of the scheduler of a running Dask cluster, ``"tcp://host:8786"``, whose
             workers do the work instead (extra ``cluster``).
@@ -337,7 +338,7 @@ class HankelEnsemble:
         (window,) = read_windows(self, run, [start], steps)
         series = member_series(self, run, [window], Crew(workers, backend, scheduler), progress)
         shape = (1, window.steps, len(self.states))
-        values, lost = reduce_members(series, self.n_members, shape, level)
+        values, lost = reduce_members(series, self.n_members, shape, level, workers)
         variables = label_channels(
             self.state_labels, self.state_spread, values[0], ("statistic", "time")
         )
@@ -432,7 +433,7 @@ class HankelEnsemble:
         windows = read_windows(self, run, starts, steps)
         shape = (len(windows), windows[0].steps, len(self.states))
         series = member_series(self, run, windows, Crew(workers, backend, scheduler))
-        values, lost = reduce_members(series, self.n_members, shape, level)
+        values, lost = reduce_members(series, self.n_members, shape, level, workers)
         variables = label_channels(
             self.state_labels, self.state_spread, values, ("window", "statistic", "lead")
         )

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import math
+import os
 import tempfile
+import threading
 from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import BinaryIO
 
@@ -71,6 +75,8 @@ def statistic_coordinate(level: float) -> xr.Variable:
 
 def first_lost(values: FloatArray) -> npt.NDArray[np.int64]:
     """First instant at which a channel is NaN, or −1, of values (…, steps, N)."""
+    if not np.isnan(values.sum()):
+        return np.full(values.shape[:-2], -1)
     gone: npt.NDArray[np.bool_] = np.isnan(values.sum(axis=-1))
     first = np.argmax(gone, axis=-1)
     return np.where(np.take_along_axis(gone, first[..., None], axis=-1)[..., 0], first, -1)
@@ -102,7 +108,11 @@ def stack_members(
 
 
 def reduce_members(
-    series: Iterable[FloatArray], members: int, shape: tuple[int, int, int], level: float
+    series: Iterable[FloatArray],
+    members: int,
+    shape: tuple[int, int, int],
+    level: float,
+    threads: int = 1,
 ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     """Reduce members to statistics without holding all of them.
 
@@ -120,6 +130,8 @@ def reduce_members(
         (window, steps, N).
     level : float
         Probability between the two quantiles.
+    threads : int, optional
+        Pieces reduced side by side once all members are there.
 
     Returns
     -------
@@ -131,7 +143,8 @@ def reduce_members(
     windows, steps, N = shape
     out = np.empty((windows, 4, steps, N))
     lost = np.full((members, windows), -1, dtype=np.int64)
-    length = max(1, min(steps, CHUNK // max(1, 8 * N * members)))
+    room = CHUNK // max(1, 8 * N * members * threads)
+    length = max(1, min(math.ceil(steps / threads), room))
     pieces = math.ceil(steps / length)
     with _store((windows, pieces, members, length, N)) as store:
         for member, values in enumerate(series):
@@ -140,12 +153,16 @@ def reduce_members(
                 for piece in range(pieces):
                     part = values[window, piece * length : (piece + 1) * length]
                     store.put(window, piece, member, part)
-        for window in range(windows):
-            kept = lost[:, window] < 0
-            for piece in range(pieces):
-                at = slice(piece * length, min((piece + 1) * length, steps))
-                block = store.get(window, piece)[kept, : at.stop - at.start]
-                out[window, :, at] = statistics_of(block, level)
+
+        def reduce(window: int, piece: int) -> None:
+            at = slice(piece * length, min((piece + 1) * length, steps))
+            block = store.get(window, piece)[lost[:, window] < 0, : at.stop - at.start]
+            out[window, :, at] = statistics_of(block, level)
+
+        with ThreadPoolExecutor(threads) as pool:
+            todo = [(w, p) for w in range(windows) for p in range(pieces)]
+            for done in [pool.submit(reduce, *each) for each in todo]:
+                done.result()
     return out, lost
 
 
@@ -170,7 +187,19 @@ class _Spilled:
 
     def __init__(self, shape: tuple[int, ...], file: BinaryIO) -> None:
         self._shape, self._file = shape, file
-        file.truncate(8 * math.prod(shape))
+        self._lock = threading.Lock()  # reading moves the place in the file
+        self._size = 8 * math.prod(shape)
+        with _spilling(self._size):
+            self._reserve()
+
+    def _reserve(self) -> None:
+        """Take the room now where that can be done: a full disk is told before the work."""
+        try:
+            os.posix_fallocate(self._file.fileno(), 0, self._size)
+        except (AttributeError, OSError) as error:
+            if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+                raise
+            self._file.truncate(self._size)
 
     def _seek(self, window: int, piece: int, member: int) -> None:
         place = np.ravel_multi_index((window, piece, member), self._shape[:3])
@@ -178,14 +207,32 @@ class _Spilled:
 
     def put(self, window: int, piece: int, member: int, part: FloatArray) -> None:
         """Keep a piece of a member, shape (time, N)."""
-        self._seek(window, piece, member)
-        self._file.write(np.ascontiguousarray(part).data)
+        left = np.ascontiguousarray(part).data.cast("B")
+        with _spilling(self._size):
+            self._seek(window, piece, member)
+            while left:
+                left = left[self._file.write(left) :]
 
     def get(self, window: int, piece: int) -> FloatArray:
         """A piece of all members, shape (member, length, N)."""
-        self._seek(window, piece, 0)
         shape = self._shape[2:]
-        return np.fromfile(self._file, dtype=np.float64, count=math.prod(shape)).reshape(shape)
+        with self._lock:
+            self._seek(window, piece, 0)
+            found = np.fromfile(self._file, dtype=np.float64, count=math.prod(shape))
+        return found.reshape(shape)
+
+
+@contextmanager
+def _spilling(size: int) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise RequestError(
+            f"cannot keep {size / 2**20:.0f} MiB of members in the temporary folder "
+            f"{tempfile.gettempdir()}: {error.strerror or error}. Free space there, name a folder "
+            "on another disk in the environment variable TMPDIR, or ask for fewer steps, windows "
+            "or members at a time."
+        ) from error
 
 
 @contextmanager

@@ -7,8 +7,9 @@ has one thread, so that workers do not fight for cores.
 
 from __future__ import annotations
 
+import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager
 from itertools import islice
@@ -38,6 +39,11 @@ __all__ = [
 Data = TypeVar("Data")
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+WORTH = 6.0
+"""Seconds that processes must save: two were ready after 2 s on idle cores and 6 s on busy ones."""
+TRIED = 3
+"""Items by which the time of the others is judged: the first one also loads what it needs."""
 
 
 def check_crew(crew: Crew) -> None:
@@ -92,6 +98,11 @@ def side_by_side(
     if crew == Crew(1, crew.backend):
         yield from _alone(function, data, items)
         return
+    if crew.backend == "auto" and crew.scheduler is None:
+        done = yield from _until_worth(function, data, items, crew.workers)
+        items = items[done:]
+        if not items:
+            return
     with _team(function, data, crew, len(items)) as team:
         pending: deque[Future[list[Result]]] = deque()
         for first in range(0, len(items), team.batch):
@@ -145,6 +156,23 @@ def _alone(
     with one_blas_thread():
         for item in items:
             yield desk.do(function, item)
+
+
+def _until_worth(
+    function: Function[Data, Item, Result], data: Data, items: Sequence[Item], workers: int
+) -> Generator[Result, None, int]:
+    """Results of the first items, until processes would save time; returns their number."""
+    desk, spent = Desk(data), 0.0
+    for done, item in enumerate(items):
+        left = spent / max(done, 1) * (len(items) - done)
+        if done >= TRIED and left * (1 - 1 / workers) > WORTH:
+            return done
+        begin = time.perf_counter()
+        with one_blas_thread():
+            found = desk.do(function, item)
+        spent += time.perf_counter() - begin
+        yield found
+    return len(items)
 
 
 def _team(

@@ -240,12 +240,16 @@ def prior_words(text: str) -> str:
     --------
     >>> prior_words("Uniform(low=50, high=150)"), prior_words("100.0")
     ('uniform from 50 to 150', '100')
+    >>> prior_words("Fixed(value=80.0)"), prior_words("scipy.stats.norm(loc=100.0, scale=20.0)")
+    ('80 in all draws', 'scipy.stats.norm(loc=100.0, scale=20.0)')
     """
     try:
         return f"{float(text):g}"
     except ValueError:
         pass
     found = _keywords(text)
+    if found is not None and found[0] == "Fixed":
+        return f"{found[1]['value']:g} in all draws"
     kinds = {"Uniform": "uniform", "LogUniform": "log-uniform"}
     if found is None or found[0] not in kinds or not {"low", "high"} <= set(found[1]):
         return text

@@ -142,9 +142,11 @@ def write_report(result: StudyResult, progress: Progress | None = None) -> Path:
         for number, each in enumerate(figures):
             tell(number, len(figures), f"drawing {each.name.replace('_', ' ')}")
             figure = each.draw()
+            if each.raster:
+                figure.set_dpi(RASTER_DPI)
             _lay_out(figure)
             picture = result.folder / "figures" / f"{each.name}.png"
-            save_figure(figure, picture, RASTER_DPI if each.raster else None)
+            save_figure(figure, picture, figure.dpi)
             if each.raster:
                 drawn.setdefault(each.section, []).append((each, inline_png(picture, each.name)))
                 continue
@@ -372,9 +374,13 @@ def _table(table: ReportTable) -> str:
         cells = "".join(cell("td", text, k) for k, text in enumerate(row))
         rows.append(f"<tr{attribute}>{cells}</tr>")
     note = f'<p class="note">{html.escape(table.note)}</p>' if table.note else ""
-    return (
+    text = (
         f'<div class="table" id="table-{table.name}"><button class="copy">Copy table</button>'
         f'<div class="scroll"><table><caption>{html.escape(table.title)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>{note}"
         f"<p class='note only-screen'>Files: tables/{table.name}.csv, .tex.</p></div>"
     )
+    if not table.folded:
+        return text
+    title = html.escape(table.title)
+    return f'<details class="only-screen"><summary>{title}</summary>\n{text}</details>'

@@ -24,6 +24,20 @@ def _response(result: StudyResult, test: str) -> xr.Dataset | None:
     return result.groups.get(f"statistics/response/{test}")
 
 
+def signed(value: float, digits: int) -> str:
+    """Text of a number with its sign, where anything of it is left after rounding.
+
+    Examples
+    --------
+    >>> signed(1.4, 0), signed(-0.04, 1), signed(-0.06, 1)
+    ('+1', '0.0', '-0.1')
+    """
+    text = number(value, digits)
+    if text == MISSING or float(text) == 0.0:
+        return text.removeprefix("-")
+    return text if value < 0 else f"+{text}"
+
+
 def response_table(result: StudyResult, test: str) -> ReportTable | None:
     """Error of a test set in regular waves, taken apart channel by channel.
 
@@ -52,10 +66,10 @@ def response_table(result: StudyResult, test: str) -> ReportTable | None:
                     channel_words(name),
                     model_words(model),
                     number(float(at["sd_ratio"]), 2),
-                    f"{float(at['mean_shift']):+.2f}",
+                    signed(float(at["mean_shift"]), 2),
                     *(number(float(at[f"error_{key}"]), 2) for key in ("offset", "wave", "rest")),
                     number(float(at["amplitude_ratio"]), 2),
-                    f"{lead:+.0f}" if np.isfinite(lead) else MISSING,
+                    signed(lead, 0),
                 )
             )
     return ReportTable(
@@ -133,15 +147,20 @@ def _celerity_words(at: xr.Dataset, facts: dict[str, float]) -> list[str]:
     lead, shift = float(at["celerity_phase"]), float(facts["surge_shift"])
     if not np.isfinite(lead):
         return []
-    sense = "early" if lead > 0 else "late"
+    out = f"{abs(lead):.0f}° {'early' if lead > 0 else 'late'}"
+    if abs(lead) < 0.5:
+        out = "less than 1° early or late"
     said = (
         f"The alignment carries all waves at {float(at['celerity']):.2f} m/s; these run at "
         f"{facts['phase_speed']:.2f} m/s, and the vessel lies {abs(shift):.2f} m "
         f"{'down' if shift > 0 else 'up'}stream of its training mean: that alone makes the "
-        f"forecast {abs(lead):.0f}° {sense}."
+        f"forecast {out}."
     )
     if abs(lead) > PHASE:
-        said += " Alignment by linear dispersion (mode = 'dispersion') has no such error."
+        said += (
+            " Alignment by linear dispersion (mode = 'dispersion') has none of this error of one "
+            "celerity; the other causes of error remain."
+        )
     return [said]
 
 
@@ -149,7 +168,7 @@ def _drift_words(at: xr.Dataset, names: list[str]) -> str:
     part = at.sel(channel=names)
     listed = ", ".join(
         f"{channel_words(name)} ({float(each['error_offset']):.1f} measured SDs; mean "
-        f"{float(each['mean_shift']):+.1f} training SDs off, measured SD "
+        f"{signed(float(each['mean_shift']), 1)} training SDs off, measured SD "
         f"{float(each['sd_ratio']):.2f} of the training SD)"
         for name in names
         for each in [part.sel(channel=name)]

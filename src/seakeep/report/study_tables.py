@@ -54,6 +54,8 @@ class ReportTable:
         Columns that come from another data set.
     averages : tuple of int
         Rows that are averages of others.
+    folded : bool
+        Whether a page folds it away until it is wanted.
     """
 
     name: str
@@ -64,6 +66,7 @@ class ReportTable:
     numeric: tuple[int, ...] = ()
     elsewhere: tuple[int, ...] = ()
     averages: tuple[int, ...] = ()
+    folded: bool = False
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -235,9 +238,9 @@ def coverage_table(result: StudyResult, model: str) -> ReportTable:
     columns = ["channel"]
     tables = {test: result.groups[f"statistics/coverage/{test}"].sel(model=model)
               for test in result.tests}  # fmt: skip
-    for test, data in tables.items():
-        for side in data["against"].values:
-            columns.append(f"{result.label_of(test)}: inside, {side}")
+    true = any("truth" in data["against"].values for data in tables.values())
+    for test in tables:
+        columns.append(f"{result.label_of(test)}: inside" + (" [of the truth]" if true else ""))
         columns.append(f"{result.label_of(test)}: width [SD]")
     names = [*result.channels, "average"]
     rows = []
@@ -245,16 +248,20 @@ def coverage_table(result: StudyResult, model: str) -> ReportTable:
         row = ["average" if name == "average" else channel_words(name)]
         for data in tables.values():
             at = data.sel(channel=name)
-            row += [number(float(v), 2) for v in at["inside"].values]
+            first, *others = (number(float(v), 2) for v in at["inside"].values)
+            row.append(first + "".join(f" [{each}]" for each in others))
             row.append(number(float(at["relative_width"].sel(against="measured")), 2))
         rows.append(tuple(row))
     level = float(result.settings["statistics"]["level"])
     note = (
-        f"Part of the instants inside the band of nominally {level:g} (quantiles of the members), "
-        "and its mean width in measured SD; means over all cells."
+        f"Part of the measured instants inside the band of nominally {level:g} (quantiles of the "
+        "members), and its mean width in measured SD; means over all cells."
     )
-    if any("truth" in data["against"].values for data in tables.values()):
-        note += " The truth is the virtual tank's, without noise or slap; rates are not filtered."
+    if true:
+        note += (
+            " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
+            "slap; rates are not filtered."
+        )
     return ReportTable(
         f"coverage_{model}",
         f"Coverage of the {100 * level:g} % band, {model_words(model)}",

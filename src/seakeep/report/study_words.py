@@ -64,11 +64,15 @@ def _verdict(single: float, ensemble: float) -> str:
     if not np.isfinite(single + ensemble):
         return ""
     if ensemble < single:
-        return f" (the ensemble's mean is better by {100 * (1 - ensemble / single):.0f} %)"
+        return f" (the ensemble's mean is better by {_percent(1 - ensemble / single)})"
     return (
         " (the ensemble does not beat the deterministic model: it is worse by "
-        f"{100 * (ensemble / single - 1):.0f} %)"
+        f"{_percent(ensemble / single - 1)})"
     )
+
+
+def _percent(part: float) -> str:
+    return "less than 1 %" if part < 0.005 else f"{100 * part:.0f} %"
 
 
 def _coverage_findings(result: StudyResult, model: str) -> list[str]:
@@ -222,6 +226,7 @@ def quality_table(result: StudyResult, name: str) -> ReportTable:
         "run. Frozen: samples equal to both neighbours. Slack: a load below 0.1 % of its largest. "
         "Flagged: part of the samples.",
         (3, 4, 5, 6, 7, 8),
+        folded=True,
     )  # fmt: skip
 
 

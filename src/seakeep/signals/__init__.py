@@ -22,6 +22,7 @@ from seakeep.signals.rigid_body import (
     transfer_position,
     transfer_velocity,
 )
+from seakeep.signals.separation import misplaced_probes, probe_separation
 from seakeep.signals.spectra import (
     encounter_period,
     peak_period,
@@ -66,10 +67,12 @@ __all__ = [
     "integrate",
     "low_pass",
     "lowpass_taps",
+    "misplaced_probes",
     "onto_uniform",
     "peak_period",
     "phase_celerity",
     "pool_drift",
+    "probe_separation",
     "remove_gravity",
     "resample",
     "rotation_matrix",

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from seakeep.signals.frames import opencv
 
-__all__ = ["Segmentation", "Sighting", "binary_mask", "find_panel"]
+__all__ = ["CORNERS", "Segmentation", "Sighting", "binary_mask", "find_panel"]
 
 Image = npt.NDArray[np.uint8]
 
@@ -25,6 +25,8 @@ MARGIN = 8
 """Pixels around a component in which its background is looked at."""
 EDGE, CLEAR = 5, 11
 """Sides of the squares by which a component grows to take in its edge, and to leave it behind."""
+CORNERS = ("left_top", "left_bottom", "right_top", "right_bottom")
+"""Fields of a :class:`Sighting` that say how much of each corner is seen."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,8 @@ class Sighting:
         Saturated pixels in the region.
     brightness : float
         Mean of the region's colours, 0 to 255.
+    left_top, left_bottom, right_top, right_bottom : float
+        Part seen of each end's halves: squares of half the rectangle's height at its corners.
     """
 
     x: float = np.nan
@@ -88,6 +92,10 @@ class Sighting:
     cut: float = 0.0
     saturation: float = 0.0
     brightness: float = 0.0
+    left_top: float = np.nan
+    left_bottom: float = np.nan
+    right_top: float = np.nan
+    right_bottom: float = np.nan
 
     def row(self) -> tuple[float, ...]:
         """Return the numbers in the order of the fields."""
@@ -166,13 +174,16 @@ def find_panel(frame: Image, how: Segmentation) -> Sighting:
     angle, long_side, short_side = _axes(
         moments["mu20"] / mass, moments["mu11"] / mass, moments["mu02"] / mass
     )
+    seen = (filled > 0).astype(np.float32) if weights is None else weights
+    centre = moments["m10"] / mass, moments["m01"] / mass
+    corners = _corners(seen, centre, angle, long_side, short_side)
     _, sides, _ = cv2.minAreaRect(outline)  # runs through the centres of the outermost pixels
     rows, columns = mask.shape
     cut = min(bounds[:2]) == 0 or bounds[0] + bounds[2] == columns or bounds[1] + bounds[3] == rows
     origin = (0, 0) if how.region is None else how.region[:2]
     return Sighting(
-        x=origin[0] + left + moments["m10"] / mass,
-        y=origin[1] + top + moments["m01"] / mass,
+        x=origin[0] + left + centre[0],
+        y=origin[1] + top + centre[1],
         angle=angle,
         length=long_side,
         height=short_side,
@@ -181,7 +192,30 @@ def find_panel(frame: Image, how: Segmentation) -> Sighting:
         cut=float(cut),
         saturation=saturation,
         brightness=brightness,
+        **dict(zip(CORNERS, corners, strict=True)),
     )
+
+
+def _corners(
+    seen: npt.NDArray[np.float32],
+    centre: tuple[float, float],
+    angle: float,
+    length: float,
+    height: float,
+) -> list[float]:
+    """Part seen of the corners of a rectangle, in the order of :data:`CORNERS`."""
+    rows, columns = np.indices(seen.shape, dtype=np.float32)
+    x, y = columns - centre[0], rows - centre[1]
+    along, down = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+    side = 0.5 * height
+    out = []
+    for end in (-1.0, 1.0):
+        # Pixels that a border divides count in part, or the sum would depend on the grid.
+        near = np.clip(end * along - (0.5 * length - side) + 0.5, 0.0, 1.0)
+        for half in (-1.0, 1.0):
+            inside = near * np.clip(half * down + 0.5, 0.0, 1.0)
+            out.append(float(np.sum(inside * seen)) / side**2)
+    return out
 
 
 def _weights(patch: Image, filled: Image) -> npt.NDArray[np.float32] | None:

@@ -13,7 +13,7 @@ from seakeep.errors import RequestError
 from seakeep.signals.filters import as_series, positive
 from seakeep.signals.spectra import encounter_period
 
-__all__ = ["Repeat", "find_repeat"]
+__all__ = ["Repeat", "find_repeat", "is_regular"]
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -113,7 +113,7 @@ def find_repeat(
     waves = _analytic(record)
     length = round(positive("periods", periods, "1") * encounter_period(record, step) / step)
     length = min(length, record.size)
-    if _is_regular(waves):
+    if _even(waves):
         return None
     best: Repeat | None = None
     repeated = np.zeros(record.size, dtype=bool)
@@ -145,7 +145,23 @@ def _analytic(series: FloatArray) -> ComplexArray:
     return out
 
 
-def _is_regular(waves: ComplexArray) -> bool:
+def is_regular(series: npt.ArrayLike) -> bool:
+    """Whether a record's envelope is as even as that of regular waves.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Elevation, uniformly sampled, without gaps.
+
+    Returns
+    -------
+    bool
+        True where the envelope varies by less than a fifth of its mean.
+    """
+    return _even(_analytic(as_series(series, minimum=8)))
+
+
+def _even(waves: ComplexArray) -> bool:
     margin = waves.size // 20  # the envelope of a cut record is bent at its ends
     envelope = np.abs(waves[margin : waves.size - margin])
     return bool(envelope.std() < REGULAR * envelope.mean())

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from seakeep.errors import DataError
+from seakeep.signals.panel import CORNERS
 
 __all__ = ["FLAGS", "Limits", "Reference", "judge", "reference_panel"]
 
@@ -19,7 +20,7 @@ Flags = npt.NDArray[np.int64]
 FLAGS = {
     "good": 0,
     "lost": 1,  # nothing of the panel's colour
-    "occluded": 2,  # too small, or cut by the border of the picture
+    "occluded": 2,  # too small, a corner hidden, or cut by the border of the picture
     "overexposed": 3,  # shape off, or much more of the picture saturated than usual
     "misshapen": 4,  # too large or no rectangle, without saturation
     "jump": 5,  # further from its neighbours than the vessel can move
@@ -35,6 +36,13 @@ LEAST_FILL = 0.85
 """Least fill of what is taken for the panel; a turned rectangle of pixels has about 0.97."""
 FILL_DROP = 0.05
 """Fill below the run's median that is flagged."""
+CORNER_DROP, BINARY_CORNER_DROP = 0.01, 0.035
+"""Part of a corner's square below the run's median that is flagged: a hidden corner that large
+turns a panel three times as long as high by 0.2 degrees, the accuracy asked of the pitch; and by
+0.7 degrees, by which the steps of a binary mask turn a sound one."""
+CORNER_NOISE = 6.0
+"""Robust standard deviations of the corners seen that are never flagged, for panels of few pixels;
+Gaussian noise reaches 4.3 in one of 100 000 frames."""
 GLARE, FLOOD, BRIGHTER = 0.25, 0.10, 1.3
 """Overexposure: saturated pixels above the run's median, in panel areas, where the shape is off or
 the picture is brighter than its median by the last factor; and as part of the picture whatever the
@@ -59,12 +67,15 @@ class Limits:
         Time between frames, s.
     pixels : int
         Pixels of the picture, or of the region.
+    binary : bool
+        Whether the panel was measured on a binary mask.
     """
 
     tolerance: float
     max_speed: float
     step: float
     pixels: int
+    binary: bool = False
 
 
 @dataclass(frozen=True)
@@ -83,6 +94,10 @@ class Reference:
         Mean of a frame's colours, 0 to 255.
     metres_per_pixel : float
         Calibration, m.
+    corners : tuple of float
+        Part seen of each corner.
+    corner_noise : float
+        Robust standard deviation of the corner seen least.
     """
 
     length: float
@@ -91,6 +106,8 @@ class Reference:
     saturation: float
     brightness: float
     metres_per_pixel: float
+    corners: tuple[float, ...]
+    corner_noise: float
 
 
 def reference_panel(
@@ -136,7 +153,12 @@ def reference_panel(
     )
     seen_scale = float(np.sqrt(panel[0] * panel[1] / (length * height)))
     scale = seen_scale if metres_per_pixel is None else metres_per_pixel
-    return Reference(length, height, fill, saturation, brightness, scale)
+    corners = np.stack([seen[name][like] for name in CORNERS])
+    usual = np.median(corners, axis=1)
+    lowest = np.min(corners - usual[:, None], axis=0)
+    noise = 1.4826 * float(np.median(np.abs(lowest - np.median(lowest))))
+    places = tuple(float(each) for each in usual)
+    return Reference(length, height, fill, saturation, brightness, scale, places, noise)
 
 
 def _not_found(
@@ -188,7 +210,13 @@ def judge(
     tolerance = limits.tolerance * reference.length
     panel_area = reference.length * reference.height
     excess = np.nan_to_num(seen["saturation"] - reference.saturation)
+    usual = np.array(reference.corners)[:, None]
+    corners = usual - np.stack([seen[name] for name in CORNERS])
+    least = BINARY_CORNER_DROP if limits.binary else CORNER_DROP
+    drop = max(least, CORNER_NOISE * reference.corner_noise)
+    hidden = np.max(np.nan_to_num(corners, nan=np.inf), axis=0) / drop
     deviations = (
+        hidden,
         np.abs(seen["length"] - reference.length) / tolerance,
         np.abs(seen["height"] - reference.height) / tolerance,
         (reference.fill - seen["fill"]) / FILL_DROP,
@@ -197,7 +225,8 @@ def judge(
     off = (shape > 1) | (seen["cut"] > 0)
     flag = np.full(shape.size, FLAGS["good"])
     flag[off] = FLAGS["misshapen"]
-    flag[off & ((seen["area"] < panel_area) | (seen["cut"] > 0))] = FLAGS["occluded"]
+    small = (seen["area"] < panel_area) | (hidden > 1) | (seen["cut"] > 0)
+    flag[off & small] = FLAGS["occluded"]
     brighter = seen["brightness"] > BRIGHTER * reference.brightness
     flag[(off | brighter) & (excess > GLARE * panel_area)] = FLAGS["overexposed"]
     flag[excess > FLOOD * limits.pixels] = FLAGS["overexposed"]

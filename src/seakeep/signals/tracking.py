@@ -198,7 +198,7 @@ def track_video(
     seen = _on_grid(frames, rows, count)
     reference = reference_panel(seen, how.panel, how.metres_per_pixel, str(path))
     width, height = size if how.region is None else how.region[2:]
-    limits = Limits(how.tolerance, how.max_speed, 1.0 / rate, width * height)
+    limits = Limits(how.tolerance, how.max_speed, 1.0 / rate, width * height, not how.refine)
     flag, quality = judge(seen, reference, limits)
     _tell(path, flag)
     motion, bridged = _motions(seen, flag, reference, how, rate, str(path))

@@ -211,7 +211,8 @@ def compare(
     level : float, optional
         Probability between the bounds of an ensemble's band.
     workers : int, optional
-        Members of an ensemble at work at a time, on threads: they need no time to start.
+        Members of an ensemble at work at a time, on processes where these save time. A script
+        then needs ``if __name__ == "__main__":``.
 
     Returns
     -------
@@ -254,7 +255,7 @@ def compare(
             return model.forecast(run, start=start, steps=steps)
         tell = None if members is None else _named(members, str(run.attrs["run"]))
         return model.forecast_summary(
-            run, start, steps, level, workers=workers, backend="threads", progress=tell
+            run, start, steps, level, workers=workers, backend="auto", progress=tell
         )
 
     return [

@@ -164,6 +164,13 @@ def _test_runs(study: Study, name: str) -> list[str]:
             f"tests.{name}: no run to test. The runs that test are: {listed}; waves = "
             f"{test.waves!r}. Name runs = [...], or give runs of the campaign a test span."
         )
+    trains = list(study.settings.training.runs) or campaign.training_runs
+    if learnt := [n for n in chosen if n in trains and n not in campaign.test_runs and not folds]:
+        raise RequestError(
+            f"tests.{name}: the run '{learnt[0]}' trains, and the campaign gives it no test span: "
+            "models would forecast what they learnt from. Give it the spans train = [begin, end] "
+            "and test = [begin, end], or name other runs."
+        )
     return chosen
 
 

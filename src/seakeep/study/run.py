@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import xarray as xr
 
 from seakeep.campaign.prepare import Progress
 from seakeep.core.scratch import Scratch
+from seakeep.models.priors import Prior, describe
 from seakeep.models.workers import Crew, WorkerLostError, as_finished, check_crew
 from seakeep.study.cells import Unit, cells_of, compute, units_of
 from seakeep.study.description import describe_study
@@ -125,7 +126,17 @@ def _attributes(
 def _fields(spec: Spec) -> dict[str, str]:
     """Settings of a model as words."""
     kept = [each for each in fields(spec) if each.repr and each.name != "dt"]
-    return {each.name: str(getattr(spec, each.name)) for each in kept}
+    return {each.name: _words_of(getattr(spec, each.name)) for each in kept}
+
+
+def _words_of(value: object) -> str:
+    """A setting in words; a distribution of scipy.stats by name, for it prints as an address."""
+    if not isinstance(value, Prior) or is_dataclass(value):
+        return str(value)
+    known = describe(value)
+    assert known is not None
+    stated = [*map(str, known["args"]), *(f"{key}={v}" for key, v in known["kwds"].items())]
+    return f"{known['prior']}({', '.join(stated)})"
 
 
 def _conditional(plan: Plan) -> str:

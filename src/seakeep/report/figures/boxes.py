@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 __all__ = ["average_boxes", "channel_boxes", "draw_box_violin"]
 
 FloatArray = npt.NDArray[np.float64]
+
+NARROW = 14
+"""Letters of a test set's label on one line."""
 
 JITTER = np.random.default_rng(7).uniform(-1, 1, 4096)
 """Sideways places of the single values; the same in every figure."""
@@ -100,13 +104,14 @@ def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
     matplotlib.figure.Figure
     """
     with figure_style():
-        figure = new_figure(max(6.0, 2.0 + 1.7 * len(tests)), 3.6)
+        figure = new_figure(max(8.5, 2.0 + 1.7 * len(tests)), 3.6)
         for axes, (measure, heading) in zip(figure.subplots(1, 2), HEADING.items(), strict=True):
             for place, test in enumerate(tests):
                 for number, model in enumerate(result.models):
                     values = average_of(_cells(result, test, model, measure))
                     _draw_beside(axes, result, values, place, number, model)
-            _finish(axes, [result.label_of(test) for test in tests], heading)
+            labels = [_narrow(result.label_of(test)) for test in tests]
+            _finish(axes, labels, heading)
             axes.set_xlim(-0.6, len(tests) - 0.4)
         _legend(figure, result)
         return figure
@@ -153,6 +158,13 @@ def _draw_beside(
     width = 0.84 / len(result.models)
     centre = place + width * (number - 0.5 * (len(result.models) - 1))
     draw_box_violin(axes, values, centre, 0.92 * width, model_colour(result, model))
+
+
+def _narrow(label: str) -> str:
+    """A label in lines, parted behind its commas first."""
+    if len(label) <= NARROW:
+        return label
+    return "\n".join(textwrap.fill(part, NARROW) for part in label.replace(", ", ",\n").split("\n"))
 
 
 def _finish(axes: Any, labels: Sequence[str], heading: str) -> None:

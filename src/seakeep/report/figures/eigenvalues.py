@@ -46,16 +46,19 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
         decay.set(xlabel="frequency [Hz]", ylabel="modulus")
         decay.set_xlim(0, 3 / float(result.attrs["encounter_period"]))
         decay.set_ylim(0.8, 1.01)
-        decay.legend(fontsize=7, loc="lower right", markerscale=2)
+        legend = decay.legend(fontsize=7, loc="lower right", markerscale=2)
+        for handle in legend.legend_handles:
+            handle.set_alpha(0.9)
         return figure
 
 
 def _draw(plane: Any, decay: Any, values: Any, result: StudyResult, model: str) -> None:
     single = not result.is_ensemble(model)
+    members = result.groups[f"eigenvalues/{model}"].sizes["member"]
     style = {
-        "s": 9 if single else 3,
+        "s": 9 if single else 5,
         "color": model_colour(result, model),
-        "alpha": 0.9 if single else 0.12,
+        "alpha": 0.9 if single else float(np.clip(12 / members, 0.12, 0.6)),
         "linewidths": 0,
         "rasterized": True,
         "label": model_words(model),

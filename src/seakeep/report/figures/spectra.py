@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from seakeep.conventions import canonical_channel
 from seakeep.report.style import figure_style, new_figure
 from seakeep.study import StudyResult
 
@@ -34,7 +35,7 @@ def spectrum_figure(result: StudyResult) -> Figure:
     """
     with figure_style():
         spectra, runs = result.groups["spectra"], result.groups["runs"]
-        figure = new_figure(6.5, 3.6)
+        figure = new_figure(8.5, 4.2)
         axes = figure.subplots()
         waves = {
             str(n): str(w) for n, w in zip(runs["run"].values, runs["waves"].values, strict=True)
@@ -55,7 +56,9 @@ def spectrum_figure(result: StudyResult) -> Figure:
         peak = max((_peak(spectra, n)[0] for n in waves), default=1.0)
         axes.set_xlim(0, 2.2 * peak)
         axes.set_ylim(bottom=0)
-        axes.set(xlabel="frequency [Hz]", ylabel=f"{spectra.attrs['channel']} [m²/Hz]")
+        known = canonical_channel(str(spectra.attrs["channel"]))
+        words = known.long_name if known else str(spectra.attrs["channel"])
+        axes.set(xlabel="frequency [Hz]", ylabel=f"spectral density of {words} [m²/Hz]")
         if axes.get_legend_handles_labels()[0]:
             axes.legend(fontsize=8)
         return figure

@@ -1,6 +1,6 @@
-"""Write docs/campaign_file.md: each table and key of a campaign file, from the settings' own words.
+"""Write each table and key of the campaign file and of the study file, from the settings' own words.
 
-python docs/make_campaign_reference.py
+python docs/make_reference.py       # docs/campaign_file.md, and the keys in docs/study.md
 """
 
 import types
@@ -11,8 +11,10 @@ from pydantic_core import PydanticUndefined
 
 from seakeep.campaign.settings import CampaignSettings, InstrumentSettings, InstrumentsSettings
 from seakeep.campaign.tables import Table
+from seakeep.study.settings import StudySettings
 
-PAGE = Path(__file__).with_name("campaign_file.md")
+DOCS = Path(__file__).parent
+BEGIN, END = "<!-- keys: written by make_reference.py -->\n", "<!-- end of the keys -->\n"
 
 INTRODUCTION = """# The campaign file
 
@@ -100,13 +102,11 @@ def text_of(table):
     return " ".join((table.__doc__ or "").split("\n\n")[0].split())
 
 
-def page():
-    """The whole page."""
-    lines = [INTRODUCTION]
+def keys_of(settings):
+    """Lines of all tables that a file of these settings may have, one after the other."""
+    lines = []
     queue = [
-        table
-        for field in CampaignSettings.model_fields.values()
-        for table in tables_of(field.annotation)
+        table for field in settings.model_fields.values() for table in tables_of(field.annotation)
     ]
     done = []
     while queue:
@@ -120,9 +120,24 @@ def page():
             queue.insert(0, InstrumentSettings)
         for field in table.model_fields.values():
             queue += tables_of(field.annotation)
-    return "\n".join(lines).rstrip() + "\n"
+    return lines
 
+
+def campaign_page():
+    """The whole page of the campaign file."""
+    return "\n".join([INTRODUCTION, *keys_of(CampaignSettings)]).rstrip() + "\n"
+
+
+def study_page():
+    """The page of the study as it is written, with its keys anew."""
+    before, _, rest = (DOCS / "study.md").read_text(encoding="utf-8").partition(BEGIN)
+    after = rest.partition(END)[2]
+    return before + BEGIN + "\n" + "\n".join(keys_of(StudySettings)) + "\n" + END + after
+
+
+PAGES = {"campaign_file.md": campaign_page, "study.md": study_page}
 
 if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
-    print(PAGE.name)
+    for name, page in PAGES.items():
+        (DOCS / name).write_text(page(), encoding="utf-8")
+        print(name)

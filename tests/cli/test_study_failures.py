@@ -1,0 +1,179 @@
+"""What goes wrong with a study at the command line: message, exit status, and what is kept."""
+
+import errno
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import cli
+from seakeep.study import read_result, read_study, run_study
+from seakeep.study.store import CellFolder
+
+pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+
+TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
+STUDY = """
+[study]
+campaign = "campaign.toml"
+preset = "recommended"
+[training]
+windows = 2
+[models.deterministic]
+[models.bayesian]
+kind = "bayesian_hankel_dmdc"
+n_members = 3
+train_length = { uniform = [10, 20] }
+[tests.unseen]
+runs = ["unseen"]
+windows = 2
+length = 6
+[statistics]
+n_series = 4
+[output]
+eigenvalues = false
+"""
+
+
+def copy_study(place):
+    for path in TUTORIAL.glob("*"):
+        if path.suffix in (".toml", ".csv"):
+            shutil.copy(path, place)
+    (place / "study.toml").write_text(STUDY, encoding="utf-8")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    copy_study(tmp_path)
+    return tmp_path
+
+
+def study(folder, out="out"):
+    arguments = ["study", str(folder / "study.toml"), "-o", str(folder / out), "--workers", "1"]
+    return cli.main(arguments)
+
+
+def change(path, old, new):
+    text = path.read_text("utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), "utf-8")
+
+
+def cells_in(folder):
+    return sorted((folder / "out" / "cells").iterdir())
+
+
+def without_line(folder):
+    """The run that tests was recorded without the mooring line."""
+    path = folder / "run3.csv"
+    rows = [line.rsplit(";", 1)[0] for line in path.read_text("utf-8").splitlines()]
+    path.write_text("\n".join(rows) + "\n", "utf-8")
+
+
+def of_another(folder):
+    CellFolder(folder / "out", "0" * 64).open("another")
+
+
+def a_file(folder):
+    (folder / "out").write_text("a file", "utf-8")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "status", "words"),
+    [
+        (
+            lambda folder: change(folder / "study.toml", "[10, 20]", "[1000, 2000]"),
+            2,
+            ["training: no window is feasible in", "Shorten train_length or the delays"],
+        ),
+        (
+            lambda folder: change(folder / "study.toml", "length = 6", "length = 600"),
+            2,
+            ["tests.unseen: no window is feasible", "Reduce length or startup"],
+        ),
+        (
+            lambda folder: change(folder / "study.toml", "length = 6", "length = 6\nstartup = 1e6"),
+            2,
+            ["tests.unseen: no window is feasible", "holds 0 samples", "Reduce length or startup"],
+        ),
+        (
+            lambda folder: change(folder / "study.toml", '["unseen"]', '["first"]'),
+            2,
+            ["tests.unseen: the run 'first' trains", "no test span", "or name other runs"],
+        ),
+        (
+            without_line,
+            2,
+            ["run3.csv has no column 'FWD_LINE'", "Its columns: t, WP_01", "Name one of these"],
+        ),
+        (of_another, 2, ["holds the results of another study", "000000000000", "-o"]),
+        (a_file, 1, ["results could not be written to", "the same command then goes on"]),
+    ],
+    ids=["training", "length", "startup", "trains", "channel", "digest", "file"],
+)
+def test_each_mistake_has_its_message_and_its_exit_status(folder, spoil, status, words, capfd):
+    spoil(folder)
+    assert study(folder) == status
+    told = " ".join(capfd.readouterr().err.split())
+    for each in words:
+        assert each in told
+    assert "Traceback" not in told
+
+
+def filling(room, write):
+    """A function that writes, on a disk on which so many files still have room."""
+    left = iter(range(room))
+
+    def writes(*arguments, **keywords):
+        if next(left, None) is None:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return write(*arguments, **keywords)
+
+    return writes
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    place = tmp_path_factory.mktemp("undisturbed")
+    copy_study(place)
+    return run_study(read_study(place / "study.toml"), place / "out")
+
+
+# Two training windows, two models, two test windows: 8 cells, in units of two.
+@pytest.mark.parametrize("room", [0, 3])
+def test_a_disk_that_fills_up_loses_no_finished_cell(folder, room, undisturbed, monkeypatch, capfd):
+    with monkeypatch.context() as patch:
+        patch.setattr(np, "savez", filling(room, np.savez))
+        assert study(folder) == 1
+    told = " ".join(capfd.readouterr().err.split())
+    assert "No space left on device. All cells that were finished are kept." in told
+    assert "the same command then goes on where it stopped" in told
+    before = {path.name: path.stat().st_mtime_ns for path in cells_in(folder)}
+    assert len(before) == room
+    # Then there is room for the cells, and none for all of the result.
+    with monkeypatch.context() as patch:
+        patch.setattr(xr.Dataset, "to_netcdf", filling(1, xr.Dataset.to_netcdf))
+        assert study(folder) == 1
+    assert "No space left on device. All cells that were" in capfd.readouterr().err
+    assert not (folder / "out" / "study.nc").exists()
+    after = {path.name: path.stat().st_mtime_ns for path in cells_in(folder)}
+    assert len(after) == 8
+    # A unit of which a cell is missing is done again as a whole.
+    assert sum(after[name] == clock for name, clock in before.items()) == room // 2 * 2
+    found = run_study(read_study(folder / "study.toml"), folder / "out")
+    assert found.groups.keys() == undisturbed.groups.keys()
+    for name, group in undisturbed.groups.items():
+        xr.testing.assert_identical(group, found.groups[name])
+
+
+def test_a_disk_that_fills_up_before_the_report_keeps_the_result(folder, monkeypatch, capfd):
+    with monkeypatch.context() as patch:
+        # The header of the folder has room, the first table has not.
+        patch.setattr(Path, "write_text", filling(1, Path.write_text))
+        assert study(folder) == 1
+    assert "No space left on device. All cells that were" in capfd.readouterr().err
+    assert not (folder / "out" / "report.html").exists()
+    assert read_result(folder / "out").attrs["study"]

@@ -1,0 +1,47 @@
+"""A synthetic run of a vessel that drifts in irregular waves, past two probes."""
+
+import numpy as np
+import xarray as xr
+
+from seakeep.waves import wavenumber
+
+DT, DEPTH = 0.1, 3.6
+POSITIONS = {"eta_fwd": 48.42, "eta_cog": 52.09}
+STATES, INPUTS = ["surge", "heave"], ["eta_fwd", "eta_cog"]
+
+
+def drifting_run(seed=0, samples=1500, moved=0.0, name="run"):
+    """Heave answers the elevation where the vessel is; surge drifts slowly over half a wavelength.
+
+    The surge is an oscillation, which a model with state delays continues; the probes may stand
+    `moved` metres downstream of their stated places.
+    """
+    rng = np.random.default_rng(seed)
+    time = DT * np.arange(samples)
+    omega = 2 * np.pi * rng.uniform(0.3, 0.9, 40)
+    amplitude = 0.02 * np.exp(-((omega / (2 * np.pi) - 0.5) ** 2) / 0.02)
+    phase, k = rng.uniform(0, 2 * np.pi, 40), wavenumber(omega, DEPTH)
+    surge = 0.6 * np.sin(2 * np.pi * time / 25 + rng.uniform(0, 6.28))
+
+    def waves(x, lag=0.0):
+        place = np.broadcast_to(x, time.shape)
+        return (amplitude * np.cos(np.outer(time - lag, omega) - np.outer(place, k) + phase)).sum(
+            axis=1
+        )
+
+    vessel = POSITIONS["eta_cog"] + surge
+    heave = 0.8 * waves(vessel, 0.2) + 0.4 * waves(vessel, 0.5)
+    noise = 1e-4
+    channels = {
+        "surge": surge + noise * rng.standard_normal(samples),
+        "heave": heave + noise * rng.standard_normal(samples),
+        **{key: waves(x + moved) for key, x in POSITIONS.items()},
+    }
+    run = xr.Dataset(
+        {key: ("time", values, {"units": "m"}) for key, values in channels.items()},
+        coords={"time": ("time", time, {"units": "s"})},
+        attrs={"water_depth": DEPTH, "run": name},
+    )
+    for key, x in POSITIONS.items():
+        run[key].attrs["x_position"] = x
+    return run

@@ -1,0 +1,158 @@
+"""Tables of a study: what they take of its cells, and that they are the named statistics."""
+
+import warnings
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import statistics
+from seakeep.errors import DataError, SeakeepWarning
+from seakeep.study import read_study, run_study
+from seakeep.study.plan import make_plan
+from seakeep.study.statistics import box_table, coverage_table, joined
+from seakeep.study.windows import random_stream
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory, put_study):
+    """A study whose truth is known: the measurement of heave, half a centimetre higher."""
+    folder = tmp_path_factory.mktemp("study")
+    text = put_study(folder).replace("seed = 3", 'seed = 3\ntruth = "truth"')
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    _, runs = make_plan(read_study(folder / "study.toml"))
+    (folder / "truth").mkdir()
+    true = xr.Dataset({"heave": runs["unseen"]["heave"] + 0.005}).drop_vars(
+        [name for name in runs["unseen"].coords if name != "time"]
+    )
+    true.attrs, true["heave"].attrs = {}, {}
+    true.to_netcdf(folder / "truth" / "unseen.nc", engine="h5netcdf")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(place):
+    return run_study(read_study(place / "study.toml"), place / "out")
+
+
+@pytest.mark.parametrize(
+    ("variant", "block", "bandwidth", "crosses"),
+    [
+        ("paper", "carlstein", "paper", True),
+        ("recommended", "politis_white", "silverman", False),
+    ],
+)
+def test_divergences_are_those_of_the_joined_windows(found, variant, block, bandwidth, crosses):
+    table = found.groups["statistics/divergence"]
+    test = found.tests["unseen"]
+    for model in found.models:
+        predicted, measured, _ = joined(test, model)
+        for c, channel in enumerate(found.channels):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", SeakeepWarning)
+                alone = statistics.jsd_interval(
+                    predicted[..., c],
+                    measured[:, c],
+                    block_length=block,
+                    bandwidth=bandwidth,
+                    segments=None if crosses else [test.sizes["time"]] * test.sizes["window"],
+                    n_series=8,
+                    rng=random_stream(3, f"jsd.unseen.{variant}.{channel}"),
+                )
+            row = table.sel(model=model, variant=variant, channel=channel)
+            for key in ("mean", "lower", "upper", "uncertainty", "noise_floor", "block_length"):
+                assert float(row[key]) == getattr(alone, key)
+            assert float(row["noise_floor"]) > 0
+
+
+def test_the_truth_is_read_at_the_instants_of_the_windows(found):
+    test = found.tests["unseen"]
+    heave = test.sel(channel="heave")
+    np.testing.assert_allclose(heave["truth"], heave["measured"] + 0.005, rtol=0, atol=1e-9)
+    assert np.isnan(test["truth"].sel(channel="pitch")).all()
+    table = found.groups["statistics/coverage/unseen"].sel(model="bayesian")
+    assert list(table["against"].values) == ["measured", "truth"]
+    assert np.isnan(table["inside"].sel(against="truth", channel="pitch"))
+    for side in ("measured", "truth"):
+        inside = (heave["bayesian_lower"] <= heave[side]) & (heave[side] <= heave["bayesian_upper"])
+        row = table.sel(against=side, channel="heave")
+        assert float(row["inside"]) == pytest.approx(float(inside.mean()), abs=1e-12)
+    # Half a centimetre is a tenth of the wave height: the coverages differ.
+    assert table["inside"].sel(channel="heave").diff("against").item() != 0
+
+
+def test_a_truth_that_is_missing_is_named(place, tmp_path):
+    path = place / "study.toml"
+    other = tmp_path / "study.toml"
+    text = path.read_text("utf-8").replace(
+        '"campaign.toml"', f'"{(place / "campaign.toml").as_posix()}"'
+    )
+    other.write_text(text, "utf-8")
+    with pytest.raises(DataError, match=r"truth of true channels, and unseen.nc is not in it"):
+        run_study(read_study(other), tmp_path / "out")
+
+
+def test_all_training_windows_share_the_draws(place, found):
+    plan, runs = make_plan(read_study(place / "study.toml"))
+    for each in plan.training:
+        ((name, begin, stop),) = each.spans
+        part = runs[name].sel(time=slice(begin - 1e-6, stop + 1e-6))
+        draws = plan.specs["bayesian"].fit(part, list(plan.states), list(plan.inputs)).draws
+        xr.testing.assert_equal(draws, found.groups["draws/bayesian"])
+
+
+def cells(inside=0.5):
+    """Two training sets and two windows of two channels; the last pair is not judged."""
+    time = np.arange(8)
+    measured = np.where(time % 2, 1.0, -1.0)[None, :, None] * [[[1.0, 10.0]], [[2.0, 20.0]]]
+    lower = np.broadcast_to(np.where(time % 4 < 4 * inside, -30.0, 25.0)[:, None], (2, 2, 8, 2))
+    upper = np.full((2, 2, 8, 2), 30.0)
+    lower, upper = lower.copy(), upper.copy()
+    lower[1, 1], upper[1, 1] = np.nan, np.nan
+    errors = np.array([[[0.1, 0.3], [0.2, np.nan]], [[0.4, 0.8], [9.0, 9.0]]])
+    return xr.Dataset(
+        {
+            "measured": (("window", "time", "channel"), measured),
+            "judged": (("training", "window"), [[True, True], [True, False]]),
+            "m_lower": (("training", "window", "time", "channel"), lower),
+            "m_upper": (("training", "window", "time", "channel"), upper),
+            "m_nrmse": (("training", "window", "channel"), errors),
+            "m_nammae": (("training", "window", "channel"), 2 * errors),
+        },
+        coords={"channel": ["heave", "pitch"]},
+    )
+
+
+def test_coverage_by_hand():
+    row = coverage_table(cells(), ["m"]).sel(model="m", against="measured")
+    np.testing.assert_allclose(row["inside"], 0.5, rtol=1e-15)
+    np.testing.assert_allclose(row["below"], 0.5, rtol=1e-15)
+    # Widths of 60 and of 5 in turns, over SDs √(8/7) times amplitudes 1, 2, 1 (10, 20, 10).
+    heave = 32.5 / np.sqrt(8 / 7) * np.mean([1, 0.5, 1])
+    np.testing.assert_allclose(
+        row["relative_width"].sel(channel=["heave", "pitch"]), [heave, heave / 10], rtol=1e-12
+    )
+
+
+def test_boxes_are_matplotlibs_of_the_judged_cells():
+    cbook = pytest.importorskip("matplotlib.cbook", reason="needs matplotlib (extra 'figures')")
+    table = box_table(cells(), ["m"]).sel(model="m", measure="nrmse")
+    expected = {
+        "heave": [0.1, 0.2, 0.4],
+        "pitch": [0.3, 0.8],  # one cell is slack, and left out
+        "average": [0.2, 0.2, 0.6],
+    }
+    for channel, values in expected.items():
+        (box,) = cbook.boxplot_stats(values, whis=1.5)
+        row = table.sel(channel=channel)
+        for ours, theirs in (
+            ("median", "med"),
+            ("lower_quartile", "q1"),
+            ("upper_quartile", "q3"),
+            ("lower_whisker", "whislo"),
+            ("upper_whisker", "whishi"),
+            ("mean", "mean"),
+        ):
+            assert float(row[ours]) == pytest.approx(float(box[theirs]), rel=1e-12), ours
+        assert int(row["count"]) == len(values)
+    assert int(table["left_out"].sel(channel="pitch")) == 1

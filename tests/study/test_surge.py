@@ -1,0 +1,156 @@
+"""Waves carried to the vessel by measured or predicted surge; two test sets, one regular."""
+
+import numpy as np
+import pytest
+
+from seakeep.models.labelled import nearest_sample
+from seakeep.study import read_study, run_study
+from seakeep.study.plan import make_plan
+from seakeep.waves import wavenumber
+
+RATE, DEPTH, PROBE = 10.0, 3.6, -1.5
+
+CAMPAIGN = f"""
+[campaign]
+encounter_period = 1.6
+[rig]
+water_depth = {DEPTH}
+positions = {{ eta_fwd = {PROBE} }}
+[channels.eta_fwd]
+column = "eta"
+[channels.surge]
+column = "x"
+[channels.heave]
+column = "z"
+[runs.sea]
+file = "sea.csv"
+train = [0, 60]
+test = [60, 110]
+[runs.wave]
+file = "wave.csv"
+waves = "regular"
+role = "test"
+[preparation]
+sampling_rate = 10
+[model]
+states = ["surge", "heave"]
+inputs = ["eta_fwd"]
+"""
+
+STUDY = """
+[study]
+campaign = "campaign.toml"
+[training]
+windows = 1
+[models.deterministic]
+state_delays = 6
+input_delays = 20
+ridge = 1e-2
+alignment = { mode = "dispersion", surge = "predicted" }
+[models.bayesian]
+kind = "bayesian_hankel_dmdc"
+n_members = 3
+train_length = { uniform = [15, 20] }
+state_delay = { uniform = [0.3, 0.6] }
+input_delay = { uniform = [1, 2] }
+ridge = 1e-2
+alignment = { mode = "dispersion", surge = "predicted" }
+[tests.later]
+runs = ["sea"]
+windows = 2
+length = 8
+[tests.regular]
+waves = "regular"
+windows = 3
+length = 5
+startup = 12
+[statistics]
+n_series = 4
+[output]
+eigenvalues = false
+"""
+
+
+def write_run(path, seed, seconds, frequencies, grows=0.0):
+    """A vessel that surges slowly and heaves with the wave where it is."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(round(seconds * RATE) + 1) / RATE
+    omega = 2 * np.pi * np.asarray(frequencies)
+    k, phase = wavenumber(omega, DEPTH), rng.uniform(0, 2 * np.pi, omega.size)
+    surge = 0.4 * np.sin(2 * np.pi * time / 17)
+    envelope = np.clip(time / grows, 0, 1) if grows else 1.0
+
+    def waves(place):
+        at = np.broadcast_to(place, time.shape)
+        angle = np.outer(time, omega) - np.outer(at, k) + phase
+        return 0.02 * envelope * np.cos(angle).sum(axis=1)
+
+    noise = 1e-4 * rng.standard_normal((2, time.size))
+    columns = [time, waves(PROBE), surge + noise[0], 0.8 * waves(surge) + noise[1]]
+    header = "t [s],eta [m],x [m],z [m]"
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_run(tmp_path / "sea.csv", 2, 110, np.random.default_rng(2).uniform(0.4, 0.9, 12))
+    write_run(tmp_path / "wave.csv", 3, 40, [0.6], grows=10.0)
+    (tmp_path / "campaign.toml").write_text(CAMPAIGN, "utf-8")
+    (tmp_path / "study.toml").write_text(STUDY, "utf-8")
+    return tmp_path
+
+
+def test_cells_by_predicted_surge_are_what_the_models_say(folder):
+    study = read_study(folder / "study.toml")
+    found = run_study(study, folder / "out")
+    assert found.attrs["conditional_on"] == ""
+    plan, runs = make_plan(study)
+    name, begin, stop = plan.training[0].spans[0]
+    part = runs[name].sel(time=slice(begin - 1e-6, stop + 1e-6))
+    models = {m: s.fit(part, list(plan.states), list(plan.inputs)) for m, s in plan.specs.items()}
+    places = [(test, k, w) for test, each in plan.tests.items() for k, w in enumerate(each)]
+    assert [test for test, _, _ in places] == ["later"] * 2 + ["regular"] * 3
+    for test, k, window in places:
+        run = runs[window.run]
+        # What was measured after the start is not read: it may be anything.
+        scrambled = run.copy(deep=True)
+        at = nearest_sample(run["time"].values, window.start, window.run) + 1
+        for channel in plan.states:
+            scrambled[channel].values[at:] = 1e3
+        cell = found.tests[test].isel(training=0, window=k)
+        alone = models["deterministic"].forecast(scrambled, window.start, window.steps)
+        band = models["bayesian"].forecast_summary(scrambled, window.start, window.steps, 0.95)
+        for channel in plan.states:
+            column = cell.sel(channel=channel)
+            # The same arithmetic, window by window: equal to rounding.
+            np.testing.assert_allclose(
+                column["deterministic_mean"], alone[channel], rtol=0, atol=1e-10
+            )
+            for key in ("mean", "std", "lower", "upper"):
+                expected = band[channel].sel(statistic=key)
+                np.testing.assert_allclose(column[f"bayesian_{key}"], expected, rtol=0, atol=1e-10)
+
+
+def test_every_test_set_has_its_statistics_and_its_start_up_is_cut(folder):
+    path = folder / "study.toml"
+    path.write_text(path.read_text("utf-8").replace('"predicted"', '"none"'), "utf-8")
+    found = run_study(read_study(path), folder / "out")
+    for test, windows, seconds in (("later", 2, 12.8), ("regular", 3, 8.0)):
+        assert found.tests[test].sizes["window"] == windows
+        assert float(found.tests[test]["time"][-1]) == pytest.approx(seconds)
+        for table in ("boxes", "coverage", "trend"):
+            assert f"statistics/{table}/{test}" in found.groups
+    assert float(found.tests["regular"]["start"].min()) >= 12.0
+    assert set(found.tests["regular"]["run"].values) == {"wave"}
+    # The error in regular waves alone is taken apart.
+    assert "statistics/response/regular" in found.groups
+    assert "statistics/response/later" not in found.groups
+    assert found.groups["runs"].sel(run="wave")["wave_frequency"] == pytest.approx(0.6, abs=0.005)
+
+
+def test_what_a_study_by_measured_surge_is_conditional_on_is_kept(folder):
+    path = folder / "study.toml"
+    text = path.read_text("utf-8").replace('surge = "predicted"', 'surge = "measured"')
+    path.write_text(text, "utf-8")
+    found = run_study(read_study(path), folder / "out")
+    assert found.attrs["conditional_on"] == "surge"

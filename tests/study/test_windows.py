@@ -1,0 +1,145 @@
+"""Where a study learns and where it tests: windows apart, several sets, start-up cut off."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep.errors import RequestError
+from seakeep.models.settings import periods_to_samples
+from seakeep.study.settings import validate_study
+from seakeep.study.windows import Needs, choose_tests, choose_training
+
+DT = 0.1
+
+
+def recorded(samples, *, waves="irregular", sea_state="", first=0.0, **spans):
+    """A run as preparation leaves it: the windows look at its clock and its attributes alone."""
+    return xr.Dataset(
+        coords={"time": ("time", first + DT * np.arange(samples))},
+        attrs={"dt": DT, "waves": waves, "sea_state": sea_state, **spans},
+    )
+
+
+def settings(**tables):
+    return validate_study({"study": {"campaign": "campaign.toml", "seed": 5}, **tables}, "s.toml")
+
+
+def samples_of(run, start, stop):
+    time = run["time"].values
+    return int(np.argmin(np.abs(time - start))), int(np.argmin(np.abs(time - stop)))
+
+
+RUNS = {
+    "a": recorded(1000, train_span=(10.0, 60.0), test_span=(60.1, 99.9)),
+    "b": recorded(800, train_span=(0.0, 40.0), test_span=(40.1, 79.9), first=0.0),
+}
+NEEDS = Needs(snapshots=120, history=30)
+
+
+def training(needs=NEEDS, runs=RUNS, **table):
+    return choose_training(settings(training=table), runs, list(runs), needs)
+
+
+def windows_of(runs=RUNS, name="set", steps=50, needs=NEEDS, whole=False, **table):
+    chosen = settings(tests={name: table}).tests[name]
+    return choose_tests(
+        name, chosen, runs, list(runs), steps=steps, needs=needs, whole=whole, seed=5
+    )
+
+
+def test_training_windows_apart_share_no_snapshot():
+    found = training(placement="apart", windows=None)
+    for name, run in RUNS.items():
+        stops = sorted(
+            samples_of(run, *each.spans[0][1:])[1] for each in found if each.runs == (name,)
+        )
+        assert np.diff(stops).min() >= NEEDS.snapshots
+    # 501 and 401 samples from the spans' ends back in steps of 120, as long as 150 remain.
+    assert [each.runs[0] for each in found].count("a") == 3
+    assert [each.runs[0] for each in found].count("b") == 3
+
+
+def test_every_training_window_holds_the_largest_draw_with_its_history():
+    for placement in ("random", "apart"):
+        for each in training(placement=placement, windows=6):
+            name, begin, stop = each.spans[0]
+            first, last = samples_of(RUNS[name], begin, stop)
+            assert begin >= RUNS[name].attrs["train_span"][0]
+            assert stop <= RUNS[name].attrs["train_span"][1]
+            assert last - first + 1 >= NEEDS.snapshots + NEEDS.history
+
+
+def test_random_training_windows_are_drawn_without_replacement_from_all_feasible_stops():
+    found = training(windows=10)
+    assert len({(each.runs, each.spans[0][2]) for each in found}) == 10
+    # 352 and 252 stops are feasible; all of them are used when as many are asked for.
+    every = training(windows=352 + 252)
+    assert len({each.spans for each in every}) == 604
+    with pytest.raises(RequestError, match=r"605 windows were asked for and 604 are feasible"):
+        training(windows=605)
+
+
+def test_test_windows_apart_share_no_instant_and_all_that_fit_are_taken():
+    found = windows_of(placement="apart", windows=None)
+    for name, run in RUNS.items():
+        ends = sorted(
+            samples_of(run, w.start, w.start)[0] + w.steps for w in found if w.run == name
+        )
+        assert np.diff(ends).min() >= 50
+        assert run["time"].values[ends[-1]] <= run.attrs["test_span"][1] + 1e-9
+        assert all(w.start >= run.attrs["test_span"][0] - 1e-9 for w in found if w.run == name)
+    # Test spans of 399 samples: seven windows of 50 instants with a start before each.
+    assert len(found) == 14
+
+
+def test_windows_apart_are_as_many_as_fit_and_no_more():
+    assert len(windows_of(placement="apart", windows=40)) == 14
+    assert len(windows_of(placement="apart", windows=3)) == 3
+
+
+def test_the_start_up_of_a_test_span_is_cut_off():
+    wave = {"wave": recorded(700, waves="regular", test_span=(0.0, 69.9))}
+    found = windows_of(wave, windows=None, placement="random", startup=25.0)
+    assert min(w.start for w in found) == pytest.approx(25.0)
+    without = windows_of(wave, windows=None, placement="random")
+    # What remains before the first start is the delay history.
+    assert min(w.start for w in without) == pytest.approx(NEEDS.history * DT)
+    with pytest.raises(RequestError, match=r"tests.set: no window is feasible.*start-up"):
+        windows_of(wave, startup=66.0)
+
+
+def test_a_further_test_set_moves_no_window_of_another():
+    alone = windows_of(name="irregular", windows=4)
+    windows_of(name="regular", windows=4)
+    assert windows_of(name="irregular", windows=4) == alone
+    assert windows_of(name="regular", windows=4) != alone
+
+
+def test_leaving_out_a_sea_state_leaves_out_all_of_its_runs():
+    runs = {
+        "a1": recorded(400, sea_state="A"),
+        "a2": recorded(400, sea_state="A"),
+        "b1": recorded(400, sea_state="B"),
+        "lone": recorded(400),
+    }
+    found = training(runs=runs, scheme="leave_out", leave_out="sea_state")
+    assert [each.left_out for each in found] == [("a1", "a2"), ("b1",), ("lone",)]
+    assert [each.runs for each in found] == [
+        ("b1", "lone"),
+        ("a1", "a2", "lone"),
+        ("a1", "a2", "b1"),
+    ]
+    assert found[0].may_test("a2")
+    assert not found[0].may_test("b1")
+
+
+def test_nothing_is_left_to_learn_from_where_one_sea_state_is_all():
+    runs = {"a1": recorded(400, sea_state="A"), "a2": recorded(400, sea_state="A")}
+    with pytest.raises(RequestError, match="leaving out a sea state of a1, a2 leaves no run"):
+        training(runs=runs, scheme="leave_out", leave_out="sea_state")
+
+
+def test_the_papers_windows_hold_37_5_periods():
+    # 30 periods of 32 samples, and the longest delay of 7.5 before them.
+    needs = Needs(periods_to_samples(30, 1.64, 1.64 / 32), periods_to_samples(7.5, 1.64, 1.64 / 32))
+    assert needs.training == 37.5 * 32
