@@ -2,7 +2,7 @@
 
     python docs/figures/make_figures.py indices     # docs/figures/indices.svg and .png
     python docs/figures/make_figures.py tutorial    # docs/figures/unseen.png and band.png
-    python docs/figures/make_figures.py study       # the report of the tutorial's study; needs Chromium
+    python docs/figures/make_figures.py study       # its study's report; needs Chromium
     python docs/figures/make_figures.py tank        # the virtual tank's; extras tank and video
     python docs/figures/make_figures.py ntnu sjtu   # examples/*/figures; need SEAKEEP_DATA_DIR
 

@@ -258,7 +258,10 @@ def coverage_table(result: StudyResult, model: str) -> ReportTable:
         "members), and its mean width in measured SD; means over all cells."
     )
     if true:
-        note += " In brackets, of the true instants. The truth is the virtual tank's, without noise or slap; rates are not filtered."
+        note += (
+            " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
+            "slap; rates are not filtered."
+        )
     return ReportTable(
         f"coverage_{model}",
         f"Coverage of the {100 * level:g} % band, {model_words(model)}",
