@@ -95,7 +95,8 @@ def reproduce(
         raise RequestError(f"--preset must be paper or recommended; received '{preset}'.")
     chosen: Preset = "paper" if preset == "paper" else "recommended"
     size = Size.quick() if quick else Size()
-    count = _count(workers, scheduler)
+    # The few cells of the quick study are done before another process has started.
+    count = 1 if quick and workers is None else _count(workers, scheduler)
     _run(
         out,
         lambda tell: reproduce_study(

@@ -171,7 +171,8 @@ def _lay_out(figure: Figure) -> None:
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.execute(figure)
-        figure.set_layout_engine("none")
+        # Without any engine; "none" stands for one, for which each file would be drawn twice.
+        figure.set_layout_engine(None)
 
 
 def svg_text(figure: Figure, name: str) -> str:
