@@ -2,13 +2,16 @@
 
     python docs/figures/make_figures.py indices     # docs/figures/indices.svg and .png
     python docs/figures/make_figures.py tutorial    # docs/figures/unseen.png and band.png
-    python docs/figures/make_figures.py study       # its study's report; needs Chromium
+    python docs/figures/make_figures.py study       # the tutorial's study report; needs Chromium
     python docs/figures/make_figures.py tank        # the virtual tank's; extras tank and video
+    python docs/figures/make_figures.py chain       # docs/figures/quality_sheet.png; extra tank
     python docs/figures/make_figures.py ntnu sjtu   # examples/*/figures; need SEAKEEP_DATA_DIR
 
 Figures of results are drawn small and in few colours, so that the repository stays light.
 """
 
+import contextlib
+import re
 import shutil
 import subprocess
 import sys
@@ -24,7 +27,7 @@ from PIL import Image
 import seakeep
 from seakeep.report.overlay import overlay_figure
 from seakeep.report.page import write_report
-from seakeep.report.style import save_figure
+from seakeep.report.style import figure_style, save_figure
 from seakeep.study import compare, fit_campaign, in_degrees, read_study, run_study
 
 HERE = Path(__file__).parent
@@ -260,7 +263,28 @@ def tank():
     cv2.imwrite(str(HERE / "tank_side_view.jpg"), small, [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 
-DRAWINGS = {each.__name__: each for each in (indices, tutorial, study, ntnu, sjtu, tank)}
+def chain():
+    """A part of the data-quality sheet, by the example of the measurement chain's page."""
+    from seakeep.campaign.checks import check_pairs
+    from seakeep.report.quality_sheet import quality_figure
+    from seakeep.tank.play import play
+    from seakeep.tank.settings import default_settings
+
+    page = (ROOT / "docs" / "measurement_chain.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```python\n(.*?)^```$", page, flags=re.M | re.S)
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        play(default_settings(), Path("virtual"), names=("irregular_1", "regular_2"))
+        faults = next(block for block in blocks if "file.write" in block)
+        exec(compile(faults, "measurement_chain.md", "exec"), {"Path": Path})  # the page is ours
+        campaign = seakeep.read_campaign("virtual/campaign.toml")
+        run = campaign.prepare(["irregular_1"])["irregular_1"]
+        _, agreements = check_pairs(run, campaign.settings)
+    shown = run[["eta_us_fwd", "heave", "heave_of_acceleration"]].assign_attrs(run.attrs)
+    with figure_style():  # all colours, unlike `save`: a palette would take those of single marks
+        quality_figure(shown, agreements).savefig(HERE / "quality_sheet.png", dpi=90)
+
+
+DRAWINGS = {each.__name__: each for each in (indices, tutorial, study, ntnu, sjtu, tank, chain)}
 
 if __name__ == "__main__":
     for wanted in sys.argv[1:] or ["indices"]:

@@ -27,6 +27,7 @@ from seakeep.core.bootstrap import (
     choose_block_length,
     lag_one_correlation,
 )
+from seakeep.core.calibration import ConformalMargin, band_scores, conformal_margin
 from seakeep.core.coverage import BandCoverage, BoxStatistics, box_statistics
 from seakeep.core.density import (
     Bandwidth,
@@ -46,13 +47,16 @@ __all__ = [
     "BandErrors",
     "BlockChoice",
     "BoxStatistics",
+    "ConformalMargin",
     "DensityInterval",
     "JsdInterval",
     "TrendTest",
     "band_error_over_time",
+    "band_scores",
     "block_length",
     "box_statistics",
     "choose_block_length",
+    "conformal_margin",
     "coverage",
     "density_grid",
     "density_interval",

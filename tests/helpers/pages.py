@@ -57,7 +57,7 @@ def run_console(block):
 
 
 def play(page, name):
-    """Run the console and Python blocks of a page; the text block after one is its output."""
+    """Run the console and Python blocks of a page; a text block after one must show its output."""
     printed, names = "", {}
     for kind, content in blocks_of(page):
         if kind == "console":

@@ -196,7 +196,7 @@ def test_a_damaged_cell_is_computed_again(study_folder):
 
 def test_a_result_of_another_format_is_told(finished, monkeypatch):
     monkeypatch.setattr(store, "FORMAT", store.FORMAT + 1)
-    with pytest.raises(RequestError, match=r"written in format 2.*another folder"):
+    with pytest.raises(RequestError, match=r"written in format 3.*another folder"):
         read_result(finished.folder)
 
 

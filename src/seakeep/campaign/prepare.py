@@ -33,8 +33,8 @@ Progress = Callable[[int, int, str], None]
 SHOWN_RUNS = 6
 """Runs that a campaign's representation names."""
 
-FORMAT = 3
-"""Goes into the digest: raise it when the same settings begin to give other arrays."""
+FORMAT = 4
+"""Goes into the digest: raise it when the same settings begin to give other arrays or findings."""
 
 
 @dataclass(frozen=True)

@@ -210,9 +210,10 @@ def find_column(path: Path, table: Columns, wanted: str) -> str:
     """Name of a wanted column; refuse one that is missing or at fault."""
     name = table.find(wanted)
     if name is None:
+        meant = did_you_mean(wanted, table.names)
+        mend = "" if meant else " Name one of these, or give another file."
         raise RequestError(
-            f"{path} has no column '{wanted}'.{did_you_mean(wanted, table.names)} "
-            f"Its columns: {', '.join(table.names)}. Name one of these, or give another file."
+            f"{path} has no column '{wanted}'.{meant} Its columns: {', '.join(table.names)}.{mend}"
         )
     if name in table.faults:
         raise DataError(table.faults[name])

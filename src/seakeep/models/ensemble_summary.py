@@ -57,6 +57,13 @@ def summary(ensemble: HankelEnsemble) -> str:
         f"    {name}: {first:.10g} to {stop:.10g} s"
         for name, (first, stop) in ensemble.training_spans.items()
     ]
+    if (calibration := ensemble.calibration) is not None:
+        found, count_of = calibration.found, sum(calibration.windows.values())
+        relative = found.margin / ensemble.state_spread
+        lines.append(
+            f"  band          calibrated for {found.level:g} on {counted(count_of, 'window')} of "
+            f"{calibration.steps} steps: wider by {_range(relative, '.2g')} training SD either way"
+        )
     radii = ensemble.spectral_radii()
     unstable = int(np.count_nonzero(radii >= 1.0))
     verdict = (

@@ -16,12 +16,13 @@ import xarray as xr
 from seakeep.errors import RequestError
 from seakeep.models import aligned, ensemble_store, ensemble_summary, store
 from seakeep.models.alignment import FittedAlignment
+from seakeep.models.calibration import Band, Calibration, calibrate, check_band, widened
 from seakeep.models.draws import Draw
 from seakeep.models.ensemble_labels import label_channels, statuses, verdict, window_coords
 from seakeep.models.ensemble_series import member_series, read_windows
 from seakeep.models.ensemble_summary import warn_of_unstable
 from seakeep.models.forecasting import ForecastWindow
-from seakeep.models.labelled import ChannelLabel
+from seakeep.models.labelled import ChannelLabel, Runs
 from seakeep.models.members import (
     TrainingArrays,
     identify_member,
@@ -69,6 +70,8 @@ class HankelEnsemble:
         How the wave input is aligned to the vessel; the training arrays are aligned.
     radii : ndarray, shape (member,), optional
         Spectral radii of the members, once :meth:`spectral_radii` has found them.
+    calibration : Calibration, optional
+        By how much the calibrated band is wider than that of the members; see :meth:`calibrate`.
     """
 
     settings: HankelSettings = field(repr=False)
@@ -80,6 +83,7 @@ class HankelEnsemble:
     input_labels: tuple[ChannelLabel, ...]
     alignment: FittedAlignment | None = None
     radii: FloatArray | None = field(default=None, repr=False)
+    calibration: Calibration | None = field(default=None, repr=False)
 
     @property
     def n_members(self) -> int:
@@ -137,6 +141,16 @@ class HankelEnsemble:
             if ends:
                 spans[name] = min(first for first, _ in ends), max(stop for _, stop in ends)
         return spans
+
+    @cached_property
+    def read_spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant that any member reads of each run, delay history included, s."""
+        arrays = self.arrays
+        return {
+            name: (begin, begin + (len(x) - 1) * self.dt)
+            for name, begin, x in zip(arrays.names, arrays.begins, arrays.states, strict=True)
+            if len(x)
+        }
 
     def _ends(self, draw: Draw, run: int) -> tuple[float, float]:
         """First and last instant of a member's training window in a run, s."""
@@ -308,6 +322,7 @@ class HankelEnsemble:
         steps: int | None = None,
         level: float = 0.95,
         *,
+        band: Band = "members",
         workers: int = 1,
         backend: Backend = "processes",
         scheduler: str | None = None,
@@ -321,6 +336,8 @@ class HankelEnsemble:
             As in :meth:`forecast`.
         level : float, optional
             Probability between ``lower`` and ``upper``.
+        band : {"members", "calibrated"}, optional
+            Quantiles of the members, or these moved outwards as :meth:`calibrate` found.
 
         Returns
         -------
@@ -335,24 +352,71 @@ class HankelEnsemble:
             As :meth:`forecast`.
         """
         level = check_level(level)
+        check_band(self, level, band)
         (window,) = read_windows(self, run, [start], steps)
         series = member_series(self, run, [window], Crew(workers, backend, scheduler), progress)
         shape = (1, window.steps, len(self.states))
         values, lost = reduce_members(series, self.n_members, shape, level, workers)
+        values = widened(self, values, band)
         variables = label_channels(
             self.state_labels, self.state_spread, values[0], ("statistic", "time")
         )
         variables["status"] = xr.Variable(("member",), statuses(lost[:, 0], window.time.values))
         counts = {"level": level, "members": self.n_members, **verdict(lost)}
+        if band == "calibrated":
+            counts["band"] = band
         return xr.Dataset(
             variables,
             coords={
-                "statistic": statistic_coordinate(level),
+                "statistic": statistic_coordinate(level, band == "calibrated"),
                 "member": np.arange(self.n_members),
                 "time": window.time,
             },
             attrs=self._attributes(run, window) | {"start": window.start} | counts,
         )
+
+    def calibrate(
+        self,
+        runs: Runs,
+        steps: int,
+        level: float = 0.95,
+        *,
+        workers: int = 1,
+        backend: Backend = "processes",
+        scheduler: str | None = None,
+    ) -> Self:
+        """Widen the band so that it holds unseen measurements as often as it says.
+
+        The band forecasts windows end to end in `runs` that no member has read, and is moved
+        outwards, channel by channel, by a quantile of how far measurements lie outside of it
+        (:func:`seakeep.statistics.conformal_margin`, which says what that warrants and what not).
+
+        Parameters
+        ----------
+        runs : Dataset, sequence of Dataset, or mapping of names to Datasets
+            Runs of the same sea, or parts of them, under the names by which they trained. Leave
+            out what the ensemble is to be tested on.
+        steps : int
+            Instants of a window: as many as will be forecast.
+        level : float, optional
+            Probability that the band is to have.
+        workers, backend, scheduler
+            As in :meth:`forecast`.
+
+        Returns
+        -------
+        HankelEnsemble
+            The same members, with the :attr:`calibration` that ``band="calibrated"`` uses.
+
+        Raises
+        ------
+        RequestError
+            If there is no such window, or a setting is out of range.
+        DataError
+            If a run cannot be used.
+        """
+        crew = Crew(workers, backend, scheduler)
+        return replace(self, calibration=calibrate(self, runs, steps, level, crew))
 
     def forecast_windows(
         self,
@@ -475,6 +539,8 @@ class HankelEnsemble:
             labels={"state": self.state_labels, "input": self.input_labels},
             alignment=self.alignment,
             radii=self.radii,
+        ).assign_attrs(
+            {} if self.calibration is None else {"calibration": self.calibration.to_json()}
         )
 
     @classmethod
@@ -502,4 +568,5 @@ class HankelEnsemble:
             input_labels=parts.labels["input"],
             alignment=parts.alignment,
             radii=parts.radii,
+            calibration=Calibration.from_json(dataset.attrs.get("calibration", "null")),
         )

@@ -63,9 +63,10 @@ def statistics_of(values: FloatArray, level: float) -> FloatArray:
     return out
 
 
-def statistic_coordinate(level: float) -> xr.Variable:
+def statistic_coordinate(level: float, calibrated: bool = False) -> xr.Variable:
     """Coordinate of the statistics, which says what the bounds of the band are."""
     bounds = f"the quantiles {0.5 - level / 2:g} and {0.5 + level / 2:g} of the members"
+    bounds += ", moved outwards by the margin of a calibration" if calibrated else ""
     attrs = {
         "long_name": "statistic over the members",
         "comment": f"lower and upper are {bounds}; members that diverged are left out of all four",

@@ -91,7 +91,12 @@ def report_tables(result: StudyResult) -> dict[str, list[ReportTable]]:
             table for test in result.tests if (table := response_table(result, test)) is not None
         ],
         "time": [trend_table(result)],
-        "coverage": [coverage_table(result, model) for model in ensembles],
+        "coverage": [
+            coverage_table(result, model, calibrated)
+            for model in ensembles
+            for calibrated in (False, True)
+            if not calibrated or f"calibration/{model}" in result.groups
+        ],
         "densities": [
             divergence_table(result, model, variant)
             for model in (*ensembles, *(m for m in result.models if m not in ensembles))

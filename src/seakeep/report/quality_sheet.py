@@ -16,7 +16,7 @@ from seakeep.campaign.checks import Finding, check_pairs, findings_of
 from seakeep.campaign.settings import CampaignSettings
 from seakeep.files import replacing
 from seakeep.report.style import COLOURS, axis_label, figure_style, new_figure
-from seakeep.signals.quality import FLAGS, Agreement
+from seakeep.signals.quality import FLAGS, LATE, Agreement
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,13 +24,14 @@ if TYPE_CHECKING:
 __all__ = ["channel_rows", "quality_figure", "write_quality_sheet"]
 
 _MARKS = {
-    "missing": ("#D55E00", "missing"),
-    "bridged": ("#E69F00", "bridged"),
-    "outlier": ("#CC79A7", "outlier"),
-    "saturated": ("#0072B2", "saturated"),
-    "stuck": ("#009E73", "stuck"),
-    "replaced": ("#56B4E9", "replaced"),
+    "missing": ("black", "x"),
+    "bridged": ("#E69F00", "+"),
+    "outlier": ("#CC79A7", "o"),
+    "saturated": ("#0072B2", "^"),
+    "stuck": ("#009E73", "s"),
+    "replaced": ("#56B4E9", "d"),
 }
+"""Colour and shape of each flag: shapes tell them apart in grey print."""
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #1b2430; max-width: 1080px;
        margin: 2em auto; padding: 0 1em; }
@@ -120,7 +121,8 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
             at.margins(x=0.005)
         for at, name in zip(axes[len(names) :], lagging, strict=True):
             each = agreements[name]
-            at.axhspan(-each.period / 8, each.period / 8, color="#009E73", alpha=0.12)
+            limit = LATE * each.period
+            at.axhspan(-limit, limit, color="#009E73", alpha=0.12)
             instants = each.centre + time[0]
             at.plot(instants, each.lags, "o-", color=COLOURS["ensemble"], markersize=3)
             at.set_ylim(-0.55 * each.period, 0.55 * each.period)
@@ -135,9 +137,10 @@ def _mark(at: Any, time: Any, x: Any, flags: Any) -> None:
     for word, bit in FLAGS.items():
         hit = (flags & bit) > 0
         if hit.any():
-            colour, label = _MARKS[word]
+            colour, shape = _MARKS[word]
             height = np.where(np.isfinite(x[hit]), x[hit], level)
-            at.plot(time[hit], height, ".", color=colour, markersize=4, label=label)
+            style = {"color": colour, "marker": shape, "markersize": 3.5, "linestyle": "none"}
+            at.plot(time[hit], height, **style, zorder=3, label=word)
             seen = True
     if seen:
         at.legend(loc="upper right", fontsize=6, ncols=6, borderpad=0.1)
@@ -224,7 +227,7 @@ def _page(
         f"<h1>Data quality: {html.escape(title)}</h1>"
         "<p>Checks flag and tell; nothing is repaired unless the campaign asks for it, and what "
         "was repaired is listed. A lag is positive where a sensor is late against the trusted one "
-        "of its group; the green band is an eighth of the period.</p>"
+        "of its group; inside the green band it does no harm.</p>"
         '<div class="scroll"><table><tr><th>run</th><th>record used</th><th>findings</th>'
         f"<th>channels</th></tr>{''.join(lines)}</table></div>{''.join(parts)}</body></html>"
     )

@@ -221,8 +221,8 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> ReportTab
     )
 
 
-def coverage_table(result: StudyResult, model: str) -> ReportTable:
-    """Coverage and width of the band of an ensemble, each test set, each channel.
+def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> ReportTable:
+    """Coverage and width of a band of an ensemble, each test set, each channel.
 
     Parameters
     ----------
@@ -230,11 +230,14 @@ def coverage_table(result: StudyResult, model: str) -> ReportTable:
         The study.
     model : str
         An ensemble.
+    calibrated : bool, optional
+        Its calibrated band, where the study has one, in place of the members' own.
 
     Returns
     -------
     ReportTable
     """
+    prefix, words = ("calibrated_", "calibrated ") if calibrated else ("", "")
     columns = ["channel"]
     tables = {test: result.groups[f"statistics/coverage/{test}"].sel(model=model)
               for test in result.tests}  # fmt: skip
@@ -248,23 +251,30 @@ def coverage_table(result: StudyResult, model: str) -> ReportTable:
         row = ["average" if name == "average" else channel_words(name)]
         for data in tables.values():
             at = data.sel(channel=name)
-            first, *others = (number(float(v), 2) for v in at["inside"].values)
+            first, *others = (number(float(v), 2) for v in at[f"{prefix}inside"].values)
             row.append(first + "".join(f" [{each}]" for each in others))
-            row.append(number(float(at["relative_width"].sel(against="measured")), 2))
+            width = at[f"{prefix}relative_width"].sel(against="measured")
+            row.append(number(float(width), 2))
         rows.append(tuple(row))
     level = float(result.settings["statistics"]["level"])
     note = (
         f"Part of the measured instants inside the band of nominally {level:g} (quantiles of the "
         "members), and its mean width in measured SD; means over all cells."
     )
+    if calibrated:
+        note += (
+            " Calibrated: these quantiles, moved outwards by a margin found on training data that "
+            "the members had not read, in windows as long as the first test set's. The margin "
+            "warrants nothing in a sea of another kind."
+        )
     if true:
         note += (
             " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
             "slap; rates are not filtered."
         )
     return ReportTable(
-        f"coverage_{model}",
-        f"Coverage of the {100 * level:g} % band, {model_words(model)}",
+        f"coverage_{prefix}{model}",
+        f"Coverage of the {words}{100 * level:g} % band, {model_words(model)}",
         tuple(columns),
         tuple(rows),
         note + conditional(result),

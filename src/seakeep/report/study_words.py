@@ -83,12 +83,20 @@ def _coverage_findings(result: StudyResult, model: str) -> list[str]:
     words = "which is what it claims"
     if abs(inside - level) > 0.05:
         words = "far too little" if inside < level - 0.2 else "not what it claims"
+    calibrated = ""
+    if "calibrated_inside" in table and np.isfinite(table["calibrated_inside"][0]):
+        row = table.sel(channel="average")
+        calibrated = (
+            f" Calibrated on training data it holds {100 * float(row['calibrated_inside']):.0f} %, "
+            f"{float(row['calibrated_relative_width']):.2g} measured SD wide instead of "
+            f"{float(row['relative_width']):.2g}."
+        )
     lost = int(sum((test[f"{model}_lost"] >= 0).sum() for test in result.tests.values()))
     total = int(sum((test[f"{model}_lost"] >= -1).sum() for test in result.tests.values()))
     return [
         f"The {100 * level:g} % band of the {model_words(model)} model holds "
         f"{100 * inside:.0f} % of the measured instants of {result.label_of(first)}, {words}: "
-        "it carries the spread of the hyperparameters, and no noise or model error.",
+        "it carries the spread of the hyperparameters, and no noise or model error." + calibrated,
         f"{lost} of {total} member forecasts diverged and were left out of mean and band.",
     ]
 

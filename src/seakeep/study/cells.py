@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,7 @@ from seakeep.models.alignment import FittedAlignment
 from seakeep.models.fitted_ensemble import HankelEnsemble
 from seakeep.models.forecasting import cut_divergence
 from seakeep.models.summaries import STATISTICS, reduce_members
+from seakeep.study.calibration import calibration_arrays, calibration_name
 from seakeep.study.plan import Plan
 from seakeep.study.windows import TestWindow, TrainingSet
 from seakeep.study.workflow import between
@@ -191,11 +192,14 @@ def cells_of(plan: Plan, unit: Unit) -> list[str]:
     """Names of the files that a unit leaves behind."""
     if unit.kind == "eigenvalues":
         return [eigenvalue_name(unit)]
-    return [
+    names = [
         cell_name(unit.model, unit.training, test, number)
         for test in plan.tests
         for number in _numbers(plan, unit.training, test)
     ]
+    if plan.calibrated_on and plan.is_ensemble(unit.model):
+        names.append(calibration_name(unit.model, unit.training))
+    return names
 
 
 def compute(plan: Plan, runs: Runs, unit: Unit, write: Write) -> None:
@@ -235,6 +239,13 @@ def compute(plan: Plan, runs: Runs, unit: Unit, write: Write) -> None:
     else:
         spread = training_moments(plan, runs, training)[1]
         _ensemble_cells(plan, runs, fitted, unit, groups, spread, write)
+        if plan.calibrated_on:
+
+            def fit(part: TrainingSet) -> HankelEnsemble:
+                return cast("HankelEnsemble", fit_training(plan, runs, unit.model, part))
+
+            found = calibration_arrays(plan, runs, training, fitted, fit)
+            write(calibration_name(unit.model, unit.training), found)
 
 
 def fit_training(

@@ -13,6 +13,7 @@ from seakeep.core import metrics
 from seakeep.core.bands import band_error_over_time
 from seakeep.errors import DataError, SeakeepError
 from seakeep.models.fitted_ensemble import HankelEnsemble
+from seakeep.study.calibration import calibration_name
 from seakeep.study.cells import (
     Unit,
     cell_name,
@@ -64,7 +65,7 @@ def merge_cells(study: Study, plan: Plan, runs: Runs, cells: CellFolder) -> dict
     -------
     dict of str to Dataset
         ``tests/NAME`` with the arrays of every model over (training, window, …), and
-        ``draws/MODEL`` and ``eigenvalues/MODEL`` of ensembles.
+        ``draws/MODEL``, ``calibration/MODEL`` and ``eigenvalues/MODEL`` of ensembles.
 
     Raises
     ------
@@ -75,6 +76,8 @@ def merge_cells(study: Study, plan: Plan, runs: Runs, cells: CellFolder) -> dict
     for model in plan.specs:
         if plan.is_ensemble(model):
             groups[f"draws/{model}"] = draws_of(plan, runs, model)
+            if plan.calibrated_on:
+                groups[f"calibration/{model}"] = _merge_calibration(plan, cells, model)
         if study.settings.output.eigenvalues:
             groups[f"eigenvalues/{model}"] = _merge_eigenvalues(plan, cells, model)
     return groups
@@ -218,6 +221,16 @@ def true_channels(study: Study, plan: Plan, runs: Runs, test: str) -> FloatArray
             )
         )
     return np.stack(out)
+
+
+def _merge_calibration(plan: Plan, cells: CellFolder, model: str) -> xr.Dataset:
+    found = [_cell(cells, calibration_name(model, k)) for k in range(len(plan.training))]
+    stacked = {key: np.stack([each[key] for each in found]) for key in found[0]}
+    return xr.Dataset(
+        {key: (("training", "channel")[: values.ndim], values) for key, values in stacked.items()},
+        coords={"training": [each.name for each in plan.training], "channel": list(plan.states)},
+        attrs={"level": plan.level},
+    )
 
 
 def _merge_eigenvalues(plan: Plan, cells: CellFolder, model: str) -> xr.Dataset:

@@ -50,6 +50,8 @@ class Plan:
         Windows of the first test set whose members are kept; one of each further set.
     needs : Needs
         Samples of the greediest draw.
+    calibrated_on : tuple of str
+        Runs that train, if bands are to be calibrated on them.
     """
 
     digest: str
@@ -63,6 +65,7 @@ class Plan:
     tests: dict[str, tuple[TestWindow, ...]]
     shown: int
     needs: Needs
+    calibrated_on: tuple[str, ...] = ()
 
     def is_ensemble(self, model: str) -> bool:
         """Whether a model is an ensemble."""
@@ -146,6 +149,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
         tests=tests,
         shown=settings.output.shown_windows,
         needs=needs,
+        calibrated_on=tuple(training_names) if settings.calibrates else (),
     )
     _check_pairs(plan)
     return plan, runs

@@ -19,6 +19,7 @@ from seakeep.study.description import describe_study
 from seakeep.study.merge import merge_cells
 from seakeep.study.plan import Plan, make_plan
 from seakeep.study.settings import Study
+from seakeep.study.slow import warn_of_slow_study
 from seakeep.study.specs import Spec
 from seakeep.study.statistics import judge
 from seakeep.study.store import RESULT, CellFolder, StudyResult, read_result, versions, write_result
@@ -74,6 +75,11 @@ def run_study(
         If the disk is full; finished cells are kept.
     WorkerLostError
         If a worker process was stopped from outside; finished cells are kept.
+
+    Warns
+    -----
+    SeakeepWarning
+        If training windows hold fewer than five periods of a slow motion.
     """
     crew = Crew(workers, scheduler=scheduler)
     out = Path(out)
@@ -87,6 +93,7 @@ def run_study(
             return found
     check_crew(crew)
     plan, runs = make_plan(study, lambda done, total, name: tell(0, 1, f"preparing {name}"))
+    warn_of_slow_study(plan, runs)
     units = units_of(plan, study.settings.output.eigenvalues)
     left = [unit for unit in units if not all(cells.has(name) for name in cells_of(plan, unit))]
     _compute_all(plan, runs, cells, units, left, crew, tell)

@@ -135,6 +135,11 @@ class StatisticsSettings(Table):
         description="period that parts the low-frequency from the wave-frequency band of ε(t), in "
         "encounter periods",
     )
+    calibrate: bool | None = Field(
+        default=None,
+        description="whether the bands of ensembles are calibrated too, on training data that "
+        "members have not read; left out, with preset = 'recommended' alone",
+    )
     densities_of: str | None = Field(
         default=None, description="the test set whose densities are compared; left out, the first"
     )
@@ -167,6 +172,12 @@ class StudySettings(Table):
     )
     statistics: StatisticsSettings = StatisticsSettings()
     output: OutputSettings = OutputSettings()
+
+    @property
+    def calibrates(self) -> bool:
+        """Whether the bands of ensembles are calibrated."""
+        stated = self.statistics.calibrate
+        return self.study.preset == "recommended" if stated is None else stated
 
     @model_validator(mode="after")
     def _names(self) -> StudySettings:

@@ -42,7 +42,8 @@ def judge(
     Parameters
     ----------
     groups : mapping of str to Dataset
-        ``tests/NAME`` with the arrays of every model, ``runs``, ``training`` and ``spectra``.
+        ``tests/NAME`` with the arrays of every model, ``runs``, ``training``, ``spectra`` and,
+        where bands are calibrated, ``calibration/MODEL``.
     settings : StudySettings
         The study.
     channels : sequence of str
@@ -64,7 +65,12 @@ def judge(
         test = groups[f"tests/{name}"]
         out[f"statistics/boxes/{name}"] = box_table(test, models)
         if ensembles:
-            out[f"statistics/coverage/{name}"] = coverage_table(test, ensembles)
+            margins = {
+                m: groups[f"calibration/{m}"]["margin"].values
+                for m in ensembles
+                if f"calibration/{m}" in groups
+            }
+            out[f"statistics/coverage/{name}"] = coverage_table(test, ensembles, margins)
         rng = random_stream(settings.study.seed, f"trend.{name}")
         out[f"statistics/trend/{name}"] = trend_table(test, models, rng)
         if is_regular(groups, name):
@@ -147,7 +153,9 @@ def average_of(cells: FloatArray) -> FloatArray:
     return out
 
 
-def coverage_table(test: xr.Dataset, ensembles: Sequence[str]) -> xr.Dataset:
+def coverage_table(
+    test: xr.Dataset, ensembles: Sequence[str], margins: Mapping[str, FloatArray] | None = None
+) -> xr.Dataset:
     """Part of the instants at which the band holds the measurement, and the truth where known.
 
     Parameters
@@ -156,32 +164,54 @@ def coverage_table(test: xr.Dataset, ensembles: Sequence[str]) -> xr.Dataset:
         A test set.
     ensembles : sequence of str
         Models with a band.
+    margins : mapping of str to ndarray, each of shape (training, channel), optional
+        By how much the calibrated band of each is wider on either side.
 
     Returns
     -------
     Dataset
         Over (model, against, channel): ``inside``, ``below``, ``above``, and ``relative_width``
-        in measured standard deviations, averages over all cells; channel ``average`` too.
+        in measured standard deviations, averages over all cells; channel ``average`` too. With
+        margins the same of the calibrated band, ``calibrated_inside`` and so on.
     """
     sides = ["measured", *(["truth"] if "truth" in test else [])]
     numbers = ("inside", "below", "above", "relative_width")
     names = ["average", *map(str, test["channel"].values)]
-    values = np.full((len(numbers), len(ensembles), len(sides), len(names)), np.nan)
     judged = test["judged"].values
-    for m, model in enumerate(ensembles):
-        lower, upper = (test[f"{model}_{bound}"].values[judged] for bound in ("lower", "upper"))
-        for s, side in enumerate(sides):
-            against = np.broadcast_to(test[side].values, (*judged.shape, *test[side].shape[1:]))
-            known = np.isfinite(against).all(axis=(0, 1, 2))
-            band = statistics.coverage(lower, upper, np.where(known, against, 0.0)[judged])
-            for k, number in enumerate(numbers):
-                each = np.where(known, getattr(band, number), np.nan)
-                each = np.where(np.isfinite(each), each, np.nan)
-                values[k, m, s] = [np.nanmean(average_of(each)), *average_of(each.T)]
+    variables: dict[str, Any] = {}
+    for prefix in ("", "calibrated_") if margins else ("",):
+        values = np.full((len(numbers), len(ensembles), len(sides), len(names)), np.nan)
+        for m, model in enumerate(ensembles):
+            lower, upper = (test[f"{model}_{bound}"].values[judged] for bound in ("lower", "upper"))
+            if margins and prefix:
+                margin = margins[model][np.nonzero(judged)[0], None, :]
+                lower, upper = lower - margin, upper + margin
+            for s, side in enumerate(sides):
+                values[:, m, s] = _coverage_row(test, side, lower, upper, numbers)
+        variables |= {
+            prefix + n: (("model", "against", "channel"), values[i]) for i, n in enumerate(numbers)
+        }
     return xr.Dataset(
-        {n: (("model", "against", "channel"), values[i]) for i, n in enumerate(numbers)},
-        coords={"model": list(ensembles), "against": sides, "channel": names},
+        variables, coords={"model": list(ensembles), "against": sides, "channel": names}
     )
+
+
+def _coverage_row(
+    test: xr.Dataset, side: str, lower: FloatArray, upper: FloatArray, numbers: Sequence[str]
+) -> FloatArray:
+    """Coverage over the judged cells, shape (number, 1 + channel): the average first."""
+    judged = test["judged"].values
+    against = np.broadcast_to(test[side].values, (*judged.shape, *test[side].shape[1:]))
+    known = np.isfinite(against).all(axis=(0, 1, 2))
+    band = statistics.coverage(lower, upper, np.where(known, against, 0.0)[judged])
+    rows = []
+    for number in numbers:
+        each = np.where(known, getattr(band, number), np.nan)
+        each = np.where(np.isfinite(each), each, np.nan)
+        over_cells = average_of(each)
+        mean = np.nanmean(over_cells) if np.isfinite(over_cells).any() else np.nan
+        rows.append([mean, *average_of(each.T)])
+    return np.array(rows)
 
 
 def trend_table(test: xr.Dataset, models: Sequence[str], rng: np.random.Generator) -> xr.Dataset:

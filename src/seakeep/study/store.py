@@ -30,7 +30,7 @@ __all__ = [
     "write_result",
 ]
 
-FORMAT = 2
+FORMAT = 3
 """Goes into digest and result: raise it when the same settings begin to give other arrays."""
 
 RESULT = "study.nc"
@@ -211,7 +211,7 @@ class StudyResult:
         Settings (JSON), digest, seed, versions, and what figures and tables need to know.
     groups : dict of str to Dataset
         ``channels``, ``training``, ``runs``, ``prepared/RUN``, ``spectra``, ``tests/NAME``,
-        ``draws/MODEL``, ``eigenvalues/MODEL``, and ``statistics/…``.
+        ``draws/MODEL``, ``calibration/MODEL``, ``eigenvalues/MODEL``, and ``statistics/…``.
     """
 
     folder: Path

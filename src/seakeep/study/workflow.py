@@ -13,6 +13,7 @@ from seakeep.errors import RequestError
 from seakeep.models import HankelDMDc, HankelDMDcModel, HankelEnsemble
 from seakeep.study.needs import needs_of
 from seakeep.study.repeats import warn_of_repeats
+from seakeep.study.slow import warn_of_slow_model
 from seakeep.study.specs import Spec, build_spec, counts_in_periods
 
 __all__ = ["fit_campaign", "training_runs"]
@@ -95,7 +96,8 @@ def fit_campaign(
     Warns
     -----
     SeakeepWarning
-        If the test part of a training run repeats the model's training input.
+        If the test part of a training run repeats the model's training input, or the training
+        windows (of an ensemble the longest) hold fewer than five periods of a slow motion.
     """
     settings = campaign.model(model)
     prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
@@ -111,6 +113,8 @@ def fit_campaign(
     identified = spec.fit(runs, list(settings.states), list(settings.inputs), stop=stop)
     both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
     warn_of_repeats(identified, campaign, both)
+    if spec.standardize:
+        warn_of_slow_model(identified, runs)
     return identified
 
 

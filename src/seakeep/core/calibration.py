@@ -1,0 +1,172 @@
+"""How far the band of an ensemble must be widened to hold what it is meant to hold.
+
+Split-conformal prediction: the band forecasts windows that its members never saw, and is widened by
+a quantile of what they lie outside of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.errors import DataError, RequestError
+
+__all__ = ["ConformalMargin", "band_scores", "conformal_margin"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ConformalMargin:
+    """By how much bounds are moved outwards, channel by channel.
+
+    Attributes
+    ----------
+    margin : ndarray, shape (channel,)
+        In the unit of the channel; infinite where a band was lost too often.
+    block_length : ndarray, shape (channel,)
+        Samples over which exceedances depend on each other.
+    blocks : ndarray, shape (channel,)
+        Blocks that the scores are worth.
+    warranted : ndarray, shape (channel,)
+        Probability that so many blocks can warrant, at most `level`.
+    level : float
+        Probability that the band is to have.
+    """
+
+    margin: FloatArray
+    block_length: FloatArray
+    blocks: FloatArray
+    warranted: FloatArray
+    level: float
+
+
+def band_scores(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike) -> FloatArray:
+    r"""How far a measurement lies outside of a band; negative inside.
+
+    Parameters
+    ----------
+    lower, upper, measured : array_like, shape (…, time, channel)
+        Bounds and measurement in the same units.
+
+    Returns
+    -------
+    ndarray, shape (…, time, channel)
+        :math:`\max(l - y,\, y - u)`; infinite where the band is lost (NaN), since nothing is held
+        there.
+
+    Raises
+    ------
+    RequestError
+        If the shapes differ.
+    DataError
+        If the measurement has gaps.
+    """
+    low, high, y = (np.asarray(item, dtype=float) for item in (lower, upper, measured))
+    if not low.shape == high.shape == y.shape:
+        raise RequestError(
+            f"lower has shape {low.shape}, upper {high.shape} and measured {y.shape}; all must be "
+            "of the same shape (…, time, channel)."
+        )
+    if not np.all(np.isfinite(y)):
+        raise DataError(
+            f"measured holds {int(np.count_nonzero(~np.isfinite(y)))} value(s) that are NaN or "
+            "infinite. Fill its gaps first, or calibrate on windows without them."
+        )
+    found: FloatArray = np.maximum(low - y, y - high)
+    return np.where(np.isnan(found), np.inf, found)
+
+
+def conformal_margin(
+    scores: npt.ArrayLike, level: float = 0.95, block_length: float | None = None
+) -> ConformalMargin:
+    r"""Margin by which a band is widened so that it holds a part `level` of the instants.
+
+    Parameters
+    ----------
+    scores : array_like, shape (window, time, channel)
+        From :func:`band_scores`, of windows that the band did not learn from.
+    level : float
+        Probability that the widened band is to have.
+    block_length : float, optional
+        Samples over which scores depend on each other; 1 for independent ones. By default, channel
+        by channel, the integrated correlation time of the exceedances of the quantile `level`, on
+        which the error of an empirical quantile depends.
+
+    Returns
+    -------
+    ConformalMargin
+
+    Raises
+    ------
+    RequestError
+        If the shape or a setting is out of range.
+    DataError
+        If a score is NaN.
+
+    Notes
+    -----
+    Of n scores in K = n / `block_length` blocks the margin is the order statistic of rank
+    :math:`\lceil n\,\mathrm{level}\,(1 + 1/K)\rceil`, and never negative: a band is not narrowed.
+    With independent exchangeable scores (K = n) this is conformalised quantile regression (Romano,
+    Patterson and Candès, 2019), and the coverage of a new score is at least `level`, whatever their
+    distribution. In time series it is so for exchangeable blocks, and about so for stationary
+    forecast errors whose dependence is short against the record. It does not hold in another sea
+    than that of the scores. Where K blocks cannot warrant `level` (K / (K + 1) is less), the
+    margin is the largest score, and ``warranted`` says what remains.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> scores = np.arange(-9.0, 11.0).reshape(1, 20, 1)
+    >>> found = conformal_margin(scores, 0.8, block_length=1)
+    >>> float(found.margin[0]), float(found.warranted[0])
+    (7.0, 0.8)
+    """
+    s = np.asarray(scores, dtype=float)
+    if s.ndim != 3 or 0 in s.shape:
+        raise RequestError(
+            f"scores has shape {s.shape}; (window, time, channel) with at least one of each is "
+            "needed."
+        )
+    if not 0 < level < 1:
+        raise RequestError(f"level must lie between 0 and 1; received {level!r}.")
+    if block_length is not None and not 1 <= block_length <= s.shape[1]:
+        raise RequestError(
+            f"block_length must lie between 1 and the {s.shape[1]} samples of a window; received "
+            f"{block_length}."
+        )
+    if np.isnan(s).any():
+        raise DataError("scores holds NaN; a band that is lost has the score infinity.")
+    n, channels = s.shape[0] * s.shape[1], range(s.shape[2])
+    lengths = np.array([block_length or _dependence(s[..., c], level) for c in channels])
+    blocks = n / lengths
+    ranks = np.minimum(np.ceil(n * level * (1.0 + 1.0 / blocks) - 1e-9), n).astype(int)
+    ordered = np.sort(s.reshape(n, -1), axis=0)
+    margin = np.maximum(ordered[ranks - 1, channels], 0.0)
+    return ConformalMargin(
+        margin=margin,
+        block_length=lengths,
+        blocks=blocks,
+        warranted=np.minimum(level, blocks / (blocks + 1.0)),
+        level=float(level),
+    )
+
+
+def _dependence(scores: FloatArray, level: float) -> float:
+    """Integrated correlation time of the exceedances, in samples, of scores (window, time)."""
+    steps = scores.shape[1]
+    above = scores >= np.quantile(scores, level, method="higher")
+    deviations = above - above.mean()
+    variance = float(np.mean(deviations**2))
+    if variance == 0.0:
+        return float(steps)
+    total = 1.0
+    for lag in range(1, steps):
+        correlation = float(np.mean(deviations[:, lag:] * deviations[:, :-lag])) / variance
+        if correlation <= 0.0:
+            break
+        total += 2.0 * correlation
+    return min(total, float(steps))

@@ -1,0 +1,190 @@
+"""A band calibrated on windows that the members never saw."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.core.calibration import ConformalMargin, band_scores, conformal_margin
+from seakeep.errors import RequestError
+from seakeep.models import labelled
+from seakeep.models.ensemble_series import member_series, read_windows
+from seakeep.models.summaries import STATISTICS, check_level, reduce_members
+from seakeep.models.workers import Crew
+
+if TYPE_CHECKING:
+    from seakeep.models.fitted_ensemble import HankelEnsemble
+
+__all__ = ["Band", "Calibration", "calibrate", "check_band", "held_out_scores", "widened"]
+
+FloatArray = npt.NDArray[np.float64]
+Band = Literal["members", "calibrated"]
+NUMBERS = ("margin", "block_length", "blocks", "warranted")
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What a band was widened by, and on what that was found.
+
+    Parameters
+    ----------
+    found : ConformalMargin
+        Margins of the states.
+    windows : dict of str to int
+        Number of windows in each run.
+    steps : int
+        Instants of a window.
+    """
+
+    found: ConformalMargin
+    windows: dict[str, int]
+    steps: int
+
+    def to_json(self) -> str:
+        """As text; a margin that is infinite is kept as such."""
+        arrays = {key: getattr(self.found, key).tolist() for key in NUMBERS}
+        words = {"level": self.found.level, "windows": self.windows, "steps": self.steps}
+        return json.dumps(arrays | words)
+
+    @classmethod
+    def from_json(cls, text: str) -> Calibration | None:
+        """Rebuild from :meth:`to_json`; None of ``null``."""
+        kept: dict[str, Any] | None = json.loads(text)
+        if kept is None:
+            return None
+        arrays = {key: np.array(kept[key]) for key in NUMBERS}
+        found = ConformalMargin(**arrays, level=float(kept["level"]))
+        return cls(found, dict(kept["windows"]), int(kept["steps"]))
+
+
+def calibrate(
+    ensemble: HankelEnsemble, runs: labelled.Runs, steps: int, level: float, crew: Crew
+) -> Calibration:
+    """Find the margins of an ensemble; see :meth:`HankelEnsemble.calibrate`."""
+    named = labelled.as_runs(runs)
+    scores = held_out_scores(ensemble, named, steps, level, crew)
+    if not scores:
+        raise RequestError(
+            f"no window of {steps} steps with {ensemble.history_samples} samples of history lies "
+            f"in {', '.join(named)} outside of what the members learnt from. Give runs that do not "
+            "train, or fewer steps."
+        )
+    margin = conformal_margin(np.concatenate(list(scores.values())), level)
+    return Calibration(margin, {name: len(each) for name, each in scores.items()}, steps)
+
+
+def held_out_scores(
+    ensemble: HankelEnsemble, runs: Mapping[str, xr.Dataset], steps: int, level: float, crew: Crew
+) -> dict[str, FloatArray]:
+    """Scores of the band in windows end to end, none of which a member has read.
+
+    Parameters
+    ----------
+    ensemble : HankelEnsemble
+        The ensemble.
+    runs : mapping of str to Dataset
+        Runs, or parts of runs, under the names by which they trained.
+    steps : int
+        Instants of a window.
+    level : float
+        Probability between the bounds.
+    crew : Crew
+        Who does the work.
+
+    Returns
+    -------
+    dict of str to ndarray, each of shape (window, steps, N)
+        Runs in which there is such a window.
+    """
+    level = check_level(level)
+    found = {}
+    for name, run in runs.items():
+        starts = _unread_starts(ensemble, name, run, steps)
+        if not starts:
+            continue
+        windows = read_windows(ensemble, run, starts, steps)
+        series = member_series(ensemble, run, windows, crew)
+        shape = (len(windows), steps, len(ensemble.states))
+        values, _ = reduce_members(series, ensemble.n_members, shape, level)
+        lower, upper = (values[:, STATISTICS.index(key)] for key in ("lower", "upper"))
+        measured = np.stack(
+            [_measured(ensemble, run, name, window.start, steps) for window in windows]
+        )
+        found[name] = band_scores(lower, upper, measured)
+    return found
+
+
+def _unread_starts(ensemble: HankelEnsemble, name: str, run: xr.Dataset, steps: int) -> list[float]:
+    """Starts of windows end to end in a run, clear of what members have read of it."""
+    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
+        raise RequestError(f"steps must be a positive integer; received {steps!r}.")
+    time = np.asarray(run["time"].values, dtype=float)
+    slack = 1e-6 * ensemble.dt
+    read = ensemble.read_spans.get(name)
+    starts, at = [], ensemble.history_samples - 1
+    while at + steps < time.size:
+        # The instants at + 1 … at + steps are forecast.
+        if read and time[at + 1] <= read[1] + slack and time[at + steps] >= read[0] - slack:
+            at = max(at, int(np.searchsorted(time, read[1] - slack)))
+            read = None
+            continue
+        starts.append(float(time[at]))
+        at += steps
+    return starts
+
+
+def _measured(
+    ensemble: HankelEnsemble, run: xr.Dataset, name: str, start: float, steps: int
+) -> FloatArray:
+    at = labelled.nearest_sample(np.asarray(run["time"].values, dtype=float), start, name)
+    return labelled.channel_matrix(run, ensemble.states, name, slice(at + 1, at + 1 + steps))
+
+
+def check_band(ensemble: HankelEnsemble, level: float, band: Band) -> None:
+    """Refuse a band that the ensemble does not have.
+
+    Parameters
+    ----------
+    ensemble : HankelEnsemble
+        The ensemble.
+    level : float
+        Probability that is asked of the band.
+    band : {"members", "calibrated"}
+        Which band.
+
+    Raises
+    ------
+    RequestError
+        If the ensemble was not calibrated, or for another level, or there is no such band.
+    """
+    if band == "members":
+        return
+    if band != "calibrated":
+        raise RequestError(f"band must be 'members' or 'calibrated'; received {band!r}.")
+    if ensemble.calibration is None:
+        raise RequestError(
+            "the ensemble is not calibrated. Call ensemble.calibrate(runs, steps) with runs that "
+            "its members did not learn from, and forecast with what it returns."
+        )
+    known = ensemble.calibration.found.level
+    if abs(known - level) > 1e-12:
+        raise RequestError(
+            f"the band was calibrated for level = {known:g}, and {level:g} was asked for. "
+            "Calibrate for that level."
+        )
+
+
+def widened(ensemble: HankelEnsemble, values: FloatArray, band: Band) -> FloatArray:
+    """Statistics of shape (…, 4, steps, N) with the bounds of a band that was checked."""
+    if band == "members" or ensemble.calibration is None:
+        return values
+    out, margin = values.copy(), ensemble.calibration.found.margin
+    out[..., STATISTICS.index("lower"), :, :] -= margin
+    out[..., STATISTICS.index("upper"), :, :] += margin
+    return out

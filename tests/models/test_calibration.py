@@ -1,0 +1,148 @@
+"""The calibrated band of an ensemble: on windows that no member read, kept in its file."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import seakeep
+from seakeep.core.calibration import band_scores, conformal_margin
+from seakeep.errors import RequestError
+
+STATES, INPUTS, DT = ["heave", "pitch"], ["eta"], 0.1
+
+
+def sea(seed, samples=1600, name="sea"):
+    """A response with noise that no member knows of, so that their band is too narrow."""
+    rng = np.random.default_rng(seed)
+    time = DT * np.arange(samples)
+    angles = np.outer(time, 2 * np.pi * rng.uniform(0.3, 1.0, 40)) + rng.uniform(0, 6.28, 40)
+    waves = {"heave": np.cos(angles - 0.4), "pitch": np.sin(angles), "eta": np.cos(angles)}
+    channels = {key: each.sum(axis=1) for key, each in waves.items()}
+    for key in STATES:
+        channels[key] = channels[key] + 1.5 * rng.standard_normal(samples)
+    return xr.Dataset(
+        {key: ("time", values, {"units": "m"}) for key, values in channels.items()},
+        coords={"time": ("time", time, {"units": "s"})},
+        attrs={"run": name},
+    )
+
+
+@pytest.fixture(scope="module")
+def run():
+    return sea(0)
+
+
+@pytest.fixture(scope="module")
+def ensemble(run):
+    spec = seakeep.BayesianHankelDMDc(
+        encounter_period=1.6,
+        train_length=seakeep.Uniform(10, 16),
+        state_delay=seakeep.Uniform(0.2, 0.6),
+        input_delay=seakeep.Uniform(0.5, 1.5),
+        ridge=seakeep.Uniform(200, 400),
+        n_members=8,
+        seed=1,
+    )
+    return spec.fit(run, STATES, INPUTS, stop=60.0)
+
+
+@pytest.fixture(scope="module")
+def calibrated(ensemble, run):
+    return ensemble.calibrate(run.sel(time=slice(None, 110.0)), steps=40)
+
+
+def test_the_calibrated_band_covers_unseen_windows_as_it_says(calibrated, run):
+    inside = {"members": [], "calibrated": []}
+    for start in np.arange(112.0, 155.0, 4.0):
+        for band, found in inside.items():
+            summary = calibrated.forecast_summary(run, start, 40, band=band)
+            for name in STATES:
+                measured = run[name].sel(time=summary["time"], method="nearest")
+                low, high = (summary[name].sel(statistic=key) for key in ("lower", "upper"))
+                found.append(float(((low <= measured) & (measured <= high)).mean()))
+    assert np.mean(inside["members"]) < 0.6
+    # 880 instants, nearly independent noise: a standard error of 0.007, and 0.01 of the margin.
+    assert np.mean(inside["calibrated"]) == pytest.approx(0.95, abs=0.036)
+
+
+def test_bounds_are_moved_by_the_margin_and_nothing_else(calibrated, ensemble, run):
+    plain = ensemble.forecast_summary(run, 120.0, 30)
+    wide = calibrated.forecast_summary(run, 120.0, 30, band="calibrated")
+    margin = calibrated.calibration.found.margin
+    assert (margin > 0).all()
+    for k, name in enumerate(STATES):
+        for key, side in (("mean", 0), ("std", 0), ("lower", -1), ("upper", 1)):
+            moved = wide[name].sel(statistic=key) - plain[name].sel(statistic=key)
+            # One addition: rounding of numbers of about ten.
+            np.testing.assert_allclose(moved, side * margin[k], rtol=0, atol=1e-14 * 10)
+    assert wide.attrs["band"] == "calibrated"
+    assert "margin" in wide["statistic"].attrs["comment"]
+    xr.testing.assert_identical(plain, calibrated.forecast_summary(run, 120.0, 30))
+
+
+def test_no_window_touches_what_a_member_has_read(ensemble, calibrated, run):
+    (first, last) = ensemble.read_spans["sea"]
+    # The longest draw with its delay history, up to stop.
+    needed = max(draw.needed(False) for draw in ensemble.members)
+    assert last == pytest.approx(60.0)
+    assert last - first == pytest.approx((needed - 1) * DT)
+    reach = ensemble.history_samples - 1
+    before = int((round(first / DT) - 1 - reach) // 40)
+    after = (1100 - 600) // 40
+    assert calibrated.calibration.windows == {"sea": before + after}
+    # The scores are those of these windows, the first of them by hand.
+    starts = [reach * DT + 40 * DT * k for k in range(before)] + [
+        60.0 + 4.0 * k for k in range(after)
+    ]
+    found = ensemble.summarize_windows(run, starts, 40)
+    scores = []
+    for window, start in enumerate(starts):
+        at = round(start / DT)
+        columns = [
+            band_scores(
+                found[name].isel(window=window).sel(statistic="lower").values[:, None],
+                found[name].isel(window=window).sel(statistic="upper").values[:, None],
+                run[name].values[at + 1 : at + 41, None],
+            )
+            for name in STATES
+        ]
+        scores.append(np.concatenate(columns, axis=1))
+    expected = conformal_margin(np.stack(scores), 0.95)
+    np.testing.assert_allclose(calibrated.calibration.found.margin, expected.margin, rtol=1e-12)
+
+
+def test_another_run_is_used_whole(ensemble):
+    found = ensemble.calibrate({"other": sea(3, 500, "other")}, steps=40).calibration
+    assert found.windows == {"other": (500 - ensemble.history_samples) // 40}
+
+
+def test_a_file_keeps_the_calibration(calibrated, ensemble, run, tmp_path):
+    calibrated.save(tmp_path / "ensemble.nc")
+    kept = seakeep.load_model(tmp_path / "ensemble.nc")
+    xr.testing.assert_identical(
+        kept.forecast_summary(run, 120.0, 30, band="calibrated"),
+        calibrated.forecast_summary(run, 120.0, 30, band="calibrated"),
+    )
+    assert kept.calibration.windows == calibrated.calibration.windows
+    ensemble.save(tmp_path / "plain.nc")
+    assert seakeep.load_model(tmp_path / "plain.nc").calibration is None
+
+
+def test_the_summary_says_it(calibrated, ensemble):
+    assert "calibrated for 0.95 on 20 windows of 40 steps" in calibrated.summary()
+    assert "calibrated" not in ensemble.summary()
+
+
+def test_what_is_refused(ensemble, calibrated, run):
+    with pytest.raises(RequestError, match="the ensemble is not calibrated"):
+        ensemble.forecast_summary(run, 120.0, 30, band="calibrated")
+    with pytest.raises(RequestError, match=r"calibrated for level = 0\.95, and 0\.9 was asked"):
+        calibrated.forecast_summary(run, 120.0, 30, level=0.9, band="calibrated")
+    with pytest.raises(RequestError, match="must be 'members' or 'calibrated'; received 'x'"):
+        calibrated.forecast_summary(run, 120.0, 30, band="x")
+    with pytest.raises(RequestError, match=r"no window of 400 steps .* outside of what"):
+        ensemble.calibrate(run.sel(time=slice(None, 62.0)), steps=400)
+    with pytest.raises(RequestError, match="steps must be a positive integer; received 0"):
+        ensemble.calibrate(run, steps=0)
+    with pytest.raises(RequestError, match="level must lie between 0 and 1"):
+        ensemble.calibrate(run, steps=40, level=95)

@@ -1,0 +1,74 @@
+"""Slow motions of which training holds too few periods: told, and only where they govern."""
+
+import warnings
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import SeakeepWarning
+from seakeep.models.slow import FEWEST, slow_motions, warn_of_slow_motions
+
+DT, PERIOD = 0.1, 1.64
+
+
+def run_of(seed, seconds, slow_period=30.0, slow=1.0, regular=False):
+    """Surge of waves and a slow drift of a random envelope; heave of waves alone."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0, seconds, DT)
+
+    def sum_of(low, high, count=40):
+        f, phase = rng.uniform(low, high, count), rng.uniform(0, 2 * np.pi, count)
+        return np.cos(2 * np.pi * np.outer(t, f) + phase).sum(axis=1) / np.sqrt(count / 2)
+
+    f0 = 1.0 / slow_period
+    drift = sum_of(0.8 * f0, 1.2 * f0) if not regular else np.cos(2 * np.pi * f0 * t)
+    values = {"surge": slow * drift + 0.3 * sum_of(0.4, 0.9), "heave": sum_of(0.4, 0.9)}
+    return xr.Dataset(
+        {name: ("time", x, {"units": "m"}) for name, x in values.items()}, coords={"time": t}
+    )
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_period_of_a_slow_drift_is_found(seed):
+    (found,) = slow_motions({"a": run_of(seed, 600)}, ["heave", "surge"], 33.0, PERIOD)
+    assert found.channel == "surge"
+    # The drift's own frequencies lie within ±20 %, and so does their mean in any realisation.
+    assert found.period == pytest.approx(30.0, rel=0.2)
+    assert found.cycles == pytest.approx(33.0 / found.period)
+    assert found.share > 0.8
+
+
+def test_a_regular_drift_is_counted_exactly():
+    (found,) = slow_motions({"a": run_of(0, 600, regular=True)}, ["surge"], 600.0, PERIOD)
+    assert found.cycles == pytest.approx(20.0, abs=0.6)  # half a cycle at either end
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_few_periods_warn_and_enough_do_not(seed):
+    runs = {"a": run_of(seed, 210), "b": run_of(seed + 100, 210)}
+    # The paper's window of 20 T in one run: about one slow period.
+    with pytest.warns(SeakeepWarning, match=r"32\.8 s in all, hold (0|1)\.\d periods .* surge"):
+        warn_of_slow_motions({"a": runs["a"]}, ["surge", "heave"], 32.8, PERIOD)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_slow_motions(runs, ["surge", "heave"], 420.0, PERIOD)
+
+
+def test_waves_alone_and_a_drift_that_does_not_govern_are_left_alone():
+    runs = {"a": run_of(1, 210, slow=0.1)}
+    assert slow_motions(runs, ["surge", "heave"], 33.0, PERIOD) == []
+
+
+def test_a_drift_longer_than_the_record_counts_as_none():
+    run = run_of(2, 150, slow_period=300.0, regular=True)
+    (found,) = slow_motions({"a": run}, ["surge"], 150.0, PERIOD)
+    assert found.cycles < 1
+    with pytest.warns(SeakeepWarning, match=f"fewer than {FEWEST}"):
+        warn_of_slow_motions({"a": run}, ["surge"], 150.0, PERIOD)
+
+
+def test_records_that_tell_nothing_are_left_out():
+    run = run_of(3, 60)
+    run["surge"].values[5] = np.nan
+    assert slow_motions({"a": run, "b": run_of(3, 5)}, ["surge"], 33.0, PERIOD) == []

@@ -1,0 +1,122 @@
+"""Conformal margins: the coverage they warrant, found on synthetic scores of known distribution."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from seakeep.errors import DataError, RequestError
+from seakeep.statistics import band_scores, conformal_margin, coverage
+
+
+def test_the_coverage_of_exchangeable_scores_is_that_of_the_order_statistic():
+    rng = np.random.default_rng(0)
+    n, level, repeats = 39, 0.9, 4000
+    inside = 0
+    for _ in range(repeats):
+        scores = rng.standard_t(3, size=(1, n, 1))
+        margin = float(conformal_margin(scores, level, block_length=1).margin[0])
+        inside += rng.standard_t(3) <= margin
+    # Rank ⌈0.9 · 40⌉ = 36 of 39: a new score is below it with probability 36/40, whatever its
+    # distribution. Three standard errors of a binomial count.
+    exact = 36 / (n + 1)
+    assert inside / repeats == pytest.approx(exact, abs=3 * np.sqrt(exact * (1 - exact) / repeats))
+
+
+def test_a_band_that_is_too_narrow_covers_what_it_says_in_new_windows():
+    rng = np.random.default_rng(1)
+    # Members know a third of the spread: their 95 % band holds about 48 %.
+    half = 1.96 / 3 * np.array([1.0, 20.0])
+
+    def drawn(windows):
+        return rng.standard_normal((windows, 200, 2)) * [1.0, 20.0]
+
+    y = drawn(40)
+    plain = coverage(np.broadcast_to(-half, y.shape), np.broadcast_to(half, y.shape), y)
+    expected = 2 * stats.norm.cdf(1.96 / 3) - 1
+    np.testing.assert_allclose(plain.inside.mean(axis=0), expected, atol=0.02)
+    found = conformal_margin(band_scores(-half + 0 * y, half + 0 * y, y), 0.95)
+    new = drawn(400)
+    reach = half + found.margin
+    inside = (np.abs(new) <= reach).mean(axis=(0, 1))
+    # The quantile of 8000 scores has a standard error of √(0.95 · 0.05 / 8000) = 0.0024 in
+    # probability, and the 80 000 new ones add 0.0008: three of both.
+    np.testing.assert_allclose(inside, 0.95, atol=0.008)
+    # What the distribution asks for: 1.96 SD.
+    np.testing.assert_allclose(reach, [1.96, 39.2], rtol=0.05)
+
+
+def autoregression(rng, phi, windows, steps):
+    x = np.empty((windows, steps))
+    x[:, 0] = rng.standard_normal(windows)
+    for k in range(1, steps):
+        x[:, k] = phi * x[:, k - 1] + np.sqrt(1 - phi**2) * rng.standard_normal(windows)
+    return x[..., None]
+
+
+def test_dependent_scores_are_worth_fewer_and_the_coverage_is_kept():
+    rng = np.random.default_rng(2)
+    held, plain, worth = [], [], []
+    for _ in range(400):
+        scores = autoregression(rng, 0.95, 6, 100)
+        for found, out in (
+            (conformal_margin(scores, 0.9), held),
+            (conformal_margin(scores, 0.9, block_length=1), plain),
+        ):
+            out.append(stats.norm.cdf(found.margin[0]))
+        worth.append(conformal_margin(scores, 0.9).blocks[0])
+    error = np.std(held) / np.sqrt(len(held))
+    # As if the 600 scores were independent, too little is covered; with their dependence, enough.
+    assert np.mean(plain) < 0.9 - 3 * error
+    assert 0.9 - 3 * error < np.mean(held) < 0.95
+    assert np.median(worth) < 600 / 5
+
+
+def test_independent_scores_are_worth_nearly_all_of_their_number():
+    scores = np.random.default_rng(3).standard_normal((10, 300, 1))
+    # The first few correlations are noise of 1/√3000, until one is not positive.
+    assert conformal_margin(scores, 0.9).blocks[0] > 3000 / 1.5
+
+
+def test_few_blocks_warrant_less_and_give_the_largest_score():
+    scores = np.arange(12.0).reshape(2, 6, 1)
+    found = conformal_margin(scores, 0.95, block_length=6)
+    assert found.margin[0] == 11.0
+    assert found.blocks[0] == 2
+    assert found.warranted[0] == pytest.approx(2 / 3)
+
+
+def test_a_band_is_never_narrowed():
+    scores = np.full((4, 50, 1), -1.0) - np.arange(50.0)[:, None]
+    assert conformal_margin(scores, 0.9).margin[0] == 0.0
+
+
+def test_scores_by_hand_and_a_band_that_is_lost():
+    lower, upper = np.array([[0.0], [0.0], [np.nan]]), np.array([[1.0], [2.0], [3.0]])
+    found = band_scores(lower, upper, np.array([[1.5], [0.5], [1.0]]))
+    np.testing.assert_array_equal(found[:, 0], [0.5, -0.5, np.inf])
+    # Lost in more of the windows than the level leaves: no margin is wide enough.
+    scores = np.concatenate([np.zeros((3, 10, 1)), np.full((1, 10, 1), np.inf)])
+    assert conformal_margin(scores, 0.9, block_length=1).margin[0] == np.inf
+    assert conformal_margin(scores, 0.7, block_length=1).margin[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("scores", "settings", "error", "message"),
+    [
+        (np.zeros((5, 2)), {}, RequestError, r"scores has shape \(5, 2\)"),
+        (np.zeros((0, 5, 2)), {}, RequestError, r"scores has shape \(0, 5, 2\)"),
+        (np.zeros((1, 5, 2)), {"level": 1.0}, RequestError, "level must lie between 0 and 1"),
+        (np.zeros((1, 5, 2)), {"block_length": 6}, RequestError, "between 1 and the 5 samples"),
+        (np.full((1, 5, 2), np.nan), {}, DataError, "scores holds NaN"),
+    ],
+)
+def test_what_margins_refuse(scores, settings, error, message):
+    with pytest.raises(error, match=message):
+        conformal_margin(scores, **settings)
+
+
+def test_what_scores_refuse():
+    with pytest.raises(RequestError, match="all must be of the same shape"):
+        band_scores(np.zeros((3, 1)), np.ones((3, 1)), np.zeros((4, 1)))
+    with pytest.raises(DataError, match=r"1 value\(s\) that are NaN or infinite"):
+        band_scores(np.zeros((2, 1)), np.ones((2, 1)), [[0.0], [np.nan]])

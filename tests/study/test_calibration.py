@@ -1,0 +1,114 @@
+"""Bands of a study calibrated on training data: with 'recommended' by default, never on tests."""
+
+import numpy as np
+import pytest
+
+from seakeep.study import read_study, run_study
+from seakeep.study.calibration import calibration_arrays
+from seakeep.study.cells import fit_training
+from seakeep.study.plan import make_plan
+
+
+def edited(folder, *changes):
+    path = folder / "study.toml"
+    text = path.read_text("utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text, "utf-8")
+    return read_study(path)
+
+
+@pytest.mark.parametrize(
+    ("preset", "stated", "expected"),
+    [
+        ("paper", "", False),
+        ("recommended", "", True),
+        ("paper", "calibrate = true", True),
+        ("recommended", "calibrate = false", False),
+    ],
+)
+def test_the_paper_has_no_calibration_unless_asked(study_folder, preset, stated, expected):
+    study = edited(
+        study_folder,
+        ('preset = "recommended"', f'preset = "{preset}"'),
+        ("n_series = 8", f"n_series = 8\n{stated}"),
+    )
+    assert study.settings.calibrates is expected
+
+
+def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder):
+    study = edited(study_folder, ("length = 6", "length = 3"))
+    found = run_study(study, study_folder / "out")
+    plan, runs = make_plan(study)
+    kept = found.groups["calibration/bayesian"]
+    test = found.tests["unseen"]
+    table = found.groups["statistics/coverage/unseen"].sel(model="bayesian", against="measured")
+    inside = []
+    for k, training in enumerate(plan.training):
+        ensemble = fit_training(plan, runs, "bayesian", training)
+        parts = {name: runs[name] for name in ("first", "second")}  # they train as a whole
+        steps = plan.tests["unseen"][0].steps
+        alone = ensemble.calibrate(parts, steps).calibration
+        np.testing.assert_allclose(kept["margin"][k], alone.found.margin, rtol=1e-9)
+        assert int(kept["windows"][k]) == sum(alone.windows.values()) > 0
+        cell = test.isel(training=k)
+        lower = cell["bayesian_lower"] - alone.found.margin
+        upper = cell["bayesian_upper"] + alone.found.margin
+        inside.append(((lower <= cell["measured"]) & (cell["measured"] <= upper)).values)
+    by_channel = np.mean(inside, axis=(0, 1, 2))
+    np.testing.assert_allclose(table["calibrated_inside"][1:], by_channel, rtol=1e-9)
+    assert (table["calibrated_inside"] >= table["inside"]).all()
+    assert (table["calibrated_relative_width"] > table["relative_width"]).all()
+
+
+def test_where_runs_are_left_out_each_is_forecast_by_the_others_and_the_test_run_by_none(
+    study_folder,
+):
+    study = edited(
+        study_folder,
+        (
+            "windows = 2\n\n[models",
+            'scheme = "leave_out"\nruns = ["first", "second", "unseen"]\n\n[models',
+        ),
+        ("length = 6", "length = 3"),
+    )
+    plan, runs = make_plan(study)
+    fold = next(each for each in plan.training if each.left_out == ("unseen",))
+
+    def margins(given):
+        def fit(part):
+            return fit_training(plan, given, "bayesian", part)
+
+        return calibration_arrays(plan, given, fold, fit(fold), fit)
+
+    found = margins(runs)
+    steps = plan.tests["unseen"][0].steps
+    rest = {name: runs[name] for name in ("first", "second")}
+    windows = sum((run.sizes["time"] - 1 - plan.needs.history) // steps for run in rest.values())
+    # An ensemble's history may be shorter than the longest that its priors allow.
+    assert windows <= found["windows"] <= windows + 2
+    spoilt = runs["unseen"].copy(deep=True)
+    for name in plan.states:
+        spoilt[name].values[:] = 1e6
+    again = margins({**runs, "unseen": spoilt})
+    np.testing.assert_array_equal(again["margin"], found["margin"])
+    # The margin of one run alone is another: both count.
+    fewer = {**runs, "second": runs["second"] * 1.5}
+    fewer["second"].attrs = runs["second"].attrs
+    assert (margins(fewer)["margin"] != found["margin"]).any()
+
+
+def test_training_data_without_a_window_that_is_not_read_give_no_margin(study_folder):
+    study = edited(
+        study_folder,
+        ("windows = 2\n\n[models", 'scheme = "pooled"\nruns = ["first"]\n\n[models'),
+        ("train_length = { uniform = [10, 20] }\n", ""),
+    )
+    found = run_study(study, study_folder / "out")
+    kept = found.groups["calibration/bayesian"]
+    assert int(kept["windows"][0]) == 0
+    assert np.isnan(kept["margin"]).all()
+    table = found.groups["statistics/coverage/unseen"]
+    assert np.isnan(table["calibrated_inside"]).all()
+    assert np.isfinite(table["inside"].sel(channel="average", against="measured")).all()

@@ -1,0 +1,55 @@
+"""The commands tell where training windows hold too few periods of a slow motion."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from seakeep import SeakeepWarning, read_campaign
+from seakeep.study import read_study, run_study
+from seakeep.study.plan import make_plan
+from seakeep.study.slow import warn_of_slow_study
+from seakeep.study.workflow import fit_campaign
+
+DRIFT = 60.0
+"""Period of the drift put onto heave, s: the two training runs hold four periods in all."""
+
+
+@pytest.fixture
+def drifting_folder(study_folder):
+    """The tutorial's runs, their heave on a slow drift three times as large as the waves."""
+    for path in study_folder.glob("*.csv"):
+        lines = path.read_text(encoding="utf-8").splitlines()
+        names = lines[0].split(";")
+        table = np.array([[float(x) for x in line.split(";")] for line in lines[1:]])
+        heave = next(i for i, name in enumerate(names) if "heave" in name.lower())
+        size = 3 * np.sqrt(2) * table[:, heave].std()
+        table[:, heave] += size * np.sin(2 * np.pi * table[:, 0] / DRIFT)
+        rows = [";".join(f"{x:.6g}" for x in row) for row in table]
+        path.write_text("\n".join([lines[0], *rows]) + "\n", encoding="utf-8")
+    return study_folder
+
+
+def test_a_study_with_short_windows_is_told_once(drifting_folder, monkeypatch):
+    study = read_study(drifting_folder / "study.toml")
+    plan, runs = make_plan(study)
+    with pytest.warns(SeakeepWarning, match=r"slow motion of heave \(period [56]\d") as caught:
+        warn_of_slow_study(plan, runs)
+    assert len(caught) == 1
+    assert "windows of 'bayesian' in" in str(caught[0].message)  # 20 T at most
+    monkeypatch.setattr("seakeep.study.run.units_of", lambda *_: pytest.fail("told before"))
+    with pytest.warns(SeakeepWarning, match="slow motion"), pytest.raises(pytest.fail.Exception):
+        run_study(study, drifting_folder / "out")
+
+
+def test_fitting_a_campaign_tells_it(drifting_folder):
+    campaign = read_campaign(drifting_folder / "campaign.toml")
+    with pytest.warns(SeakeepWarning, match=r"hold [34]\.\d periods of the slow motion of heave"):
+        fit_campaign(campaign)
+
+
+def test_the_tutorial_itself_has_no_slow_motion(study_folder):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fit_campaign(read_campaign(study_folder / "campaign.toml"))
+        warn_of_slow_study(*make_plan(read_study(study_folder / "study.toml")))
