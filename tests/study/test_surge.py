@@ -8,6 +8,9 @@ from seakeep.study import read_study, run_study
 from seakeep.study.plan import make_plan
 from seakeep.waves import wavenumber
 
+# The runs are short, for speed: their windows hold two periods of the slow surge of 17 s.
+pytestmark = pytest.mark.filterwarnings("ignore:the training windows:seakeep.SeakeepWarning")
+
 RATE, DEPTH, PROBE = 10.0, 3.6, -1.5
 
 CAMPAIGN = f"""
