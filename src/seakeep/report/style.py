@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
@@ -107,13 +108,13 @@ def save_figure(figure: Figure, path: Path, dpi: float | None = None) -> Path:
         if kind != "png":
             figure.savefig(temporary, format=kind)
             return path
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
         from PIL import Image  # comes with matplotlib
 
         figure.set_dpi(_RC["figure.dpi"] if dpi is None else dpi)
-        raw = io.BytesIO()
-        figure.savefig(raw, format="rgba", dpi="figure")
-        size = (int(figure.bbox.width), int(figure.bbox.height))
-        full = Image.frombytes("RGBA", size, raw.getbuffer()).convert("RGB")
+        canvas: Any = FigureCanvasAgg(figure)
+        canvas.draw()
+        full = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
         # Line drawings lose nothing to a palette and shrink to a third.
         full.quantize(128).save(temporary, format=kind)
     return path
