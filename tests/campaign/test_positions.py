@@ -65,6 +65,7 @@ def test_a_wrong_position_is_warned_of_once_and_stands_on_every_sheet(campaign, 
     assert "Check [rig.positions]" in text
     for run in runs.values():
         assert [(each.channel, each.kind) for each in findings_of(run)] == [("eta_fwd", "position")]
+    pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
     write_quality_sheet(runs, stated.settings, "positions", tmp_path)
     page = (tmp_path / "quality.html").read_text(encoding="utf-8")
     assert page.count("the phases of the waves fit") == 2
