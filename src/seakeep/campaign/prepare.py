@@ -17,6 +17,7 @@ from seakeep.campaign.checks import as_attribute, checked, warn_of_positions
 from seakeep.campaign.instruments import open_loggers
 from seakeep.campaign.labels import attributes_of, cropped, role_of
 from seakeep.campaign.periods import counted, in_seconds, parse_periods
+from seakeep.campaign.plausibility import check_records, warn_of
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.resampling import on_one_axis, strays
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
@@ -33,7 +34,7 @@ Progress = Callable[[int, int, str], None]
 SHOWN_RUNS = 6
 """Runs that a campaign's representation names."""
 
-FORMAT = 4
+FORMAT = 5
 """Goes into the digest: raise it when the same settings begin to give other arrays or findings."""
 
 
@@ -452,7 +453,9 @@ class Campaign:
     ) -> xr.Dataset:
         whole = on_one_axis(groups, dt, settings, name)
         findings = checked(name, groups, whole, found.clocks[name], settings, found.left_out)
+        findings += check_records(groups, settings.runs[name])
         warn_of_positions(findings, name, misplaced)
+        warn_of(findings, name)
         reference = _reference_time(groups)
         record = (float(reference[0]), float(reference[-1]))
         run = cropped(whole, name, settings.runs[name], record)
