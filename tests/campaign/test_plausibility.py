@@ -2,10 +2,11 @@
 
 import warnings
 
+import numpy as np
 import pytest
 from small_tank import tank_columns, write_csv
 
-from seakeep.campaign import read_campaign
+from seakeep.campaign import draft_campaign, read_campaign
 from seakeep.campaign.checks import findings_of
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 
@@ -102,3 +103,55 @@ class TestRecords:
         path = edited(("train = [0, 10]", "span = [0, 9]\ntrain = [0, 8]"))
         with pytest.raises(RequestError, match=r"first\.test: \[10, inf\] s holds 0 .* 0 to 9 s"):
             read_campaign(path).prepare(["first"])
+
+
+def noisy(folder, noise):
+    """Two runs whose probe has white noise, in parts of the waves' standard deviation."""
+    for seed, name in enumerate(("first", "second")):
+        columns = tank_columns(seed)
+        waves = columns["WP fwd [mm]"]
+        shaken = np.random.default_rng(seed).normal(0.0, noise * waves.std(), waves.size)
+        write_csv(folder / f"{name}.csv", {**columns, "WP fwd [mm]": waves + shaken})
+
+
+COUNTED = ("sampling_rate = 10", "steps_per_period = 12")
+
+
+class TestPeriod:
+    def test_a_count_that_noise_leads_is_told(self, edited, tank):
+        sound = read_campaign(edited(COUNTED)).encounter_period()
+        noisy(tank, 0.3)
+        message = r"first: eta_fwd counts waves of .* energy period of its spectrum is 1\.\d+ s "
+        rest = r"\(and 1 more run.*period_hysteresis"
+        with pytest.warns(SeakeepWarning, match=message + rest):
+            run = read_campaign(edited(COUNTED)).prepare()["first"]
+        assert run.attrs["encounter_period"] < sound / 1.5
+        told = [each.channel for each in findings_of(run) if each.kind == "period"]
+        assert told == ["eta_fwd"]
+
+    def test_its_mend_keeps_the_period(self, edited, tank):
+        sound = read_campaign(edited(COUNTED)).encounter_period()
+        noisy(tank, 0.3)
+        stated = ("scale_factor = 30.0", "period_hysteresis = 0.9")
+        run = read_campaign(edited(COUNTED, stated)).prepare()["first"]
+        # Twenty seconds hold some fourteen waves: one more or less is 7 %, and waves that the
+        # hysteresis leaves out lengthen the period; noise made it a fraction.
+        assert 0.9 * sound < run.attrs["encounter_period"] < 1.5 * sound
+
+    def test_the_draft_states_what_noise_must_not_pass(self, tank):
+        sound = read_campaign(tank / "campaign.toml").encounter_period()
+        noisy(tank, 0.06)
+        files = [tank / "first.csv", tank / "second.csv"]
+        text = draft_campaign(files, tank)
+        path = tank / "draft.toml"
+        path.write_text(text, encoding="utf-8")
+        campaign = read_campaign(path)
+        # Four standard deviations of a noise of 0.06, less than a third too high by the waves'
+        # own curvature.
+        assert 0.24 <= campaign.settings.campaign.period_hysteresis <= 0.32
+        assert campaign.encounter_period() == pytest.approx(sound, rel=0.07)  # one wave in 14
+        assert "guessed: what a wave must pass" in text
+
+    def test_one_without_noise_keeps_the_paper_s_count(self, tank):
+        text = draft_campaign([tank / "first.csv", tank / "second.csv"], tank)
+        assert "period_hysteresis" not in text

@@ -63,7 +63,8 @@ class Finding:
         Channel, or the logger for a clock.
     kind : str
         ``constant``, ``missing``, ``outliers``, ``saturated``, ``stuck``, ``drift``, ``lag``,
-        ``resolution``, ``agreement``, ``position``, ``clock``, ``record`` or ``left out``.
+        ``resolution``, ``agreement``, ``position``, ``clock``, ``record``, ``period`` or
+        ``left out``.
     text : str
         What, how much, and what was done about it.
     """

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.channels import Group, read_groups
-from seakeep.campaign.checks import as_attribute, checked, warn_of_positions
+from seakeep.campaign.checks import Finding, as_attribute, checked, warn_of_positions
 from seakeep.campaign.instruments import open_loggers
 from seakeep.campaign.labels import attributes_of, cropped, role_of
 from seakeep.campaign.periods import counted, in_seconds, parse_periods
@@ -454,6 +454,8 @@ class Campaign:
         whole = on_one_axis(groups, dt, settings, name)
         findings = checked(name, groups, whole, found.clocks[name], settings, found.left_out)
         findings += check_records(groups, settings.runs[name])
+        if name in found.doubts:
+            findings.append(Finding(self.period_channel(), "period", found.doubts[name]))
         warn_of_positions(findings, name, misplaced)
         warn_of(findings, name)
         reference = _reference_time(groups)
