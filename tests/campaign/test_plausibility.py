@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from small_tank import tank_columns, write_csv
 
+from seakeep import cli
 from seakeep.campaign import draft_campaign, read_campaign
 from seakeep.campaign.checks import findings_of
 from seakeep.errors import DataError, RequestError, SeakeepWarning
@@ -155,3 +156,72 @@ class TestPeriod:
     def test_one_without_noise_keeps_the_paper_s_count(self, tank):
         text = draft_campaign([tank / "first.csv", tank / "second.csv"], tank)
         assert "period_hysteresis" not in text
+
+
+class TestValues:
+    def test_degrees_taken_for_radians(self, edited):
+        path = edited(('column = "Pitch"', 'column = "Pitch (deg)"\nunit = "deg"'))
+        assert "impossible" not in kinds(read_campaign(path).prepare()["first"])
+
+    @pytest.mark.parametrize(
+        ("stem", "header", "message"),
+        [("Pitch (deg)", "Pitch (rad)", r"pitch reaches \d.* rad, more than a right angle"),
+         ("Heave [mm]", "Heave [m]", r"heave leaves its mean by .* m in water of 3\.6 m"),
+         ("WP fwd [mm]", "WP fwd [m]", r"eta_fwd leaves its mean by .* m in water of 3\.6 m")],
+    )  # fmt: skip
+    def test_values_that_nothing_afloat_reaches(self, edited, tank, stem, header, message):
+        columns = tank_columns(0)
+        write_csv(tank / "first.csv", {header if n == stem else n: x for n, x in columns.items()})
+        with pytest.warns(SeakeepWarning, match=message + r"\. Check unit and column in \[channe"):
+            runs = read_campaign(edited()).prepare()
+        assert "impossible" in kinds(runs["first"])
+        assert "impossible" not in kinds(runs["second"])
+
+    def test_a_spike_is_an_outlier_and_no_wrong_unit(self, edited, tank):
+        columns = tank_columns(0)
+        columns["Pitch (deg)"][500] = 170.0
+        write_csv(tank / "first.csv", columns)
+        found = kinds(read_campaign(edited()).prepare()["first"])
+        assert "outliers" in found
+        assert "impossible" not in found
+
+    def test_a_unit_that_a_draft_assumed_is_told_until_it_is_confirmed(self, tank):
+        columns = tank_columns(0)
+        columns["pitch"] = np.radians(columns.pop("Pitch (deg)"))
+        write_csv(tank / "bare.csv", columns)
+        path = tank / "draft.toml"
+        text = draft_campaign([tank / "bare.csv"], tank)
+        path.write_text(text, encoding="utf-8")
+        with pytest.warns(SeakeepWarning, match="the unit of pitch, and .*remove unit_as"):
+            run = read_campaign(path).prepare()["bare"]
+        assert "unit" in kinds(run)
+        path.write_text(text.replace("unit_assumed = true", ""), encoding="utf-8")
+        assert "unit" not in kinds(read_campaign(path).prepare()["bare"])
+
+    def test_a_redundant_sensor_of_another_scale(self, edited, tank):
+        columns = tank_columns(0)
+        for seed, name in enumerate(("first", "second")):
+            columns = tank_columns(seed)
+            write_csv(tank / f"{name}.csv", {**columns, "Laser [m]": columns["Heave [mm]"]})
+        laser = (
+            '[channels.laser]\ncolumn = "Laser"\n[redundant.heave]\nchannels = ["heave", "laser"]'
+        )
+        path = edited(("[channels.pitch]", f"{laser}\n[channels.pitch]"))
+        with pytest.warns(SeakeepWarning, match="laser against heave: scale: .* 1e.03 times"):
+            run = read_campaign(path).prepare()["first"]
+        assert "scale" in kinds(run)
+
+
+def kinds(run):
+    return {each.kind for each in findings_of(run)}
+
+
+def test_the_commands_show_step_and_period(edited, tank, capsys):
+    pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
+    path = edited(("sampling_rate = 10", "steps_per_period = 20"))
+    assert cli.main(["prepare", str(path)]) == 0
+    period = read_campaign(path).encounter_period()
+    words = f"ime step {period / 20:.4g} s ({20 / period:.4g} Hz), encounter period T {period:.4g}"
+    assert words in " ".join(capsys.readouterr().err.split())
+    page = (tank / "prepared" / "quality.html").read_text(encoding="utf-8")
+    assert page.count(words) == 2

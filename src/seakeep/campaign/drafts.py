@@ -228,6 +228,10 @@ def _channels(document: tomlkit.TOMLDocument, guesses: Sequence[Guess]) -> None:
         if guess.assumed_unit:
             table.add("unit", guess.unit)
             table["unit"].comment("ASSUMED: the file states none. Correct it")
+            if guess.unit != "-":
+                table.add(
+                    "unit_assumed", tomlkit.item(True).comment("prepare warns of it: remove it")
+                )
         canonical = canonical_channel(guess.channel)
         if canonical is None:
             table.add("long_name", guess.column)

@@ -205,9 +205,10 @@ def _waves_of(
 
 
 _PERIOD_MEND = (
-    "Noise or a slow drift of the probe leads the count, and what is stated in encounter periods "
-    "with it. State in [campaign] period_hysteresis, such as 0.2, another period_channel, or "
-    "encounter_period in seconds."
+    "Noise or a slow drift of the probe leads the count, or waves too low for period_hysteresis "
+    "are left out, and all that is stated in encounter periods is wrong with it. In [campaign], "
+    "state period_hysteresis (0.2 passes noise of a twentieth of the waves), another "
+    "period_channel, or encounter_period in seconds."
 )
 
 
