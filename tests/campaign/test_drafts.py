@@ -11,7 +11,9 @@ from small_tank import tank_columns, write_csv
 from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import DataError, RequestError, SeakeepWarning
+
+ASSUMED = "no file states the unit of {}, and the campaign's is assumed"
 
 
 def drafted(folder, files):
@@ -129,7 +131,9 @@ def test_columns_that_do_not_serve_are_listed(tmp_path):
         'unit = "m" # ASSUMED: the file states none. Correct it',
     ):
         assert line in text.splitlines()
-    np.testing.assert_allclose(campaign.prepare()["b"]["heave"], [1.5, 2.5, 4.5], rtol=1e-15)
+    with pytest.warns(SeakeepWarning, match=ASSUMED.format("heave")):
+        run = campaign.prepare()["b"]
+    np.testing.assert_allclose(run["heave"], [1.5, 2.5, 4.5], rtol=1e-15)
 
 
 def test_a_column_that_is_missing_elsewhere(tmp_path):
@@ -148,7 +152,8 @@ def test_files_without_time_or_with_odd_names(tmp_path):
     text, campaign = drafted(tmp_path, sorted(tmp_path.glob("*.csv")))
     assert "sampling_rate = 100.0 # ASSUMED: the files have no time column. Correct it" in text
     assert campaign.runs == ["1", "1_2"]
-    assert len(campaign.prepare()) == 2
+    with pytest.warns(SeakeepWarning, match=ASSUMED.format("surge")):
+        assert len(campaign.prepare()) == 2
 
 
 def test_matlab(tmp_path):
@@ -157,7 +162,8 @@ def test_matlab(tmp_path):
     io.savemat(tmp_path / "run.mat", content)
     _, campaign = drafted(tmp_path, [tmp_path / "run.mat"])
     assert list(campaign.settings.channels) == ["heave", "eta_1"]
-    assert campaign.prepare()
+    with pytest.warns(SeakeepWarning, match=ASSUMED.format("eta_1")):
+        assert campaign.prepare()
 
 
 def test_files_in_the_data_folder_are_named_by_it(tmp_path, monkeypatch):

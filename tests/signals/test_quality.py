@@ -81,6 +81,20 @@ def test_constant_and_unrelated():
     assert compare_sensors(waves(0.05), waves(), DT).faults() == []
 
 
+@pytest.mark.parametrize(
+    ("factor", "told"),
+    [(1000.0, True), (2.2, True), (1.9, False), (0.55, False), (0.45, True), (0.001, True)],
+)
+def test_another_scale(factor, told):
+    """A wrong unit does not change a correlation; the limits are 2 and 1/2, within windows."""
+    slow = 3.0 * np.sin(2 * np.pi * DT * np.arange(waves().size) / 200.0)
+    found = compare_sensors(factor * (waves() + slow), waves(), DT)
+    assert found.correlation > 0.9
+    scales = [fault for fault in found.faults() if fault.startswith("scale")]
+    assert bool(scales) is told
+    assert found.gain == pytest.approx(factor, rel=0.1)  # the slow motion is a tenth in a window
+
+
 def test_the_limits_on_lags_are_where_they_alone_make_the_least_correlation():
     period = 1.6
     t = np.arange(0, 200 * period, 0.001 * period)

@@ -63,7 +63,8 @@ class Finding:
         Channel, or the logger for a clock.
     kind : str
         ``constant``, ``missing``, ``outliers``, ``saturated``, ``stuck``, ``drift``, ``lag``,
-        ``resolution``, ``agreement``, ``position``, ``clock`` or ``left out``.
+        ``resolution``, ``agreement``, ``scale``, ``position``, ``clock``, ``record``, ``period``,
+        ``impossible``, ``unit`` or ``left out``.
     text : str
         What, how much, and what was done about it.
     """
@@ -263,7 +264,12 @@ def check_pairs(
 
 def _kind(fault: str) -> str:
     """Kind of finding that a fault of :meth:`Agreement.faults` is."""
-    starts = {"lag": "lag", "constant": "constant", "motion below": "resolution"}
+    starts = {
+        "lag": "lag",
+        "constant": "constant",
+        "motion below": "resolution",
+        "scale": "scale",
+    }
     return next((kind for start, kind in starts.items() if fault.startswith(start)), "agreement")
 
 

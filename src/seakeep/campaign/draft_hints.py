@@ -9,7 +9,7 @@ from tomlkit.items import Table
 
 from seakeep.campaign.guesses import MOTIONS, Guess, is_acceleration, words_of
 
-__all__ = ["derived_examples", "model_table", "preparation_table"]
+__all__ = ["derived_examples", "driving_wave", "model_table", "preparation_table"]
 
 _ORDER = ("heave", "pitch", "roll", "yaw", "surge", "sway")
 """Motions, those first that the waves alone move: an integral in their band is the whole motion."""
@@ -124,6 +124,12 @@ def preparation_table(
 def _waves(guesses: Sequence[Guess], whole: bool = False) -> list[str]:
     named = [(guess, str(guess.channel)) for guess in guesses if guess.channel]
     return [n for guess, n in named if n.startswith("eta_") and not (whole and guess.gaps)]
+
+
+def driving_wave(guesses: Sequence[Guess]) -> Guess | None:
+    """Wave channel from which the draft takes the encounter period: the model's first input."""
+    name = next(iter(_waves(guesses, whole=True) or _waves(guesses)), None)
+    return next((guess for guess in guesses if name and guess.channel == name), None)
 
 
 def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:

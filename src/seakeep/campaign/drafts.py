@@ -11,13 +11,26 @@ import tomlkit
 from tomlkit.items import Table
 
 from seakeep.campaign.columns import Columns, is_unit
-from seakeep.campaign.draft_hints import derived_examples, model_table, preparation_table
+from seakeep.campaign.draft_hints import (
+    derived_examples,
+    driving_wave,
+    model_table,
+    preparation_table,
+)
 from seakeep.campaign.guesses import File, Guess, arranged, guess_channels, is_trigger, waves_of
 from seakeep.campaign.readers import read_columns, time_column
 from seakeep.conventions import canonical_channel, conversion
-from seakeep.errors import RequestError
+from seakeep.errors import DataError, RequestError
+from seakeep.signals import encounter_period
 
 __all__ = ["draft_campaign"]
+
+NOISE = 4.0
+"""Standard deviations of a probe's noise that a wave must pass either way to count: one sample in
+16 000 of normal noise lies beyond."""
+
+LED = 0.9
+"""Where noise shortens the counted period to less than this part, the draft states a hysteresis."""
 
 
 def draft_campaign(files: Sequence[Path | str], folder: Path | str | None = None) -> str:
@@ -57,11 +70,11 @@ def draft_campaign(files: Sequence[Path | str], folder: Path | str | None = None
         _refuse(read)
     loggers = list({file.logger: file for file in reversed(read)}.values())[::-1]
     rates = {file.logger: _rate(file.table, file.time) for file in loggers}
-    period = _wave_period(loggers, guesses, rates)
+    period, hysteresis = _wave_period(loggers, guesses, rates)
     document = tomlkit.document()
     document.add(tomlkit.comment("Draft of a campaign. Read every line that says 'guessed', then"))
     document.add(tomlkit.comment("run: seakeep prepare THIS-FILE, and look at the sheet it makes"))
-    _general(document, paths, period)
+    _general(document, read, period, hysteresis)
     _files_table(document, read)
     _channels(document, guesses)
     names = [guess.channel for guess in guesses if guess.channel]
@@ -117,19 +130,27 @@ def _rate(table: Columns, time: str | None) -> float | None:
 
 def _wave_period(
     loggers: Sequence[File], guesses: Sequence[Guess], rates: dict[str, float | None]
-) -> float | None:
-    """Period of the spectral peak of the first wave channel, s; it only suggests a rate."""
-    wave = next((g for g in guesses if (g.channel or "").startswith("eta_")), None)
+) -> tuple[float | None, float]:
+    """Period of the first file's waves, s, and the hysteresis that keeps noise from counting."""
+    wave = driving_wave(guesses)
     if wave is None or (rate := rates[wave.logger]) is None:
-        return None
+        return None, 0.0
     table = next(file.table for file in loggers if file.logger == wave.logger)
     series = table.values[wave.column]
-    series = np.nan_to_num(series - np.nanmean(series))
-    if series.size < 64:
-        return None
-    power = np.abs(np.fft.rfft(series * np.hanning(series.size))) ** 2
-    peak = 4 + int(np.argmax(power[4:]))  # slower than a quarter of the record is drift
-    return float(series.size / (peak * rate)) if power[peak] > 0 else None
+    there = np.isfinite(series)
+    if there.sum() < 64 or not np.ptp(series[there]):
+        return None, 0.0
+    at = np.arange(series.size)
+    series = np.interp(at, at[there], series[there])
+    # Second differences of white noise have six times its variance, and know no slope.
+    noise = 1.4826 * float(np.median(np.abs(np.diff(series, 2)))) / np.sqrt(6.0)
+    clear = min(np.ceil(100 * NOISE * noise / float(series.std())) / 100, 0.5)
+    try:
+        period = encounter_period(series, 1.0 / rate, clear)
+        counted = encounter_period(series, 1.0 / rate)
+    except DataError:
+        return None, 0.0
+    return (period, float(clear)) if counted < LED * period else (counted, 0.0)
 
 
 def _relative(path: Path, folder: Path | str | None) -> str:
@@ -142,9 +163,14 @@ def _relative(path: Path, folder: Path | str | None) -> str:
     return Path(os.path.relpath(absolute, Path(folder or ".").resolve())).as_posix()
 
 
-def _general(document: tomlkit.TOMLDocument, paths: list[Path], period: float | None) -> None:
+def _general(
+    document: tomlkit.TOMLDocument,
+    files: Sequence[File],
+    period: float | None,
+    hysteresis: float,
+) -> None:
     general = tomlkit.table()
-    common = Path(os.path.commonpath([path.resolve().parent for path in paths]))
+    common = Path(os.path.commonpath([file.path.resolve().parent for file in files]))
     general.add("name", common.name or "campaign")
     general.add("scale_factor", 1.0)
     general["scale_factor"].comment("full-scale length over model length")
@@ -153,15 +179,25 @@ def _general(document: tomlkit.TOMLDocument, paths: list[Path], period: float | 
     else:
         general.add(
             tomlkit.comment(
-                f"encounter_period = {period:.3g}  # s; left out, it is measured: the mean of all "
-                "runs (this is the spectral peak of the first)"
+                f"encounter_period = {period:.3g}  # s; left out, it is measured: the mean of "
+                f"{_period_runs(files)} (this is that of {files[0].run})"
             )
+        )
+    if hysteresis:
+        general.add("period_hysteresis", hysteresis)
+        general["period_hysteresis"].comment(
+            "guessed: what a wave must pass, in standard deviations; less, and noise is counted"
         )
     document.add("campaign", general)
     rig = tomlkit.table()
     rig.add(tomlkit.comment("water_depth = 3.6  # m; 'inf' for deep water"))
     rig.add(tomlkit.comment("[rig.positions]  # channel = x in m along the waves"))
     document.add("rig", rig)
+
+
+def _period_runs(files: Sequence[File]) -> str:
+    irregular = any(waves_of(file.run) == "irregular" for file in files)
+    return "the irregular runs" if irregular else "all runs"
 
 
 def _files_table(document: tomlkit.TOMLDocument, files: Sequence[File]) -> None:
@@ -192,6 +228,10 @@ def _channels(document: tomlkit.TOMLDocument, guesses: Sequence[Guess]) -> None:
         if guess.assumed_unit:
             table.add("unit", guess.unit)
             table["unit"].comment("ASSUMED: the file states none. Correct it")
+            if guess.unit != "-":
+                table.add(
+                    "unit_assumed", tomlkit.item(True).comment("prepare warns of it: remove it")
+                )
         canonical = canonical_channel(guess.channel)
         if canonical is None:
             table.add("long_name", guess.column)

@@ -7,11 +7,12 @@ from importlib import metadata
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from seakeep.campaign.resampling import inside
 from seakeep.campaign.settings import CampaignSettings, RunSettings
-from seakeep.errors import RequestError
+from seakeep.errors import DataError, RequestError
 from seakeep.signals import Clock
 
 __all__ = ["attributes_of", "cropped", "role_of", "version"]
@@ -108,6 +109,8 @@ def cropped(
     ------
     RequestError
         If a span lies outside the record, or holds fewer than two samples.
+    DataError
+        If fewer than two samples are left of a span because a logger does not reach into it.
     """
     time, dt = run["time"].to_numpy(), float(np.median(np.diff(run["time"].to_numpy())))
     for key in ("span", "train", "test"):
@@ -121,15 +124,39 @@ def cropped(
                 f"runs from {record[0]:g} to {record[1]:g} s. Correct the span; 'inf' stands "
                 "for the end."
             )
+        _refuse_empty(f"runs.{name}.{key}", span, time, dt, record)
     if settings.span is None:
         return run
-    kept = inside(time, settings.span, dt)
-    if kept.sum() < 2:
-        raise RequestError(
-            f"runs.{name}.span: [{settings.span[0]:g}, {settings.span[1]:g}] s holds "
-            f"{kept.sum()} sample(s) at a step of {dt:g} s. Lengthen the span."
+    kept = run.isel(time=inside(time, settings.span, dt))
+    for key in ("train", "test"):
+        if (span := getattr(settings, key)) is not None:
+            time = kept["time"].to_numpy()
+            own = (float(time[0]), float(time[-1]))
+            _refuse_empty(f"runs.{name}.{key}", span, time, dt, own)
+    return kept
+
+
+def _refuse_empty(
+    key: str,
+    span: tuple[float, float],
+    time: npt.NDArray[np.float64],
+    dt: float,
+    record: tuple[float, float],
+) -> None:
+    """Refuse a span that holds too few of a run's instants, whose record is the reference's."""
+    if (count := int(inside(time, span, dt).sum())) > 1:
+        return
+    stated = f"{key}: [{span[0]:g}, {span[1]:g}] s holds {count} sample(s) at a step of {dt:g} s"
+    begin, end = float(time[0]), float(time[-1])
+    if begin > record[0] + 2 * dt or end < record[1] - 2 * dt:
+        raise DataError(
+            f"{stated}, since all loggers recorded together only from {begin:g} to {end:g} s; the "
+            f"reference runs from {record[0]:g} to {record[1]:g} s. Check whether the files of the "
+            "other loggers are whole, or correct the span."
         )
-    return run.isel(time=kept)
+    raise RequestError(
+        f"{stated}. Lengthen the span, or move it into the run's {begin:g} to {end:g} s."
+    )
 
 
 def role_of(settings: RunSettings) -> str:

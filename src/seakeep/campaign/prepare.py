@@ -17,6 +17,7 @@ from seakeep.campaign.checks import as_attribute, checked, warn_of_positions
 from seakeep.campaign.instruments import open_loggers
 from seakeep.campaign.labels import attributes_of, cropped, role_of
 from seakeep.campaign.periods import counted, in_seconds, parse_periods
+from seakeep.campaign.plausibility import implausible, warn_of
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.resampling import on_one_axis, strays
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
@@ -33,7 +34,7 @@ Progress = Callable[[int, int, str], None]
 SHOWN_RUNS = 6
 """Runs that a campaign's representation names."""
 
-FORMAT = 4
+FORMAT = 5
 """Goes into the digest: raise it when the same settings begin to give other arrays or findings."""
 
 
@@ -415,7 +416,8 @@ class Campaign:
         for name in wanted:
             self._run(name)
         found, settings, period, dt = self._whole(wanted, progress, failures=failures)
-        stated, first, misplaced = dt is not None, "", set[str]()
+        stated, first = dt is not None, ""
+        misplaced, doubted = set[str](), set[tuple[str, str]]()
         for done, name in enumerate(wanted, 1):
             try:
                 if failures is not None and name in failures:
@@ -429,7 +431,7 @@ class Campaign:
                         f"the runs differ in rate: '{first}' has a step of {dt:g} s and '{name}' "
                         f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                     )
-                run = self._finished(name, groups, dt, found, settings, misplaced)
+                run = self._finished(name, groups, dt, found, settings, misplaced, doubted)
             except SeakeepError as error:
                 spare(failures, name, error)
                 if progress is not None:
@@ -449,10 +451,13 @@ class Campaign:
         found: Survey,
         settings: CampaignSettings,
         misplaced: set[str],
+        doubted: set[tuple[str, str]],
     ) -> xr.Dataset:
         whole = on_one_axis(groups, dt, settings, name)
         findings = checked(name, groups, whole, found.clocks[name], settings, found.left_out)
+        findings += implausible(name, groups, whole, settings, found.doubts)
         warn_of_positions(findings, name, misplaced)
+        warn_of(findings, name, doubted)
         reference = _reference_time(groups)
         record = (float(reference[0]), float(reference[-1]))
         run = cropped(whole, name, settings.runs[name], record)

@@ -133,6 +133,9 @@ class ChannelSettings(Table):
     unit: str | None = Field(
         default=None, description="unit of the column, such as 'mm'; left out, the file's header"
     )
+    unit_assumed: bool = Field(
+        default=False, description="true while unit is a guess: prepare warns until it is removed"
+    )
     sign: Literal[1, -1] = Field(default=1, description="1 or -1")
     offset: Finite = Field(
         default=0.0, description="added to the reading, in the file's unit, before the sign"

@@ -15,13 +15,21 @@ from seakeep.campaign.instruments import Logger, clocks_of, open_loggers
 from seakeep.campaign.resampling import inside, on_one_axis
 from seakeep.campaign.settings import CampaignSettings, RunSettings
 from seakeep.errors import DataError, MissingFileError, SeakeepError, SeakeepWarning
-from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step
+from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step, waves_part
+from seakeep.signals.spectra import energy_period
 from seakeep.signals.synchronise import without_doubtful_drift
 
 __all__ = ["Failures", "Survey", "as_one", "spare", "survey"]
 
 Failures = dict[str, SeakeepError]
 """Errors by run, where runs that cannot be read shall not stop the others."""
+
+LED = 2.0
+"""Factor between counted and energy period beyond which one of them is no period of the waves.
+
+The energy period is 1.20 times the crossing period in a Pierson-Moskowitz spectrum, and less in
+narrower ones; two seas of one height that are two octaves apart make 1.82. White noise of a third
+of the waves' height takes a tenth off the energy period, and makes the count a fraction."""
 
 LISTED = 6
 """Errors of runs that one message holds at most."""
@@ -39,11 +47,14 @@ class Survey:
         Zero-up-crossing period of the wave channel by run, s.
     left_out : dict of str to str
         By run, of what it is no part because it cannot be read, and why.
+    doubts : dict of str to str
+        By run, what speaks against its period.
     """
 
     clocks: Mapping[str, Mapping[str, Clock]]
     periods: Mapping[str, float]
     left_out: Mapping[str, str] = field(default_factory=dict)
+    doubts: Mapping[str, str] = field(default_factory=dict)
 
 
 def spare(failures: Failures | None, run: str, error: SeakeepError) -> None:
@@ -123,6 +134,7 @@ def survey(
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
     clocks: dict[str, dict[str, Clock]] = {}
     periods: dict[str, float] = {}
+    doubts: dict[str, str] = {}
     bad: Failures = {}
     for number, run in enumerate(runs, 1):
         if progress is not None:
@@ -131,7 +143,8 @@ def survey(
             loggers = open_loggers(files_of(run), settings)
             clocks[run] = clocks_of(loggers, settings.instruments, run)
             if run in period_runs:
-                periods[run] = _period_of(run, loggers, clocks[run], settings, channel)
+                waves = _waves_of(run, loggers, clocks[run], settings, channel)
+                periods[run], doubts[run] = _period(waves, channel, settings, run)
         except SeakeepError as error:
             if run in asked:
                 spare(failures, run, error)
@@ -142,13 +155,21 @@ def survey(
         run: _left_out(run, error, run in period_runs, run in clock_runs and run not in clocks)
         for run, error in bad.items()
     }
-    for run in [each for each in left_out if each not in asked]:
-        warnings.warn(left_out[run], SeakeepWarning, stacklevel=3)
+    doubts = {run: doubt for run, doubt in doubts.items() if doubt}
+    _warn({run: words for run, words in left_out.items() if run not in asked}, doubts, channel)
     if settings.instruments.pool_drift:
         _pool(clocks)
     for each in clocks.values():
         each.update({logger: without_doubtful_drift(clock) for logger, clock in each.items()})
-    return Survey(clocks, periods, left_out)
+    return Survey(clocks, periods, left_out, doubts)
+
+
+def _warn(left_out: Mapping[str, str], doubts: Mapping[str, str], channel: str) -> None:
+    for words in left_out.values():
+        warnings.warn(words, SeakeepWarning, stacklevel=4)
+    for run, doubt in list(doubts.items())[:1]:
+        others = f" (and {len(doubts) - 1} more runs alike)" if len(doubts) > 1 else ""
+        warnings.warn(f"{run}: {channel} {doubt}{others}. {_PERIOD_MEND}", SeakeepWarning, 4)
 
 
 def _pool(clocks: Mapping[str, dict[str, Clock]]) -> None:
@@ -168,34 +189,47 @@ def _left_out(run: str, error: SeakeepError, period: bool, drift: bool) -> str:
     )
 
 
-def _period_of(
+def _waves_of(
     run: str,
     loggers: Mapping[str, Logger],
     clocks: Mapping[str, Clock],
     settings: CampaignSettings,
     channel: str,
-) -> float:
+) -> xr.Dataset:
     groups = read_groups(loggers, clocks, settings, run, [channel])
     holder = [each for each in groups.values() if channel in each]
     if holder:
-        waves = holder[0]
-    else:
-        dt = uniform_step(next(iter(groups.values()))["time"].to_numpy())
-        waves = on_one_axis(groups, dt, settings, run)
-    least = settings.campaign.period_hysteresis
-    return _period(waves, channel, settings.runs[run], run, least)
+        return holder[0]
+    dt = uniform_step(next(iter(groups.values()))["time"].to_numpy())
+    return on_one_axis(groups, dt, settings, run)
+
+
+_PERIOD_MEND = (
+    "Noise or a slow drift of the probe leads the count, or waves too low for period_hysteresis "
+    "are left out, and all that is stated in encounter periods is wrong with it. In [campaign], "
+    "state period_hysteresis (0.2 passes noise of a twentieth of the waves), another "
+    "period_channel, or encounter_period in seconds."
+)
 
 
 def _period(
-    waves: xr.Dataset, channel: str, settings: RunSettings, run: str, hysteresis: float
-) -> float:
+    waves: xr.Dataset, channel: str, settings: CampaignSettings, run: str
+) -> tuple[float, str]:
+    """Counted period of a run, s, and what speaks against it."""
     time, series = waves["time"].to_numpy(), waves[channel].to_numpy()
     step = uniform_step(time, f"run '{run}'")
-    kept = inside(time, used_span(settings), step)
+    kept = inside(time, used_span(settings.runs[run]), step)
+    series = series[kept] if kept.sum() > 2 else series
     try:
-        return encounter_period(series[kept] if kept.sum() > 2 else series, step, hysteresis)
+        counted = encounter_period(series, step, settings.campaign.period_hysteresis)
     except DataError as error:
         raise DataError(f"run '{run}', channel '{channel}': {error}") from None
+    energy = energy_period(series[waves_part(series, step)], step)
+    if energy / LED <= counted <= energy * LED:
+        return counted, ""
+    return counted, (
+        f"counts waves of {counted:.3g} s, and the energy period of its spectrum is {energy:.3g} s"
+    )
 
 
 def used_span(settings: RunSettings) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from seakeep.campaign.survey import as_one
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import replacing
-from seakeep.report.quality_sheet import write_quality_sheet
+from seakeep.report.quality_sheet import steps_of, write_quality_sheet
 
 __all__ = ["datasets", "init", "prepare"]
 
@@ -50,7 +50,7 @@ def init(
         raise RequestError(f"{out} exists already. Give another name, or --force to overwrite it.")
     with replacing(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    messages().print(f"Wrote {out}. Read it, then: seakeep fit {out} -o model.nc")
+    messages().print(f"Wrote {out}. Read it, then: seakeep prepare {out}")
 
 
 def prepare(
@@ -93,6 +93,8 @@ def _write_sheet(
 ) -> None:
     folder = next(iter(files.values())).parent
     runs = load_prepared(read, folder, list(files))
+    words = steps_of(next(iter(runs.values())))
+    messages().print(f"{words[0].upper()}{words[1:]}.")
     unread = {name: str(error) for name, error in failures.items()}
     try:
         pages = write_quality_sheet(runs, read.settings, read.name, folder, unread)

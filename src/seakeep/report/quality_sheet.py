@@ -21,7 +21,7 @@ from seakeep.signals.quality import FLAGS, LATE, Agreement
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["channel_rows", "quality_figure", "write_quality_sheet"]
+__all__ = ["channel_rows", "quality_figure", "steps_of", "write_quality_sheet"]
 
 _MARKS = {
     "missing": ("black", "x"),
@@ -246,13 +246,22 @@ def _section(name: str, run: xr.Dataset, picture: bytes) -> str:
     body = "".join(_row(row) for row in rows)
     encoded = base64.b64encode(picture).decode("ascii")
     return (
-        f'<h2 id="{html.escape(name)}">{html.escape(name)}</h2>'
+        f'<h2 id="{html.escape(name)}">{html.escape(name)}</h2><p>{html.escape(steps_of(run))}</p>'
         + (f"<ul>{items}</ul>" if items else "")
         + '<div class="scroll"><table><tr><th>channel</th><th>unit</th><th>min</th><th>max</th>'
         "<th>mean</th><th>SD</th><th>flagged</th><th>found, and done about it</th></tr>"
         f'{body}</table></div><img alt="channels of {html.escape(name)}" '
         f'src="data:image/png;base64,{encoded}">'
     )
+
+
+def steps_of(run: xr.Dataset) -> str:
+    """Step, rate and, where it is known, encounter period of a prepared run, in words."""
+    dt, period = float(run.attrs["dt"]), run.attrs.get("encounter_period")
+    words = f"time step {dt:.4g} s ({1 / dt:.4g} Hz)"
+    if period is None:
+        return f"{words}, encounter period not needed"
+    return f"{words}, encounter period T {period:.4g} s ({period / dt:.3g} steps)"
 
 
 def _item(finding: Finding) -> str:

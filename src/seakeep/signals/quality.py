@@ -51,6 +51,11 @@ FEWEST_STEPS = 5.0
 """Steps of a sensor that a motion must span from crest to trough: measurement-systems analysis asks
 for five distinct categories (AIAG, MSA, 4th edition)."""
 
+LARGEST_GAIN = 2.0
+"""Factor between the motions that two sensors tell beyond which one of them has another unit or
+calibration: a correlation of 0.8 leaves room for 1.25 by what the sensor adds of its own, and a
+wrong unit makes 10 or more."""
+
 FLAGS = {"missing": MISSING, "bridged": BRIDGED, "outlier": OUTLIER, "saturated": SATURATED,
          "stuck": STUCK, "replaced": REPLACED}  # fmt: skip
 
@@ -299,7 +304,8 @@ class Agreement:
     at_zero : float
         Median correlation without a lag.
     gain : float
-        Spread over the trusted one's.
+        Median over windows of the sensor's spread over the trusted one's; over the whole record
+        where nothing can be compared.
     centre, lags : ndarray, shape (window,)
         Middle of each window with motion, s, and its lag.
     """
@@ -320,7 +326,9 @@ class Agreement:
         """What speaks against the sensor, in words; empty if nothing does.
 
         A lag or its growth is a fault where it alone would bring the correlation below the least
-        one; a motion that spans fewer than five of the sensor's steps is below its resolution.
+        one; a motion that spans fewer than five of the sensor's steps is below its resolution; a
+        sensor that goes along, and tells more than twice the motion or less than half, has
+        another scale.
         """
         if not np.isfinite(self.correlation):
             return ["constant while the other sensor moves" if self.gain == 0 else "no motion seen"]
@@ -336,6 +344,12 @@ class Agreement:
             out.append(f"lag runs away by {self.growth:+.2f} s over the record")
         elif abs(self.lag) > LATE * self.period:
             out.append(f"lag {self.lag:+.2f} ± {self.lag_spread:.2f} s")
+        alike = self.correlation >= LEAST_CORRELATION
+        if alike and not 1 / LARGEST_GAIN <= self.gain <= LARGEST_GAIN:
+            out.append(
+                f"scale: its standard deviation is {self.gain:.3g} times as large; the unit or the "
+                "calibration of one of them is wrong"
+            )
         return out
 
     @property
@@ -390,7 +404,7 @@ def compare_sensors(
     if gain == 0 or not np.isfinite(gain) or x.size * dt < length + period:
         return nothing
     stuck = np.zeros(x.size, dtype=bool) if held is None else np.asarray(held, dtype=bool)
-    found, motion = _windows(x, y, dt, length, period, stuck)
+    found, motion, gain = _windows(x, y, dt, length, period, stuck)
     if not found.lag.size:
         return nothing
     lags = found.lag[_together(found)]
@@ -412,17 +426,22 @@ def compare_sensors(
 
 def _windows(
     x: FloatArray, y: FloatArray, dt: float, length: float, period: float, stuck: BoolArray
-) -> tuple[Lags, float]:
-    """Lags in windows of a length that tell something, and the trusted sensor's SD in them."""
+) -> tuple[Lags, float, float]:
+    """Lags in windows of a length that tell something; the trusted SD and the gain in them."""
     found = windowed_lags(x, y, dt, length, 0.5 * period)
     begin = np.clip(((found.centre - 0.5 * length) / dt).astype(int), 0, None)
     end = ((found.centre + 0.5 * length) / dt).astype(int)
-    motion = np.array([y[i:j].std() for i, j in zip(begin, end, strict=True)])
+    motion, own = (
+        np.array([z[i:j].std() for i, j in zip(begin, end, strict=True)]) for z in (y, x)
+    )
     free = np.array([not stuck[i : j + 1].any() for i, j in zip(begin, end, strict=True)])
     kept = (motion > 0.3 * motion.max()) & np.isfinite(found.lag)
     kept &= free | ~np.any(kept & free)  # a sensor that sticks all the time is judged all the same
     told = Lags(found.centre[kept], found.lag[kept], found.correlation[kept], found.at_zero[kept])
-    return told, float(np.sqrt(np.mean(motion[kept] ** 2))) if kept.any() else float("nan")
+    if not kept.any():
+        return told, float("nan"), float("nan")
+    mean = float(np.sqrt(np.mean(motion[kept] ** 2)))
+    return told, mean, float(np.median(own[kept] / motion[kept]))
 
 
 def _together(found: Lags) -> BoolArray:

@@ -16,6 +16,7 @@ from seakeep.signals.filters import as_series, positive
 __all__ = [
     "WaveStatistics",
     "encounter_period",
+    "energy_period",
     "paper_welch",
     "peak_period",
     "significant_height",
@@ -224,6 +225,34 @@ def encounter_period(
             "state encounter_period in the campaign."
         )
     return float((crossings[-1] - crossings[0]) / (crossings.size - 1))
+
+
+def energy_period(series: npt.ArrayLike, dt: float) -> float:
+    r"""Energy period :math:`T_{-1,0} = m_{-1} / m_0` of a record's spectrum.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Uniformly sampled series without gaps.
+    dt : float
+        Time step, s.
+
+    Returns
+    -------
+    float
+        Mean of the periods of its lines, weighed with their energy, s; what is slower than a
+        quarter of the record is left out as drift. NaN where nothing is left.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> round(energy_period(np.sin(np.arange(0, 100, 0.05) * 2 * np.pi / 1.6), 0.05), 2)
+    1.6
+    """
+    x = as_series(series)
+    power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size)))[4:] ** 2
+    lines = np.fft.rfftfreq(x.size, positive("the time step", dt, "s"))[4:]
+    return float((power / lines).sum() / power.sum()) if power.any() else float("nan")
 
 
 def significant_height(series: npt.ArrayLike) -> float:

@@ -1,0 +1,227 @@
+"""Whole records, and values that a vessel can reach: what prepare warns of and the sheet tells."""
+
+import warnings
+
+import numpy as np
+import pytest
+from small_tank import tank_columns, write_csv
+
+from seakeep import cli
+from seakeep.campaign import draft_campaign, read_campaign
+from seakeep.campaign.checks import findings_of
+from seakeep.errors import DataError, RequestError, SeakeepWarning
+
+LOGGERS = """
+[instruments]
+reference = "probes"
+
+[instruments.probes]
+
+[instruments.mru]
+
+[channels.eta_fwd]
+column = "WP fwd"
+
+[channels.heave]
+column = "Heave"
+
+[channels.pitch]
+column = "Pitch"
+
+[runs.first]
+files = { probes = "probes.csv", mru = "mru.csv" }
+train = [0, 10]
+test = [10, 20]
+
+[preparation]
+sampling_rate = 10
+
+[model]
+states = ["heave", "pitch"]
+inputs = ["eta_fwd"]
+"""
+
+
+@pytest.fixture
+def loggers(tmp_path):
+    """A run of two loggers; the motions' is written from one instant to another, both in s."""
+
+    def write(begin=0.0, end=20.0, spans=None):
+        columns = tank_columns()
+        time = columns["Time [s]"]
+        write_csv(tmp_path / "probes.csv", {n: columns[n] for n in ("Time [s]", "WP fwd [mm]")})
+        kept = (time >= begin) & (time <= end)
+        rest = {n: x[kept] for n, x in columns.items() if n != "WP fwd [mm]"}
+        write_csv(tmp_path / "mru.csv", rest)
+        text = LOGGERS.replace("train = [0, 10]\ntest = [10, 20]", spans or "train = [0, 10]")
+        path = tmp_path / "campaign.toml"
+        path.write_text(text if spans else LOGGERS, encoding="utf-8")
+        return read_campaign(path)
+
+    return write
+
+
+def records(run):
+    return [(each.channel, each.text) for each in findings_of(run) if each.kind == "record"]
+
+
+class TestRecords:
+    def test_a_logger_that_was_cut_off_is_told(self, loggers):
+        with pytest.warns(
+            SeakeepWarning, match=r"first: mru ends at 15 s, the other loggers at 20"
+        ):
+            run = loggers(end=15.0).prepare()["first"]
+        assert records(run)[0][1].startswith("ends at 15 s, the other loggers at 20 s: the run is")
+        assert run.attrs["test_span"] == pytest.approx((10.0, 15.0))
+
+    def test_one_that_begins_late_too(self, loggers):
+        with pytest.warns(SeakeepWarning, match=r"mru begins at 3 s, the other loggers at 0 s"):
+            run = loggers(begin=3.0).prepare()["first"]
+        assert len(records(run)) == 1
+
+    @pytest.mark.parametrize(
+        ("ends", "spans"),
+        [((0.5, 20.0), None), ((0.0, 19.5), None), ((5.0, 20.0), "span = [6, inf]"),
+         ((0.0, 15.0), "train = [1, 8]\ntest = [8, 14]")],
+    )  # fmt: skip
+    def test_a_start_by_hand_and_what_the_run_does_not_use_do_no_harm(self, loggers, ends, spans):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            assert not records(loggers(*ends, spans).prepare()["first"])
+
+    @pytest.mark.parametrize("test", ["[10, 20]", "[10, inf]"])
+    def test_a_test_part_without_samples_is_an_error(self, loggers, test):
+        """It would else be judged on the part that trains."""
+        campaign = loggers(end=8.0, spans=f"train = [0, 8]\ntest = {test}")
+        message = r"runs\.first\.test: \[10, .*holds 0 sample.* together only from 0 to 8 s"
+        with (
+            pytest.warns(SeakeepWarning, match="mru ends"),
+            pytest.raises(DataError, match=message),
+        ):
+            campaign.prepare()
+
+    def test_so_is_one_outside_the_run_s_span(self, edited):
+        path = edited(("train = [0, 10]", "span = [0, 9]\ntrain = [0, 8]"))
+        with pytest.raises(RequestError, match=r"first\.test: \[10, inf\] s holds 0 .* 0 to 9 s"):
+            read_campaign(path).prepare(["first"])
+
+
+def noisy(folder, noise):
+    """Two runs whose probe has white noise, in parts of the waves' standard deviation."""
+    for seed, name in enumerate(("first", "second")):
+        columns = tank_columns(seed)
+        waves = columns["WP fwd [mm]"]
+        shaken = np.random.default_rng(seed).normal(0.0, noise * waves.std(), waves.size)
+        write_csv(folder / f"{name}.csv", {**columns, "WP fwd [mm]": waves + shaken})
+
+
+COUNTED = ("sampling_rate = 10", "steps_per_period = 12")
+
+
+class TestPeriod:
+    def test_a_count_that_noise_leads_is_told(self, edited, tank):
+        sound = read_campaign(edited(COUNTED)).encounter_period()
+        noisy(tank, 0.3)
+        message = r"first: eta_fwd counts waves of .* energy period of its spectrum is 1\.\d+ s "
+        rest = r"\(and 1 more run.*period_hysteresis"
+        with pytest.warns(SeakeepWarning, match=message + rest):
+            run = read_campaign(edited(COUNTED)).prepare()["first"]
+        assert run.attrs["encounter_period"] < sound / 1.5
+        told = [each.channel for each in findings_of(run) if each.kind == "period"]
+        assert told == ["eta_fwd"]
+
+    def test_its_mend_keeps_the_period(self, edited, tank):
+        sound = read_campaign(edited(COUNTED)).encounter_period()
+        noisy(tank, 0.3)
+        stated = ("scale_factor = 30.0", "period_hysteresis = 0.9")
+        run = read_campaign(edited(COUNTED, stated)).prepare()["first"]
+        # Twenty seconds hold some fourteen waves: one more or less is 7 %, and waves that the
+        # hysteresis leaves out lengthen the period; noise made it a fraction.
+        assert 0.9 * sound < run.attrs["encounter_period"] < 1.5 * sound
+
+    def test_the_draft_states_what_noise_must_not_pass(self, tank):
+        sound = read_campaign(tank / "campaign.toml").encounter_period()
+        noisy(tank, 0.06)
+        files = [tank / "first.csv", tank / "second.csv"]
+        text = draft_campaign(files, tank)
+        path = tank / "draft.toml"
+        path.write_text(text, encoding="utf-8")
+        campaign = read_campaign(path)
+        # Four standard deviations of a noise of 0.06, less than a third too high by the waves'
+        # own curvature.
+        assert 0.24 <= campaign.settings.campaign.period_hysteresis <= 0.32
+        assert campaign.encounter_period() == pytest.approx(sound, rel=0.07)  # one wave in 14
+        assert "guessed: what a wave must pass" in text
+
+    def test_one_without_noise_keeps_the_paper_s_count(self, tank):
+        text = draft_campaign([tank / "first.csv", tank / "second.csv"], tank)
+        assert "period_hysteresis" not in text
+
+
+class TestValues:
+    def test_degrees_taken_for_radians(self, edited):
+        path = edited(('column = "Pitch"', 'column = "Pitch (deg)"\nunit = "deg"'))
+        assert "impossible" not in kinds(read_campaign(path).prepare()["first"])
+
+    @pytest.mark.parametrize(
+        ("stem", "header", "message"),
+        [("Pitch (deg)", "Pitch (rad)", r"pitch reaches \d.* rad, more than a right angle"),
+         ("Heave [mm]", "Heave [m]", r"heave leaves its mean by .* m in water of 3\.6 m"),
+         ("WP fwd [mm]", "WP fwd [m]", r"eta_fwd leaves its mean by .* m in water of 3\.6 m")],
+    )  # fmt: skip
+    def test_values_that_nothing_afloat_reaches(self, edited, tank, stem, header, message):
+        columns = tank_columns(0)
+        write_csv(tank / "first.csv", {header if n == stem else n: x for n, x in columns.items()})
+        with pytest.warns(SeakeepWarning, match=message + r"\. Check unit and column in \[channe"):
+            runs = read_campaign(edited()).prepare()
+        assert "impossible" in kinds(runs["first"])
+        assert "impossible" not in kinds(runs["second"])
+
+    def test_a_spike_is_an_outlier_and_no_wrong_unit(self, edited, tank):
+        columns = tank_columns(0)
+        columns["Pitch (deg)"][500] = 170.0
+        write_csv(tank / "first.csv", columns)
+        found = kinds(read_campaign(edited()).prepare()["first"])
+        assert "outliers" in found
+        assert "impossible" not in found
+
+    def test_a_unit_that_a_draft_assumed_is_told_until_it_is_confirmed(self, tank):
+        columns = tank_columns(0)
+        columns["pitch"] = np.radians(columns.pop("Pitch (deg)"))
+        write_csv(tank / "bare.csv", columns)
+        path = tank / "draft.toml"
+        text = draft_campaign([tank / "bare.csv"], tank)
+        path.write_text(text, encoding="utf-8")
+        with pytest.warns(SeakeepWarning, match="the unit of pitch, and .*remove unit_as"):
+            run = read_campaign(path).prepare()["bare"]
+        assert "unit" in kinds(run)
+        path.write_text(text.replace("unit_assumed = true", ""), encoding="utf-8")
+        assert "unit" not in kinds(read_campaign(path).prepare()["bare"])
+
+    def test_a_redundant_sensor_of_another_scale(self, edited, tank):
+        columns = tank_columns(0)
+        for seed, name in enumerate(("first", "second")):
+            columns = tank_columns(seed)
+            write_csv(tank / f"{name}.csv", {**columns, "Laser [m]": columns["Heave [mm]"]})
+        laser = (
+            '[channels.laser]\ncolumn = "Laser"\n[redundant.heave]\nchannels = ["heave", "laser"]'
+        )
+        path = edited(("[channels.pitch]", f"{laser}\n[channels.pitch]"))
+        with pytest.warns(SeakeepWarning, match="laser against heave: scale: .* 1e.03 times"):
+            run = read_campaign(path).prepare()["first"]
+        assert "scale" in kinds(run)
+
+
+def kinds(run):
+    return {each.kind for each in findings_of(run)}
+
+
+def test_the_commands_show_step_and_period(edited, tank, capsys):
+    pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
+    path = edited(("sampling_rate = 10", "steps_per_period = 20"))
+    assert cli.main(["prepare", str(path)]) == 0
+    period = read_campaign(path).encounter_period()
+    words = f"ime step {period / 20:.4g} s ({20 / period:.4g} Hz), encounter period T {period:.4g}"
+    assert words in " ".join(capsys.readouterr().err.split())
+    page = (tank / "prepared" / "quality.html").read_text(encoding="utf-8")
+    assert page.count(words) == 2
