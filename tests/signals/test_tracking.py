@@ -328,6 +328,35 @@ def test_a_lag_at_the_limit_is_told():
     assert compare_motion(first, later, ["heave"], max_lag=0.5)["heave"].at_limit
 
 
+def test_a_lag_one_wave_period_off_is_told():
+    def records(amplitudes, late):
+        t = np.arange(0, 60, 0.05)
+        wave = [np.sin(a * t + i) for i, a in enumerate(amplitudes)]
+        mru = [np.sin(a * (t + late) + i) for i, a in enumerate(amplitudes)]
+        return [
+            xr.Dataset({"heave": ("time", sum(each), {"units": "m"})}, {"time": t})
+            for each in (wave, mru)
+        ]
+
+    regular, period = records([4.0], 0.3), 2 * np.pi / 4.0
+    found = compare_motion(*regular, ["heave"])["heave"]
+    assert found.ambiguous
+    apart = abs(found.lag - found.rival_lag) / period
+    assert apart == pytest.approx(round(apart), abs=0.04)  # two steps of 0.05 s in a period
+    # A sea: components that are not multiples of one another leave one peak that fits.
+    sea = records([3.1, 3.6, 4.0, 4.7, 5.3], 2.1)
+    found = compare_motion(*sea, ["heave"])["heave"]
+    assert found.max_lag == 10.0
+    assert found.lag == pytest.approx(2.1, abs=1e-3)  # a fiftieth of a step: noiseless
+    assert not found.ambiguous
+    assert abs(found.rival_lag - 2.1) > 1.0
+    assert found.enclosed
+    # Searched within 1 s, a peak a period off is the best there is.
+    near = compare_motion(*sea, ["heave"], max_lag=1.0)["heave"]
+    assert near.period == pytest.approx(2 * np.pi / 4.2, rel=0.05)
+    assert not near.enclosed
+
+
 def test_contact_sheet_and_overlay(disturbed, tmp_path):
     path, _ = disturbed
     tracked = track_video(path, TrackingSettings(bridge=0.2))
@@ -565,6 +594,7 @@ def test_the_command_compares_bridges_and_writes_netcdf(disturbed, tmp_path, cap
     err = capsys.readouterr().err
     assert "flagged: 10 lost, 4 occluded, 6 overexposed (10 bridged)" in err
     assert "pitch against the MRU: correlation 0.9" in err
+    assert "Note: pitch: the lags searched (within 0.4 s) do not reach a wave period (1." in err
     with xr.open_dataset(out, engine="h5netcdf") as stored:
         assert stored["bridged"].sum() == 10
         assert '"bridge": 0.2' in stored.attrs["settings"]
