@@ -406,7 +406,7 @@ def test_a_video_without_the_panel(tmp_path):
     path = tmp_path / "calm.mp4"
     render(path, lambda i, lit: lit * 0.2, frames=8)
     with pytest.raises(DataError, match=r"calm\.mp4: the panel \(0\.3 × 0\.1 m\) was not found in "
-                       r"any of 8 frames: nothing is as bright .* Lower 'lower'"):  # fmt: skip
+                       r"any of 8 frames: nothing is as bright .*lower; --threshold"):  # fmt: skip
         track_video(path)
 
 
@@ -420,8 +420,27 @@ def test_most_frames_flagged_is_told(tmp_path):
 def test_no_good_frame_while_at_rest(tmp_path):
     path = tmp_path / "late.mp4"
     render(path, lambda i, lit: lit * (0.2 if i < 4 else 1.0), frames=12)
-    with pytest.raises(DataError, match=r"no good frame among the first 0\.1 s, over which"):
+    with pytest.raises(
+        DataError, match=r"late\.mp4, first 0\.1 s \(unless the origin .* of 3 frames"
+    ):
         track_video(path, TrackingSettings(rest=0.1))
+
+
+def test_a_panel_that_is_not_there_stops_the_tracking_early(tmp_path):
+    path, told = tmp_path / "long.mp4", []
+    render(path, lambda i, lit: lit * 0.2, frames=45)
+    with pytest.raises(DataError, match=r"first 1 s .* was not found in any of 30 frames"):
+        track_video(path, progress=lambda *words: told.append(words))
+    assert not told  # not read to its end, where progress is told
+    with pytest.raises(DataError, match="was not found in any of 45 frames"):
+        track_video(path, TrackingSettings(origin=(100.0, 100.0)))
+
+
+def test_tuples_of_the_command_say_that_blanks_divide_them(capsys):
+    assert cli.main(["track", "--help"]) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert "--lamp X Y RADIUS" in words
+    assert "three numbers divided by blanks, such as 40 40 12" in words
 
 
 def test_a_video_of_zero_frames(tmp_path):
@@ -520,7 +539,10 @@ def test_a_varying_frame_rate(plain, monkeypatch):
     ("settings", "message"),
     [
         ({"panel": (0.1, 0.1)}, r"panel is \(length, height\) in metres, the length at least"),
-        ({"lower": (0, 0, 300)}, r"lower and upper are \(red, green, blue\), each 0 to 255"),
+        (
+            {"lower": (0, 0, 300)},
+            r"lower \(--threshold\) and upper are \(red, green, blue\), each 0 to 255",
+        ),
         ({"downstream": "up"}, "downstream is 'right' or 'left' in the picture; received 'up'"),
         ({"metres_per_pixel": -1.0}, r"metres_per_pixel must be positive \(m\); received -1"),
         ({"opening": -1}, "opening and closing are sides in pixels"),

@@ -42,11 +42,19 @@ def track(
         typer.Option(help="Calibration; by default from the panel's size as seen."),
     ] = None,
     panel: Annotated[
-        tuple[float, float], typer.Option(help="Length and height of the panel, m.")
+        tuple[float, float],
+        typer.Option(
+            metavar="LENGTH HEIGHT",
+            help="Length and height of the panel, m: two numbers divided by a blank.",
+        ),
     ] = DEFAULT.panel,
     panel_place: Annotated[
         tuple[float, float],
-        typer.Option(help="Panel's centre from the centre of gravity: downstream, up, m."),
+        typer.Option(
+            metavar="X Z",
+            help="Panel's centre from the centre of gravity, downstream and up, m: two numbers "
+            "divided by a blank.",
+        ),
     ] = DEFAULT.panel_place,
     downstream: Annotated[
         Literal["right", "left"], typer.Option(help="Side of the picture to which waves run.")
@@ -56,18 +64,34 @@ def track(
     ] = 0.0,
     origin: Annotated[
         tuple[float, float] | None,
-        typer.Option(help="Pixel of the panel's centre at rest; by default from the first second."),
+        typer.Option(
+            metavar="X Y",
+            help="Pixel of the panel's centre at rest, two numbers divided by a blank; by default "
+            "from the first second.",
+        ),
     ] = None,
     threshold: Annotated[
-        tuple[int, int, int], typer.Option(help="Least red, green and blue of the panel.")
+        tuple[int, int, int],
+        typer.Option(
+            metavar="RED GREEN BLUE",
+            help="Least red, green and blue of the panel, each 0 to 255: three numbers divided by "
+            "blanks.",
+        ),
     ] = DEFAULT.lower,
     region: Annotated[
         tuple[int, int, int, int] | None,
-        typer.Option(help="Part of the picture searched: left, top, width, height, pixels."),
+        typer.Option(
+            metavar="LEFT TOP WIDTH HEIGHT",
+            help="Part of the picture searched, pixels: four numbers divided by blanks.",
+        ),
     ] = None,
     lamp: Annotated[
         tuple[float, float, float] | None,
-        typer.Option(help="Lamp that shows the trigger: x, y, radius, pixels."),
+        typer.Option(
+            metavar="X Y RADIUS",
+            help="Lamp that shows the trigger, pixels from the upper left corner: three numbers "
+            "divided by blanks, such as 40 40 12.",
+        ),
     ] = None,
     tolerance: Annotated[
         float, typer.Option(help="Part of its length by which the panel seen may differ.")
@@ -86,7 +110,8 @@ def track(
         float | None,
         typer.Option(
             "--max-lag",
-            help="Longest lag searched against --mru, s; by default 10, or a quarter of the record.",
+            help="Longest lag searched against --mru, s; by default 10, or a quarter of the "
+            "record.",
         ),
     ] = None,
 ) -> None:
