@@ -187,6 +187,18 @@ MISTAKES = [
         "derived.pitch_rate: step 'differentiate' has no key 'band'; remove it",
     ),
     (
+        'step = "differentiate"',
+        'step = "transfer"\noffset = [-0.6, 0.0]',
+        "derived.pitch_rate.offset: received [-0.6, 0.0], a list of the wrong length (2). Give "
+        "'transfer': [x, y, z] from the measured",
+    ),
+    (
+        'step = "differentiate"',
+        'step = "remove_gravity"\ncomponents = ["a", "b", "c", "d"]',
+        "derived.pitch_rate.components: received ['a', 'b', 'c', 'd'], a list of the wrong length "
+        "(4). Give 'remove_gravity': accelerometers along x, y and z of the body",
+    ),
+    (
         'from = "pitch"\nstep = "differentiate"',
         'expression = "2 * ptch"',
         "derived.pitch_rate.expression: the channel 'ptch' does not exist. Did you mean 'pitch'?",

@@ -95,14 +95,19 @@ def test_interrupted_half_way_a_second_call_continues(copied):
     calls = []
     write_prepared(campaign, names=RUNS, progress=lambda *call: calls.append(call))
     assert (folder / f"{RUNS[0]}.nc").stat().st_mtime_ns == written
-    assert [call for call in calls if call[0]] == [(2, 2, RUNS[1])]
+    assert calls[-1] == (2, 2, RUNS[1])
+    assert {call[:2] for call in calls[:-1]} == {(1, 2)}  # one is done, also while clocks are found
 
 
 @pytest.mark.parametrize(
     ("pair", "error", "message"),
     [
         (('column = "heave [m]"', 'column = "heavy"'), RequestError,
-         r"none of its 4 files has a column 'heavy' for channel 'heave'\. Did you mean 'heave'"),
+         r"none of its 4 files has a column 'heavy' for channel 'heave'\. Did you mean 'heave'\? "
+         r"Correct \[channels\.heave\]\. Their columns: .*pitch"),
+        (('column = "heave [m]"', 'column = "heave [mm]"'), RequestError,
+         r"no.* 'heave \[mm\]' for channel 'heave'\. There is a column 'heave \[m\]', in another "
+         r"unit\. Correct"),
         (('column = "heave [m]"\nunit = "m"', 'column = "trigger"\nunit = "m"'), RequestError,
          r"column 'trigger' of channel 'heave' stands in the files of wave_probes and"),
         (('reference = "wave_probes"', 'reference = "wave_prober"'), RequestError,

@@ -8,6 +8,7 @@ from small_tank import CAMPAIGN, tank_columns, write_csv
 
 from seakeep.campaign import read_campaign
 from seakeep.campaign.checks import findings_of
+from seakeep.errors import DataError
 from seakeep.signals import rotation_matrix
 
 G = 9.81
@@ -130,6 +131,15 @@ def test_gravity_is_removed_from_one_accelerometer(tmp_path, axis):
     text += f"[channels.a]\n[derived.free]\nfrom = 'a'\nstep = 'remove_gravity'\naxis = '{axis}'\n"
     run = written(tmp_path, columns, text).prepare()["r"]
     np.testing.assert_allclose(run["free"], along, atol=1e-9)
+
+
+def test_gravity_that_is_not_there_is_not_removed(tmp_path):
+    """A reading set to zero at rest, and nobody said so."""
+    columns, text = gyroscope()
+    columns["a [m/s^2]"] = rate(bow, 2)(T)[:, 2]
+    text += "[channels.a]\n[derived.heave_acceleration]\nfrom = 'a'\nstep = 'remove_gravity'\n"
+    with pytest.raises(DataError, match=r"mean upward acceleration is -9\.\d+ .* zeroed = true"):
+        written(tmp_path, columns, text).prepare()
 
 
 class TestOutliers:

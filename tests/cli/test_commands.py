@@ -289,9 +289,13 @@ def test_compare_keeps_radians_if_asked(run):
 
 
 def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
-    status, out, _ = run(f"prepare {CAMPAIGN} -o docs/tutorial/prepared")
+    status, out, err = run(f"prepare {CAMPAIGN} -o docs/tutorial/prepared")
     assert status == 0
     assert [Path(line).name for line in out.split()] == ["first.nc", "second.nc", "unseen.nc"]
+
+    assert "look for prepared runs" not in err
+    status, _, err = run(f"prepare {CAMPAIGN} -o elsewhere --no-sheet")
+    assert "fit, forecast and compare look for prepared runs in docs/tutorial/prepared alone" in err
 
     def refuse(*_args, **_keywords):
         raise AssertionError("the raw file was read again")
@@ -397,7 +401,7 @@ def test_ctrl_c_ends_with_130_and_says_what_is_kept(run, monkeypatch):
     monkeypatch.setattr(modelling, "fit_campaign", interrupt)
     status, _, err = run(f"fit {CAMPAIGN} -o m.nc")
     assert status == 130
-    assert "Interrupted. Files that were finished are kept." in err
+    assert "Interrupted. Files that were finished are kept: repeat the command to go on." in err
 
 
 def test_an_unforeseen_error_asks_for_a_report(run, monkeypatch):
@@ -474,7 +478,9 @@ def test_full_scale_by_froudes_law(run, place):
         encoding="utf-8",
     )
     assert run(command.format(scaled, "model_scale"))[0] == 0
-    assert run(command.format(scaled, "full_scale") + " --full-scale")[0] == 0
+    status, _, err = run(command.format(scaled, "full_scale") + " --full-scale")
+    assert status == 0
+    assert "Times are at full scale (1:25); --start and --steps at model scale." in err
     small, full = (xr.load_dataset(place / f"{n}_scale.nc") for n in ("model", "full"))
     # Froude: lengths by the scale, times by its root, so rates by 1/root; loads by its cube.
     by = {"heave": 25, "pitch": 1, "heave_rate": 5, "pitch_rate": 1 / 5, "mooring_bow": 25**3}

@@ -328,6 +328,35 @@ def test_a_lag_at_the_limit_is_told():
     assert compare_motion(first, later, ["heave"], max_lag=0.5)["heave"].at_limit
 
 
+def test_a_lag_one_wave_period_off_is_told():
+    def records(amplitudes, late):
+        t = np.arange(0, 60, 0.05)
+        wave = [np.sin(a * t + i) for i, a in enumerate(amplitudes)]
+        mru = [np.sin(a * (t + late) + i) for i, a in enumerate(amplitudes)]
+        return [
+            xr.Dataset({"heave": ("time", sum(each), {"units": "m"})}, {"time": t})
+            for each in (wave, mru)
+        ]
+
+    regular, period = records([4.0], 0.3), 2 * np.pi / 4.0
+    found = compare_motion(*regular, ["heave"])["heave"]
+    assert found.ambiguous
+    apart = abs(found.lag - found.rival_lag) / period
+    assert apart == pytest.approx(round(apart), abs=0.04)  # two steps of 0.05 s in a period
+    # A sea: components that are not multiples of one another leave one peak that fits.
+    sea = records([3.1, 3.6, 4.0, 4.7, 5.3], 2.1)
+    found = compare_motion(*sea, ["heave"])["heave"]
+    assert found.max_lag == 10.0
+    assert found.lag == pytest.approx(2.1, abs=1e-3)  # a fiftieth of a step: noiseless
+    assert not found.ambiguous
+    assert abs(found.rival_lag - 2.1) > 1.0
+    assert found.enclosed
+    # Searched within 1 s, a peak a period off is the best there is.
+    near = compare_motion(*sea, ["heave"], max_lag=1.0)["heave"]
+    assert near.period == pytest.approx(2 * np.pi / 4.2, rel=0.05)
+    assert not near.enclosed
+
+
 def test_contact_sheet_and_overlay(disturbed, tmp_path):
     path, _ = disturbed
     tracked = track_video(path, TrackingSettings(bridge=0.2))
@@ -377,7 +406,7 @@ def test_a_video_without_the_panel(tmp_path):
     path = tmp_path / "calm.mp4"
     render(path, lambda i, lit: lit * 0.2, frames=8)
     with pytest.raises(DataError, match=r"calm\.mp4: the panel \(0\.3 × 0\.1 m\) was not found in "
-                       r"any of 8 frames: nothing is as bright .* Lower 'lower'"):  # fmt: skip
+                       r"any of 8 frames: nothing is as bright .*lower; --threshold"):  # fmt: skip
         track_video(path)
 
 
@@ -391,8 +420,27 @@ def test_most_frames_flagged_is_told(tmp_path):
 def test_no_good_frame_while_at_rest(tmp_path):
     path = tmp_path / "late.mp4"
     render(path, lambda i, lit: lit * (0.2 if i < 4 else 1.0), frames=12)
-    with pytest.raises(DataError, match=r"no good frame among the first 0\.1 s, over which"):
+    with pytest.raises(
+        DataError, match=r"late\.mp4, first 0\.1 s \(unless the origin .* of 3 frames"
+    ):
         track_video(path, TrackingSettings(rest=0.1))
+
+
+def test_a_panel_that_is_not_there_stops_the_tracking_early(tmp_path):
+    path, told = tmp_path / "long.mp4", []
+    render(path, lambda i, lit: lit * 0.2, frames=45)
+    with pytest.raises(DataError, match=r"first 1 s .* was not found in any of 30 frames"):
+        track_video(path, progress=lambda *words: told.append(words))
+    assert not told  # not read to its end, where progress is told
+    with pytest.raises(DataError, match="was not found in any of 45 frames"):
+        track_video(path, TrackingSettings(origin=(100.0, 100.0)))
+
+
+def test_tuples_of_the_command_say_that_blanks_divide_them(capsys):
+    assert cli.main(["track", "--help"]) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert "--lamp X Y RADIUS" in words
+    assert "three numbers divided by blanks, such as 40 40 12" in words
 
 
 def test_a_video_of_zero_frames(tmp_path):
@@ -491,7 +539,10 @@ def test_a_varying_frame_rate(plain, monkeypatch):
     ("settings", "message"),
     [
         ({"panel": (0.1, 0.1)}, r"panel is \(length, height\) in metres, the length at least"),
-        ({"lower": (0, 0, 300)}, r"lower and upper are \(red, green, blue\), each 0 to 255"),
+        (
+            {"lower": (0, 0, 300)},
+            r"lower \(--threshold\) and upper are \(red, green, blue\), each 0 to 255",
+        ),
         ({"downstream": "up"}, "downstream is 'right' or 'left' in the picture; received 'up'"),
         ({"metres_per_pixel": -1.0}, r"metres_per_pixel must be positive \(m\); received -1"),
         ({"opening": -1}, "opening and closing are sides in pixels"),
@@ -565,6 +616,7 @@ def test_the_command_compares_bridges_and_writes_netcdf(disturbed, tmp_path, cap
     err = capsys.readouterr().err
     assert "flagged: 10 lost, 4 occluded, 6 overexposed (10 bridged)" in err
     assert "pitch against the MRU: correlation 0.9" in err
+    assert "Note: pitch: the lags searched (within 0.4 s) do not reach a wave period (1." in err
     with xr.open_dataset(out, engine="h5netcdf") as stored:
         assert stored["bridged"].sum() == 10
         assert '"bridge": 0.2' in stored.attrs["settings"]

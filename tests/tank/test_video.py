@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
+from seakeep.campaign import load_prepared, read_campaign, write_prepared
 from seakeep.tank.instruments import clock_instants
-from seakeep.tank.play import play_run
+from seakeep.tank.play import play, play_run
 from seakeep.tank.video import METRES_PER_PIXEL, PANEL, PANEL_HEIGHT, pixel_of, render_side_view
 
 cv2 = pytest.importorskip("cv2", reason="needs the extra video")
@@ -10,13 +11,17 @@ pytest.importorskip("numba", reason="needs the extra tank")
 
 
 @pytest.fixture(scope="module")
-def played(settings, rig):
+def filmed(settings):
     run = settings.runs["regular_2"].model_copy(update={"startup": 0.0, "duration": 14.0})
     clocks = dict(settings.instruments.clocks)
     clocks["video"] = clocks["video"].model_copy(update={"rate": 10.0})  # fewer frames to render
     instruments = settings.instruments.model_copy(update={"clocks": clocks})
-    made = settings.model_copy(update={"runs": {"one": run}, "instruments": instruments})
-    return play_run(made, "one", rig)
+    return settings.model_copy(update={"runs": {"one": run}, "instruments": instruments})
+
+
+@pytest.fixture(scope="module")
+def played(filmed, rig):
+    return play_run(filmed, "one", rig)
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +74,16 @@ def test_lamp_shows_the_trigger(video, played):
     level = {i: f[30:50, 30:50, 2].mean() for i, f in frames(video, {lit, lit - 10, lit + 10})}
     assert readings[lit] == pytest.approx(8.8, abs=0.05)
     assert level[lit] > 2.5 * max(level[lit - 10], level[lit + 10])
+
+
+def test_a_filmed_campaign_is_prepared(filmed, tmp_path):
+    files = play(filmed, tmp_path, videos=["one"])["one"]
+    assert files["side_view"].suffix == ".mp4"
+    campaign = read_campaign(tmp_path / "campaign.toml")
+    assert "side_view" not in campaign.settings.runs["one"].files  # no table of a logger
+    assert "# Filmed: raw/one/side_view.mp4" in campaign.path.read_text(encoding="utf-8")
+    assert write_prepared(campaign)
+    assert "surge" in load_prepared(campaign)["one"]
 
 
 def test_missing_opencv_names_the_extra(monkeypatch):

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.conventions import si_unit
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, did_you_mean
 
-__all__ = ["Columns", "is_unit", "split_unit", "unique_names"]
+__all__ = ["Columns", "is_unit", "meant_column", "split_unit", "unique_names"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -55,6 +55,35 @@ class Columns:
             return wanted
         by_header = {header: name for name, header in self.headers.items()}
         return by_header.get(wanted.strip())
+
+
+def meant_column(wanted: str, tables: Iterable[Columns]) -> str:
+    """Say which column may be meant by one that no table has.
+
+    Parameters
+    ----------
+    wanted : str
+        Name or full header that was asked for.
+    tables : iterable of Columns
+        Where it was looked for.
+
+    Returns
+    -------
+    str
+        A sentence with a leading space, or ``""``.
+
+    Examples
+    --------
+    >>> table = Columns({"heave": np.zeros(2)}, {"heave": "mm"}, headers={"heave": "heave [mm]"})
+    >>> meant_column("heave [m]", [table])
+    " There is a column 'heave [mm]', in another unit."
+    """
+    names = [(name, each.headers.get(name, name)) for each in tables for name in each.names]
+    bare, unit = split_unit(wanted)
+    for _, header in names:
+        if unit is not None and split_unit(header)[0] == bare and header != bare:
+            return f" There is a column '{header}', in another unit."
+    return did_you_mean(wanted, [name for name, _ in names])
 
 
 def is_unit(text: str) -> bool:

@@ -11,7 +11,7 @@ import xarray as xr
 from seakeep.campaign.settings import CampaignSettings, DerivedSettings, long_name_of
 from seakeep.campaign.validation import sources_of
 from seakeep.conventions import canonical_channel, conversion, si_unit
-from seakeep.errors import RequestError, SeakeepError
+from seakeep.errors import DataError, RequestError, SeakeepError
 from seakeep.signals import (
     band_pass,
     blend,
@@ -154,11 +154,11 @@ def _body_step(
         if settings.components is not None:
             force = np.column_stack([dataset[each].to_numpy() for each in settings.components])
             moved = remove_gravity(force, angles, zeroed=bool(settings.zeroed))
-            return moved[:, axis], unit, described
+            return _afloat(moved[:, axis], axis), unit, described
         # One accelerometer alone: what gravity adds along its axis; that it turns is left out.
         felt = GRAVITY * rotation_matrix(angles)[:, 2, axis]
         at_rest = GRAVITY if settings.zeroed and axis == 2 else 0.0
-        return series + at_rest - felt, unit, described
+        return _afloat(series + at_rest - felt, axis), unit, described
     offset = settings.offset or (0.0, 0.0, 0.0)
     described = f"{settings.source}, {offset} m from where it was measured"
     vector = np.zeros((series.size, 3))
@@ -176,6 +176,19 @@ def _body_step(
     turning = _three(dataset, [f"{each}_acceleration" for each in ANGLES])
     moved = transfer_acceleration(vector, angles, rates, turning, offset)
     return moved[:, axis], unit, described
+
+
+def _afloat(acceleration: FloatArray, axis: int) -> FloatArray:
+    """Refuse a mean upward acceleration that no floating body has: gravity was counted wrongly."""
+    mean = float(np.mean(acceleration))
+    if axis == 2 and abs(mean) > 0.5 * GRAVITY:
+        raise DataError(
+            f"without gravity the mean upward acceleration is {mean:.3g} m/s^2, which no floating "
+            f"body keeps up. An accelerometer along z reads +{GRAVITY} m/s^2 at rest: where its "
+            "readings were set to zero there, or hold no gravity, state zeroed = true; where they "
+            "are reversed, sign = -1 in its [channels.NAME]."
+        )
+    return acceleration
 
 
 def _axis(name: str, settings: DerivedSettings) -> int:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.campaign.columns import Columns
+from seakeep.campaign.columns import Columns, meant_column
 from seakeep.campaign.readers import find_column, read_columns, time_column, times_of
 from seakeep.campaign.settings import (
     CampaignSettings,
@@ -169,9 +169,11 @@ def homes(
         having = [key for key, logger in loggers.items() if logger.columns.find(column) is not None]
         if not having:
             every = [c for logger in loggers.values() for c in logger.columns.names]
+            meant = meant_column(column, [logger.columns for logger in loggers.values()])
             raise RequestError(
                 f"run '{run}': none of its {len(loggers)} files has a column '{column}' for "
-                f"channel '{name}'.{did_you_mean(column, every)} Correct [channels.{name}]."
+                f"channel '{name}'.{meant} Correct [channels.{name}]. "
+                f"Their columns: {', '.join(dict.fromkeys(every))}."
             )
         if len(having) > 1:
             raise RequestError(

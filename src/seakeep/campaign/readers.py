@@ -14,7 +14,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.campaign.binary import read_matlab, read_netcdf
-from seakeep.campaign.columns import Columns
+from seakeep.campaign.columns import Columns, meant_column
 from seakeep.campaign.kinds import refuse_foreign
 from seakeep.campaign.rosbag import is_recording, read_recording
 from seakeep.campaign.settings import FileSettings
@@ -210,7 +210,7 @@ def find_column(path: Path, table: Columns, wanted: str) -> str:
     """Name of a wanted column; refuse one that is missing or at fault."""
     name = table.find(wanted)
     if name is None:
-        meant = did_you_mean(wanted, table.names)
+        meant = meant_column(wanted, [table])
         mend = "" if meant else " Name one of these, or give another file."
         raise RequestError(
             f"{path} has no column '{wanted}'.{meant} Its columns: {', '.join(table.names)}.{mend}"

@@ -16,7 +16,7 @@ from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepWarning
 from seakeep.files import make_folder, replacing
 
-__all__ = ["load_prepared", "write_prepared"]
+__all__ = ["load_prepared", "prepared_folder", "write_prepared"]
 
 
 def write_prepared(
@@ -57,7 +57,7 @@ def write_prepared(
         As :meth:`Campaign.prepare`.
     """
     failed: Failures = {} if failures is None else failures
-    folder = _folder(campaign, out_dir)
+    folder = prepared_folder(campaign, out_dir)
     make_folder(folder)
     wanted = list(campaign.runs if names is None else names)
     files = {name: folder / f"{name}.nc" for name in wanted}
@@ -66,9 +66,9 @@ def write_prepared(
     steps = {step for name, step in fresh.items() if step is not None and name not in missing}
     done = len(wanted) - len(missing)
 
-    def told(count: int, total: int, name: str) -> None:
+    def told(count: int, _: int, name: str) -> None:
         if progress is not None:
-            progress(done + count if count else 0, done + total, name)
+            progress(done + count, len(wanted), name)
 
     for name, run in campaign.each_prepared(missing, told, failed):
         _write(run, files[name])
@@ -119,7 +119,7 @@ def load_prepared(
     RequestError, DataError
         As :meth:`Campaign.prepare`.
     """
-    folder = _folder(campaign, out_dir)
+    folder = prepared_folder(campaign, out_dir)
     wanted = list(campaign.runs if names is None else names)
     fresh = {name: _fresh(campaign, name, folder / f"{name}.nc") for name in wanted}
     missing = [name for name, run in fresh.items() if run is None]
@@ -131,7 +131,8 @@ def load_prepared(
     return {name: made[name] if name in made else found[name] for name in wanted}
 
 
-def _folder(campaign: Campaign, out_dir: Path | str | None) -> Path:
+def prepared_folder(campaign: Campaign, out_dir: Path | str | None = None) -> Path:
+    """Folder of the prepared runs: the one stated, or ``prepared`` beside the campaign file."""
     return campaign.path.parent / "prepared" if out_dir is None else Path(out_dir)
 
 

@@ -159,6 +159,9 @@ def _reason(item: Any, place: list[str], table: type[BaseModel] | None, descript
         known = [field.alias or name for name, field in table.model_fields.items()]
         near = did_you_mean(place[-1], known)
         return f"unknown key, received {_shown(value)}.{near} Keys here: {', '.join(known)}."
+    if (kind == "missing" and place[-1].isdigit()) or kind == "too_long":
+        mend = f" Give {description}." if description else ""
+        return f"received {_shown(value)}, a list of the wrong length ({len(value)}).{mend}"
     if kind == "missing":
         return f"missing. Add it: {description}." if description else "missing. Add it."
     if kind == "value_error":

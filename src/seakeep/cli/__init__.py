@@ -87,7 +87,10 @@ def main(arguments: list[str] | None = None) -> int:
     except SystemExit as leaving:
         status = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
         if status == INTERRUPTED:
-            messages().print("Interrupted. Files that were finished are kept.", style="red")
+            messages().print(
+                "Interrupted. Files that were finished are kept: repeat the command to go on.",
+                style="red",
+            )
         return status
     except SeakeepError as error:
         if debug:

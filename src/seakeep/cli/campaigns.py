@@ -18,6 +18,7 @@ from seakeep.campaign import (
     write_prepared,
 )
 from seakeep.campaign.datasets import DATASETS, data_folder, fetch, find_dataset, state_of
+from seakeep.campaign.store import prepared_folder
 from seakeep.campaign.survey import as_one
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.errors import RequestError, SeakeepError
@@ -57,7 +58,12 @@ def prepare(
     campaign: Annotated[Path, typer.Argument(help="Campaign file.", metavar="CAMPAIGN.toml")],
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="Folder; by default 'prepared' beside the campaign."),
+        typer.Option(
+            "-o",
+            "--out",
+            help="Folder; by default 'prepared' beside the campaign, the only one in which fit, "
+            "forecast and compare look.",
+        ),
     ] = None,
     anew: Annotated[
         bool, typer.Option("--anew", help="Prepare again what is fresh already.")
@@ -84,6 +90,12 @@ def prepare(
         typer.echo(str(path))
     if sheet and files:
         _write_sheet(read, files, failures)
+    if out is not None and out.resolve() != prepared_folder(read).resolve():
+        messages().print(
+            f"Note: fit, forecast and compare look for prepared runs in {prepared_folder(read)} "
+            f"alone, and prepare anew what is not there. Those in {out} are for load_prepared.",
+            style="yellow",
+        )
     if failures:
         raise as_one(failures)
 

@@ -46,7 +46,9 @@ CampaignFile = Annotated[Path, typer.Argument(help="Campaign file.", metavar="CA
 FullScale = Annotated[
     bool,
     typer.Option(
-        "--full-scale", help="Convert results by Froude's law with the campaign's scale factor."
+        "--full-scale",
+        help="Convert results by Froude's law with the campaign's scale factor; START and STEPS "
+        "stay at model scale.",
     ),
 ]
 Level = Annotated[
@@ -169,13 +171,16 @@ def forecast(
                 )
     else:
         result = identified.forecast(prepared, start=first, steps=count)
+    scaled = ""
     if full_scale:
-        result = forecast_at_full_scale(result, _scale(read))
+        scale = _scale(read)
+        result = forecast_at_full_scale(result, scale)
+        scaled = f" Times are at full scale (1:{scale:g}); --start and --steps at model scale."
     write_forecast(result, out)
     status = result.attrs["status"]
     messages().print(
         f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
-        f"t = {result.attrs['start']:.10g} s, status {status}."
+        f"t = {result.attrs['start']:.10g} s, status {status}.{scaled}"
     )
     if not _usable(result):
         raise typer.Exit(1)

@@ -13,7 +13,7 @@ from seakeep.campaign import read_table
 from seakeep.cli.console import messages, progress_bar
 from seakeep.errors import RequestError
 from seakeep.files import replacing
-from seakeep.signals.agreement import compare_motion
+from seakeep.signals.agreement import Agreement, compare_motion
 from seakeep.signals.sightings import FLAGS
 from seakeep.signals.tracking import TrackingSettings, track_video
 from seakeep.signals.tracking_pictures import contact_sheet, overlay_video, write_picture
@@ -42,11 +42,19 @@ def track(
         typer.Option(help="Calibration; by default from the panel's size as seen."),
     ] = None,
     panel: Annotated[
-        tuple[float, float], typer.Option(help="Length and height of the panel, m.")
+        tuple[float, float],
+        typer.Option(
+            metavar="LENGTH HEIGHT",
+            help="Length and height of the panel, m: two numbers divided by a blank.",
+        ),
     ] = DEFAULT.panel,
     panel_place: Annotated[
         tuple[float, float],
-        typer.Option(help="Panel's centre from the centre of gravity: downstream, up, m."),
+        typer.Option(
+            metavar="X Z",
+            help="Panel's centre from the centre of gravity, downstream and up, m: two numbers "
+            "divided by a blank.",
+        ),
     ] = DEFAULT.panel_place,
     downstream: Annotated[
         Literal["right", "left"], typer.Option(help="Side of the picture to which waves run.")
@@ -56,18 +64,34 @@ def track(
     ] = 0.0,
     origin: Annotated[
         tuple[float, float] | None,
-        typer.Option(help="Pixel of the panel's centre at rest; by default from the first second."),
+        typer.Option(
+            metavar="X Y",
+            help="Pixel of the panel's centre at rest, two numbers divided by a blank; by default "
+            "from the first second.",
+        ),
     ] = None,
     threshold: Annotated[
-        tuple[int, int, int], typer.Option(help="Least red, green and blue of the panel.")
+        tuple[int, int, int],
+        typer.Option(
+            metavar="RED GREEN BLUE",
+            help="Least red, green and blue of the panel, each 0 to 255: three numbers divided by "
+            "blanks.",
+        ),
     ] = DEFAULT.lower,
     region: Annotated[
         tuple[int, int, int, int] | None,
-        typer.Option(help="Part of the picture searched: left, top, width, height, pixels."),
+        typer.Option(
+            metavar="LEFT TOP WIDTH HEIGHT",
+            help="Part of the picture searched, pixels: four numbers divided by blanks.",
+        ),
     ] = None,
     lamp: Annotated[
         tuple[float, float, float] | None,
-        typer.Option(help="Lamp that shows the trigger: x, y, radius, pixels."),
+        typer.Option(
+            metavar="X Y RADIUS",
+            help="Lamp that shows the trigger, pixels from the upper left corner: three numbers "
+            "divided by blanks, such as 40 40 12.",
+        ),
     ] = None,
     tolerance: Annotated[
         float, typer.Option(help="Part of its length by which the panel seen may differ.")
@@ -83,8 +107,13 @@ def track(
         typer.Option("--mru", help="Record with heave and pitch to compare with."),
     ] = None,
     max_lag: Annotated[
-        float, typer.Option("--max-lag", help="Longest lag searched against --mru, s.")
-    ] = 1.0,
+        float | None,
+        typer.Option(
+            "--max-lag",
+            help="Longest lag searched against --mru, s; by default 10, or a quarter of the "
+            "record.",
+        ),
+    ] = None,
 ) -> None:
     """Track a white panel on the vessel: surge, heave and pitch, with a quality a frame.
 
@@ -165,12 +194,32 @@ def _summary(tracked: xr.Dataset, written: list[Path]) -> None:
         messages().print("Wrote " + ", ".join(map(str, written)))
 
 
-def _agreement(tracked: xr.Dataset, reference: xr.Dataset, max_lag: float) -> None:
+def _agreement(tracked: xr.Dataset, reference: xr.Dataset, max_lag: float | None) -> None:
     for name, found in compare_motion(tracked, reference, max_lag=max_lag).items():
         factor, unit = (np.rad2deg(1.0), "deg") if found.units == "rad" else (1e3, "mm")
-        limit = " (the longest searched: raise --max-lag)" if found.at_limit else ""
         messages().print(
             f"{name} against the MRU: correlation {found.correlation:.4f}, video late by "
-            f"{found.lag:+.3f} s{limit}, RMS difference {factor * found.rms:.3g} {unit}, "
+            f"{found.lag:+.3f} s, RMS difference {factor * found.rms:.3g} {unit}, "
             f"{found.samples} samples"
         )
+        if doubt := _doubt(found):
+            messages().print(f"Note: {name}: {doubt}", style="yellow")
+
+
+def _doubt(found: Agreement) -> str:
+    """Why the lag may be another one; empty where nothing speaks for that."""
+    searched = f"the lags searched (within {found.max_lag:g} s)"
+    if found.at_limit:
+        return f"the lag is at the end of {searched}; the true one may be longer. Raise --max-lag."
+    if found.ambiguous:
+        return (
+            f"at {found.rival_lag:+.3f} s the correlation is {found.rival_correlation:.4f}, nearly "
+            "as high: the lag is known only up to whole wave periods. Let a trigger that both "
+            "recorded decide (--lamp), or take an irregular run."
+        )
+    if not found.enclosed:
+        return (
+            f"{searched} do not reach a wave period ({found.period:.3g} s) beyond this one, where "
+            "the two may fit better. Raise --max-lag."
+        )
+    return ""

@@ -184,7 +184,9 @@ def check_finite(
     raise DataError(
         f"channel '{names[column]}' of {name} has {int(bad[:, column].sum())} missing or infinite "
         f"value(s) in the samples needed, the first at t = {time[first + row]:.10g} s. "
-        "Fill the gap, or choose a window without it: nothing is filled in silence."
+        "Nothing is filled in silence: have short gaps bridged (gaps = 'bridge' and longest_gap in "
+        "[preparation]), or cut the run so that the gap lies outside (record, span, train or test "
+        "in [runs.NAME])."
     )
 
 

@@ -25,6 +25,10 @@ FloatArray = npt.NDArray[np.float64]
 
 SHORTEST = 16
 """Samples in common below which a correlation says nothing."""
+LONGEST = 10.0
+"""Lag searched by default, s: clocks set by hand, or recordings started by a shout."""
+FINEST = 0.01
+"""Difference, in SD of the motion, below which two sensors are taken to agree."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,15 @@ class Agreement:
         Samples compared.
     at_limit : bool
         Whether `lag` is the longest searched, so that the true one may be longer.
+    max_lag : float
+        Longest lag searched, s.
+    period : float
+        Mean zero-crossing period of the motion, s.
+    rival_lag : float
+        Lag of the next highest peak of the correlation, s, commonly a wave period off; NaN where
+        the lags searched hold no other.
+    rival_correlation : float
+        Correlation there; NaN likewise.
     """
 
     channel: str
@@ -62,13 +75,32 @@ class Agreement:
     offset: float
     samples: int
     at_limit: bool
+    max_lag: float
+    period: float
+    rival_lag: float
+    rival_correlation: float
+
+    @property
+    def enclosed(self) -> bool:
+        """Whether lags one wave period off `lag` were searched too, on either side."""
+        return abs(self.lag) + self.period <= self.max_lag
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether at `rival_lag` the difference is less than twice that at `lag`."""
+        return _misfit(self.rival_correlation) < 2.0 * max(_misfit(self.correlation), FINEST)
+
+
+def _misfit(correlation: float) -> float:
+    """RMS difference of two series of SD 1."""
+    return float(np.sqrt(max(2.0 * (1.0 - correlation), 0.0)))
 
 
 def compare_motion(
     tracked: xr.Dataset,
     reference: xr.Dataset,
     channels: Iterable[str] = ("heave", "pitch"),
-    max_lag: float = 1.0,
+    max_lag: float | None = None,
 ) -> dict[str, Agreement]:
     """Compare a video's motions with those of a motion reference unit.
 
@@ -82,8 +114,8 @@ def compare_motion(
     channels : iterable of str, optional
         Channels.
     max_lag : float, optional
-        Longest lag searched, s. In regular waves a lag is known only up to a whole period: search
-        less than half a period.
+        Longest lag searched, s; by default 10 s, or a quarter of the shorter record. In regular
+        waves a lag is known only up to a whole period, which `Agreement.ambiguous` tells.
 
     Returns
     -------
@@ -106,7 +138,8 @@ def compare_motion(
     >>> round(found.lag, 3), round(found.correlation, 3)
     (0.1, 1.0)
     """
-    positive("max_lag", max_lag, "s")
+    if max_lag is not None:
+        positive("max_lag", max_lag, "s")
     names = list(channels)
     for name in names:
         for which, data in (("tracked", tracked), ("reference", reference)):
@@ -119,12 +152,13 @@ def compare_motion(
     return {name: _compare(tracked[name], reference[name], max_lag) for name in names}
 
 
-def _compare(first: xr.DataArray, second: xr.DataArray, max_lag: float) -> Agreement:
+def _compare(first: xr.DataArray, second: xr.DataArray, reach: float | None) -> Agreement:
     name = str(first.name)
     unit = str(first.attrs.get("units", "1"))
     factor = conversion(str(second.attrs.get("units", unit)), unit, f"'{name}'")
     t1, y1 = _finite(first, f"tracked '{name}'")
     t2, y2 = _finite(second, f"reference '{name}'")
+    max_lag = reach or min(LONGEST, 0.25 * float(min(np.ptp(t1), np.ptp(t2))))
     # Only instants whose partner lies inside the other record at every lag searched.
     common = (t1 >= t2[0] + max_lag) & (t1 <= t2[-1] - max_lag)
     t1, y1 = t1[common], y1[common]
@@ -157,6 +191,11 @@ def _compare(first: xr.DataArray, second: xr.DataArray, max_lag: float) -> Agree
                 options={"xatol": 1e-4 * step},
             ).x
         )
+    inner = values[1:-1]
+    peaks = 1 + np.flatnonzero((inner > values[:-2]) & (inner >= values[2:]))
+    others = peaks[np.abs(peaks - best) > 1]
+    rival = int(others[np.argmax(values[others])]) if others.size else None
+    crossings = int(np.count_nonzero(np.diff(y1 > np.mean(y1))))
     difference = y1 - spline(t1 - lag)
     return Agreement(
         channel=name,
@@ -168,6 +207,10 @@ def _compare(first: xr.DataArray, second: xr.DataArray, max_lag: float) -> Agree
         offset=float(np.mean(difference)),
         samples=int(t1.size),
         at_limit=at_limit,
+        max_lag=max_lag,
+        period=2.0 * float(t1[-1] - t1[0]) / max(crossings, 1),
+        rival_lag=np.nan if rival is None else float(lags[rival]),
+        rival_correlation=np.nan if rival is None else float(values[rival]),
     )
 
 

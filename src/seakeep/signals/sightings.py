@@ -174,14 +174,16 @@ def _not_found(
     if not there.any():
         return (
             f"{name}: the panel ({wanted}) was not found in any of {count} frames: nothing is as "
-            "bright as the thresholds ask. Lower 'lower' (red, green, blue), or correct the region."
+            "bright as the thresholds ask. Reduce the least red, green and blue (lower; "
+            "--threshold), or correct the region."
         )
     length, height = np.median(seen["length"][there]), np.median(seen["height"][there])
     return (
         f"{name}: the panel ({wanted}) was not found in any of {count} frames: the largest bright "
         f"component measures {length:.0f} × {height:.0f} pixels (median of {int(there.sum())} "
-        "frames), which is not its shape. Raise 'lower' (red, green, blue), state a region that "
-        "holds no other bright thing, or correct the panel's size."
+        "frames), which is not its shape. Raise the least red, green and blue (lower; "
+        "--threshold), state a region that holds no other bright thing, or correct the "
+        "panel's size."
     )
 
 

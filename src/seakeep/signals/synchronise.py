@@ -244,8 +244,8 @@ def clock_from_correlation(
     if end - begin < window + 2 * largest_lag:
         raise RequestError(
             f"the records share {end - begin:g} s, and a window of {window:g} s with lags of "
-            f"±{largest_lag:g} s needs {window + 2 * largest_lag:g} s. Shorten the window or the "
-            "lags."
+            f"±{largest_lag:g} s needs {window + 2 * largest_lag:g} s. Shorten window or "
+            "largest_lag (of a campaign: in [instruments.NAME])."
         )
     grid = begin + step * np.arange(int((end - begin) / step + 1e-9) + 1)
     lags = windowed_lags(

@@ -143,8 +143,8 @@ def _check_colours(lower: tuple[int, int, int], upper: tuple[int, int, int]) -> 
         0 <= low <= high <= 255 for low, high in zip(lower, upper, strict=True)
     ):
         raise RequestError(
-            f"lower and upper are (red, green, blue), each 0 to 255 and lower not above upper; "
-            f"received {lower} and {upper}."
+            f"lower (--threshold) and upper are (red, green, blue), each 0 to 255 and lower not "
+            f"above upper; received {lower} and {upper}."
         )
 
 
@@ -231,8 +231,9 @@ def _check_fit(video: Video, how: TrackingSettings) -> None:
     if stop is not None and stop >= 0.5 * video.rate:
         raise RequestError(
             f"{video.path} has {video.rate:g} frames a second, so the low-pass filter cannot stop "
-            f"at {stop:g} Hz. Lower passband and stopband below {0.5 * video.rate:g} Hz, or set "
-            "passband to None."
+            f"at {stop:g} Hz. Lower the passband (--passband) so that the stopband, 1.5 times as "
+            f"high unless stated, lies below {0.5 * video.rate:g} Hz, or filter nothing "
+            "(passband None; --passband 0)."
         )
 
 
@@ -246,10 +247,16 @@ def _measure(
     video: Video, how: TrackingSettings, progress: Progress | None
 ) -> tuple[npt.NDArray[np.int64], FloatArray, FloatArray]:
     """Numbers of the frames, what was seen in each (frame, field), and the lamp."""
-    numbers, rows, lamp = [], [], []
+    numbers: list[int] = []
+    rows: list[tuple[float, ...]] = []
+    lamp: list[float] = []
+    at_rest = how.origin is None
     segmentation = how.segmentation()
     disc = None if how.lamp is None else _disc(how.lamp, video.size)
     for number, frame in video.frames():
+        if at_rest and number >= how.rest * video.rate:
+            at_rest = False
+            _check_rest(video, how, np.array(rows))
         numbers.append(number)
         rows.append(find_panel(frame, segmentation).row())
         if disc is not None:
@@ -259,6 +266,15 @@ def _measure(
     if progress is not None:
         progress(len(numbers), len(numbers), "frames")
     return np.array(numbers), np.array(rows), np.array(lamp)
+
+
+def _check_rest(video: Video, how: TrackingSettings, rows: FloatArray) -> None:
+    """Refuse after the first frames what would be refused after the last one."""
+    if rows.size == 0:
+        return
+    seen = _on_grid(np.arange(len(rows)), rows, len(rows))
+    where = f"{video.path}, first {how.rest:g} s (unless the origin is stated, zero lies there)"
+    reference_panel(seen, how.panel, how.metres_per_pixel, where)
 
 
 def _disc(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from seakeep.tank.raw_files import header
 from seakeep.tank.settings import RunSettings, TankSettings
-from seakeep.tank.video import METRES_PER_PIXEL, PANEL, PANEL_HEIGHT
+from seakeep.tank.video import METRES_PER_PIXEL, PANEL, PANEL_HEIGHT, SIDE_VIEW
 
 __all__ = ["campaign_text"]
 
@@ -175,7 +175,8 @@ def campaign_text(
     settings : TankSettings
         The settings.
     files : mapping of str to mapping of str to str
-        Run → instrument → file, relative to the campaign file.
+        Run → instrument → file, relative to the campaign file; a video is named in a comment, since
+        it is no table of a logger.
     kind : {"csv", "nc"}
         Format of the raw files.
     one_logger : bool
@@ -192,15 +193,18 @@ def campaign_text(
     if not one_logger:
         lines += _instruments(settings)
     for name, run in settings.runs.items():
+        loggers = {key: path for key, path in files[name].items() if key != SIDE_VIEW}
         lines += [f"[runs.{name}]"]
+        if SIDE_VIEW in files[name]:
+            lines.append(f"# Filmed: {files[name][SIDE_VIEW]}, for `seakeep track`.")
         if one_logger:
-            lines.append(f"file = {_quoted(next(iter(files[name].values())))}")
+            lines.append(f"file = {_quoted(next(iter(loggers.values())))}")
         waves = "irregular" if run.irregular else "regular"
         lines += [f"sea_state = {_quoted(run.sea_state or waves)}", f'waves = "{waves}"']
         lines += _spans(run)
         if not one_logger:
             lines += ["", f"[runs.{name}.files]"]
-            lines += [f"{key} = {_quoted(path)}" for key, path in files[name].items()]
+            lines += [f"{key} = {_quoted(path)}" for key, path in loggers.items()]
         lines.append("")
     states = [*STATES, *(f"mooring_{name}" for name in settings.moorings)]
     return "\n".join(

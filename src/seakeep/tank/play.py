@@ -20,7 +20,7 @@ from seakeep.tank.instruments import Played, record_run, record_together
 from seakeep.tank.raw_files import write_dataset, write_record, write_text
 from seakeep.tank.seas import Sea, sea_of_run
 from seakeep.tank.settings import TankSettings
-from seakeep.tank.video import check_video, render_side_view
+from seakeep.tank.video import SIDE_VIEW, check_video, render_side_view
 
 __all__ = ["check_settings", "generator", "noisy_truth", "play", "play_run", "truth"]
 
@@ -299,8 +299,8 @@ def play(
         raw, hidden = make_folder(folder / "raw" / name), make_folder(folder / "truth")
         files[name] = {record.name: write_record(record, raw, kind) for record in records}
         if name in filmed:
-            files[name]["side_view"] = render_side_view(
-                played, raw / "side_view.mp4", generator(part, name, "video")
+            files[name][SIDE_VIEW] = render_side_view(
+                played, raw / f"{SIDE_VIEW}.mp4", generator(part, name, "video")
             )
         write_dataset(truth(played, name), hidden / f"{name}.nc")
     relative = {

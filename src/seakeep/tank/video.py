@@ -21,6 +21,7 @@ __all__ = [
     "METRES_PER_PIXEL",
     "PANEL",
     "PANEL_HEIGHT",
+    "SIDE_VIEW",
     "check_video",
     "frame_of",
     "pixel_of",
@@ -35,6 +36,8 @@ WIDTH, HEIGHT = 1280, 720
 METRES_PER_PIXEL = 0.0025
 PANEL = (0.30, 0.10)  # m
 PANEL_HEIGHT = 0.25  # m, of its centre above the centre of gravity
+SIDE_VIEW = "side_view"
+"""Name of the camera's file beside those of the loggers."""
 LEFT, TOP = -1.0, 1.1  # m, of the picture's upper left corner: x, height above still water
 FRACTION_BITS = 6  # corners are placed to 1/64 pixel
 SUBPIXELS = 8
