@@ -74,7 +74,9 @@ def without_line(folder):
 
 
 def of_another(folder):
-    CellFolder(folder / "out", "0" * 64).open("another")
+    cells = CellFolder(folder / "out", "0" * 64)
+    cells.open("another")
+    cells.write("cell", {})
 
 
 def a_file(folder):
@@ -110,7 +112,7 @@ def a_file(folder):
             ["run3.csv has no column 'FWD_LINE'", "Its columns: t, WP_01", "Name one of these"],
         ),
         (of_another, 2, ["holds the results of another study", "000000000000", "-o"]),
-        (a_file, 1, ["results could not be written to", "the same command then goes on"]),
+        (a_file, 2, ["results could not be written to", "Choose another place"]),
     ],
     ids=["training", "length", "startup", "trains", "channel", "digest", "file"],
 )

@@ -154,6 +154,53 @@ def test_a_folder_of_another_study_is_refused(study_folder, finished):
         run_study(read_study(study_folder / "study.toml"), study_folder / "out")
 
 
+def test_a_plan_that_failed_leaves_the_folder_free(study_folder):
+    change(study_folder, '["unseen"]', '["first"]')
+    with pytest.raises(RequestError, match="the run 'first' trains"):
+        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
+    change(study_folder, '["first"]', '["unseen"]')
+    study = read_study(study_folder / "study.toml")
+    assert run_study(study, study_folder / "out").attrs["digest"] == study.digest
+
+
+def test_a_folder_without_a_finished_cell_belongs_to_no_study(tmp_path):
+    store.CellFolder(tmp_path, "one").open("first")
+    second = store.CellFolder(tmp_path, "two")
+    second.open("second")
+    assert json.loads((tmp_path / "study.json").read_text("utf-8"))["digest"] == "two"
+    second.write("cell", {"mean": np.arange(3.0)})
+    with pytest.raises(RequestError, match="holds the results of another study"):
+        store.CellFolder(tmp_path, "one").open("first")
+
+
+def test_the_smallest_study_tests_runs_that_do_not_state_their_waves(study_folder):
+    path = study_folder / "study.toml"
+    path.write_text('[study]\ncampaign = "campaign.toml"\n', "utf-8")
+    plan, _ = make_plan(read_study(path))
+    assert {window.run for window in plan.tests["irregular"]} == {"unseen"}
+    path.write_text(path.read_text("utf-8") + '[tests.regular]\nwaves = "regular"\n', "utf-8")
+    with pytest.raises(RequestError, match=r"not stated: irregular.*State the waves of a run"):
+        make_plan(read_study(path))
+
+
+@pytest.mark.parametrize(
+    ("number", "kind", "status", "mend"),
+    [
+        (errno.EACCES, RequestError, 2, "Choose a folder that you may write to"),
+        (errno.EROFS, RequestError, 2, "Choose a folder that you may write to"),
+        (errno.ENOENT, RequestError, 2, "Choose another place"),
+        (errno.ENOTDIR, RequestError, 2, "Choose another place"),
+        (errno.ENOSPC, StorageError, 1, "Free space on the disk"),
+        (errno.EIO, StorageError, 1, "Look after the disk"),
+    ],
+)
+def test_a_write_that_fails_names_the_mend_of_its_cause(number, kind, status, mend, tmp_path):
+    with pytest.raises(kind, match=mend) as caught, store.storing(tmp_path):
+        raise OSError(number, os.strerror(number))
+    assert caught.value.exit_status == status
+    assert os.strerror(number) in str(caught.value)
+
+
 def test_no_feasible_training_window(study_folder):
     change(study_folder, "[10, 20]", "[1000, 2000]")
     with pytest.raises(RequestError, match=r"no window is feasible.*Shorten train_length"):

@@ -18,6 +18,10 @@ LARGE = 0.5
 """NRMSE from which on the words look for a cause."""
 PHASE = 15.0
 """Degrees by which a forecast is out of step; 15° make an NRMSE of 0.26."""
+FITS = 1.5
+"""Factor within which an offset counts as what falling back to the training mean makes."""
+SELDOM = 0.01
+"""Part of a run's samples below which a slack line is not worth a word."""
 
 
 def _response(result: StudyResult, test: str) -> xr.Dataset | None:
@@ -116,8 +120,8 @@ def _words(result: StudyResult, test: str, data: xr.Dataset) -> str:
     if np.isfinite(facts["energy_share"]):
         words.append(
             f"{100 * facts['energy_share']:.0f} % of the training sea's energy lies within a tenth "
-            f"of this frequency, and the waves are {facts['height_ratio']:.2f} times as high (4 "
-            "standard deviations)."
+            f"of this frequency, and the waves are {facts['height_ratio']:.2f} times as high (heights "
+            "counted as 4 standard deviations of the elevation)."
         )
     drifting = (at["error_offset"] > at["error_wave"]) & (at["error_offset"] > LARGE)
     waves = at["error_wave"].where(~drifting)
@@ -127,7 +131,25 @@ def _words(result: StudyResult, test: str, data: xr.Dataset) -> str:
     words += _celerity_words(at, facts)
     if bool(drifting.any()):
         words.append(_drift_words(at, [str(n) for n in data["channel"].values[drifting.values]]))
-    return " ".join(words)
+    return " ".join(words + _slack_words(result, test))
+
+
+def _slack_words(result: StudyResult, test: str) -> list[str]:
+    """Name the lines that lose their load in the runs of a test set."""
+    tested = sorted({str(run) for run in result.tests[test]["run"].values})
+    slack = result.groups["runs"]["slack"].sel(run=tested, name=result.channels).max("run")
+    listed = [
+        f"{channel_words(str(name))} in {100 * float(part):.0f} %"
+        for name, part in zip(slack["name"].values, slack.values, strict=True)
+        if part >= SELDOM
+    ]
+    if not listed:
+        return []
+    return [
+        f"Slack line: {', '.join(listed)} of a run's samples (a load below 0.1 % of the largest). "
+        "A line that loses its load does not answer linearly, and where it is slack throughout "
+        "only noise is left: offset, amplitude ratio and phase lead say little of such a load."
+    ]
 
 
 def _wave_words(at: xr.Dataset, moving: npt.NDArray[Any], who: str) -> str:
@@ -173,8 +195,26 @@ def _drift_words(at: xr.Dataset, names: list[str]) -> str:
         for name in names
         for each in [part.sel(channel=name)]
     )
-    return (
-        f"An offset leads in {listed}. Steady drift grows with the square of the waves, and a "
-        "linear model falls back to its training mean; where the measured SD is small, the same "
-        "offset counts as many SDs."
-    )
+    said = [f"An offset leads in {listed}."]
+    expected = np.abs(part["mean_shift"]) / part["sd_ratio"]
+    off = np.abs(np.log(expected / part["error_offset"])) > np.log(FITS)
+    away = [str(name) for name in part["channel"].values[off.values]]
+    if len(away) < len(names):
+        which = "" if not away else f" in {_listed([n for n in names if n not in away])}"
+        said.append(
+            "A linear model falls back to its training mean, and steady drift grows with the "
+            f"square of the waves: that accounts for the offset{which} within a factor of {FITS:g}."
+        )
+    if away:
+        numbers = ", ".join(
+            f"{float(expected.sel(channel=name)):.1f} in {channel_words(name)}" for name in away
+        )
+        said.append(
+            "Falling back to the training mean would make an offset, in measured SDs, of "
+            f"{numbers}: that does not account for what was found."
+        )
+    return " ".join(said)
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(channel_words(name) for name in names)

@@ -161,12 +161,17 @@ def _test_runs(study: Study, name: str) -> list[str]:
     default = list(study.settings.training.runs) if folds else campaign.test_runs
     names = list(test.runs) or default or campaign.test_runs
     kinds = {n: campaign.settings.runs[n].waves for n in names}
-    chosen = [n for n in names if test.waves is None or kinds[n] == test.waves]
+    chosen = [n for n in names if test.waves in (None, kinds[n] or "irregular")]
     if not chosen:
-        listed = ", ".join(f"{n} ({kind or 'not stated'})" for n, kind in kinds.items()) or "none"
+        listed = (
+            ", ".join(f"{n} ({kind or 'not stated: irregular'})" for n, kind in kinds.items())
+            or "none"
+        )
         raise RequestError(
             f"tests.{name}: no run to test. The runs that test are: {listed}; waves = "
-            f"{test.waves!r}. Name runs = [...], or give runs of the campaign a test span."
+            f"{test.waves!r}. State the waves of a run in the campaign, such as waves = "
+            "'irregular' under [runs.NAME]; or name runs = [...] here, without waves; or give runs "
+            "of the campaign a test span."
         )
     trains = list(study.settings.training.runs) or campaign.training_runs
     if learnt := [n for n in chosen if n in trains and n not in campaign.test_runs and not folds]:

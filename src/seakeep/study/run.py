@@ -68,7 +68,7 @@ def run_study(
     ------
     RequestError
         If settings leave no feasible window, a channel is missing, the folder holds another
-        study, or the cluster cannot be used.
+        study or cannot be written, or the cluster cannot be used.
     DataError
         If a run cannot be read or used.
     StorageError
@@ -85,7 +85,7 @@ def run_study(
     out = Path(out)
     tell = progress or (lambda done, total, what: None)
     cells = CellFolder(out, study.digest)
-    cells.open(study.name)
+    cells.check()
     if (out / RESULT).exists():
         found = read_result(out)
         if found.attrs.get("digest") == study.digest:
@@ -94,6 +94,7 @@ def run_study(
     check_crew(crew)
     plan, runs = make_plan(study, lambda done, total, name: tell(0, 1, f"preparing {name}"))
     warn_of_slow_study(plan, runs)
+    cells.open(study.name)
     units = units_of(plan, study.settings.output.eigenvalues)
     left = [unit for unit in units if not all(cells.has(name) for name in cells_of(plan, unit))]
     _compute_all(plan, runs, cells, units, left, crew, tell)

@@ -106,7 +106,9 @@ class TestSetSettings(Table):
 
     runs: Names = Field(default=(), description="list of runs; left out, the test runs")
     waves: Literal["regular", "irregular"] | None = Field(
-        default=None, description="'regular' or 'irregular': only such runs"
+        default=None,
+        description="'regular' or 'irregular': only such runs; a run whose waves are not stated "
+        "counts as irregular",
     )
     windows: Count | None = Field(
         default=10, description="number of test windows; with placement = 'apart' at most"
@@ -252,6 +254,9 @@ class Study:
         content["campaign"] = self.campaign.digest
         content["files"] = {n: self.campaign.checksum_of(n) for n in self.campaign.runs}
         content["format"] = FORMAT
+        kinds = {run.waves for run in self.campaign.settings.runs.values()}
+        if None in kinds and any(t.waves == "irregular" for t in self.settings.tests.values()):
+            content["waves_not_stated"] = "irregular"
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -37,6 +39,10 @@ RESULT = "study.nc"
 HEADER = "study.json"
 CELLS = "cells"
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+FORBIDDEN = (errno.EACCES, errno.EPERM, errno.EROFS)
+NO_FOLDER = (errno.ENOENT, errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG)
+
 Arrays = dict[str, npt.NDArray[Any]]
 
 
@@ -51,17 +57,40 @@ def versions() -> dict[str, str]:
 
 @contextmanager
 def storing(folder: Path) -> Iterator[None]:
-    """Tell that the results were stopped by the disk, not by the request."""
+    """Tell why results could not be written, and what mends it.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the results.
+
+    Raises
+    ------
+    RequestError
+        If there can be no such folder, or it may not be written to.
+    StorageError
+        If the disk is full or fails.
+    """
     try:
         yield
     except (RequestError, OSError) as error:
         cause = error if isinstance(error, OSError) else error.__cause__
         if not isinstance(cause, OSError):
             raise
+        said = f"results could not be written to {folder}: {cause.strerror or cause}."
+        if cause.errno in FORBIDDEN:
+            raise RequestError(
+                f"{said} Choose a folder that you may write to, or change its permissions; the "
+                "same command goes on with the cells that are there."
+            ) from error
+        if cause.errno in NO_FOLDER:
+            raise RequestError(
+                f"{said} No folder can be made or kept there. Choose another place."
+            ) from error
+        mend = "Free space on the disk" if cause.errno in FULL else "Look after the disk"
         raise StorageError(
-            f"results could not be written to {folder}: {cause.strerror or cause}. All cells that "
-            "were finished are kept. Free space on the disk; the same command then goes on where "
-            "it stopped."
+            f"{said} All cells that were finished are kept. {mend}; the same command then goes on "
+            "where it stopped."
         ) from error
 
 
@@ -80,8 +109,28 @@ class CellFolder:
     folder: Path
     digest: str
 
+    def check(self) -> None:
+        """Find, before the work, that the folder can be written and holds no other study.
+
+        A study that was begun and has no finished cell is none: nothing of it is lost.
+
+        Raises
+        ------
+        RequestError
+            If the folder holds the results of another study, or of other versions, or cannot be
+            made or written.
+        StorageError
+            If the disk fails.
+        """
+        with storing(self.folder):
+            (self.folder / CELLS).mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=self.folder / CELLS).close()
+        header = self.folder / HEADER
+        if header.exists() and self._holds_results():
+            _check_header(self.folder, _read_header(header), self._header())
+
     def open(self, name: str) -> None:
-        """Make the folder, or find that it belongs to this study.
+        """Make the folder this study's, or find that it belongs to it.
 
         Parameters
         ----------
@@ -91,21 +140,20 @@ class CellFolder:
         Raises
         ------
         RequestError
-            If the folder holds the results of another study, or of other versions.
+            As :meth:`check`.
         StorageError
-            If it cannot be made.
+            If the disk is full or fails.
         """
-        header = self.folder / HEADER
-        expected = {"digest": self.digest, "versions": versions()}
-        with storing(self.folder):
-            (self.folder / CELLS).mkdir(parents=True, exist_ok=True)
-        if header.exists():
-            found = _read_header(header)
-            _check_header(self.folder, found, expected)
-            return
-        text = json.dumps({"study": name, **expected}, indent=1)
-        with storing(self.folder), replacing(header) as temporary:
+        self.check()
+        text = json.dumps({"study": name, **self._header()}, indent=1)
+        with storing(self.folder), replacing(self.folder / HEADER) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
+
+    def _header(self) -> dict[str, Any]:
+        return {"digest": self.digest, "versions": versions()}
+
+    def _holds_results(self) -> bool:
+        return (self.folder / RESULT).exists() or any((self.folder / CELLS).glob("*.npz"))
 
     def _path(self, name: str) -> Path:
         return self.folder / CELLS / f"{name}.npz"
