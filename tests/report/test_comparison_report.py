@@ -144,6 +144,40 @@ def test_the_figure_of_an_ensemble_shows_mean_and_band():
     assert box.y1 <= figure.axes[-1].get_tightbbox().y0 + 1  # below the panels, over none
 
 
+def test_labels_of_many_channels_are_whole_and_apart():
+    pytest.importorskip("matplotlib")
+    from seakeep.report.overlay import overlay_figure
+
+    plain = comparison()
+    motions = ("surge", "heave", "pitch", "yaw", "roll")
+    names = [f"{each}{kind}" for each in motions for kind in ("", "_rate", "_acceleration")]
+
+    def wide(data):
+        units = {"heave": "m", "surge": "m"}
+        made = {
+            name: data["heave"].assign_attrs(units=units.get(name.split("_")[0], "rad"))
+            for name in names
+        }
+        return xr.Dataset(made, attrs=data.attrs)
+
+    judged = replace(plain, measured=wide(plain.measured), forecast=wide(plain.forecast))
+    for name in names:
+        judged.forecast[name].attrs["training_std"] = 0.7
+    figure = overlay_figure(judged)
+    figure.draw_without_rendering()
+    labels = [axes.yaxis.label.get_window_extent() for axes in figure.axes]
+    for upper, lower in itertools.pairwise(labels):
+        assert lower.y1 < upper.y0
+    for axes, box in zip(figure.axes, labels, strict=True):
+        assert box.height <= axes.get_window_extent().height  # none reaches beyond its panel
+    assert all(box.x0 >= 0 and box.y0 >= 0 for box in labels)
+    # The legend of the inputs stands over the left end of their own panel.
+    box = figure.axes[-1].get_legend().get_window_extent()
+    panel = figure.axes[-1].get_window_extent()
+    assert abs(box.x0 - panel.x0) < 20  # pixels, of a panel 700 wide
+    assert box.y0 == pytest.approx(panel.y1, abs=12)
+
+
 def test_table_holds_what_can_be_computed_by_hand():
     table = comparison_table([comparison()]).isel(run=0)
     samples = TIME.size

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from seakeep import cli
 from seakeep.campaign import read_campaign
@@ -98,6 +99,43 @@ class TestShipSection:
             assert max(near) >= 0.80, name
 
 
+def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
+    from seakeep.report.quality_sheet import channel_rows, quality_figure
+    from seakeep.signals.quality import FLAGS, LATE, Agreement
+
+    time = np.linspace(0.0, 10.0, 101)
+    heave = 3.0 + np.sin(time)
+    flags = np.zeros(time.size, dtype=np.int16)
+    flags[40:45] = FLAGS["missing"]
+    heave[40:45] = np.nan
+    run = xr.Dataset(
+        {
+            "heave": ("time", heave, {"units": "m"}),
+            "pitch": ("time", np.deg2rad(5.0) * np.sin(time), {"units": "rad"}),
+        },
+        {"time": time, "heave_flags": ("time", flags)},
+    )
+    rows = {row["channel"]: row for row in channel_rows(run)}
+    assert rows["pitch"]["units"] == "deg"
+    assert rows["pitch"]["numbers"][1] == pytest.approx(5.0, rel=2e-3)  # the nearest sample
+    # Windows stand 1 s apart, and two are missing.
+    centre, lags = np.array([1.0, 2.0, 5.0, 6.0]), np.array([0.01, 0.02, 0.01, 0.02])
+    found = Agreement(
+        period=6.0, motion=0.7, step=np.nan, lag=0.015, lag_spread=0.005, growth=0.0,
+        correlation=1.0, at_zero=1.0, gain=1.0, centre=centre, lags=lags,
+    )  # fmt: skip
+    figure = quality_figure(run, {"heave": found})
+    top, pitch, lag = figure.axes
+    assert pitch.get_ylabel().endswith("[deg]")
+    marks = next(line for line in top.lines if line.get_label() == "missing").get_ydata()
+    true = np.interp(time[40:45], time[[39, 45]], heave[[39, 45]])
+    np.testing.assert_allclose(marks, true)
+    line = lag.lines[0]
+    assert list(np.isnan(line.get_ydata())) == [False, False, True, False, False]
+    # The scale follows the harmful lag, a tenth of a period, and not the lags searched, a half.
+    assert lag.get_ylim()[1] == pytest.approx(1.5 * LATE * found.period)
+
+
 def test_prepare_writes_a_page_that_needs_nothing_else(tmp_path, monkeypatch):
     from small_tank import CAMPAIGN as SMALL
     from small_tank import tank_columns, write_csv
@@ -115,6 +153,7 @@ def test_prepare_writes_a_page_that_needs_nothing_else(tmp_path, monkeypatch):
     page = (folder / "quality.html").read_text(encoding="utf-8")
     assert not re.search(r'(src|href)="(?!data:|#)', page)
     assert page.count("<img") == 2
+    assert "<th>span used</th>" in page
     assert "outlier: 1 samples in 1 place(s)" in page
     before = (folder / "first.nc").stat().st_mtime_ns
     assert cli.main(["prepare", str(tmp_path / "campaign.toml"), "--no-sheet"]) == 0

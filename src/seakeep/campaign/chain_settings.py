@@ -146,7 +146,9 @@ class DerivedSettings(Table):
         description="'blend': where both count half, below the waves, Hz or per period",
     )
     offset: Vector | None = Field(
-        default=None, description="'transfer': [x, y, z] from the measured to the wanted point, m"
+        default=None,
+        description="'transfer': [x, y, z] from the measured to the wanted point, m, in the body's "
+        "axes (x downstream, z up)",
     )
     axis: Literal["x", "y", "z"] | None = Field(
         default=None, description="direction of a channel that is not called surge, sway or heave"
@@ -155,7 +157,9 @@ class DerivedSettings(Table):
         default=None, description="'remove_gravity': accelerometers along x, y and z of the body"
     )
     zeroed: bool | None = Field(
-        default=None, description="'remove_gravity': whether readings were set to zero at rest"
+        default=None,
+        description="'remove_gravity': true where readings were set to zero at rest, false where "
+        "the one along z reads +9.81 m/s^2 there",
     )
     unit: str | None = Field(
         default=None, description="unit of the result; needed by expressions for free names"

@@ -23,6 +23,9 @@ ENLARGED = 20
 MOST_STEPS = 150
 """Steps of an envelope that a panel can show; longer records take several periods a step."""
 
+LABEL = 8
+"""Points of a label: the longest line of one fits beside its panel."""
+
 SHADES = ("#56606B", "#56B4E9", "#CC79A7", "#E69F00")
 """Of several inputs."""
 BAND: dict[str, Any] = {"color": COLOURS["ensemble"], "alpha": 0.35, "linewidth": 0.6}
@@ -53,7 +56,7 @@ def _draw(comparison: Comparison) -> Figure:
     rows = len(states) + bool(inputs)
     period = _period_if_long(comparison.measured[states[0]])
     columns = 1 if period is None else 2
-    figure = new_figure(7.5 if columns == 1 else 11.0, 1.0 + 1.35 * rows)
+    figure = new_figure(7.5 if columns == 1 else 11.0, 1.0 + 1.45 * rows)
     axes = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
     table = comparison_table([comparison]).isel(run=0)
     for row, name in enumerate(states):
@@ -61,16 +64,21 @@ def _draw(comparison: Comparison) -> Figure:
             _draw_envelopes(axes[row, 0], comparison, name, period)
         _draw_state(axes[row, -1], comparison, name)
         units = str(comparison.measured[name].attrs.get("units", ""))
-        axes[row, 0].set_ylabel(axis_label(name, units))
+        axes[row, 0].set_ylabel(axis_label(name, units), fontsize=LABEL)
         axes[row, 0].set_title(_judgement(table.sel(channel=name)), loc="right", fontsize=8, pad=2)
     if inputs:
         if period is not None:
             _draw_input_envelopes(axes[-1, 0], comparison.inputs, inputs, period)
         _draw_inputs(axes[-1, -1], comparison.inputs, inputs)
         units = str(comparison.inputs[inputs[0]].attrs.get("units", ""))
-        axes[-1, 0].set_ylabel(f"input\n[{units}]")
-        axes[-1, -1].legend(
-            loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=min(len(inputs), 4), fontsize=7
+        axes[-1, 0].set_ylabel(f"input\n[{units}]", fontsize=LABEL)
+        axes[-1, 0].legend(
+            *axes[-1, -1].get_legend_handles_labels(),
+            loc="lower left",
+            bbox_to_anchor=(0.0, 0.98),
+            borderaxespad=0.0,
+            ncols=min(len(inputs), 4),
+            fontsize=LABEL,
         )
     for column in range(columns):
         axes[-1, column].set_xlabel("time [s]")

@@ -52,8 +52,17 @@ def _flags(run: xr.Dataset, name: str) -> Any:
     return np.zeros(run.sizes["time"], dtype=int)
 
 
+def _shown(units: str) -> tuple[float, str]:
+    """Factor and unit in which a channel is shown: angles in degrees."""
+    if units == "rad" or units.startswith("rad/"):
+        return float(np.rad2deg(1.0)), units.replace("rad", "deg", 1)
+    return 1.0, units
+
+
 def channel_rows(run: xr.Dataset) -> list[dict[str, Any]]:
     """Rows of a run's table: statistics, flagged shares and findings of each channel.
+
+    Angles and their rates are in degrees.
 
     Parameters
     ----------
@@ -70,6 +79,8 @@ def channel_rows(run: xr.Dataset) -> list[dict[str, Any]]:
     for name in map(str, run.data_vars):
         x, flags = run[name].to_numpy(), _flags(run, name)
         some = bool(np.isfinite(x).any())
+        factor, units = _shown(str(run[name].attrs.get("units", "")))
+        x = factor * x
         numbers = [np.nanmin(x), np.nanmax(x), np.nanmean(x), np.nanstd(x, ddof=1)] if some else []
         shares = [
             f"{word} {100 * np.mean((flags & bit) > 0):.2g} %"
@@ -79,7 +90,7 @@ def channel_rows(run: xr.Dataset) -> list[dict[str, Any]]:
         rows.append(
             {
                 "channel": name,
-                "units": str(run[name].attrs.get("units", "")),
+                "units": units,
                 "numbers": [float(each) for each in numbers] or [float("nan")] * 4,
                 "flagged": ", ".join(shares),
                 "repaired": str(run[name].attrs.get("repaired", "")),
@@ -109,41 +120,52 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
     rows = len(names) + len(lagging)
     found = {each.channel for each in findings_of(run)}
     with figure_style():
-        figure = new_figure(9.5, 0.5 + 1.15 * rows)
+        figure = new_figure(9.5, 0.5 + 1.3 * rows)
         axes = figure.subplots(rows, 1, squeeze=False, sharex=True)[:, 0]
         time = run["time"].to_numpy()
         for at, name in zip(axes, names, strict=False):
-            x, flags = run[name].to_numpy(), _flags(run, name)
+            factor, units = _shown(str(run[name].attrs.get("units", "")))
+            x, flags = factor * run[name].to_numpy(), _flags(run, name)
             colour = COLOURS["forecast"] if name in found else COLOURS["measured"]
             at.plot(time, x, color=colour, linewidth=0.6)
             _mark(at, time, x, flags)
-            at.set_ylabel(axis_label(name, str(run[name].attrs.get("units", ""))), fontsize=7)
+            at.set_ylabel(axis_label(name, units), fontsize=8)
             at.margins(x=0.005)
         for at, name in zip(axes[len(names) :], lagging, strict=True):
             each = agreements[name]
             limit = LATE * each.period
             at.axhspan(-limit, limit, color="#009E73", alpha=0.12)
             instants = each.centre + time[0]
-            at.plot(instants, each.lags, "o-", color=COLOURS["ensemble"], markersize=3)
-            at.set_ylim(-0.55 * each.period, 0.55 * each.period)
-            at.set_ylabel(f"lag of\n{name.replace('_', ' ')} [s]", fontsize=7)
+            at.plot(*_broken(instants, each.lags), "o-", color=COLOURS["ensemble"], markersize=3)
+            reach = max(1.5 * limit, 1.1 * float(np.nanmax(np.abs(each.lags), initial=0.0)))
+            at.set_ylim(-reach, reach)
+            at.set_ylabel(f"lag of\n{name.replace('_', ' ')} [s]", fontsize=8)
         axes[-1].set_xlabel("time [s]")
     return figure
 
 
+def _broken(instants: Any, lags: Any) -> tuple[Any, Any]:
+    """Split a line by NaN where windows are missing, so that it does not run across them."""
+    apart = np.diff(instants)
+    holes = 1 + np.flatnonzero(apart > 1.5 * np.median(apart)) if apart.size else apart.astype(int)
+    return np.insert(instants, holes, instants[holes - 1]), np.insert(lags, holes, np.nan)
+
+
 def _mark(at: Any, time: Any, x: Any, flags: Any) -> None:
     seen = False
-    level = np.nanmean(x) if np.isfinite(x).any() else 0.0
+    there = np.isfinite(x)
+    # A sample that is not there stands between its neighbours.
+    filled = np.interp(time, time[there], x[there]) if there.any() else np.zeros_like(time)
     for word, bit in FLAGS.items():
         hit = (flags & bit) > 0
         if hit.any():
             colour, shape = _MARKS[word]
-            height = np.where(np.isfinite(x[hit]), x[hit], level)
             style = {"color": colour, "marker": shape, "markersize": 3.5, "linestyle": "none"}
-            at.plot(time[hit], height, **style, zorder=3, label=word)
+            at.plot(time[hit], filled[hit], **style, zorder=3, label=word)
             seen = True
     if seen:
-        at.legend(loc="upper right", fontsize=6, ncols=6, borderpad=0.1)
+        place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
+        at.legend(**place, fontsize=7, ncols=6, borderpad=0.1)
 
 
 def write_quality_sheet(
@@ -227,8 +249,10 @@ def _page(
         f"<h1>Data quality: {html.escape(title)}</h1>"
         "<p>Checks flag and tell; nothing is repaired unless the campaign asks for it, and what "
         "was repaired is listed. A lag is positive where a sensor is late against the trusted one "
-        "of its group; inside the green band it does no harm.</p>"
-        '<div class="scroll"><table><tr><th>run</th><th>record used</th><th>findings</th>'
+        "of its group; inside the green band it does no harm. Findings count over the whole "
+        "record that was read; the shares flagged, the statistics and the pictures show "
+        "the span used.</p>"
+        '<div class="scroll"><table><tr><th>run</th><th>span used</th><th>findings</th>'
         f"<th>channels</th></tr>{''.join(lines)}</table></div>{''.join(parts)}</body></html>"
     )
 
@@ -249,7 +273,8 @@ def _section(name: str, run: xr.Dataset, picture: bytes) -> str:
         f'<h2 id="{html.escape(name)}">{html.escape(name)}</h2><p>{html.escape(steps_of(run))}</p>'
         + (f"<ul>{items}</ul>" if items else "")
         + '<div class="scroll"><table><tr><th>channel</th><th>unit</th><th>min</th><th>max</th>'
-        "<th>mean</th><th>SD</th><th>flagged</th><th>found, and done about it</th></tr>"
+        "<th>mean</th><th>SD</th><th>flagged in the span</th>"
+        "<th>found in the record, and done about it</th></tr>"
         f'{body}</table></div><img alt="channels of {html.escape(name)}" '
         f'src="data:image/png;base64,{encoded}">'
     )

@@ -129,9 +129,21 @@ def axis_label(name: str, units: str) -> str:
     'pitch rate\n$\\dot{\\theta}$ [rad/s]'
     >>> axis_label("propeller_torque", "N m")
     'propeller torque\n[N m]'
+    >>> axis_label("eta_us_fwd", "m").partition("\n$")[0]
+    'wave elevation\nus fwd'
     """
     channel = canonical_channel(name)
     words = channel.long_name if channel else name.replace("_", " ")
     symbol = f"${channel.symbol}$ " if channel else ""
-    lines = "\n".join(textwrap.wrap(words, WIDEST))
+    lines = "\n".join(_balanced(words))
     return f"{lines}\n{symbol}[{units or '?'}]"
+
+
+def _balanced(words: str) -> list[str]:
+    """Wrap into as few lines as fit, of lengths as equal as they can be."""
+    lines = textwrap.wrap(words, WIDEST)
+    for width in range(1, WIDEST):
+        narrower = textwrap.wrap(words, width, break_long_words=False)
+        if len(narrower) == len(lines) and max(map(len, narrower)) <= WIDEST:
+            return narrower
+    return lines
