@@ -353,3 +353,39 @@ def test_files_that_have_nothing_in_common(tmp_path):
         match=r"first\.csv and .*first\.csv have no column in common\. .* as RUN/LOGGER\.csv or",
     ):
         draft_campaign([tmp_path / "first.csv", moved])
+
+
+def probes(folder, runs):
+    """One logger a run, ``RUN/wave_probes.csv``, with a trigger; what it measures its name says."""
+    for seed, run in enumerate(runs):
+        columns = tank_columns(seed)
+        waves = columns["WP fwd [mm]"]
+        trigger = (columns["Time [s]"] % 5 < 0.1).astype(float)
+        (folder / run).mkdir()
+        yield write_csv(
+            folder / run / "wave_probes.csv",
+            {"time [s]": columns["Time [s]"], "trigger [V]": trigger, "us_fwd [mm]": waves},
+        )
+
+
+def test_one_logger_a_run_keeps_the_names_of_runs_and_logger(tmp_path):
+    runs = ["irregular_1", "irregular_2", "regular_1", "regular_2"]
+    text, campaign = drafted(tmp_path, list(probes(tmp_path, runs)))
+    assert campaign.runs == runs
+    assert list(campaign.settings.channels) == ["eta_us_fwd"]
+    assert "# column 'trigger [V]' left out: pulses of a trigger" in text
+    assert "STATE IT" not in text
+    assert "measured: the mean of the irregular runs (this is that of irregular_1)" in text
+    assert 'states = ["eta_us_fwd"] # CORRECT IT: no motion was found; name the files of' in text
+    assert campaign.training_runs == ["irregular_1"]
+    assert text.count("# guessed: irregular runs but the last train, the rest tests\n") == 4
+
+
+def test_motions_that_are_noise_alone_are_no_states(tmp_path):
+    columns = tank_columns(0, seconds=40.0)
+    noise = np.random.default_rng(0).normal(0.0, 0.1, columns["Time [s]"].size)
+    columns |= {"Roll [deg]": noise, "Yaw [deg]": noise[::-1]}
+    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
+    assert campaign.model().states == ("heave", "pitch")
+    assert "# roll, yaw: noise alone was found; left out." in text
+    assert {"roll", "yaw"} <= set(campaign.settings.channels)

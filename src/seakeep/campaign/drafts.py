@@ -17,7 +17,16 @@ from seakeep.campaign.draft_hints import (
     model_table,
     preparation_table,
 )
-from seakeep.campaign.guesses import File, Guess, arranged, guess_channels, is_trigger, waves_of
+from seakeep.campaign.guesses import (
+    LONG,
+    File,
+    Guess,
+    arranged,
+    guess_channels,
+    is_trigger,
+    noise_of,
+    waves_of,
+)
 from seakeep.campaign.readers import read_columns, time_column
 from seakeep.conventions import canonical_channel, conversion
 from seakeep.errors import DataError, RequestError
@@ -138,13 +147,11 @@ def _wave_period(
     table = next(file.table for file in loggers if file.logger == wave.logger)
     series = table.values[wave.column]
     there = np.isfinite(series)
-    if there.sum() < 64 or not np.ptp(series[there]):
+    if there.sum() < LONG or not np.ptp(series[there]):
         return None, 0.0
     at = np.arange(series.size)
     series = np.interp(at, at[there], series[there])
-    # Second differences of white noise have six times its variance, and know no slope.
-    noise = 1.4826 * float(np.median(np.abs(np.diff(series, 2)))) / np.sqrt(6.0)
-    clear = min(np.ceil(100 * NOISE * noise / float(series.std())) / 100, 0.5)
+    clear = min(np.ceil(100 * NOISE * noise_of(series) / float(series.std())) / 100, 0.5)
     try:
         period = encounter_period(series, 1.0 / rate, clear)
         counted = encounter_period(series, 1.0 / rate)
@@ -290,6 +297,8 @@ def _runs(document: tomlkit.TOMLDocument, files: Sequence[File], folder: Path | 
     loggers = {file.logger for file in files}
     irregular = [name for name in names if waves_of(name) != "regular"]
     order = irregular if len(irregular) > 1 else names
+    which = "irregular runs but the last train, the rest tests"
+    which = which if len(order) < len(names) else "the first runs train, the last one tests"
     for name in names:
         table = tomlkit.table()
         own = {file.logger: _relative(file.path, folder) for file in files if file.run == name}
@@ -306,7 +315,7 @@ def _runs(document: tomlkit.TOMLDocument, files: Sequence[File], folder: Path | 
         else:
             last = name == order[-1] and len(order) > 1
             table.add("role", "test" if last or name not in order else "train")
-            table["role"].comment("guessed: the first runs train, the last one tests")
+            table["role"].comment(f"guessed: {which}" if len(names) > 1 else "the only run")
         table.add(tomlkit.comment("span = [10.0, inf]  # s; cut the start-up of the waves off"))
         if set(own) != {""}:
             table.add("files", _file_table(own))
