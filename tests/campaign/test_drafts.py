@@ -8,6 +8,7 @@ import pytest
 from scipy import io
 from small_tank import tank_columns, write_csv
 
+from seakeep import cli
 from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
@@ -389,3 +390,23 @@ def test_motions_that_are_noise_alone_are_no_states(tmp_path):
     assert campaign.model().states == ("heave", "pitch")
     assert "# roll, yaw: noise alone was found; left out." in text
     assert {"roll", "yaw"} <= set(campaign.settings.channels)
+
+
+def test_init_takes_what_the_message_asks_for(tmp_path, capsys):
+    """A title with blanks, a blank line, tabs, decimal commas, a row of units."""
+    path = tmp_path / "de.txt"
+    rows = [f"{i / 50:.4f}\t{np.sin(i / 9):.4f}".replace(".", ",") for i in range(200)]
+    head = ["Messung Schlepptank BM-7", "", "Zeit\tWelle_1", "s\tcm"]
+    path.write_text("\n".join([*head, *rows, ""]), encoding="utf-8")
+    assert cli.main(["init", str(path)]) == 1
+    assert "give --skip-rows 2 to seakeep init" in " ".join(capsys.readouterr().err.split())
+    out = tmp_path / "campaign.toml"
+    options = ["--skip-rows", "2", "--delimiter", "tab", "--decimal", ","]
+    assert cli.main(["init", str(path), *options, "-o", str(out)]) == 0
+    files = read_campaign(out).settings.files
+    assert (files.skip_rows, files.delimiter, files.decimal) == (2, "\t", ",")
+    run = read_campaign(out).read_run("de")
+    np.testing.assert_allclose(run["welle_1"][:3], np.sin(np.arange(3) / 9) / 100, atol=1e-6)
+    for wrong in (["--delimiter", "x"], ["--decimal", "x"]):
+        assert cli.main(["init", str(path), *wrong]) == 2
+        assert f"{wrong[0]}: received 'x'. Give" in capsys.readouterr().err

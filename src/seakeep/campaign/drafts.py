@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,7 @@ from seakeep.campaign.guesses import (
     waves_of,
 )
 from seakeep.campaign.readers import read_columns, time_column
+from seakeep.campaign.settings import FileSettings
 from seakeep.conventions import canonical_channel, conversion
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import encounter_period
@@ -42,7 +43,11 @@ LED = 0.9
 """Where noise shortens the counted period to less than this part, the draft states a hysteresis."""
 
 
-def draft_campaign(files: Sequence[Path | str], folder: Path | str | None = None) -> str:
+def draft_campaign(
+    files: Sequence[Path | str],
+    folder: Path | str | None = None,
+    options: Mapping[str, object] | None = None,
+) -> str:
     """Draft a campaign file from the files of its runs.
 
     Parameters
@@ -53,6 +58,8 @@ def draft_campaign(files: Sequence[Path | str], folder: Path | str | None = None
     folder : Path or str, optional
         Folder in which the campaign file will lie: paths are written relative to it. The default
         is the working folder.
+    options : mapping of str to object, optional
+        Keys of ``[files]`` that are known, such as ``skip_rows``; the draft states them.
 
     Returns
     -------
@@ -72,7 +79,8 @@ def draft_campaign(files: Sequence[Path | str], folder: Path | str | None = None
             "no file was given. Name the runs' files: seakeep init RUN1.csv RUN2.csv"
         )
     paths = [Path(file) for file in files]
-    tables = [read_columns(path) for path in paths]
+    known = {key: value for key, value in (options or {}).items() if value is not None}
+    tables = [read_columns(path, FileSettings.model_validate(known)) for path in paths]
     read = arranged(paths, tables, [time_column(table) for table in tables])
     guesses = guess_channels(read)
     if not any(guess.channel for guess in guesses):
@@ -84,7 +92,7 @@ def draft_campaign(files: Sequence[Path | str], folder: Path | str | None = None
     document.add(tomlkit.comment("Draft of a campaign. Read every line that says 'guessed', then"))
     document.add(tomlkit.comment("run: seakeep prepare THIS-FILE, and look at the sheet it makes"))
     _general(document, read, period, hysteresis)
-    _files_table(document, read)
+    _files_table(document, read, known)
     _channels(document, guesses)
     names = [guess.channel for guess in guesses if guess.channel]
     document.add(tomlkit.nl())
@@ -207,8 +215,12 @@ def _period_runs(files: Sequence[File]) -> str:
     return "the irregular runs" if irregular else "all runs"
 
 
-def _files_table(document: tomlkit.TOMLDocument, files: Sequence[File]) -> None:
+def _files_table(
+    document: tomlkit.TOMLDocument, files: Sequence[File], known: Mapping[str, object]
+) -> None:
     table = tomlkit.table()
+    for key, value in known.items():
+        table.add(key, value)
     times = {file.time for file in files}
     if len(times) == 1 and (time := files[0].time) is not None:
         table.add("time", time)
