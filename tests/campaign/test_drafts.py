@@ -8,6 +8,7 @@ import pytest
 from scipy import io
 from small_tank import tank_columns, write_csv
 
+from seakeep import cli
 from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
@@ -353,3 +354,59 @@ def test_files_that_have_nothing_in_common(tmp_path):
         match=r"first\.csv and .*first\.csv have no column in common\. .* as RUN/LOGGER\.csv or",
     ):
         draft_campaign([tmp_path / "first.csv", moved])
+
+
+def probes(folder, runs):
+    """One logger a run, ``RUN/wave_probes.csv``, with a trigger; what it measures its name says."""
+    for seed, run in enumerate(runs):
+        columns = tank_columns(seed)
+        waves = columns["WP fwd [mm]"]
+        trigger = (columns["Time [s]"] % 5 < 0.1).astype(float)
+        (folder / run).mkdir()
+        yield write_csv(
+            folder / run / "wave_probes.csv",
+            {"time [s]": columns["Time [s]"], "trigger [V]": trigger, "us_fwd [mm]": waves},
+        )
+
+
+def test_one_logger_a_run_keeps_the_names_of_runs_and_logger(tmp_path):
+    runs = ["irregular_1", "irregular_2", "regular_1", "regular_2"]
+    text, campaign = drafted(tmp_path, list(probes(tmp_path, runs)))
+    assert campaign.runs == runs
+    assert list(campaign.settings.channels) == ["eta_us_fwd"]
+    assert "# column 'trigger [V]' left out: pulses of a trigger" in text
+    assert "STATE IT" not in text
+    assert "measured: the mean of the irregular runs (this is that of irregular_1)" in text
+    assert 'states = ["eta_us_fwd"] # CORRECT IT: no motion was found; name the files of' in text
+    assert campaign.training_runs == ["irregular_1"]
+    assert text.count("# guessed: irregular runs but the last train, the rest tests\n") == 4
+
+
+def test_motions_that_are_noise_alone_are_no_states(tmp_path):
+    columns = tank_columns(0, seconds=40.0)
+    noise = np.random.default_rng(0).normal(0.0, 0.1, columns["Time [s]"].size)
+    columns |= {"Roll [deg]": noise, "Yaw [deg]": noise[::-1]}
+    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
+    assert campaign.model().states == ("heave", "pitch")
+    assert "# roll, yaw: noise alone was found; left out." in text
+    assert {"roll", "yaw"} <= set(campaign.settings.channels)
+
+
+def test_init_takes_what_the_message_asks_for(tmp_path, capsys):
+    """A title with blanks, a blank line, tabs, decimal commas, a row of units."""
+    path = tmp_path / "de.txt"
+    rows = [f"{i / 50:.4f}\t{np.sin(i / 9):.4f}".replace(".", ",") for i in range(200)]
+    head = ["Messung Schlepptank BM-7", "", "Zeit\tWelle_1", "s\tcm"]
+    path.write_text("\n".join([*head, *rows, ""]), encoding="utf-8")
+    assert cli.main(["init", str(path)]) == 1
+    assert "give --skip-rows 2 to seakeep init" in " ".join(capsys.readouterr().err.split())
+    out = tmp_path / "campaign.toml"
+    options = ["--skip-rows", "2", "--delimiter", "tab", "--decimal", ","]
+    assert cli.main(["init", str(path), *options, "-o", str(out)]) == 0
+    files = read_campaign(out).settings.files
+    assert (files.skip_rows, files.delimiter, files.decimal) == (2, "\t", ",")
+    run = read_campaign(out).read_run("de")
+    np.testing.assert_allclose(run["welle_1"][:3], np.sin(np.arange(3) / 9) / 100, atol=1e-6)
+    for wrong in (["--delimiter", "x"], ["--decimal", "x"]):
+        assert cli.main(["init", str(path), *wrong]) == 2
+        assert f"{wrong[0]}: received 'x'. Give" in capsys.readouterr().err

@@ -234,7 +234,23 @@ def test_round_trip(tmp_path, values, delimiter, comma, units, compressed, newli
         (
             "Basin 2\nBy: us\ntime,heave\n0,1\n1,2\n",
             DataError,
-            r"line 3: 1 cells where the header has 2 .* skip_rows where words stand above the head",
+            r"line 3: 1 cells where the header has 2 .* every line has 2 cells divided by commas: ",
+        ),
+        (
+            "Basin 2, my run\n\nt\theave\npitch\n",
+            DataError,
+            r"skip_rows where words stand above the header; seakeep init takes them as --delimit",
+        ),
+        (
+            "Basin 2 A\n\nt\theave\n0,0\t1,5\n0,1\t1,6\n",
+            DataError,
+            r"line 3: .* From line 3 on, every line has 2 cells divided by tabs: state skip_rows ="
+            r" 2 in \[files\] of the campaign, or give --skip-rows 2 to seakeep init",
+        ),
+        (
+            "t,heave\n0,0,1,5\n0,1,1,6\n",
+            DataError,
+            r"4 cells where the header has 2 .* decimal commas in a file divided by",
         ),
         (
             "time,0,0.1,0.2\nheave,1,2,3\n",

@@ -133,7 +133,9 @@ class DerivedSettings(Table):
         description="[low, high] in Hz, or ['0.3 /T', '8 /T'], kept by 'integrate' and 'band_pass'",
     )
     passband: Frequency | None = Field(
-        default=None, description="edge of the pass band, Hz, or per period such as '16 /T'"
+        default=None,
+        description="edge of the pass band, Hz, or per period such as '16 /T' (not on "
+        "the channel on which the period is counted)",
     )
     stopband: Frequency | None = Field(
         default=None, description="edge of the stop band, Hz or per period"

@@ -64,7 +64,8 @@ def derived_examples(names: Sequence[str], period: float | None, rate: float) ->
 def _band(period: float | None, rate: float) -> str:
     if period is None:
         return f"[0.4, {min(5.0, 0.4 * rate):.3g}]  # Hz"
-    return f'["0.3 /T", "{min(8.0, 0.4 * rate * period):.2g} /T"]  # around the waves, T a period'
+    edges = f'["0.3 /T", "{min(8.0, 0.4 * rate * period):.2g} /T"]'
+    return f"{edges}  # around the waves, T a period; in Hz if T is counted on it"
 
 
 def preparation_table(
@@ -148,7 +149,12 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
         The table.
     """
     names = [str(guess.channel) for guess in guesses if guess.channel]
-    whole = [str(guess.channel) for guess in guesses if guess.channel and not guess.gaps]
+    noise = [str(guess.channel) for guess in guesses if guess.channel and guess.noise]
+    whole = [
+        str(guess.channel)
+        for guess in guesses
+        if guess.channel and not guess.gaps and not guess.noise
+    ]
     waves = _waves(guesses, whole=True) or _waves(guesses)
     kinds = [MOTIONS, [f"{m}_rate" for m in MOTIONS], [f"{m}_acceleration" for m in MOTIONS]]
     moved = [[name for name in whole if name in kind] for kind in kinds]
@@ -158,7 +164,14 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
     model = tomlkit.table()
     model.add("preset", "recommended")
     model.add("states", list(states))
-    model["states"].comment("guessed: the motions that the model forecasts")
+    motions = any(moved)
+    model["states"].comment(
+        "guessed: the motions that the model forecasts"
+        if motions
+        else "CORRECT IT: no motion was found; name the files of all loggers to init"
+    )
+    if left := [name for name in noise if any(name in kind for kind in kinds)]:
+        model.add(tomlkit.comment(f"{', '.join(left)}: noise alone was found; left out."))
     if loads:
         for line in (
             f"Loads ({', '.join(loads)}) may be added to the states to have them forecast too.",

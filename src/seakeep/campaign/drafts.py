@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +17,18 @@ from seakeep.campaign.draft_hints import (
     model_table,
     preparation_table,
 )
-from seakeep.campaign.guesses import File, Guess, arranged, guess_channels, is_trigger, waves_of
+from seakeep.campaign.guesses import (
+    LONG,
+    File,
+    Guess,
+    arranged,
+    guess_channels,
+    is_trigger,
+    noise_of,
+    waves_of,
+)
 from seakeep.campaign.readers import read_columns, time_column
+from seakeep.campaign.settings import FileSettings
 from seakeep.conventions import canonical_channel, conversion
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import encounter_period
@@ -33,7 +43,11 @@ LED = 0.9
 """Where noise shortens the counted period to less than this part, the draft states a hysteresis."""
 
 
-def draft_campaign(files: Sequence[Path | str], folder: Path | str | None = None) -> str:
+def draft_campaign(
+    files: Sequence[Path | str],
+    folder: Path | str | None = None,
+    options: Mapping[str, object] | None = None,
+) -> str:
     """Draft a campaign file from the files of its runs.
 
     Parameters
@@ -44,6 +58,8 @@ def draft_campaign(files: Sequence[Path | str], folder: Path | str | None = None
     folder : Path or str, optional
         Folder in which the campaign file will lie: paths are written relative to it. The default
         is the working folder.
+    options : mapping of str to object, optional
+        Keys of ``[files]`` that are known, such as ``skip_rows``; the draft states them.
 
     Returns
     -------
@@ -63,7 +79,8 @@ def draft_campaign(files: Sequence[Path | str], folder: Path | str | None = None
             "no file was given. Name the runs' files: seakeep init RUN1.csv RUN2.csv"
         )
     paths = [Path(file) for file in files]
-    tables = [read_columns(path) for path in paths]
+    known = {key: value for key, value in (options or {}).items() if value is not None}
+    tables = [read_columns(path, FileSettings.model_validate(known)) for path in paths]
     read = arranged(paths, tables, [time_column(table) for table in tables])
     guesses = guess_channels(read)
     if not any(guess.channel for guess in guesses):
@@ -75,7 +92,7 @@ def draft_campaign(files: Sequence[Path | str], folder: Path | str | None = None
     document.add(tomlkit.comment("Draft of a campaign. Read every line that says 'guessed', then"))
     document.add(tomlkit.comment("run: seakeep prepare THIS-FILE, and look at the sheet it makes"))
     _general(document, read, period, hysteresis)
-    _files_table(document, read)
+    _files_table(document, read, known)
     _channels(document, guesses)
     names = [guess.channel for guess in guesses if guess.channel]
     document.add(tomlkit.nl())
@@ -138,13 +155,11 @@ def _wave_period(
     table = next(file.table for file in loggers if file.logger == wave.logger)
     series = table.values[wave.column]
     there = np.isfinite(series)
-    if there.sum() < 64 or not np.ptp(series[there]):
+    if there.sum() < LONG or not np.ptp(series[there]):
         return None, 0.0
     at = np.arange(series.size)
     series = np.interp(at, at[there], series[there])
-    # Second differences of white noise have six times its variance, and know no slope.
-    noise = 1.4826 * float(np.median(np.abs(np.diff(series, 2)))) / np.sqrt(6.0)
-    clear = min(np.ceil(100 * NOISE * noise / float(series.std())) / 100, 0.5)
+    clear = min(np.ceil(100 * NOISE * noise_of(series) / float(series.std())) / 100, 0.5)
     try:
         period = encounter_period(series, 1.0 / rate, clear)
         counted = encounter_period(series, 1.0 / rate)
@@ -200,8 +215,12 @@ def _period_runs(files: Sequence[File]) -> str:
     return "the irregular runs" if irregular else "all runs"
 
 
-def _files_table(document: tomlkit.TOMLDocument, files: Sequence[File]) -> None:
+def _files_table(
+    document: tomlkit.TOMLDocument, files: Sequence[File], known: Mapping[str, object]
+) -> None:
     table = tomlkit.table()
+    for key, value in known.items():
+        table.add(key, value)
     times = {file.time for file in files}
     if len(times) == 1 and (time := files[0].time) is not None:
         table.add("time", time)
@@ -290,6 +309,8 @@ def _runs(document: tomlkit.TOMLDocument, files: Sequence[File], folder: Path | 
     loggers = {file.logger for file in files}
     irregular = [name for name in names if waves_of(name) != "regular"]
     order = irregular if len(irregular) > 1 else names
+    which = "irregular runs but the last train, the rest tests"
+    which = which if len(order) < len(names) else "the first runs train, the last one tests"
     for name in names:
         table = tomlkit.table()
         own = {file.logger: _relative(file.path, folder) for file in files if file.run == name}
@@ -306,7 +327,7 @@ def _runs(document: tomlkit.TOMLDocument, files: Sequence[File], folder: Path | 
         else:
             last = name == order[-1] and len(order) > 1
             table.add("role", "test" if last or name not in order else "train")
-            table["role"].comment("guessed: the first runs train, the last one tests")
+            table["role"].comment(f"guessed: {which}" if len(names) > 1 else "the only run")
         table.add(tomlkit.comment("span = [10.0, inf]  # s; cut the start-up of the waves off"))
         if set(own) != {""}:
             table.add("files", _file_table(own))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from seakeep.campaign.columns import Columns, is_unit
 from seakeep.conventions import canonical_channel, si_unit
@@ -20,10 +21,13 @@ __all__ = [
     "guess_channels",
     "is_acceleration",
     "is_trigger",
+    "noise_of",
     "suggest_channel",
     "waves_of",
     "words_of",
 ]
+
+FloatArray = npt.NDArray[np.float64]
 
 # What a column may be called, in the words of tanks in several countries: whole words, lower case.
 _WORDS = {
@@ -51,6 +55,8 @@ _SIDE = {"sb": "starboard", "stb": "starboard", "starboard": "starboard", "ps": 
 _TRIGGER = {"trigger", "trig", "sync", "synch", "ttl", "lamp", "led"}
 _REGULAR = {"regular", "reg", "monochromatic"}
 _IRREGULAR = {"irregular", "irreg", "irr", "random", "jonswap", "bretschneider", "spectrum"}
+LONG = 64
+"""Samples that a column must have for its waves or its noise to be judged."""
 USABLE = 0.9
 """Part of a column that must be numbers for it to become a channel with gaps."""
 
@@ -68,7 +74,7 @@ class File:
 
 @dataclass(frozen=True)
 class Guess:
-    """What a column may be; `channel` is None where nothing fits."""
+    """What a column may be; `channel` is None where nothing fits, `noise` where nothing moves."""
 
     column: str
     header: str
@@ -78,6 +84,7 @@ class Guess:
     why: str = ""
     assumed_unit: bool = False
     gaps: bool = False
+    noise: bool = False
 
 
 def is_trigger(column: str) -> bool:
@@ -135,7 +142,8 @@ def arranged(
     """Find out which file belongs to which run and logger.
 
     Files are of several loggers where those of one run have different columns, and those of one
-    logger the same: ``RUN/LOGGER.csv`` or ``RUN_LOGGER.csv``. Otherwise each file is a run.
+    logger the same: ``RUN/LOGGER.csv`` or ``RUN_LOGGER.csv``. Otherwise each file is a run, called
+    as its folder where the files are called alike.
     """
     own = [
         {n for n in table.names if n != time and not is_trigger(n)}
@@ -145,7 +153,11 @@ def arranged(
         if _fits(keys, own):
             break
     else:
-        keys = [(name, "") for name in _numbered([_stem(path) for path in paths])]
+        stems = [_stem(path) for path in paths]
+        folders = [_by_folder(path)[0] for path in paths]
+        if len(set(stems)) == 1 and len(set(folders)) > 1:
+            stems = folders
+        keys = [(name, "") for name in _numbered(stems)]
     return [
         File(path, run, logger, table, time)
         for path, (run, logger), table, time in zip(paths, keys, tables, times, strict=True)
@@ -183,6 +195,10 @@ def guess_channels(files: Sequence[File]) -> list[Guess]:
         for column in first.table.names:
             if column == first.time or (first.logger and is_trigger(column)):
                 continue
+            if is_trigger(column):
+                header = first.table.headers.get(column, column)
+                found.append(Guess(column, header, None, None, why="pulses of a trigger"))
+                continue
             found.append(_guess(column, same, taken))
     order = list(dict.fromkeys(file.logger for file in files))
     return sorted(found, key=lambda guess: order.index(guess.logger))
@@ -194,7 +210,8 @@ def _guess(column: str, files: Sequence[File], taken: set[str]) -> Guess:
     why, gaps = _fault(column, files)
     if unit is not None and not is_unit(unit):
         why = why or f"its unit '{unit}' is not known; state unit = '…'"
-    channel = None if why else suggest_channel(column, unit, logger)
+    # One file a run may be that of one logger, whose name tells what it measured.
+    channel = None if why else suggest_channel(column, unit, logger or _stem(files[0].path))
     if channel is not None:
         stem, count = channel, 2
         while channel in taken:
@@ -203,7 +220,24 @@ def _guess(column: str, files: Sequence[File], taken: set[str]) -> Guess:
     assumed = unit is None
     canonical = canonical_channel(channel) if channel else None
     unit = unit if unit is not None else (canonical.units if canonical else "-")
-    return Guess(column, header, unit, channel, logger, why, assumed, gaps)
+    noise = not why and all(_is_noise(file.table.values[column]) for file in files)
+    return Guess(column, header, unit, channel, logger, why, assumed, gaps, noise)
+
+
+def _is_noise(series: FloatArray) -> bool:
+    """Whether most of a column's variance has no memory from one sample to the next."""
+    series = series[np.isfinite(series)]
+    if series.size < LONG:
+        return False
+    return bool(noise_of(series) > np.sqrt(0.5) * float(series.std()) > 0)
+
+
+def noise_of(series: FloatArray) -> float:
+    """Standard deviation of a series' white noise, by its second differences.
+
+    Those of white noise have six times its variance, and know no slope.
+    """
+    return 1.4826 * float(np.median(np.abs(np.diff(series, 2)))) / float(np.sqrt(6.0))
 
 
 def _fault(column: str, files: Sequence[File]) -> tuple[str, bool]:

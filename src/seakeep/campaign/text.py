@@ -60,7 +60,7 @@ def read_text(path: Path, options: FileSettings) -> Columns:
     # Not splitlines: it would break lines at form feeds and other marks inside a cell.
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     layout = _layout(path, lines if lines[-1] else lines[:-1], options)
-    _check_widths(path, layout)
+    _check_widths(path, layout, lines)
     if lines[-1]:
         _warn_of_a_short_end(path, layout)
     names, units = unique_names(layout.headers)
@@ -262,7 +262,7 @@ def _units(cells: list[str], headers: list[str]) -> list[str] | None:
     return stripped
 
 
-def _check_widths(path: Path, layout: _Layout) -> None:
+def _check_widths(path: Path, layout: _Layout, lines: list[str]) -> None:
     wanted, mark = len(layout.headers), layout.delimiter
     if mark == " ":
         counts = [len(line.split()) for _, line in layout.body]
@@ -283,9 +283,36 @@ def _check_widths(path: Path, layout: _Layout) -> None:
         + (
             "It is the last line: the file was cut off. Export it again, or remove the line."
             if last
-            else "Mend the lines, or state in [files]: delimiter, decimal, or skip_rows where "
-            "words stand above the header."
+            else _widths_mend(wanted, counts, mark, lines)
         )
+    )
+
+
+HEAD = 40
+"""Lines that may stand above a header."""
+
+
+def _widths_mend(wanted: int, counts: list[int], mark: str, lines: list[str]) -> str:
+    """What to do about lines of another width, with what the file itself tells."""
+    if mark == "," and all(count in (2 * wanted, 2 * wanted - 1) for count in counts):
+        return (
+            "This looks like decimal commas in a file divided by commas, which cannot be told "
+            "apart: export it with decimal points, or divided by semicolons or tabs."
+        )
+    rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
+    for name, each in (("tabs", "\t"), ("semicolons", ";"), ("commas", ",")):
+        widths = [line.count(each) + 1 for _, line in rows]
+        first = next((i for i in range(min(HEAD, len(rows))) if len(set(widths[i:])) == 1), 0)
+        if first and widths[-1] > 1 and len(rows) - first > 2:
+            above = rows[first][0] - 1
+            return (
+                f"From line {above + 1} on, every line has {widths[-1]} cells divided by {name}: "
+                f"state skip_rows = {above} in [files] of the campaign, or give --skip-rows "
+                f"{above} to seakeep init."
+            )
+    return (
+        "Mend the lines, or state in [files]: delimiter, decimal, or skip_rows where words stand "
+        "above the header; seakeep init takes them as --delimiter, --decimal and --skip-rows."
     )
 
 

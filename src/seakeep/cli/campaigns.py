@@ -35,6 +35,15 @@ def init(
         typer.Option("-o", "--out", help="File to write; by default standard output."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    skip_rows: Annotated[
+        int | None, typer.Option("--skip-rows", min=0, help="Lines above the header to leave out.")
+    ] = None,
+    delimiter: Annotated[
+        str | None, typer.Option("--delimiter", help="',' or ';' or 'tab' or 'blank'.")
+    ] = None,
+    decimal: Annotated[
+        str | None, typer.Option("--decimal", help="Mark of decimals, '.' or ','.")
+    ] = None,
 ) -> None:
     """Draft a campaign file from the headers of measured files.
 
@@ -43,7 +52,7 @@ def init(
     Example: seakeep init docs/tutorial/run1.csv docs/tutorial/run2.csv -o campaign.toml
     """
     folder = Path() if out is None else out.parent
-    text = draft_campaign(files, folder)
+    text = draft_campaign(files, folder, _file_options(skip_rows, delimiter, decimal))
     if out is None:
         typer.echo(text, nl=False)
         return
@@ -52,6 +61,19 @@ def init(
     with replacing(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     messages().print(f"Wrote {out}. Read it, then: seakeep prepare {out}")
+
+
+def _file_options(
+    skip_rows: int | None, delimiter: str | None, decimal: str | None
+) -> dict[str, object]:
+    marks = {None: None, ",": ",", ";": ";", "tab": "\t", "\t": "\t", "blank": " ", " ": " "}
+    if delimiter not in marks:
+        raise RequestError(
+            f"--delimiter: received '{delimiter}'. Give ',' or ';' or 'tab' or 'blank'."
+        )
+    if decimal not in (None, ".", ","):
+        raise RequestError(f"--decimal: received '{decimal}'. Give '.' or ','.")
+    return {"skip_rows": skip_rows, "delimiter": marks[delimiter], "decimal": decimal}
 
 
 def prepare(

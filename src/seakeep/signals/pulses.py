@@ -86,7 +86,9 @@ def find_pulses(trigger: FloatArray, time: FloatArray, name: str = "the trigger"
     if not rising.size or top < 6 * noise or top <= 0:
         raise DataError(
             f"{name} has no pulses that stand out of its noise (largest value {top:g} above the "
-            f"median, noise {noise:g}). Check the column, or synchronise by another signal."
+            f"median, noise {noise:g}). Check the column that trigger names in [instruments.NAME]; "
+            "or synchronise by another signal: state in its place shared (one signal both record), "
+            "correlated (two that go together) or offset (s)."
         )
     half = 0.5 * top
 
