@@ -4,20 +4,24 @@ import base64
 import csv
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from seakeep.errors import RequestError
-from seakeep.report.interactive import pack
+from seakeep.report.deviations import test_overlap as overlap_of_tests
+from seakeep.report.glossary import few_cells, plain_symbol
+from seakeep.report.interactive import dashes, pack
 from seakeep.report.published import PUBLISHED
 from seakeep.report.study_tables import latex_text
+from seakeep.report.style import LINES
 from seakeep.study import read_result, read_study, run_study
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
-from seakeep.report.figures.boxes import draw_box_violin
+from seakeep.report.figures.boxes import FEWEST, draw_box_violin
 from seakeep.report.page import write_report
 
 TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
@@ -139,6 +143,43 @@ def test_the_deviations_name_what_is_in_effect(page):
     assert " T̂ of " in rows["training windows"]
 
 
+def test_words_and_symbols_are_said_once(page):
+    text = page.read_text("utf-8")
+    assert text.count("Words and symbols") == 1
+    for term in ("cell", "T̂", "NAMMAE", "HDMDc, BHDMDc", "EV, U"):
+        assert f"<dt>{term}</dt>" in text
+    assert "θ pitch; z\u0307 heave rate" in text
+    assert plain_symbol("pitch_acceleration") == "θ\u0308"
+    assert plain_symbol("eta_fwd") == "η_fwd"
+
+
+def test_few_cells_are_told_and_drawn_without_a_density(page):
+    from matplotlib.figure import Figure
+
+    result = read_result(page.parent)
+    count = int(result.tests["unseen"]["judged"].sum())
+    assert count < FEWEST
+    assert f": n = {count})" in few_cells(result)
+    assert "Few cells (a &amp; b" in page.read_text("utf-8")
+    for size, violins in ((FEWEST - 1, 0), (FEWEST, 1)):
+        axes = Figure().subplots()
+        draw_box_violin(axes, np.arange(float(size)), 0.0, 1.0, "black")
+        bodies = [each for each in axes.collections if each.get_alpha() == 0.18]
+        assert len(bodies) == violins
+
+
+def test_test_windows_that_overlap_are_told(page):
+    result = read_result(page.parent)
+    length = float(result.tests["unseen"]["time"].values[-1])
+    start = result.tests["unseen"]["start"]
+    for apart, words in ((1.5 * length, ""), (0.5 * length, " 67 %")):
+        starts = start.copy(data=apart * np.arange(start.size))
+        moved = result.tests["unseen"].assign(start=starts)
+        other = replace(result, groups={**result.groups, "tests/unseen": moved})
+        # Three windows each half over the next: shares of 1/2, 1 and 1/2.
+        assert (words in overlap_of_tests(other)) if words else overlap_of_tests(other) == ""
+
+
 def test_letters_that_latex_reads_otherwise():
     assert latex_text("50 % of a_b & λ") == r"50 \% of a\_b \& $\lambda$"
 
@@ -150,6 +191,13 @@ def test_packing_loses_a_step_of_the_range_at_most():
     step = (packed["high"] - packed["low"]) / 65534
     found = np.where(codes == 65535, np.nan, packed["low"] + step * codes)
     np.testing.assert_allclose(found, values, rtol=0, atol=0.5 * step)
+
+
+def test_the_interactive_lines_have_the_dashes_of_the_figures():
+    import matplotlib as mpl
+
+    assert dashes(LINES["ensemble"]["linestyle"]) == mpl.rcParamsDefault["lines.dashdot_pattern"]
+    assert dashes(LINES["forecast"]["linestyle"]) == list(LINES["forecast"]["linestyle"][1])
 
 
 def test_boxes_and_whiskers_are_matplotlibs():
@@ -246,6 +294,9 @@ def test_the_time_histories_zoom_choose_and_show_members(opened):
     assert "members" not in state(opened, "drawn")
     opened.find_element("css selector", "#history-show input[value=members]").click()
     assert "members" in state(opened, "drawn")
+    assert state(opened, "legend").split(", ") == [
+        "Bayesian members", "Bayesian band", "measured", "deterministic", "Bayesian mean"
+    ]  # fmt: skip
     ActionChains(opened).move_to_element(canvas).perform()
     assert "measured" in opened.find_element("id", "history-readout").text
     assert opened.get_log("browser") == []

@@ -14,7 +14,7 @@ from seakeep.report.study_tables import ReportTable
 from seakeep.study import StudyResult
 from seakeep.study.windows import windows_overlap
 
-__all__ = ["alignment_words", "deviations", "prior_words", "training_overlap"]
+__all__ = ["alignment_words", "deviations", "prior_words", "test_overlap", "training_overlap"]
 
 APART = 0.005
 """Windows that share less than this part of their length are apart."""
@@ -39,16 +39,46 @@ def training_overlap(result: StudyResult) -> str:
     count, length, span, share = found
     room = (
         f"A training window must hold the largest draw with its delay history, {length:.1f} T̂ of "
-        f"the {span:.0f} T̂ of a training span"
+        f"the {span:.0f} T̂ of the longest training span"
     )
     if count == 1:
         return f"{room}; there is one."
     if share < APART:
-        return f"{room}; the {count} windows do not overlap."
+        runs = len(set(result.groups["training"]["run"].values.tolist()))
+        where = f", which lie in {runs} runs," if runs > 1 else ""
+        return f"{room}; the {count} windows{where} do not overlap."
     return (
         f"{room}: so the {count} windows share {100 * share:.0f} % of their length with one "
         "another. They are not independent, and the boxes show the spread over test windows more "
         "than that over training data."
+    )
+
+
+def test_overlap(result: StudyResult) -> str:
+    """Sentence on test windows that overlap.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    str
+        Empty where no two do.
+    """
+    said = []
+    for test, data in result.tests.items():
+        length = float(data["time"].values[-1])
+        pairs = zip(data["run"].values, data["start"].values, strict=True)
+        share = windows_overlap([(str(run), float(s), float(s) + length) for run, s in pairs])
+        if share >= APART:
+            said.append(f"{result.label_of(test)} {100 * share:.0f} %")
+    if not said:
+        return ""
+    return (
+        f"Test windows overlap; the mean part of one that others cover too: {', '.join(said)}. "
+        "Errors over them are not independent."
     )
 
 
@@ -179,8 +209,8 @@ def _study_rows(result: StudyResult) -> Rows:
             shared = "one"
         overlap = [
             ("training windows", "ten, drawn at random, which cannot but overlap",
-             f"{count}, placed {_placed(training['placement'])}; {length:.1f} T̂ of {span:.0f} T̂ "
-             f"each; {shared}"),
+             f"{count}, placed {_placed(training['placement'])}; the largest draw reads "
+             f"{length:.1f} T̂ of a span of {span:.0f} T̂; {shared}"),
         ]  # fmt: skip
     placements = {each["placement"] for each in result.settings["tests"].values()}
     return [

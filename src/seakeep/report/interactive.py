@@ -10,17 +10,19 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.conventions import canonical_channel, conversion
-from seakeep.report.figures.common import model_colour, model_words
+from seakeep.report.figures.common import line_of, model_colour, model_words
 from seakeep.report.figures.histories import shown_cells
 from seakeep.study import StudyResult
 
-__all__ = ["history_data", "pack"]
+__all__ = ["DASH_DOT", "dashes", "history_data", "pack"]
 
 FloatArray = npt.NDArray[np.float64]
 
 MOST_MEMBERS = 40
 """Members of a cell that are embedded; more cannot be told apart on a screen."""
 MISSING = 65535
+DASH_DOT = (6.4, 1.6, 1.0, 1.6)
+"""Matplotlib's pattern of ``-.``, in line widths."""
 
 
 def pack(values: npt.ArrayLike) -> dict[str, Any]:
@@ -49,6 +51,19 @@ def pack(values: npt.ArrayLike) -> dict[str, Any]:
     codes = np.full(x.size, MISSING, dtype="<u2")
     codes[known] = np.rint((x[known] - low) / step).astype("<u2")
     return {"low": low, "high": high, "data": base64.b64encode(codes.tobytes()).decode()}
+
+
+def dashes(style: str | tuple[int, tuple[float, ...]]) -> list[float]:
+    """Dashes and gaps of a line style of matplotlib, in line widths.
+
+    Examples
+    --------
+    >>> dashes("-"), dashes((0, (4, 1.5)))
+    ([], [4, 1.5])
+    """
+    if isinstance(style, str):
+        return {"-": [], "-.": list(DASH_DOT)}[style]
+    return list(style[1])
 
 
 def history_data(result: StudyResult) -> str:
@@ -104,7 +119,7 @@ def _channel(
             "name": model,
             "label": f"{model_words(model)} mean" if ensemble else model_words(model),
             "colour": model_colour(result, model),
-            "dash": [] if ensemble else [5, 3],
+            "dash": dashes(line_of(result, model)["linestyle"]),
             "mean": pack(factor * cell[f"{model}_mean"].values[:, column]),
         }
         if ensemble:

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 
 from seakeep.campaign.prepare import Progress
 from seakeep.files import replacing
-from seakeep.report.deviations import deviations, training_overlap
+from seakeep.report.deviations import deviations, test_overlap, training_overlap
 from seakeep.report.figures import ReportFigure, report_figures
+from seakeep.report.glossary import few_cells, glossary
 from seakeep.report.interactive import history_data
 from seakeep.report.regular import response_table, response_words
 from seakeep.report.study_tables import (
@@ -292,7 +293,7 @@ def _section(
     if key == "regular":
         parts.append(_paragraphs(response_words(result)))
     if key == "settings":
-        parts.append(_paragraphs([training_overlap(result)]))
+        parts.append(_paragraphs([training_overlap(result), test_overlap(result)]))
     figures = [(each.raster, _figure(each, drawing)) for each, drawing in drawn.get(key, [])]
     parts += [text for raster, text in figures if not raster]
     parts += [_table(table) for table in tables.get(key, [])]
@@ -307,14 +308,30 @@ def _paragraphs(texts: Sequence[str], kind: str = "") -> str:
 
 def _summary(result: StudyResult) -> str:
     items = "".join(f"<li>{html.escape(text)}</li>" for text in findings(result))
-    notices = [str(result.attrs.get("preparation_note", "")), training_overlap(result)]
+    notices = [
+        str(result.attrs.get("preparation_note", "")),
+        few_cells(result),
+        training_overlap(result),
+        test_overlap(result),
+    ]
     conditional = str(result.attrs.get("conditional_on", ""))
     if conditional:
         notices.append(
             f"Every number here is conditional on measured {conditional}: the alignment of the "
             "waves reads it after the start of a forecast. It is no forecast in the strict sense."
         )
-    return f"<ul>{items}</ul>\n" + _paragraphs(notices, "notice")
+    return f"<ul>{items}</ul>\n" + _paragraphs(notices, "notice") + _glossary(result)
+
+
+def _glossary(result: StudyResult) -> str:
+    terms = "".join(
+        f"<dt>{html.escape(term)}</dt><dd>{html.escape(words)}</dd>"
+        for term, words in glossary(result)
+    )
+    return (
+        '<details class="glossary" open><summary>Words and symbols</summary>'
+        f"<dl>{terms}</dl></details>"
+    )
 
 
 def _explorer(result: StudyResult) -> str:

@@ -120,8 +120,8 @@ def _words(result: StudyResult, test: str, data: xr.Dataset) -> str:
     if np.isfinite(facts["energy_share"]):
         words.append(
             f"{100 * facts['energy_share']:.0f} % of the training sea's energy lies within a tenth "
-            f"of this frequency, and the waves are {facts['height_ratio']:.2f} times as high (heights "
-            "counted as 4 standard deviations of the elevation)."
+            f"of this frequency, and the waves are {facts['height_ratio']:.2f} times as high "
+            "(heights counted as 4 standard deviations of the elevation)."
         )
     drifting = (at["error_offset"] > at["error_wave"]) & (at["error_offset"] > LARGE)
     waves = at["error_wave"].where(~drifting)
@@ -196,8 +196,8 @@ def _drift_words(at: xr.Dataset, names: list[str]) -> str:
         for each in [part.sel(channel=name)]
     )
     said = [f"An offset leads in {listed}."]
-    expected = np.abs(part["mean_shift"]) / part["sd_ratio"]
-    off = np.abs(np.log(expected / part["error_offset"])) > np.log(FITS)
+    expected = abs(part["mean_shift"]) / part["sd_ratio"]
+    off = abs(np.log(expected / part["error_offset"])) > np.log(FITS)
     away = [str(name) for name in part["channel"].values[off.values]]
     if len(away) < len(names):
         which = "" if not away else f" in {_listed([n for n in names if n not in away])}"

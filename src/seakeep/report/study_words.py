@@ -241,6 +241,7 @@ def quality_table(result: StudyResult, name: str) -> ReportTable:
 def training_table(result: StudyResult) -> ReportTable:
     """Training sets and test windows."""
     training = result.groups["training"]
+    reads = float(result.attrs["longest_training"])
     rows = [
         ("training", str(n), str(s), str(left) or "")
         for n, s, left in zip(
@@ -261,8 +262,9 @@ def training_table(result: StudyResult) -> ReportTable:
         "Training sets and test windows, the same for all models",
         ("use", "set", "instants", "left out"),
         tuple(rows),
-        "The delay history of a forecast is measured data just before the start; it may reach into "
-        "a training span.",
+        "Of a training set: from the begin of its span to its stop, of which a draw reads the last "
+        f"part, {reads:.2f} s at most, delay history included. The delay history of a forecast is "
+        "measured data just before the start; it may reach into a training span.",
     )
 
 

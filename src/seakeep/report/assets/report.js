@@ -49,7 +49,7 @@
   });
   var readout = document.getElementById("history-readout");
   var range = null, cursor = null, drag = null;
-  var margin = { left: 70, right: 14, top: 14, bottom: 40 };
+  var margin = { left: 70, right: 14, top: 34, bottom: 40 };
 
   function numbers(packed) {                  // 16-bit integers between two bounds, base64
     if (packed.values) { return packed.values; }
@@ -143,11 +143,45 @@
       context.fillRect(Math.min(xt(drag.from), xt(drag.to)), margin.top, Math.abs(xt(drag.to) - xt(drag.from)), inner.h);
     }
     context.restore();
+    legend(list, width);
     canvas.dataset.range = span[0].toFixed(4) + " " + span[1].toFixed(4);
     canvas.dataset.channel = channel().name;
     canvas.dataset.cell = c.label;
     canvas.dataset.drawn = list.map(function (s) { return s.kind; }).join(" ");
     tell();
+  }
+  function legend(list, width) {              // above the plot, as the lines are drawn
+    context.font = "12px system-ui, sans-serif";
+    context.textAlign = "left";
+    var entries = list.map(function (s) {
+      return { series: s, label: s.label || s.model.label.replace(/ mean$/, "") + " " + s.kind };
+    });
+    var at = width - margin.right;
+    entries.reverse().forEach(function (entry) {
+      var s = entry.series;
+      at -= context.measureText(entry.label).width;
+      context.fillStyle = "#1b2430";
+      context.fillText(entry.label, at, 20);
+      context.strokeStyle = context.fillStyle = s.colour || s.model.colour;
+      context.globalAlpha = s.kind === "band" ? 0.22 : 1;
+      if (s.kind === "band") {
+        context.fillRect(at - 36, 10, 30, 12);
+      } else {
+        stroke(s);
+        context.beginPath();
+        context.moveTo(at - 36, 16);
+        context.lineTo(at - 6, 16);
+        context.stroke();
+        context.setLineDash([]);
+      }
+      context.globalAlpha = 1;
+      at -= 50;
+    });
+    canvas.dataset.legend = entries.reverse().map(function (entry) { return entry.label; }).join(", ");
+  }
+  function stroke(s) {                        // width, and dashes in widths
+    context.lineWidth = s.width || 0.7;
+    context.setLineDash((s.dash || []).map(function (d) { return d * context.lineWidth; }));
   }
   function vertical(at, colour) {
     context.strokeStyle = colour;
@@ -183,11 +217,10 @@
     context.restore();
   }
   function paint(s, first, last, x, y) {
-    context.setLineDash(s.dash || []);
+    stroke(s);
     if (s.kind === "members") {
       context.strokeStyle = s.model.colour;
       context.globalAlpha = 0.25;
-      context.lineWidth = 0.7;
       for (var m = 0; m < s.values.length / cell().steps; m++) {
         path(s.values, m * cell().steps, first, last, x, y);
         context.stroke();
@@ -201,7 +234,6 @@
       context.fill();
     } else {
       context.strokeStyle = s.colour;
-      context.lineWidth = s.width;
       path(s.values, 0, first, last, x, y);
       context.stroke();
     }

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from seakeep.report.figures.boxes import average_boxes, channel_boxes
+from seakeep.report.figures.boxes import FEWEST, average_boxes, channel_boxes
 from seakeep.report.figures.common import model_words
 from seakeep.report.figures.densities import density_figure
 from seakeep.report.figures.eigenvalues import eigenvalue_figure
@@ -69,7 +69,7 @@ def report_figures(result: StudyResult) -> list[ReportFigure]:
                 "waves",
                 "Power spectral density of the wave elevation: nominal where it is known, and "
                 "measured (mean over the irregular runs, or over all where none is) with the "
-                "paper's Welch segments and with long ones. Dashed: peaks of the regular waves.",
+                "paper's Welch segments and with long ones. Dashed: the regular waves.",
                 partial(spectrum_figure, result),
             )
         )
@@ -94,7 +94,7 @@ def _boxes(result: StudyResult) -> list[ReportFigure]:
     tests = list(result.tests)
     box = (
         "Boxes: quartiles; whiskers: furthest values within 1.5 inter-quartile ranges; violins: "
-        "density; dots: single cells, outliers included."
+        f"density, from {FEWEST} cells on; dots: single cells, outliers included."
     )
     groups = [tests[:1], tests[1:]] if len(tests) <= 9 else [tests]
     figures = [

@@ -30,6 +30,9 @@ FloatArray = npt.NDArray[np.float64]
 NARROW = 14
 """Letters of a test set's label on one line."""
 
+FEWEST = 10
+"""Values from which on a density is drawn; of fewer, points and box alone."""
+
 JITTER = np.random.default_rng(7).uniform(-1, 1, 4096)
 """Sideways places of the single values; the same in every figure."""
 
@@ -54,12 +57,12 @@ def draw_box_violin(
     x = x[np.isfinite(x)]
     if x.size == 0:
         return
-    if x.size > 2 and np.ptp(x) > 0:
+    if x.size >= FEWEST and np.ptp(x) > 0:
         violin = axes.violinplot([x], [place], widths=width, showextrema=False, points=120)
         for body in violin["bodies"]:
             body.set(facecolor=colour, edgecolor=colour, alpha=0.18, linewidth=0.6)
     sideways = place + 0.16 * width * np.resize(JITTER, x.size)
-    axes.scatter(sideways, x, s=4, color=colour, alpha=0.35, linewidths=0, rasterized=True)
+    axes.scatter(sideways, x, s=7, color=colour, alpha=0.5, linewidths=0, rasterized=True)
     box = box_statistics(x)
     half = 0.13 * width
     axes.fill_between(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from seakeep.conventions import canonical_channel
 from seakeep.report.style import figure_style, new_figure
@@ -52,8 +53,8 @@ def spectrum_figure(result: StudyResult) -> Figure:
             curves = _mean(spectra, irregular, kind)
             if curves is not None:
                 axes.plot(*curves, label=words, color=colour, linestyle=dash)
-        _mark_regular(axes, spectra, [n for n, kind in waves.items() if kind == "regular"])
-        peak = max((_peak(spectra, n)[0] for n in waves), default=1.0)
+        _mark_regular(axes, runs["wave_frequency"].values)
+        peak = max((_peak(spectra, n) for n in waves), default=1.0)
         axes.set_xlim(0, 2.2 * peak)
         axes.set_ylim(bottom=0)
         known = canonical_channel(str(spectra.attrs["channel"]))
@@ -80,18 +81,17 @@ def _mean(spectra: Any, names: list[str], kind: str) -> Any:
     return frequency, np.mean(rows, axis=0)
 
 
-def _peak(spectra: Any, name: str) -> tuple[float, float]:
+def _peak(spectra: Any, name: str) -> float:
     key = f"{name}_recommended"
     if f"{key}_density" not in spectra:
-        return 0.0, 0.0
+        return 0.0
     at = int(np.argmax(spectra[f"{key}_density"].values))
-    return float(spectra[f"{key}_frequency"].values[at]), float(
-        spectra[f"{key}_density"].values[at]
-    )
+    return float(spectra[f"{key}_frequency"].values[at])
 
 
-def _mark_regular(axes: Any, spectra: Any, names: list[str]) -> None:
-    frequencies = sorted({round(_peak(spectra, name)[0], 3) for name in names} - {0.0})
-    for number, frequency in enumerate(frequencies):
-        label = "regular waves (peaks)" if number == 0 else None
+def _mark_regular(axes: Any, frequencies: npt.NDArray[np.float64]) -> None:
+    """Mark the regular waves where text and tables have them, not at a bin of the spectrum."""
+    known = sorted({round(float(f), 3) for f in frequencies[np.isfinite(frequencies)]})
+    for number, frequency in enumerate(known):
+        label = "regular waves" if number == 0 else None
         axes.axvline(frequency, color="#009E73", linewidth=0.9, linestyle="--", label=label)
