@@ -321,7 +321,9 @@ class TestUnits:
         mended = text.replace(
             "[preparation]", "[runs.second.channels.heave]\nunit = 'm'\n[preparation]"
         )
-        assert float(self.prepared(tank, "deg", mended)["second"]["heave"].std()) > 1.0
+        with pytest.warns(SeakeepWarning, match=r"heave leaves its mean by .* Check unit"):
+            runs = self.prepared(tank, "deg", mended)  # millimetres, now said to be metres
+        assert float(runs["second"]["heave"].std()) > 1.0
 
     def test_one_unit_in_other_words(self, tank):
         text = CAMPAIGN.replace('column = "Pitch"', 'column = "Pitch"\nunit = "°"')
@@ -349,7 +351,9 @@ class TestLengths:
         return read_campaign(folder / "campaign.toml").prepare()["r"]
 
     def test_the_run_is_what_all_recorded(self, tmp_path):
-        run = self.prepared(tmp_path, 2.0, 12.0)
+        with pytest.warns(SeakeepWarning, match=r"r: mru .* at .* s, the other loggers at") as told:
+            run = self.prepared(tmp_path, 2.0, 12.0)
+        assert len(told) == 2  # it began late, and ended early
         assert float(run["time"][0]) == pytest.approx(2.0)
         assert float(run["time"][-1]) == pytest.approx(11.95)
         assert np.isfinite(run["heave"]).all()

@@ -275,8 +275,8 @@ def test_clocks_from_signals(tmp_path, way, offset, drift):
     path.write_text(
         "[channels.draught]\n[channels.heave]\n[instruments]\nreference = 'loads'\n"
         f"[instruments.loads]\n[instruments.camera]\n{way} = ['heave', 'draught']\n"
-        "[preparation]\nsampling_rate = 20\n[runs.r.files]\nloads = 'loads.csv'\n"
-        "camera = 'camera.csv'\n"
+        "[preparation]\nsampling_rate = 20\n[runs.r]\nspan = [5, 185]\n[runs.r.files]\n"
+        "loads = 'loads.csv'\ncamera = 'camera.csv'\n"
     )
     campaign = read_campaign(path)
     clock = campaign.clocks()["r"]["camera"]
