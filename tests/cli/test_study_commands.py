@@ -104,5 +104,7 @@ def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(folder):
     told = process.communicate(timeout=60)[1]
     assert process.returncode == 130, told
     assert "the same command goes on where it stopped" in told
+    assert told.count("kept") == 1
+    assert f"Interrupted. All cells that were finished are kept in {out}" in told
     assert "Traceback" not in told
     assert list((out / "cells").glob("*.npz"))

@@ -2,6 +2,7 @@
 
 import base64
 import csv
+import json
 import re
 import shutil
 from dataclasses import replace
@@ -15,7 +16,8 @@ from seakeep.report.deviations import test_overlap as overlap_of_tests
 from seakeep.report.glossary import few_cells, plain_symbol
 from seakeep.report.interactive import dashes, pack
 from seakeep.report.published import PUBLISHED
-from seakeep.report.study_tables import latex_text
+from seakeep.report.study_tables import coverage_table, latex_text, number
+from seakeep.report.study_words import findings
 from seakeep.report.style import LINES
 from seakeep.study import read_result, read_study, run_study
 
@@ -180,6 +182,34 @@ def test_test_windows_that_overlap_are_told(page):
         assert (words in overlap_of_tests(other)) if words else overlap_of_tests(other) == ""
 
 
+def test_windows_asked_for_that_do_not_fit_are_told(page):
+    result = read_result(page.parent)
+    assert not any("asked for" in text for text in findings(result))
+    settings = result.settings
+    settings["training"]["windows"] = 30
+    many = replace(result, attrs={**result.attrs, "settings": json.dumps(settings)})
+    assert findings(many)[-1].startswith("2 training windows were used of the 30 asked for")
+
+
+def test_a_margin_for_windows_of_another_length_is_named(page):
+    result = read_result(page.parent)
+    assert "not made for" not in coverage_table(result, "bayesian", calibrated=True).note
+    settings = result.settings
+    settings["tests"]["long"] = {**settings["tests"]["unseen"], "length": 12.0, "label": ""}
+    groups = dict(result.groups)
+    for name in ("tests", "statistics/coverage"):
+        groups[f"{name}/long"] = groups[f"{name}/unseen"]
+    both = replace(result, attrs={**result.attrs, "settings": json.dumps(settings)}, groups=groups)
+    note = coverage_table(both, "bayesian", calibrated=True).note
+    assert "Those are 6 T̂ long; the margin is not made for long (12 T̂)" in note
+
+
+def test_numbers_have_a_minus_and_zero_has_none():
+    assert number(-0.0004) == "0.000"
+    assert number(-0.4) == "-0.400"
+    assert latex_text("-0.12 [-0.3, 0.1] a-1") == r"$-$0.12 [$-$0.3, 0.1] a-1"
+
+
 def test_letters_that_latex_reads_otherwise():
     assert latex_text("50 % of a_b & λ") == r"50 \% of a\_b \& $\lambda$"
 
@@ -254,8 +284,6 @@ def state(browser, key):
 
 
 def test_nothing_is_asked_for_and_nothing_complained_of(opened, page):
-    import json
-
     assert opened.get_log("browser") == []
     messages = [json.loads(entry["message"])["message"] for entry in opened.get_log("performance")]
     asked = {

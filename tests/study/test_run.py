@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.errors import RequestError
+from seakeep.errors import DataError, RequestError
 from seakeep.models.labelled import nearest_sample
 from seakeep.statistics import band_error_over_time
 from seakeep.study import StorageError, read_result, read_study, run_study, store
@@ -245,6 +245,12 @@ def test_a_result_of_another_format_is_told(finished, monkeypatch):
     monkeypatch.setattr(store, "FORMAT", store.FORMAT + 1)
     with pytest.raises(RequestError, match=r"written in format 3.*another folder"):
         read_result(finished.folder)
+
+
+def test_a_damaged_result_is_told(tmp_path):
+    (tmp_path / "study.nc").write_bytes(b"no NetCDF")
+    with pytest.raises(DataError, match=r"study.nc is damaged or no NetCDF file.*run the study"):
+        read_result(tmp_path)
 
 
 def test_a_folder_without_a_study_is_told(tmp_path):

@@ -97,6 +97,12 @@ def test_windows_apart_are_as_many_as_fit_and_no_more():
     assert len(windows_of(placement="apart", windows=3)) == 3
 
 
+def test_a_window_too_long_is_answered_with_the_longest_in_periods():
+    # 500 instants are 15 periods, and a test span of 399 samples holds 398 after a start: 11.94.
+    with pytest.raises(RequestError, match=r"\(length at most 11.9 periods\)"):
+        windows_of(steps=500)
+
+
 def test_the_start_up_of_a_test_span_is_cut_off():
     wave = {"wave": recorded(700, waves="regular", test_span=(0.0, 69.9))}
     found = windows_of(wave, windows=None, placement="random", startup=25.0)

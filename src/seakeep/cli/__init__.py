@@ -64,6 +64,16 @@ app.command("track")(tracking.track)
 app.command("info")(information.info)
 
 
+def _kept(leaving: BaseException) -> str:
+    """What a command noted on Ctrl-C about what is kept, or what holds of all commands."""
+    error: BaseException | None = leaving
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt) and (notes := getattr(error, "__notes__", [])):
+            return " ".join(notes)
+        error = error.__context__
+    return "Files that were finished are kept: repeat the command to go on."
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; the entry point of ``seakeep``.
 
@@ -87,10 +97,7 @@ def main(arguments: list[str] | None = None) -> int:
     except SystemExit as leaving:
         status = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
         if status == INTERRUPTED:
-            messages().print(
-                "Interrupted. Files that were finished are kept: repeat the command to go on.",
-                style="red",
-            )
+            messages().print(f"Interrupted. {_kept(leaving)}", style="red")
         return status
     except SeakeepError as error:
         if debug:

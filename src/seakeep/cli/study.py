@@ -13,7 +13,7 @@ from rich import box
 from rich.table import Table
 
 from seakeep.campaign.prepare import Progress
-from seakeep.cli.console import messages, progress_bar, results, worker_count
+from seakeep.cli.console import progress_bar, results, worker_count
 from seakeep.errors import RequestError
 from seakeep.report.page import write_report
 from seakeep.report.study_tables import ReportTable, overview_table
@@ -168,12 +168,12 @@ def _run(folder: Path, work: Callable[[Progress], StudyResult]) -> None:
     try:
         with _Progress("Study") as tell:
             found = work(tell)
+        with _Progress("Report") as tell:
             page = write_report(found, tell)
-    except KeyboardInterrupt:
-        messages().print(
-            f"Stopped. All cells that were finished are kept in {folder}; the same command goes "
-            "on where it stopped.",
-            style="red",
+    except KeyboardInterrupt as stop:
+        stop.add_note(
+            f"All cells that were finished are kept in {folder}; the same command goes on where it "
+            "stopped."
         )
         raise
     results().print(_rich(overview_table(found)))

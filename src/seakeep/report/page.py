@@ -388,6 +388,8 @@ def _table(table: ReportTable) -> str:
         kinds = ["number"] if column in table.numeric else []
         kinds += ["elsewhere"] if column in table.elsewhere else []
         attribute = f' class="{" ".join(kinds)}"' if kinds else ""
+        if column in table.numeric:
+            text = re.sub(r"(?<![\w)])-(?=\d)", "−", text)
         return f"<{tag}{attribute}>{html.escape(text)}</{tag}>"
 
     head = "".join(cell("th", text, k) for k, text in enumerate(table.columns))

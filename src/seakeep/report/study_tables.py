@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,7 +73,10 @@ class ReportTable:
 
 def number(value: float, digits: int = 3) -> str:
     """Text of a number; a dash for one that is not finite."""
-    return f"{value:.{digits}f}" if np.isfinite(value) else MISSING
+    if not np.isfinite(value):
+        return MISSING
+    text = f"{value:.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0 else text
 
 
 def channel_words(name: str) -> str:
@@ -266,6 +270,7 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
         note += (
             " Calibrated: these quantiles, moved outwards by a margin found on training data that "
             "the members had not read, in windows as long as the first test set's. "
+            + _other_lengths(result)
             + _calibrated_on(result.groups[f"calibration/{model}"], level)
             + "The margin warrants nothing in a sea of another kind."
         )
@@ -283,6 +288,20 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
         tuple(range(1, len(columns))),
         averages=(len(rows) - 1,),
     )
+
+
+def _other_lengths(result: StudyResult) -> str:
+    """Sentence on test sets whose windows are not as long as those that the margin is for."""
+    lengths = {test: float(each["length"]) for test, each in result.settings["tests"].items()}
+    first = next(iter(result.tests))
+    others = [
+        f"{result.label_of(test)} ({lengths[test]:g} T̂)"
+        for test in result.tests
+        if lengths[test] != lengths[first]
+    ]
+    if not others:
+        return ""
+    return f"Those are {lengths[first]:g} T̂ long; the margin is not made for {', '.join(others)}. "
 
 
 def _calibrated_on(found: xr.Dataset, level: float) -> str:
@@ -398,7 +417,7 @@ def latex_text(text: str) -> str:
     >>> latex_text("50 % of λ_max")
     '50 \\% of $\\lambda$\\_max'
     """
-    text = text.replace("T̂", "\0")
+    text = re.sub(r"(?<![\w)])-(?=\d)", "−", text.replace("T̂", "\0"))
     return "".join(_LATEX.get(each, each) for each in text).replace("\0", r"$\hat T$")
 
 

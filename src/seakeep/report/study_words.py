@@ -53,7 +53,24 @@ def findings(result: StudyResult) -> list[str]:
         said.append(f"{_capital(result.label_of(test))}: " + "; ".join(parts) + ".")
     for model in ensembles:
         said += _coverage_findings(result, model)
-    return said
+    return said + _windows_found(result)
+
+
+def _windows_found(result: StudyResult) -> list[str]:
+    """Say of which windows, placed without overlap, fewer fit than were asked for."""
+    settings = result.settings
+    places = {
+        f"test windows of {result.label_of(name)}": (settings["tests"][name], data.sizes["window"])
+        for name, data in result.tests.items()
+    }
+    if settings["training"]["scheme"] == "halves":
+        used = result.groups["training"].sizes["training"]
+        places = {"training windows": (settings["training"], used), **places}
+    return [
+        f"{used} {what} were used of the {each['windows']} asked for: no more fit without overlap."
+        for what, (each, used) in places.items()
+        if each["windows"] is not None and used < each["windows"]
+    ]
 
 
 def _capital(words: str) -> str:

@@ -92,7 +92,7 @@ def run_study(
             tell(1, 1, "finished before")
             return found
     check_crew(crew)
-    plan, runs = make_plan(study, lambda done, total, name: tell(0, 1, f"preparing {name}"))
+    plan, runs = make_plan(study, lambda done, total, name: tell(done, total, f"preparing {name}"))
     warn_of_slow_study(plan, runs)
     cells.open(study.name)
     units = units_of(plan, study.settings.output.eigenvalues)
@@ -181,7 +181,7 @@ def _compute_all(
 
 def _words(plan: Plan, unit: Unit) -> str:
     if unit.kind == "eigenvalues":
-        return f"{unit.model}, eigenvalues"
+        return f"{unit.model}, eigenvalues from member {unit.first + 1} on"
     return f"{unit.model}, training set {plan.training[unit.training].name}"
 
 

@@ -80,7 +80,9 @@ class TrainingSettings(Table):
         default="run", description="'run', or 'sea_state': all runs of one sea state at once"
     )
     windows: Count | None = Field(
-        default=10, description="number of training windows; for 'halves' alone"
+        default=10,
+        description="a number of training windows, with placement = 'apart' at most; belongs to "
+        "scheme = 'halves'",
     )
     placement: Placement = Field(
         default="random", description="'random' as in the paper, or 'apart': without overlap"

@@ -382,7 +382,8 @@ def read_result(folder: Path | str) -> StudyResult:
                 groups[name] = opened.load()
     except (OSError, KeyError, ValueError, TypeError) as error:
         raise DataError(
-            f"{path} cannot be read: {error}. Remove it and run the study again."
+            f"{path} is damaged or no NetCDF file: {type(error).__name__} while reading it. Remove "
+            "it and run the study again."
         ) from error
     if attrs.get("format") != FORMAT:
         raise RequestError(

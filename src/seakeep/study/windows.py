@@ -306,7 +306,8 @@ def choose_tests(
             f"tests.{name}: no window is feasible. A window has {steps} instants "
             f"({steps * dt:g} s), and the longest test span ({', '.join(names)}) holds "
             f"{max(longest, 0)} samples after {needs.history} of delay history and the start-up. "
-            "Reduce length or startup, or give longer runs."
+            f"Reduce length or startup{_longest_length(longest, steps, test.length)}, or give "
+            "longer runs."
         )
     count = len(places) if test.windows is None else test.windows
     if count > len(places) and test.placement == "random":
@@ -320,6 +321,12 @@ def choose_tests(
         TestWindow(each, float(runs[each]["time"].values[last - steps]), steps)
         for each, last in chosen
     )
+
+
+def _longest_length(samples: int, steps: int, length: float) -> str:
+    """Words for the longest window, in the periods of ``length``, that so many samples hold."""
+    periods = np.floor(10 * (samples - 1) * length / steps) / 10
+    return f" (length at most {periods:g} periods)" if periods > 0 else ""
 
 
 def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from seakeep.report.figures.boxes import FEWEST, average_boxes, channel_boxes
 from seakeep.report.figures.common import model_words
 from seakeep.report.figures.densities import density_figure
-from seakeep.report.figures.eigenvalues import eigenvalue_figure
+from seakeep.report.figures.eigenvalues import LOWEST, eigenvalue_figure
 from seakeep.report.figures.errors import error_over_time_figure, hyperparameter_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.figures.spectra import spectrum_figure
@@ -143,7 +143,7 @@ def _judgements(result: StudyResult) -> list[ReportFigure]:
             "time",
             "ε(t): mean over all cells (lines) and quartiles (shaded), with the p-value of its "
             f"trend test; the error as a whole, and parted at a period of {split:g} T̂ into slow "
-            "drift and waves.",
+            "drift and waves. Rows have scales of their own.",
             partial(error_over_time_figure, result),
         )
     ]
@@ -152,7 +152,7 @@ def _judgements(result: StudyResult) -> list[ReportFigure]:
             f"densities_{model}",
             "densities",
             f"Densities of measurement and {model_words(model)} forecast with the 95 % bands of "
-            "their moving-block bootstrap (paper's settings).",
+            "their moving-block bootstrap (paper's settings); area 1 each, no common height.",
             partial(density_figure, result, model),
         )
         for model in (ensembles or result.models[:1])
@@ -173,7 +173,8 @@ def _judgements(result: StudyResult) -> list[ReportFigure]:
                 "eigenvalues",
                 "members",
                 "Eigenvalues of the models of the first training set: upper half of the complex "
-                "plane, and modulus against frequency. A modulus of 1 neither grows nor decays.",
+                "plane, and modulus against frequency. A modulus of 1 neither grows nor decays; "
+                f"those below {LOWEST:g} are left out on the right.",
                 partial(eigenvalue_figure, result),
             )
         )

@@ -13,7 +13,11 @@ from seakeep.study import StudyResult
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["eigenvalue_figure"]
+__all__ = ["LOWEST", "eigenvalue_figure"]
+
+
+LOWEST = 0.8
+"""Modulus at which the axis ends; what lies below dies out within a few samples."""
 
 
 def eigenvalue_figure(result: StudyResult) -> Figure:
@@ -29,7 +33,7 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
     matplotlib.figure.Figure
     """
     with figure_style():
-        figure = new_figure(8.5, 3.9)
+        figure = new_figure(8.5, 2.8)
         plane, decay = figure.subplots(1, 2)
         circle = np.exp(1j * np.linspace(0, np.pi, 400))
         plane.plot(circle.real, circle.imag, color="#56606B", linewidth=0.8)
@@ -41,11 +45,12 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
             _draw(plane, decay, values, result, model)
         plane.set_aspect("equal")
         plane.set_ylim(0, 1.05)
+        plane.set_xticks([-1.0, -0.5, 0.0, 0.5, 1.0])
         plane.set(xlabel="real part", ylabel="imaginary part")
         decay.axhline(1.0, color="#56606B", linewidth=0.8)
         decay.set(xlabel="frequency [Hz]", ylabel="modulus")
         decay.set_xlim(0, 3 / float(result.attrs["encounter_period"]))
-        decay.set_ylim(0.8, 1.01)
+        decay.set_ylim(LOWEST, 1.01)
         legend = decay.legend(fontsize=7, loc="lower right", markerscale=2)
         for handle in legend.legend_handles:
             handle.set_alpha(0.9)
