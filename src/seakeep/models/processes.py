@@ -126,6 +126,9 @@ _WARM = _Warm()
 
 
 def _lives(pool: ProcessPoolExecutor) -> bool:
+    # A pool notices the end of a process late: another one may still answer.
+    if not all(child.is_alive() for child in (pool._processes or {}).values()):
+        return False
     try:
         pool.submit(os.getpid).result()
     except BrokenProcessPool:  # a process that waited was stopped from outside
