@@ -1,20 +1,18 @@
 """``seakeep study``, ``report`` and ``reproduce`` as a user runs them."""
 
-import shutil
 import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
+from tutorial_study import put_tutorial
 
 from seakeep import cli
 from seakeep.models import cluster
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
-TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
 STUDY = """
 [study]
 campaign = "campaign.toml"
@@ -37,10 +35,7 @@ n_series = 8
 
 @pytest.fixture
 def folder(tmp_path):
-    for path in TUTORIAL.glob("*"):
-        if path.suffix in (".toml", ".csv"):
-            shutil.copy(path, tmp_path)
-    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    put_tutorial(tmp_path, STUDY)
     return tmp_path
 
 

@@ -2,12 +2,12 @@
 
 import errno
 import os
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from tutorial_study import put_tutorial
 
 from seakeep import cli
 from seakeep.study import read_result, read_study, run_study
@@ -15,7 +15,6 @@ from seakeep.study.store import CellFolder
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
-TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
 STUDY = """
 [study]
 campaign = "campaign.toml"
@@ -39,10 +38,7 @@ eigenvalues = false
 
 
 def copy_study(place):
-    for path in TUTORIAL.glob("*"):
-        if path.suffix in (".toml", ".csv"):
-            shutil.copy(path, place)
-    (place / "study.toml").write_text(STUDY, encoding="utf-8")
+    put_tutorial(place, STUDY)
 
 
 @pytest.fixture

@@ -6,10 +6,10 @@ import json
 import re
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tutorial_study import put_tutorial
 
 from seakeep.errors import RequestError
 from seakeep.report.deviations import test_overlap as overlap_of_tests
@@ -26,7 +26,6 @@ pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figure
 from seakeep.report.figures.boxes import FEWEST, draw_box_violin
 from seakeep.report.page import write_report
 
-TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
 STUDY = """
 [study]
 campaign = "campaign.toml"
@@ -51,10 +50,7 @@ n_series = 8
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    for path in TUTORIAL.glob("*"):
-        if path.suffix in (".toml", ".csv"):
-            shutil.copy(path, folder)
-    (folder / "study.toml").write_text(STUDY, encoding="utf-8")
+    put_tutorial(folder, STUDY)
     return write_report(run_study(read_study(folder / "study.toml"), folder / "out", workers=2))
 
 

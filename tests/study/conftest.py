@@ -1,12 +1,10 @@
 """A small study on the tutorial's campaign: seconds, and all of its parts."""
 
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
+from tutorial_study import put_tutorial
 
 STUDY = """
 [study]
@@ -40,10 +38,7 @@ def put_study() -> Callable[[Path], str]:
     """Put the tutorial's campaign and a study of it into a folder; gives the study's text."""
 
     def put(folder: Path) -> str:
-        for path in TUTORIAL.glob("*"):
-            if path.suffix in (".toml", ".csv"):
-                shutil.copy(path, folder)
-        (folder / "study.toml").write_text(STUDY, encoding="utf-8")
+        put_tutorial(folder, STUDY)
         return STUDY
 
     return put
