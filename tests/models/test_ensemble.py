@@ -16,7 +16,7 @@ from seakeep import (
     SeakeepWarning,
     Uniform,
 )
-from seakeep.models import summaries
+from seakeep.models import shelf
 from seakeep.models.draws import child
 
 PERIOD, DT = 1.6, 0.1  # 16 samples a period
@@ -194,8 +194,8 @@ def test_the_summary_is_that_of_the_members(run, monkeypatch):
         rtol=1e-12,
     )
     for held, chunk in ((2**25, 2**23), (0, 1500)):
-        monkeypatch.setattr(summaries, "HELD", held)
-        monkeypatch.setattr(summaries, "CHUNK", chunk)
+        monkeypatch.setattr(shelf, "HELD", held)
+        monkeypatch.setattr(shelf, "CHUNK", chunk)
         found = ensemble.forecast_summary(run, start=65.0, steps=77, level=0.9)
         for name in STATES:
             np.testing.assert_array_equal(found[name], expected[name])
@@ -204,7 +204,7 @@ def test_the_summary_is_that_of_the_members(run, monkeypatch):
 
 def test_no_room_for_spilled_members_is_told(run, monkeypatch):
     resource = pytest.importorskip("resource", reason="file sizes are limited on POSIX alone")
-    monkeypatch.setattr(summaries, "HELD", 0)
+    monkeypatch.setattr(shelf, "HELD", 0)
     ensemble = fitted(run)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import seakeep
-from seakeep.models import forecasting, summaries
+from seakeep.models import forecasting, shelf
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +49,8 @@ def test_a_long_forecast_holds_little_beside_its_result(run, monkeypatch, delay_
 
 
 def test_a_summary_does_not_hold_its_members(run, monkeypatch):
-    monkeypatch.setattr(summaries, "HELD", 0)
-    monkeypatch.setattr(summaries, "CHUNK", 200_000)
+    monkeypatch.setattr(shelf, "HELD", 0)
+    monkeypatch.setattr(shelf, "CHUNK", 200_000)
 
     def summary(members):
         spec = seakeep.BayesianHankelDMDc(

@@ -14,7 +14,7 @@ import xarray as xr
 from seakeep.core.calibration import ConformalMargin, band_scores, conformal_margin
 from seakeep.errors import RequestError
 from seakeep.models import labelled
-from seakeep.models.ensemble_series import member_series, read_windows
+from seakeep.models.ensemble_series import read_windows, shelved
 from seakeep.models.summaries import STATISTICS, check_level, reduce_members
 from seakeep.models.workers import Crew
 
@@ -109,9 +109,8 @@ def held_out_scores(
         if not starts:
             continue
         windows = read_windows(ensemble, run, starts, steps)
-        series = member_series(ensemble, run, windows, crew)
-        shape = (len(windows), steps, len(ensemble.states))
-        values, _ = reduce_members(series, ensemble.n_members, shape, level)
+        with shelved(ensemble, run, windows, crew) as (shelf, lost):
+            values = reduce_members(shelf, lost, level, crew.workers)
         lower, upper = (values[:, STATISTICS.index(key)] for key in ("lower", "upper"))
         measured = np.stack(
             [_measured(ensemble, run, name, window.start, steps) for window in windows]

@@ -77,6 +77,11 @@ class Crew:
                 f"{self.scheduler!r} hands all work to a cluster. Give one of the two."
             )
 
+    @property
+    def has_processes(self) -> bool:
+        """Whether processes of this machine may work."""
+        return self.scheduler is None and self.workers > 1 and self.backend != "threads"
+
 
 class Desk(Generic[Data]):
     """What all items need, and memory for each that is at work.

@@ -1,9 +1,10 @@
-"""Free runs of the members of an ensemble, one after the other."""
+"""Free runs of the members of an ensemble: whoever makes one puts it into its place."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,12 +17,14 @@ from seakeep.models.forecasting import ForecastWindow, read_window
 from seakeep.models.members import Task, forecast_member
 from seakeep.models.offsets import check_offset
 from seakeep.models.progress import Progress, told
-from seakeep.models.workers import Crew, side_by_side
+from seakeep.models.shelf import Layout, Shelf, open_shelf
+from seakeep.models.summaries import first_lost
+from seakeep.models.workers import Crew, Function, side_by_side
 
 if TYPE_CHECKING:
     from seakeep.models.fitted_ensemble import HankelEnsemble
 
-__all__ = ["member_series", "read_windows"]
+__all__ = ["read_windows", "shelved"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -61,14 +64,17 @@ def read_windows(
     return [aligned.align_window(ensemble, run, window) for window in windows]
 
 
-def member_series(
+@contextmanager
+def shelved(
     ensemble: HankelEnsemble,
     run: xr.Dataset,
     windows: Sequence[ForecastWindow],
     crew: Crew,
     progress: Progress | None = None,
-) -> Iterator[FloatArray]:
-    """Free runs of the members, in their order.
+    *,
+    whole: bool = False,
+) -> Iterator[tuple[Shelf, npt.NDArray[np.int64]]]:
+    """Free runs of all members, in pieces of time.
 
     Parameters
     ----------
@@ -79,25 +85,71 @@ def member_series(
     windows : sequence of ForecastWindow
         From :func:`read_windows`, of one length.
     crew : Crew
-        Who does the work.
+        Who does the work. Processes of this machine put the series into a file themselves.
     progress
         As in :meth:`HankelEnsemble.forecast`.
+    whole : bool, optional
+        Whether the series are wanted in one piece.
 
-    Returns
-    -------
-    iterator of ndarray, each of shape (window, steps, N)
+    Yields
+    ------
+    shelf : Shelf
         States in physical units; NaN from where a window diverges on.
+    lost : ndarray of int, shape (member, window)
+        First instant lost, or −1.
+
+    Raises
+    ------
+    RequestError
+        If the temporary folder has no room.
     """
-    found: Iterator[FloatArray]
+    function: Function[Any, Any, FloatArray]
+    data: object
+    items: Sequence[Any]
     if ensemble.alignment is not None and ensemble.alignment.settings.surge == "predicted":
         loops = [aligned.prepare_loop(ensemble, run, window) for window in windows]
-        found = side_by_side(_closed_loops, (ensemble, loops), range(ensemble.n_members), crew)
+        function, data, items = _closed_loops, (ensemble, loops), range(ensemble.n_members)
     else:
         histories = np.stack([window.state_history for window in windows])
         inputs = np.stack([np.concatenate([w.input_history, w.input_future]) for w in windows])
-        task = Task(ensemble.arrays, ensemble.settings, histories, inputs, windows[0].steps)
-        found = side_by_side(forecast_member, task, ensemble.members, crew)
-    return told(found, ensemble.n_members, progress)
+        data = Task(ensemble.arrays, ensemble.settings, histories, inputs, windows[0].steps)
+        function, items = forecast_member, ensemble.members
+    size = len(windows), ensemble.n_members, windows[0].steps, len(ensemble.states)
+    layout = Layout(*size, size[2]) if whole else Layout.in_pieces(*size, hands=crew.workers)
+    lost = np.empty((ensemble.n_members, len(windows)), dtype=np.int64)
+    with open_shelf(layout, shared=crew.has_processes, whole=whole) as shelf:
+        for number, found in enumerate(
+            told(_put_all(shelf, function, data, items, crew), len(items), progress)
+        ):
+            lost[number] = found
+        yield shelf, lost
+
+
+def _put_all(
+    shelf: Shelf,
+    function: Function[Any, Any, FloatArray],
+    data: object,
+    items: Sequence[Any],
+    crew: Crew,
+) -> Iterator[npt.NDArray[np.int64]]:
+    """Put all members on the shelf; yields where each was lost."""
+    if crew.scheduler is None:
+        yield from side_by_side(_put_one, (shelf, function, data), list(enumerate(items)), crew)
+        return
+    # Workers of a cluster may sit on other machines, which do not see the shelf.
+    for number, values in enumerate(side_by_side(function, data, items, crew)):
+        shelf.put(number, values)
+        yield first_lost(values)
+
+
+def _put_one(
+    data: tuple[Shelf, Function[Any, Any, FloatArray], Any], item: tuple[int, Any], scratch: Scratch
+) -> npt.NDArray[np.int64]:
+    shelf, function, inner = data
+    number, own = item
+    values = function(inner, own, scratch)
+    shelf.put(number, values)
+    return first_lost(values)
 
 
 def _closed_loops(

@@ -19,7 +19,7 @@ from seakeep.models.alignment import FittedAlignment
 from seakeep.models.calibration import Band, Calibration, calibrate, check_band, widened
 from seakeep.models.draws import Draw
 from seakeep.models.ensemble_labels import label_channels, statuses, verdict, window_coords
-from seakeep.models.ensemble_series import member_series, read_windows
+from seakeep.models.ensemble_series import read_windows, shelved
 from seakeep.models.ensemble_summary import warn_of_unstable
 from seakeep.models.forecasting import ForecastWindow
 from seakeep.models.labelled import ChannelLabel, Runs
@@ -33,9 +33,7 @@ from seakeep.models.progress import Progress, told
 from seakeep.models.settings import HankelSettings
 from seakeep.models.summaries import (
     check_level,
-    first_lost,
     reduce_members,
-    stack_members,
     statistic_coordinate,
 )
 from seakeep.models.workers import Backend, Crew, side_by_side
@@ -303,12 +301,12 @@ class HankelEnsemble:
             As :meth:`HankelDMDcModel.forecast`.
         """
         windows = read_windows(self, run, [start], steps)
-        series = member_series(self, run, windows, Crew(workers, backend, scheduler), progress)
-        shape = (1, windows[0].steps, len(self.states))
-        values = stack_members(series, self.n_members, shape)[0]
-        lost = first_lost(values)
+        crew = Crew(workers, backend, scheduler)
+        with shelved(self, run, windows, crew, progress, whole=True) as (shelf, lost):
+            (values,) = shelf.all()
         variables = self._labelled(values, "member", "time")
-        variables["status"] = xr.Variable(("member",), statuses(lost, windows[0].time.values))
+        status = statuses(lost[:, 0], windows[0].time.values)
+        variables["status"] = xr.Variable(("member",), status)
         return xr.Dataset(
             variables,
             coords={"member": np.arange(self.n_members), "time": windows[0].time},
@@ -353,10 +351,10 @@ class HankelEnsemble:
         """
         level = check_level(level)
         check_band(self, level, band)
+        crew = Crew(workers, backend, scheduler)
         (window,) = read_windows(self, run, [start], steps)
-        series = member_series(self, run, [window], Crew(workers, backend, scheduler), progress)
-        shape = (1, window.steps, len(self.states))
-        values, lost = reduce_members(series, self.n_members, shape, level, workers)
+        with shelved(self, run, [window], crew, progress) as (shelf, lost):
+            values = reduce_members(shelf, lost, level, workers)
         values = widened(self, values, band)
         variables = label_channels(
             self.state_labels, self.state_spread, values[0], ("statistic", "time")
@@ -449,15 +447,14 @@ class HankelEnsemble:
             As :meth:`forecast`.
         """
         windows = read_windows(self, run, starts, steps)
-        series = member_series(self, run, windows, Crew(workers, backend, scheduler))
-        shape = (len(windows), windows[0].steps, len(self.states))
-        values = stack_members(series, self.n_members, shape)
-        first = first_lost(values)
+        crew = Crew(workers, backend, scheduler)
+        with shelved(self, run, windows, crew, whole=True) as (shelf, lost):
+            values = shelf.all()
         variables = label_channels(
             self.state_labels, self.state_spread, values, ("window", "member", "lead")
         )
         status = [
-            statuses(row, window.time.values) for row, window in zip(first, windows, strict=True)
+            statuses(row, window.time.values) for row, window in zip(lost.T, windows, strict=True)
         ]
         variables["status"] = xr.Variable(("window", "member"), np.stack(status))
         coords = window_coords(windows, self.dt) | {"member": np.arange(self.n_members)}
@@ -495,9 +492,9 @@ class HankelEnsemble:
         """
         level = check_level(level)
         windows = read_windows(self, run, starts, steps)
-        shape = (len(windows), windows[0].steps, len(self.states))
-        series = member_series(self, run, windows, Crew(workers, backend, scheduler))
-        values, lost = reduce_members(series, self.n_members, shape, level, workers)
+        crew = Crew(workers, backend, scheduler)
+        with shelved(self, run, windows, crew) as (shelf, lost):
+            values = reduce_members(shelf, lost, level, workers)
         variables = label_channels(
             self.state_labels, self.state_spread, values, ("window", "statistic", "lead")
         )

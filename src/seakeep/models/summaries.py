@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-import errno
-import math
-import os
-import tempfile
-import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
 from seakeep.errors import RequestError
+from seakeep.models.shelf import Shelf
 
-__all__ = ["STATISTICS", "first_lost", "reduce_members", "stack_members", "summarize"]
+__all__ = ["STATISTICS", "first_lost", "reduce_members", "summarize"]
 
 FloatArray = npt.NDArray[np.float64]
 
 STATISTICS = ("mean", "std", "lower", "upper")
-HELD = 32 * 2**20
-"""Bytes of member series that are held in memory; more is spilled to a temporary file."""
-CHUNK = 8 * 2**20
-"""Bytes of one piece in time of all members."""
+SORTED = 512
+"""Members up to which sorting them all is faster than selecting the few that are asked for."""
 
 
 def check_level(level: object) -> float:
@@ -59,7 +51,27 @@ def statistics_of(values: FloatArray, level: float) -> FloatArray:
     if len(values):
         out[0] = values.mean(axis=0)
         out[1] = values.std(axis=0, ddof=1) if len(values) > 1 else 0.0
-        out[2:] = np.quantile(values, [0.5 - level / 2, 0.5 + level / 2], axis=0)
+        out[2:] = _quantiles(values, (0.5 - level / 2, 0.5 + level / 2))
+    return out
+
+
+def _quantiles(values: FloatArray, probabilities: tuple[float, float]) -> FloatArray:
+    """Quantiles over the first axis, as :func:`numpy.quantile` gives them to the last bit."""
+    if len(values) > SORTED:
+        return np.asarray(np.quantile(values, probabilities, axis=0))
+    ordered = np.sort(values, axis=0)
+    out = np.empty((2, *values.shape[1:]))
+    for row, probability in zip(out, probabilities, strict=True):
+        place = probability * (len(ordered) - 1)
+        below = int(place)
+        low, high, part = ordered[below], ordered[min(below + 1, len(ordered) - 1)], place - below
+        np.subtract(high, low, out=row)
+        if part < 0.5:  # from the nearer of the two, as NumPy does
+            row *= part
+            row += low
+        else:
+            row *= part - 1.0
+            row += high
     return out
 
 
@@ -83,39 +95,10 @@ def first_lost(values: FloatArray) -> npt.NDArray[np.int64]:
     return np.where(np.take_along_axis(gone, first[..., None], axis=-1)[..., 0], first, -1)
 
 
-def stack_members(
-    series: Iterable[FloatArray], members: int, shape: tuple[int, int, int]
-) -> FloatArray:
-    """Members side by side, each put into its place as it comes.
-
-    Parameters
-    ----------
-    series : iterable of ndarray, each of shape `shape`
-        Members one after the other.
-    members : int
-        Their number.
-    shape : tuple of int
-        (window, steps, N).
-
-    Returns
-    -------
-    ndarray, shape (window, member, steps, N)
-        All of them.
-    """
-    out = np.empty((shape[0], members, *shape[1:]))
-    for member, values in enumerate(series):
-        out[:, member] = values
-    return out
-
-
 def reduce_members(
-    series: Iterable[FloatArray],
-    members: int,
-    shape: tuple[int, int, int],
-    level: float,
-    threads: int = 1,
-) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """Reduce members to statistics without holding all of them.
+    shelf: Shelf, lost: npt.NDArray[np.int64], level: float, threads: int = 1
+) -> FloatArray:
+    """Reduce members to statistics, piece by piece in time.
 
     A member that is lost (NaN) anywhere in a window is left out of that window's statistics from
     its first instant on: what is left of it would weigh in one part of the band and not in the
@@ -123,126 +106,32 @@ def reduce_members(
 
     Parameters
     ----------
-    series : iterable of ndarray, each of shape `shape`
-        Members one after the other.
-    members : int
-        Their number.
-    shape : tuple of int
-        (window, steps, N).
+    shelf : Shelf
+        Series of the members.
+    lost : ndarray of int, shape (member, window)
+        First instant lost, or −1.
     level : float
         Probability between the two quantiles.
     threads : int, optional
-        Pieces reduced side by side once all members are there.
+        Pieces reduced side by side.
 
     Returns
     -------
-    statistics : ndarray, shape (window, 4, steps, N)
+    ndarray, shape (window, 4, steps, N)
         As :func:`statistics_of`.
-    lost : ndarray of int, shape (member, window)
-        First instant lost, or −1.
     """
-    windows, steps, N = shape
-    out = np.empty((windows, 4, steps, N))
-    lost = np.full((members, windows), -1, dtype=np.int64)
-    room = CHUNK // max(1, 8 * N * members * threads)
-    length = max(1, min(math.ceil(steps / threads), room))
-    pieces = math.ceil(steps / length)
-    with _store((windows, pieces, members, length, N)) as store:
-        for member, values in enumerate(series):
-            lost[member] = first_lost(values)
-            for window in range(windows):
-                for piece in range(pieces):
-                    part = values[window, piece * length : (piece + 1) * length]
-                    store.put(window, piece, member, part)
+    layout = shelf.layout
+    out = np.empty((layout.windows, 4, layout.steps, layout.channels))
 
-        def reduce(window: int, piece: int) -> None:
-            at = slice(piece * length, min((piece + 1) * length, steps))
-            block = store.get(window, piece)[lost[:, window] < 0, : at.stop - at.start]
-            out[window, :, at] = statistics_of(block, level)
+    def reduce(window: int, piece: int) -> None:
+        block = shelf.get(window, piece)[lost[:, window] < 0]
+        out[window, :, layout.instants(piece)] = statistics_of(block, level)
 
-        with ThreadPoolExecutor(threads) as pool:
-            todo = [(w, p) for w in range(windows) for p in range(pieces)]
-            for done in [pool.submit(reduce, *each) for each in todo]:
-                done.result()
-    return out, lost
-
-
-class _Held:
-    """Members in memory, of shape (window, piece, member, length, N)."""
-
-    def __init__(self, shape: tuple[int, ...]) -> None:
-        self._values = np.empty(shape)
-
-    def put(self, window: int, piece: int, member: int, part: FloatArray) -> None:
-        """Keep a piece of a member, shape (time, N)."""
-        self._values[window, piece, member, : len(part)] = part
-
-    def get(self, window: int, piece: int) -> FloatArray:
-        """A piece of all members, shape (member, length, N)."""
-        found: FloatArray = self._values[window, piece]
-        return found
-
-
-class _Spilled:
-    """The same in a file; read and written, not mapped, so that memory holds one piece alone."""
-
-    def __init__(self, shape: tuple[int, ...], file: BinaryIO) -> None:
-        self._shape, self._file = shape, file
-        self._lock = threading.Lock()  # reading moves the place in the file
-        self._size = 8 * math.prod(shape)
-        with _spilling(self._size):
-            self._reserve()
-
-    def _reserve(self) -> None:
-        """Take the room now where that can be done: a full disk is told before the work."""
-        try:
-            os.posix_fallocate(self._file.fileno(), 0, self._size)
-        except (AttributeError, OSError) as error:
-            if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-                raise
-            self._file.truncate(self._size)
-
-    def _seek(self, window: int, piece: int, member: int) -> None:
-        place = np.ravel_multi_index((window, piece, member), self._shape[:3])
-        self._file.seek(8 * int(place) * math.prod(self._shape[3:]))
-
-    def put(self, window: int, piece: int, member: int, part: FloatArray) -> None:
-        """Keep a piece of a member, shape (time, N)."""
-        left = np.ascontiguousarray(part).data.cast("B")
-        with _spilling(self._size):
-            self._seek(window, piece, member)
-            while left:
-                left = left[self._file.write(left) :]
-
-    def get(self, window: int, piece: int) -> FloatArray:
-        """A piece of all members, shape (member, length, N)."""
-        shape = self._shape[2:]
-        with self._lock:
-            self._seek(window, piece, 0)
-            found = np.fromfile(self._file, dtype=np.float64, count=math.prod(shape))
-        return found.reshape(shape)
-
-
-@contextmanager
-def _spilling(size: int) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise RequestError(
-            f"cannot keep {size / 2**20:.0f} MiB of members in the temporary folder "
-            f"{tempfile.gettempdir()}: {error.strerror or error}. Free space there, name a folder "
-            "on another disk in the environment variable TMPDIR, or ask for fewer steps, windows "
-            "or members at a time."
-        ) from error
-
-
-@contextmanager
-def _store(shape: tuple[int, ...]) -> Iterator[_Held | _Spilled]:
-    if 8 * math.prod(shape) <= HELD:
-        yield _Held(shape)
-        return
-    with tempfile.TemporaryFile(prefix="seakeep-", buffering=0) as file:
-        yield _Spilled(shape, file)
+    with ThreadPoolExecutor(threads) as pool:
+        todo = [(w, p) for w in range(layout.windows) for p in range(layout.pieces)]
+        for done in [pool.submit(reduce, *each) for each in todo]:
+            done.result()
+    return out
 
 
 def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:

@@ -29,6 +29,7 @@ from seakeep.models.crew import (
 __all__ = [
     "Backend",
     "Crew",
+    "Function",
     "WorkerLostError",
     "as_finished",
     "check_crew",
@@ -105,8 +106,12 @@ def side_by_side(
             return
     with _team(function, data, crew, len(items)) as team:
         pending: deque[Future[list[Result]]] = deque()
-        for first in range(0, len(items), team.batch):
-            pending.append(team.submit(items[first : first + team.batch]))
+        first = 0
+        while first < len(items):
+            # Fewer at a time towards the end, so that no worker waits long for another.
+            size = min(team.batch, max(1, (len(items) - first) // team.ahead))
+            pending.append(team.submit(items[first : first + size]))
+            first += size
             if len(pending) >= team.ahead:
                 yield from pending.popleft().result()
         while pending:
@@ -187,7 +192,7 @@ def _team(
         return _threads(function, data, crew.workers)
     from seakeep.models.processes import processes
 
-    return processes(function, data, crew.workers)
+    return processes(function, data, crew.workers, small)
 
 
 @contextmanager

@@ -22,7 +22,8 @@ from seakeep.models import HankelDMDc, HankelDMDcModel
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.fitted_ensemble import HankelEnsemble
 from seakeep.models.forecasting import cut_divergence
-from seakeep.models.summaries import STATISTICS, reduce_members
+from seakeep.models.shelf import Layout, open_shelf
+from seakeep.models.summaries import STATISTICS, first_lost, reduce_members
 from seakeep.study.calibration import calibration_arrays, calibration_name
 from seakeep.study.plan import Plan
 from seakeep.study.windows import TestWindow, TrainingSet
@@ -342,7 +343,12 @@ def _ensemble_cells(
                 series[test].append(part)
     for test, windows in groups.items():
         found = series.pop(test)
-        reduced, lost = reduce_members(found, len(found), found[0].shape, plan.level)
+        lost = np.stack([first_lost(values) for values in found])
+        layout = Layout.in_pieces(len(windows.numbers), len(found), *found[0].shape[1:])
+        with open_shelf(layout) as shelf:
+            for number, values in enumerate(found):
+                shelf.put(number, values)
+            reduced = reduce_members(shelf, lost, plan.level)
         pair = {"measured": windows.measured, "training_std": spread}
         errors = {
             "member_nrmse": [metrics.nrmse(predicted=v, **pair) for v in found],
