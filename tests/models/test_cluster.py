@@ -77,8 +77,9 @@ def test_members_are_those_of_one_worker_and_data_travel_once(dask_cluster, prob
     # One worker makes the data out of the task that carries them, the other fetches them from it.
     (copied,) = [nbytes for log in sent.values() for key, nbytes in log if key.endswith("-data")]
     assert copied >= size
-    # Forty members in tasks of five, and the data: both workers worked, and no task came twice.
-    assert sum(states.values()) == 8 + 1
+    # Forty members in seven tasks of five and four of 2, 1, 1 and 1, and the data: both workers
+    # worked, and no task came twice.
+    assert sum(states.values()) == 7 + 4 + 1
     summary = ensemble.forecast_summary(run, start=181.0, steps=30, scheduler=dask_cluster.address)
     xr.testing.assert_identical(summary, ensemble.forecast_summary(run, start=181.0, steps=30))
 

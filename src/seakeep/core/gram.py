@@ -72,8 +72,8 @@ class PrimalSystem:
 
     Parameters
     ----------
-    gram : ndarray, shape (p, p)
-        Upper triangle of C, p = Q(z+1) + N(s+1).
+    gram : ndarray, shape (p + room, p + room)
+        Upper triangle of C in its first p rows and columns, p = Q(z+1) + N(s+1).
     right : ndarray, shape (N, p)
         Products of the next states (the newest block alone) with the regressors.
     heads : ndarray, shape (Q + N, p)
@@ -126,6 +126,7 @@ def primal_system(
     input_delays: int,
     scratch: Scratch,
     single: bool = False,
+    room: int = 0,
 ) -> PrimalSystem:
     r"""Gram matrix :math:`\hat Y \hat Y^T` and right-hand side :math:`X' \hat Y^T`.
 
@@ -139,6 +140,8 @@ def primal_system(
         Memory.
     single : bool, optional
         Whether the Gram matrix is rounded to single precision; all sums are made in double.
+    room : int, optional
+        Rows and columns beyond the Gram matrix, for right-hand sides.
 
     Returns
     -------
@@ -171,8 +174,8 @@ def primal_system(
         for row, at in ((edges[2 * number], start - 1), (edges[2 * number + 1], end)):
             row[Q:inputs] = recent(u, at, z)
             row[inputs + N :] = recent(x, at, s)
-    gram = scratch.take((size, size))
-    _fill_primal(gram, heads, edges, N, Q, inputs)
+    gram = scratch.take((size + room, size + room))
+    _fill_primal(gram[:size, :size], heads, edges, N, Q, inputs)
     if single:
         gram = _rounded(gram, [*_panels(0, inputs, Q), *_panels(inputs, size, N)], scratch)
     return PrimalSystem(gram, right, heads, edges, N, Q, inputs)
@@ -212,6 +215,7 @@ def snapshot_gram(
     input_delays: int,
     scratch: Scratch,
     single: bool = False,
+    room: int = 0,
 ) -> FloatArray:
     r"""Gram matrix :math:`\hat Y^T \hat Y` of the snapshots of all runs.
 
@@ -225,11 +229,14 @@ def snapshot_gram(
         Memory; the result is part of it.
     single : bool, optional
         Whether the result is rounded to single precision; all sums are made in double.
+    room : int, optional
+        Rows and columns beyond the Gram matrix, for right-hand sides.
 
     Returns
     -------
-    ndarray, shape (n, n)
-        Its upper triangle, n the number of snapshot pairs of all runs.
+    ndarray, shape (n + room, n + room)
+        Its upper triangle in the first n rows and columns, n the number of snapshot pairs of all
+        runs.
     """
     s, z = state_delays, input_delays
     N, Q = pieces[0].states.shape[1], pieces[0].inputs.shape[1]
@@ -242,8 +249,8 @@ def snapshot_gram(
         rows[1:, N : N + Q] = piece.inputs[first + 1 : first + count]
         rows[1:, N + Q : 2 * N + Q] = piece.states[first - s : first - s + count - 1]
         rows[1:, 2 * N + Q :] = piece.inputs[first - z : first - z + count - 1]
-    signed = steps.copy()
-    signed[:, N + Q :] *= -1.0
+    signed = np.ascontiguousarray(steps.T)
+    signed[N + Q :] *= -1.0
     heads = np.empty((len(pieces), len(steps)))
     for own, head in zip(pieces, heads, strict=True):
         own_x = recent(own.states, own.first, s + 1)
@@ -251,8 +258,9 @@ def snapshot_gram(
         for piece, begin, stop in zip(pieces, ends[:-1], ends[1:], strict=True):
             head[begin:stop] = lagged_response(piece.states, own_x, piece.first, piece.count)
             head[begin:stop] += lagged_response(piece.inputs, own_u, piece.first, piece.count)
-    gram: FloatArray = scratch.take((len(steps), len(steps)))
-    _fill_snapshots(gram, heads, steps, signed, ends)
+    size = len(steps)
+    gram: FloatArray = scratch.take((size + room, size + room))
+    _fill_snapshots(gram[:size, :size], heads, steps, signed, ends)
     if single:
         runs = pairwise(ends.tolist())
         gram = _rounded(gram, [panel for run in runs for panel in _panels(*run, 1)], scratch)
@@ -270,7 +278,7 @@ def _fill_snapshots(
     runs = list(pairwise(ends.tolist()))
     for run, (first, last) in enumerate(runs):
         for begin, stop in _panels(first, last, 1):
-            np.matmul(steps[begin:stop], signed[begin:].T, out=gram[begin:stop, begin:])
+            np.matmul(steps[begin:stop], signed[:, begin:], out=gram[begin:stop, begin:])
             if begin == first:
                 gram[first, first:] = heads[run, first:]
             for later in range(run + 1, len(runs)):
@@ -286,8 +294,9 @@ def _fill_snapshots(
 def _rounded(gram: FloatArray, panels: Sequence[tuple[int, int]], scratch: Scratch) -> FloatArray:
     """The panels of a Gram matrix as they were made, in single precision."""
     out: FloatArray = scratch.take(gram.shape, np.float32)
+    size = panels[-1][1]
     for begin, stop in panels:
-        out[begin:stop, begin:] = gram[begin:stop, begin:]
+        out[begin:stop, begin:size] = gram[begin:stop, begin:size]
     return out
 
 

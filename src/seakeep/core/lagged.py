@@ -18,6 +18,8 @@ __all__ = ["lagged_response", "lagged_sums", "recent"]
 
 FloatArray = npt.NDArray[np.float64]
 
+RESPONSES = 24
+"""Instants whose responses are one product with a Toeplitz matrix of the weights."""
 BLOCK_WIDTH = 96
 """Columns of the block of lags that is laid out: wide enough for BLAS, small enough for cache."""
 
@@ -99,6 +101,9 @@ def lagged_sums(
 def lagged_response(series: FloatArray, weights: FloatArray, first: int, count: int) -> FloatArray:
     r"""Response :math:`\sum_l g_l^T b_{k+i-l}` for i = 0 … `count` − 1.
 
+    Some instants at a time: the samples that they reach, side by side, times a Toeplitz matrix of
+    the weights.
+
     Parameters
     ----------
     series : ndarray, shape (time, channel)
@@ -117,12 +122,17 @@ def lagged_response(series: FloatArray, weights: FloatArray, first: int, count: 
     lags = weights.size // channels if channels else 0
     if lags == 0:
         return np.zeros(count)
-    # Row t, column l of the product is b_t against lag l; the response sums it along diagonals.
-    product = np.ascontiguousarray(
-        series[first - lags + 1 : first + count] @ weights.reshape(lags, channels)[::-1].T
+    blocks = -(-count // RESPONSES)
+    reached = np.zeros((blocks * RESPONSES + lags - 1, channels))
+    reached[: count + lags - 1] = series[first - lags + 1 : first + count]
+    width = (RESPONSES + lags - 1) * channels
+    step, number = RESPONSES * reached.strides[0], reached.itemsize
+    samples = np.lib.stride_tricks.as_strided(
+        reached, shape=(blocks, width), strides=(step, number), writeable=False
     )
-    down, right = product.strides
-    diagonals = np.lib.stride_tricks.as_strided(
-        product, shape=(count, lags), strides=(down, down + right), writeable=False
-    )
-    return np.asarray(diagonals.sum(axis=1))
+    # Rows one sample longer than a block's, end to end: cut at its width, each stands a sample
+    # further right than the one before.
+    shifted = np.zeros((RESPONSES, width + channels))
+    shifted[:, : weights.size] = weights.reshape(lags, channels)[::-1].reshape(-1)
+    toeplitz = shifted.reshape(-1)[: RESPONSES * width].reshape(RESPONSES, width)
+    return np.asarray(samples @ toeplitz.T).reshape(-1)[:count]

@@ -40,7 +40,10 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 
 OUTPUT_ROWS = 192
-"""Rows of the outputs of one step of an exact-shift propagator, about."""
+"""Rows of the outputs of one step of an exact-shift propagator, at most, about."""
+SHIFTING_COST = (2500.0, 6000.0, 900.0)
+"""Nanoseconds of a step of an exact-shift propagator beyond its product, and of one more row of
+blocks when it is made: fixed, per state."""
 
 GEMM_RATE = 50.0
 """Products of large matrices, multiply-adds in double-operations per nanosecond (rough)."""
@@ -91,10 +94,12 @@ def shifting_propagator(a: FloatArray, b: FloatArray, channels: int, steps: int)
     Returns
     -------
     Propagator
-        Of about ``OUTPUT_ROWS / N`` steps.
+        Of as many steps as cost least, and about ``OUTPUT_ROWS / N`` at most.
     """
     N, size = a.shape
-    K = max(1, min(steps, -(-OUTPUT_ROWS // N)))
+    step, fixed, state = SHIFTING_COST
+    K = round(np.sqrt(steps * step / (fixed + state * N)))
+    K = max(1, min(steps, K, -(-OUTPUT_ROWS // N)))
     width = b.shape[1]
     output_state = np.empty((K * N, size), a.dtype)
     output_input = np.zeros((K * N, width + (K - 1) * channels), a.dtype)

@@ -155,10 +155,11 @@ def _gram_suffices(
     return bool(ridge >= limit * largest[0])
 
 
-def _factor(gram: FloatArray, ridge: float) -> FloatArray:
+def _factor(gram: FloatArray, ridge: float, beside: int = 0) -> FloatArray:
     """Lower Cholesky factor, in Fortran order, of the upper triangle `gram` plus λ; in its place.
 
-    The triangle above the factor keeps what stood there.
+    The triangle above the factor keeps what stood there. `beside` counts the last rows that are
+    not of a Gram matrix.
     """
     size = len(gram)
     gram.reshape(-1)[:: size + 1] += ridge
@@ -166,8 +167,8 @@ def _factor(gram: FloatArray, ridge: float) -> FloatArray:
     factor, failed = potrf(gram.T, lower=1, overwrite_a=1, clean=0)
     if failed:
         raise np.linalg.LinAlgError(
-            f"the Gram matrix of {size} rows with ridge {ridge:g} is not positive definite. Raise "
-            "ridge, or use method='svd'."
+            f"the Gram matrix of {size - beside} rows with ridge {ridge:g} is not positive "
+            "definite. Raise ridge, or use method='svd'."
         )
     return np.asarray(factor)
 
@@ -177,6 +178,25 @@ def _apply(factor: FloatArray, right: FloatArray) -> FloatArray:
     potrs = lapack.spotrs if factor.dtype == np.float32 else lapack.dpotrs
     solved, _ = potrs(factor, right.T, lower=1, overwrite_b=1)
     return np.asarray(solved).T
+
+
+def _solve_beside(padded: FloatArray, right: FloatArray, ridge: float) -> FloatArray:
+    """`right` times the inverse of a Gram matrix plus λ, shape of `right`.
+
+    The Gram matrix M − λI stands at the head of `padded`, and the right-hand sides R are put
+    beside it, so that Cholesky does the forward half of the solution on its way: the factor of
+    [M Rᵀ; R κI] begins with that of M, and R L⁻ᵀ stands below. κ is so large that what it is
+    reduced by does not count.
+    """
+    count, size = right.shape
+    padded[:size, size:] = right.T
+    padded[size:, size:] = np.diag(np.full(count, np.finfo(padded.dtype).max / 4))
+    factor = _factor(padded, ridge, count)
+    half = np.zeros((count, len(padded)), padded.dtype)
+    half[:, :size] = padded[:size, size:].T
+    trsm = blas.strsm if padded.dtype == np.float32 else blas.dtrsm
+    solved = trsm(1.0, factor, half.T, lower=1, trans_a=1, overwrite_b=1)
+    return np.asarray(solved).T[:, :size]
 
 
 def _by_singular_values(
@@ -393,11 +413,12 @@ class _Delayed:
 
     def primal(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
-        system = primal_system(*self.shape, self.scratch, self.single)
-        factor = _factor(system.gram, ridge)
         if self.all_rows:
-            return ridge_rows(system, factor, ridge, self.scratch)
-        top = _apply(factor, system.right.astype(factor.dtype))
+            system = primal_system(*self.shape, self.scratch)
+            return ridge_rows(system, _factor(system.gram, ridge), ridge, self.scratch)
+        room = self.pieces[0].states.shape[1]
+        system = primal_system(*self.shape, self.scratch, self.single, room)
+        top = _solve_beside(system.gram, system.right, ridge)
         return np.concatenate([top[:, system.inputs :], top[:, : system.inputs]], axis=1)
 
     def dual(self, ridge: float) -> FloatArray:
@@ -407,11 +428,12 @@ class _Delayed:
         summed against the lagged series; all rows are :math:`\hat X' L^{-T} Z` with
         :math:`Z = L^{-1} \hat Y^T`, and those of the delayed states are :math:`P Z^T Z`.
         """
-        factor = _factor(snapshot_gram(*self.shape, self.scratch, self.single), ridge)
         targets = np.concatenate([piece.targets for piece in self.pieces])
+        N = targets.shape[1]
         if not self.all_rows:
-            weights = _apply(factor, targets.T.astype(factor.dtype, order="C")).T
-            top, at = np.zeros((targets.shape[1], self.rows)), 0
+            gram = snapshot_gram(*self.shape, self.scratch, self.single, N)
+            weights = _solve_beside(gram, targets.T, ridge).T
+            top, at = np.zeros((N, self.rows)), 0
             for piece in self.pieces:
                 own = weights[at : at + piece.count].astype(float)
                 at += piece.count
@@ -420,7 +442,7 @@ class _Delayed:
                 top[:, : self.states] += x
                 top[:, self.states :] += u
             return top
-        N = targets.shape[1]
+        factor = _factor(snapshot_gram(*self.shape, self.scratch), ridge)
         stacked = np.concatenate([self.matrices()[0], targets.T])
         half = blas.dtrsm(1.0, factor, stacked.T, lower=1, overwrite_b=1)
         regressors, newest = half[:, : self.rows], half[:, self.rows :]

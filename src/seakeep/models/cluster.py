@@ -152,7 +152,7 @@ def cluster(
 
             threads = max(1, sum(client.nthreads().values()))
             batch = 1 if small is None else max(1, min(BATCH, small // (4 * threads)))
-            yield Team(submit, 3 * threads, batch)
+            yield Team(submit, threads, batch)
         except KilledWorker as error:
             raise WorkerLostError(
                 f"a piece of work took several workers of {scheduler} with it (is their memory "

@@ -116,16 +116,24 @@ class Team(Generic[Item, Result]):
     ----------
     submit : callable
         Takes an item and gives the future of its result.
-    ahead : int
-        Items handed out at a time: enough that no worker waits, few enough that results that are
-        not yet read stay few.
+    workers : int
+        Workers.
     batch : int
-        Items handed out together, where handing out one costs as much as a small one's work.
+        Items handed out together at most, where handing out one costs as much as a small one's
+        work.
     """
 
     submit: Callable[[Sequence[Item]], Future[list[Result]]]
-    ahead: int
+    workers: int
     batch: int = 1
+
+    @property
+    def ahead(self) -> int:
+        """Batches handed out at a time.
+
+        Enough that no worker waits, few enough that results that are not yet read stay few.
+        """
+        return 3 * self.workers
 
 
 def do_all(

@@ -342,9 +342,11 @@ def moments(
     pooled = np.concatenate(
         [values[window.samples] for values, window in zip(series, windows, strict=True)]
     )
-    mean, spread = pooled.mean(axis=0), pooled.std(axis=0, ddof=1)
+    mean = pooled.mean(axis=0)
+    centred = pooled - mean
+    spread = np.sqrt(np.einsum("tc,tc->c", centred, centred) / (len(pooled) - 1))
     # A constant that is not a binary fraction has a spread of rounding, not of zero.
-    constant = spread <= 1e-12 * np.abs(pooled).max(axis=0, initial=0.0)
+    constant = spread <= 1e-12 * np.abs(mean)
     spread = np.where(constant, 0.0, spread)
     if not standardize:
         return Scale(np.zeros(mean.size), np.ones(mean.size), spread)

@@ -16,9 +16,7 @@ from multiprocessing.connection import wait as wait_for
 from pathlib import Path
 from typing import Any, TypeVar
 
-import threadpoolctl
-
-from seakeep.models.crew import Desk, Function, Team, WorkerLostError, do_all
+from seakeep.models.crew import Desk, Function, Team, WorkerLostError, do_all, one_blas_thread
 
 __all__ = ["processes"]
 
@@ -69,7 +67,7 @@ def processes(
             path = Path(folder) / "data"
             with path.open("wb") as file:
                 pickle.dump(data, file, protocol=5)
-            yield Team(submit, 3 * workers, 1 if small is None else BATCH)
+            yield Team(submit, workers, 1 if small is None else BATCH)
     except BaseException as error:
         _end(pool)
         if isinstance(error, BrokenProcessPool):
@@ -153,7 +151,6 @@ class _Received:
 
     path: str = ""
     desk: Desk[Any]
-    limits: object = None
 
 
 def _begin() -> None:
@@ -169,6 +166,5 @@ def _work(path: str, function: Function[Any, Item, Result], items: Sequence[Item
         with Path(path).open("rb") as file:
             _Received.desk = Desk(pickle.load(file))
         _Received.path = path
-        # Here, because reading has loaded the modules, and BLAS with them.
-        _Received.limits = threadpoolctl.threadpool_limits(1, user_api="blas")
-    return do_all(_Received.desk, function, items)
+    with one_blas_thread():
+        return do_all(_Received.desk, function, items)

@@ -109,7 +109,7 @@ def side_by_side(
         first = 0
         while first < len(items):
             # Fewer at a time towards the end, so that no worker waits long for another.
-            size = min(team.batch, max(1, (len(items) - first) // team.ahead))
+            size = min(team.batch, max(1, (len(items) - first) // team.workers))
             pending.append(team.submit(items[first : first + size]))
             first += size
             if len(pending) >= team.ahead:
@@ -145,13 +145,17 @@ def as_finished(
         waiting = enumerate(items)
         pending = {team.submit([item]): number for number, item in islice(waiting, team.ahead)}
         while pending:
-            finished, _ = wait(pending, return_when=FIRST_COMPLETED)
-            for future in finished:
-                number = pending.pop(future)
-                (result,) = future.result()
+            finished = wait(pending, return_when=FIRST_COMPLETED).done
+            failed = [future for future in finished if future.exception() is not None]
+            ready = [(pending.pop(f), f.result()[0]) for f in finished if f not in failed]
+            # A future that is held has its result made again if its worker is lost.
+            del finished
+            for number, result in ready:
                 for following, item in islice(waiting, 1):
                     pending[team.submit([item])] = following
                 yield number, result
+            for future in failed:
+                future.result()
 
 
 def _alone(
@@ -206,6 +210,6 @@ def _threads(
 
     try:
         with one_blas_thread():
-            yield Team(submit, 3 * workers)
+            yield Team(submit, workers)
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
