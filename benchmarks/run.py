@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -75,46 +76,68 @@ def one_model(history: str, with_peers: bool):
     return contenders, problem
 
 
-def members(
-    count: int, windows: int, workers: tuple[int, ...] = (1,), ridge=None, single: bool = False
-):
-    """Contenders of an ensemble: the same draws, forecast from one or several starts.
+def plain_cells(draws, deterministic: bool, problem, stops, starts):
+    """Plain NumPy over all training windows, models and test windows."""
+    chosen = [
+        draws[f"{name}_samples"].values.tolist()
+        for name in ("train_length", "state_delay", "input_delay")
+    ]
+    settings = [*zip(*chosen, draws.ridge.values.tolist(), strict=True)]
+    if deterministic:
+        settings.append((SNAPSHOTS, STATE_DELAYS, INPUT_DELAYS, RIDGE))
 
-    `ridge` replaces the paper's prior of 50 to 150, where single precision is refused.
+    def call():
+        for stop, (m, s, z, ridge) in itertools.product(stops, settings):
+            model = reference.fit(problem.states, problem.inputs, stop, m=m, s=s, z=z, ridge=ridge)
+            for start in starts:
+                reference.forecast(model, problem.states, problem.inputs, start, STEPS)
+
+    return call
+
+
+def forecast_cells(ensemble, model, run, stops, starts, workers: int) -> None:
+    """The same with the package: an ensemble, and perhaps a model, a training window."""
+    for stop in stops:
+        fitted = ensemble.fit(run, *names(), stop=stop)
+        fitted.summarize_windows(run, starts, STEPS, workers=workers)
+        if model is not None:
+            one = model.fit(run, *names(), stop=stop)
+            one.forecast_windows(run, starts, STEPS)
+
+
+def members(
+    count: int,
+    windows: int,
+    workers: tuple[int, ...] = (1,),
+    ridge=None,
+    single: bool = False,
+    trainings: int = 1,
+    deterministic: bool = False,
+):
+    """Contenders of ensembles: the same draws, forecast from one or several starts.
+
+    `ridge` replaces the paper's prior of 50 to 150, where single precision is refused. With several
+    training windows and the deterministic model beside the draws these are the cells of the
+    paper's study; plain NumPy identifies once a training window and draw too.
     """
-    problem = linear_system(samples=4608)
+    spacing = SNAPSHOTS // 4
+    problem = linear_system(samples=4608 + 2 * (trainings - 1) * spacing)
     run = as_run(problem)
-    states, inputs = names()
-    stop = problem.stop * DT
+    stops = problem.stop - spacing * np.arange(trainings)[::-1]
     first = problem.stop + 400
     starts = np.linspace(first, len(problem.states) - STEPS - 2, windows).astype(int)
     paper = seakeep.BayesianHankelDMDc.paper(encounter_period=32 * DT, dt=DT, n_members=count)
     paper = paper if ridge is None else dataclasses.replace(paper, ridge=ridge)
-    draws = paper.fit(run, states, inputs, stop=stop).draws
-
-    def plain():
-        for k in range(count):
-            model = reference.fit(
-                problem.states,
-                problem.inputs,
-                problem.stop,
-                m=int(draws.train_length_samples[k]),
-                s=int(draws.state_delay_samples[k]),
-                z=int(draws.input_delay_samples[k]),
-                ridge=float(draws.ridge[k]),
-            )
-            for start in starts:
-                reference.forecast(model, problem.states, problem.inputs, start, STEPS)
+    one = seakeep.HankelDMDc.paper(encounter_period=32 * DT, dt=DT) if deterministic else None
 
     def package(delay_rows, number, precision="double"):
-        spec = dataclasses.replace(paper, delay_rows=delay_rows, precision=precision)
+        changes = {"delay_rows": delay_rows, "precision": precision}
+        spec = dataclasses.replace(paper, **changes)
+        single_model = None if one is None else dataclasses.replace(one, **changes)
+        return lambda: forecast_cells(spec, single_model, run, stops * DT, starts * DT, number)
 
-        def call():
-            ensemble = spec.fit(run, states, inputs, stop=stop)
-            return ensemble.summarize_windows(run, starts * DT, STEPS, workers=number)
-
-        return call
-
+    draws = paper.fit(run, *names(), stop=stops[0] * DT).draws
+    plain = plain_cells(draws, deterministic, problem, stops, starts)
     contenders = {"plain NumPy, loops over the same cells": plain}
     for delay_rows in ("ridge", "exact"):
         for number in workers:
@@ -156,12 +179,9 @@ def read_arguments() -> argparse.Namespace:
     parser.add_argument("--rounds", type=int, default=31, help="repetitions of one model")
     parser.add_argument("--many-rounds", type=int, default=7, help="repetitions of ensembles")
     parser.add_argument("--members", type=int, default=100, help="members of the ensemble")
-    parser.add_argument(
-        "--study-members",
-        type=int,
-        default=10,
-        help="draws of the study's cells timed (one training window, ten test windows)",
-    )
+    parser.add_argument("--study-members", type=int, default=10, help="draws of the study")
+    parser.add_argument("--trainings", type=int, default=1, help="training windows of the study")
+    parser.add_argument("--study-rounds", type=int, default=3, help="repetitions of the study")
     parser.add_argument("--workers", type=int, default=2, help="workers compared with one")
     parser.add_argument("--out", type=Path, default=Path("benchmarks/results"))
     parser.add_argument(
@@ -196,9 +216,18 @@ def main() -> None:
         if arguments.members == 100:
             survey[title] = peers.SURVEY_ENSEMBLE
     if arguments.only in (None, "study"):
-        title = f"Study: {arguments.study_members} draws, ten test windows each"
-        contenders = members(arguments.study_members, 10, numbers)
-        sections[title] = timing.interleave(contenders, arguments.many_rounds)
+        title = (
+            f"Study: {arguments.trainings} training x 10 test windows x (1 + "
+            f"{arguments.study_members}) models"
+        )
+        contenders = members(
+            arguments.study_members,
+            10,
+            numbers,
+            trainings=arguments.trainings,
+            deterministic=True,
+        )
+        sections[title] = timing.interleave(contenders, arguments.study_rounds, memory=False)
     if arguments.only in (None, "single"):
         sections |= precision(arguments)
     print(timing.write(arguments.out, sections, notes, survey))

@@ -32,8 +32,8 @@ class Timing:
         Least of the rounds, ms.
     ratio, ratio_low, ratio_high : float
         Median, least and largest ratio to the reference of the same round.
-    peak_mib : float
-        Peak of what Python and NumPy allocated in one call, MiB.
+    peak_mib : float or None
+        Peak of what Python and NumPy allocated in one call, MiB, if it was measured.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Timing:
     ratio: float
     ratio_low: float
     ratio_high: float
-    peak_mib: float
+    peak_mib: float | None
 
 
 def interleave(
@@ -75,7 +75,7 @@ def interleave(
                 begin = time.perf_counter()
                 contenders[name]()
                 taken[name].append(1e3 * (time.perf_counter() - begin))
-        peaks = {name: _peak(contenders[name]) if memory else float("nan") for name in names}
+        peaks = {name: _peak(contenders[name]) if memory else None for name in names}
     reference = taken[names[0]]
     out = []
     for name in names:
@@ -180,9 +180,10 @@ def write(
         heads += ["survey, ms"] * bool(beside) + ["ANRMSE"] * bool(accuracy)
         text += ["", f"### {name}", "", f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
         for r in rows:
+            peak = "–" if r.peak_mib is None else f"{r.peak_mib:.1f}"
             cells = [
                 *(r.name, f"{r.milliseconds:.2f}", f"{r.fastest:.2f}", f"{r.ratio:.3f}"),
-                *(f"{r.ratio_low:.3f}–{r.ratio_high:.3f}", f"{r.peak_mib:.1f}"),
+                *(f"{r.ratio_low:.3f}–{r.ratio_high:.3f}", peak),
             ]
             if beside:
                 cells.append(f"{beside[r.name]:.0f}" if r.name in beside else "–")

@@ -61,6 +61,18 @@ def test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is(models):
     assert errors["rest"] == pytest.approx(errors["none"], rel=1e-6)
 
 
+@pytest.mark.parametrize("key", ["dispersion", "predicted"])
+def test_windows_side_by_side_are_aligned_as_single_forecasts(models, key):
+    model, run = models[key], drifting_run(7)
+    together = model.forecast_windows(run, [60.0, 71.0], steps=100)
+    for window, start in enumerate((60.0, 71.0)):
+        alone = model.forecast(run, start=start, steps=100)
+        for name in model.states:
+            # Windows side by side are one product: other roundings.
+            np.testing.assert_allclose(together[name][window], alone[name], rtol=0, atol=1e-9)
+    assert together.attrs == {k: v for k, v in alone.attrs.items() if k not in ("start", "status")}
+
+
 def test_predicted_surge_reads_no_measured_surge_after_the_start(models):
     run = drifting_run(7)
     scrambled = run.copy(deep=True)

@@ -78,6 +78,13 @@ def test_bounds_are_moved_by_the_margin_and_nothing_else(calibrated, ensemble, r
     assert wide.attrs["band"] == "calibrated"
     assert "margin" in wide["statistic"].attrs["comment"]
     xr.testing.assert_identical(plain, calibrated.forecast_summary(run, 120.0, 30))
+    windows = calibrated.summarize_windows(run, [120.0, 130.0], 30, band="calibrated")
+    for name in STATES:
+        # Two windows are one product: other roundings.
+        np.testing.assert_allclose(windows[name][0], wide[name], rtol=0, atol=1e-9)
+    assert windows.attrs["band"] == "calibrated"
+    with pytest.raises(RequestError, match=r"not calibrated"):
+        ensemble.summarize_windows(run, [120.0], 30, band="calibrated")
 
 
 def test_no_window_touches_what_a_member_has_read(ensemble, calibrated, run):

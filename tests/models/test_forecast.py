@@ -6,6 +6,7 @@ import xarray as xr
 
 from seakeep import HankelDMDc
 from seakeep.core import embed
+from seakeep.errors import RequestError
 
 DT = 0.05
 S, Z = 3, 8
@@ -155,6 +156,26 @@ def test_forecasting_leaves_the_arrays_it_gets_alone(model, test_run):
     model.forecast_arrays(x[:101], u[:101], u[101:160], steps=60)
     np.testing.assert_array_equal(x, before[0])
     np.testing.assert_array_equal(u, before[1])
+
+
+def test_windows_side_by_side_are_single_forecasts(model, test_run):
+    starts = [2.0, 5.4, 0.41]
+    together = model.forecast_windows(test_run, starts, steps=60)
+    assert dict(together.sizes) == {"window": 3, "lead": 60}
+    np.testing.assert_allclose(together.start, [2.0, 5.4, 0.4], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(together.lead, DT * np.arange(1, 61), rtol=1e-12)
+    assert together.status.values.tolist() == ["ok"] * 3
+    for window, start in enumerate(starts):
+        alone = model.forecast(test_run, start=start, steps=60)
+        for name in model.states:
+            # Three windows are one product: other roundings, over 60 steps of a stable model.
+            np.testing.assert_allclose(together[name][window], alone[name], rtol=0, atol=1e-11)
+            assert together[name].attrs == alone[name].attrs
+        assert together.attrs == {"run": alone.attrs["run"]}
+    with pytest.raises(RequestError, match=r"starts is empty: name at least one instant"):
+        model.forecast_windows(test_run, [], steps=60)
+    with pytest.raises(RequestError, match=r"start = 0.1 s leaves 3 samples of history"):
+        model.forecast_windows(test_run, [5.0, 0.1], steps=60)
 
 
 def test_a_model_without_input_takes_empty_arrays(make_run):

@@ -21,8 +21,8 @@ import seakeep
 from seakeep.core.scratch import Scratch
 from seakeep.errors import RequestError
 from seakeep.models import processes, workers
-from seakeep.models.ensemble_series import read_windows
 from seakeep.models.members import TrainingArrays, forecast_member, member_radius
+from seakeep.models.windows import read_windows, stacked
 from seakeep.models.workers import Crew, WorkerLostError, as_finished, side_by_side
 
 CREWS = [Crew(1), Crew(2, "threads"), Crew(3, "threads"), Crew(2, "processes"), Crew(2, "auto")]
@@ -91,8 +91,7 @@ def _task(ensemble, run, starts):
     return seakeep.models.members.Task(
         ensemble.arrays,
         ensemble.settings,
-        np.stack([w.state_history for w in windows]),
-        np.stack([np.concatenate([w.input_history, w.input_future]) for w in windows]),
+        *stacked(windows),
         40,
     )
 

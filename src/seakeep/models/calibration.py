@@ -14,8 +14,9 @@ import xarray as xr
 from seakeep.core.calibration import ConformalMargin, band_scores, conformal_margin
 from seakeep.errors import RequestError
 from seakeep.models import labelled
-from seakeep.models.ensemble_series import read_windows, shelved
+from seakeep.models.ensemble_series import shelved
 from seakeep.models.summaries import STATISTICS, check_level, reduce_members
+from seakeep.models.windows import read_windows
 from seakeep.models.workers import Crew
 
 if TYPE_CHECKING:

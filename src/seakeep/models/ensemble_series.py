@@ -11,57 +11,21 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.core.scratch import Scratch
-from seakeep.errors import RequestError
 from seakeep.models import aligned
-from seakeep.models.forecasting import ForecastWindow, read_window
+from seakeep.models.forecasting import ForecastWindow
 from seakeep.models.members import Task, forecast_member
-from seakeep.models.offsets import check_offset
 from seakeep.models.progress import Progress, told
 from seakeep.models.shelf import Layout, Shelf, open_shelf
 from seakeep.models.summaries import first_lost
+from seakeep.models.windows import stacked
 from seakeep.models.workers import Crew, Function, side_by_side
 
 if TYPE_CHECKING:
     from seakeep.models.fitted_ensemble import HankelEnsemble
 
-__all__ = ["read_windows", "shelved"]
+__all__ = ["shelved"]
 
 FloatArray = npt.NDArray[np.float64]
-
-
-def read_windows(
-    ensemble: HankelEnsemble, run: xr.Dataset, starts: Sequence[float], steps: int | None
-) -> list[ForecastWindow]:
-    """Cut what forecasts from several starts need out of a run, the input aligned.
-
-    Parameters
-    ----------
-    ensemble : HankelEnsemble
-        The ensemble.
-    run, steps
-        As in :meth:`HankelDMDcModel.forecast`.
-    starts : sequence of float
-        Instants of the last measured state, s.
-
-    Returns
-    -------
-    list of ForecastWindow
-        One a start, with the history of the member that reaches back farthest.
-
-    Raises
-    ------
-    RequestError, DataError
-        As :meth:`HankelDMDcModel.forecast`, or if there is no start.
-    """
-    windows = [read_window(ensemble, run, float(start), steps) for start in starts]
-    if not windows:
-        raise RequestError("starts is empty: name at least one instant to forecast from.")
-    if ensemble.alignment is None:
-        return windows
-    check_offset(run)
-    if ensemble.alignment.settings.surge == "predicted":
-        return windows
-    return [aligned.align_window(ensemble, run, window) for window in windows]
 
 
 @contextmanager
@@ -110,9 +74,7 @@ def shelved(
         loops = [aligned.prepare_loop(ensemble, run, window) for window in windows]
         function, data, items = _closed_loops, (ensemble, loops), range(ensemble.n_members)
     else:
-        histories = np.stack([window.state_history for window in windows])
-        inputs = np.stack([np.concatenate([w.input_history, w.input_future]) for w in windows])
-        data = Task(ensemble.arrays, ensemble.settings, histories, inputs, windows[0].steps)
+        data = Task(ensemble.arrays, ensemble.settings, *stacked(windows), windows[0].steps)
         function, items = forecast_member, ensemble.members
     size = len(windows), ensemble.n_members, windows[0].steps, len(ensemble.states)
     layout = Layout(*size, size[2]) if whole else Layout.in_pieces(*size, hands=crew.workers)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -14,28 +13,21 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.errors import RequestError
-from seakeep.models import aligned, ensemble_store, ensemble_summary, store
+from seakeep.models import ensemble_forecasts, ensemble_store, ensemble_summary, store
 from seakeep.models.alignment import FittedAlignment
-from seakeep.models.calibration import Band, Calibration, calibrate, check_band, widened
+from seakeep.models.calibration import Band, Calibration, calibrate
 from seakeep.models.draws import Draw
-from seakeep.models.ensemble_labels import label_channels, statuses, verdict, window_coords
-from seakeep.models.ensemble_series import read_windows, shelved
 from seakeep.models.ensemble_summary import warn_of_unstable
-from seakeep.models.forecasting import ForecastWindow
 from seakeep.models.labelled import ChannelLabel, Runs
 from seakeep.models.members import (
     TrainingArrays,
     identify_member,
     member_radius,
 )
-from seakeep.models.model import HankelDMDcModel, Training
+from seakeep.models.model import HankelDMDcModel
 from seakeep.models.progress import Progress, told
 from seakeep.models.settings import HankelSettings
-from seakeep.models.summaries import (
-    check_level,
-    reduce_members,
-    statistic_coordinate,
-)
+from seakeep.models.training import Training
 from seakeep.models.workers import Backend, Crew, side_by_side
 
 __all__ = ["HankelEnsemble"]
@@ -300,17 +292,8 @@ class HankelEnsemble:
         RequestError, DataError
             As :meth:`HankelDMDcModel.forecast`.
         """
-        windows = read_windows(self, run, [start], steps)
-        crew = Crew(workers, backend, scheduler)
-        with shelved(self, run, windows, crew, progress, whole=True) as (shelf, lost):
-            (values,) = shelf.all()
-        variables = self._labelled(values, "member", "time")
-        status = statuses(lost[:, 0], windows[0].time.values)
-        variables["status"] = xr.Variable(("member",), status)
-        return xr.Dataset(
-            variables,
-            coords={"member": np.arange(self.n_members), "time": windows[0].time},
-            attrs=self._attributes(run, windows[0]) | verdict(lost) | {"start": windows[0].start},
+        return ensemble_forecasts.all_members(
+            self, run, start, steps, Crew(workers, backend, scheduler), progress
         )
 
     def forecast_summary(
@@ -342,36 +325,15 @@ class HankelEnsemble:
         Dataset
             As :func:`seakeep.summarize` makes of :meth:`forecast`, dimensions (statistic, time),
             with ``status`` over ``member``. More than 32 MiB of members are spilled to a
-            temporary file and reduced in pieces of time.
+            temporary file and reduced in pieces of time; processes put all of them there.
 
         Raises
         ------
         RequestError, DataError
             As :meth:`forecast`.
         """
-        level = check_level(level)
-        check_band(self, level, band)
         crew = Crew(workers, backend, scheduler)
-        (window,) = read_windows(self, run, [start], steps)
-        with shelved(self, run, [window], crew, progress) as (shelf, lost):
-            values = reduce_members(shelf, lost, level, workers)
-        values = widened(self, values, band)
-        variables = label_channels(
-            self.state_labels, self.state_spread, values[0], ("statistic", "time")
-        )
-        variables["status"] = xr.Variable(("member",), statuses(lost[:, 0], window.time.values))
-        counts = {"level": level, "members": self.n_members, **verdict(lost)}
-        if band == "calibrated":
-            counts["band"] = band
-        return xr.Dataset(
-            variables,
-            coords={
-                "statistic": statistic_coordinate(level, band == "calibrated"),
-                "member": np.arange(self.n_members),
-                "time": window.time,
-            },
-            attrs=self._attributes(run, window) | {"start": window.start} | counts,
-        )
+        return ensemble_forecasts.summary(self, run, start, steps, level, band, crew, progress)
 
     def calibrate(
         self,
@@ -446,19 +408,9 @@ class HankelEnsemble:
         RequestError, DataError
             As :meth:`forecast`.
         """
-        windows = read_windows(self, run, starts, steps)
-        crew = Crew(workers, backend, scheduler)
-        with shelved(self, run, windows, crew, whole=True) as (shelf, lost):
-            values = shelf.all()
-        variables = label_channels(
-            self.state_labels, self.state_spread, values, ("window", "member", "lead")
+        return ensemble_forecasts.all_members_of_windows(
+            self, run, starts, steps, Crew(workers, backend, scheduler)
         )
-        status = [
-            statuses(row, window.time.values) for row, window in zip(lost.T, windows, strict=True)
-        ]
-        variables["status"] = xr.Variable(("window", "member"), np.stack(status))
-        coords = window_coords(windows, self.dt) | {"member": np.arange(self.n_members)}
-        return xr.Dataset(variables, coords=coords, attrs=self._attributes(run, windows[0]))
 
     def summarize_windows(
         self,
@@ -467,6 +419,7 @@ class HankelEnsemble:
         steps: int,
         level: float = 0.95,
         *,
+        band: Band = "members",
         workers: int = 1,
         backend: Backend = "processes",
         scheduler: str | None = None,
@@ -475,10 +428,12 @@ class HankelEnsemble:
 
         Parameters
         ----------
-        run, starts, steps, workers, backend
+        run, starts, steps, workers, backend, scheduler
             As in :meth:`forecast_windows`.
         level : float, optional
             Probability between ``lower`` and ``upper``.
+        band
+            As in :meth:`forecast_summary`.
 
         Returns
         -------
@@ -490,25 +445,9 @@ class HankelEnsemble:
         RequestError, DataError
             As :meth:`forecast`.
         """
-        level = check_level(level)
-        windows = read_windows(self, run, starts, steps)
-        crew = Crew(workers, backend, scheduler)
-        with shelved(self, run, windows, crew) as (shelf, lost):
-            values = reduce_members(shelf, lost, level, workers)
-        variables = label_channels(
-            self.state_labels, self.state_spread, values, ("window", "statistic", "lead")
+        return ensemble_forecasts.summary_of_windows(
+            self, run, starts, steps, level, band, Crew(workers, backend, scheduler)
         )
-        variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
-        coords = window_coords(windows, self.dt) | {"statistic": statistic_coordinate(level)}
-        attrs = self._attributes(run, windows[0]) | {"level": level, "members": self.n_members}
-        return xr.Dataset(variables, coords=coords, attrs=attrs)
-
-    def _labelled(self, values: FloatArray, *dims: str) -> dict[str, xr.Variable]:
-        return label_channels(self.state_labels, self.state_spread, values, dims)
-
-    def _attributes(self, run: xr.Dataset, window: ForecastWindow) -> dict[str, Any]:
-        notes = {} if self.alignment is None else aligned.notes(self.alignment, run)
-        return {"run": window.name, "ensemble": json.dumps(self.origin), **notes}
 
     def save(self, path: str | Path) -> Path:
         """Write draws and training arrays as NetCDF, to a temporary name first.

@@ -10,8 +10,9 @@ from seakeep.core.regression import identify
 from seakeep.models.aligned import align_training
 from seakeep.models.identification import Stop, check_names, gather, until
 from seakeep.models.labelled import Runs, as_runs
-from seakeep.models.model import HankelDMDcModel, Training
+from seakeep.models.model import HankelDMDcModel
 from seakeep.models.settings import HankelSettings, periods_to_samples
+from seakeep.models.training import Training
 
 __all__ = ["HankelDMDc"]
 

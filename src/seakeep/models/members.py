@@ -10,12 +10,11 @@ import numpy.typing as npt
 
 from seakeep.core.embedding import History, TrainingWindow, training_window
 from seakeep.core.regression import Solution, identify
-from seakeep.core.rollout import rollout
 from seakeep.core.scratch import Scratch
 from seakeep.models.draws import Draw
-from seakeep.models.forecasting import cut_divergence
 from seakeep.models.identification import Scale, moments
 from seakeep.models.settings import HankelSettings
+from seakeep.models.windows import free_runs
 
 __all__ = [
     "Member",
@@ -62,6 +61,8 @@ class Member:
 
     Parameters
     ----------
+    draw : Draw
+        What is its own.
     solution : Solution
         Coefficients and the form of the regression.
     runs : tuple of int
@@ -72,11 +73,27 @@ class Member:
         Moments over these windows.
     """
 
+    draw: Draw
     solution: Solution
     runs: tuple[int, ...]
     windows: tuple[TrainingWindow, ...]
     state_scale: Scale
     input_scale: Scale
+
+    @property
+    def coefficients(self) -> FloatArray:
+        """Regressed rows of [Â B̂]."""
+        return self.solution.coefficients
+
+    @property
+    def state_delays(self) -> int:
+        """S."""
+        return self.draw.state_delays
+
+    @property
+    def input_delays(self) -> int:
+        """Z."""
+        return self.draw.input_delays
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +173,7 @@ def identify_member(
         precision=settings.precision,
         scratch=scratch,
     )
-    return Member(solution, tuple(chosen), tuple(windows), state_scale, input_scale)
+    return Member(draw, solution, tuple(chosen), tuple(windows), state_scale, input_scale)
 
 
 def forecast_member(task: Task, draw: Draw, scratch: Scratch) -> FloatArray:
@@ -179,24 +196,7 @@ def forecast_member(task: Task, draw: Draw, scratch: Scratch) -> FloatArray:
     scratch.reset()
     member = identify_member(task.arrays, task.settings, draw, scratch)
     scratch.reset()
-    coefficients = member.solution.coefficients
-    N = task.histories.shape[2]
-    size = N * (draw.state_delays + 1)
-    at = task.histories.shape[1]
-    inputs = task.inputs[:, at - 1 - draw.input_delays :]
-    if not inputs.shape[2]:
-        inputs = np.zeros((len(inputs), task.steps, 0))
-    deviations = rollout(
-        coefficients[:, :size],
-        coefficients[:, size:],
-        member.state_scale.deviations(task.histories[:, at - 1 - draw.state_delays :]),
-        member.input_scale.deviations(inputs),
-        n_states=N,
-        scratch=scratch,
-    )
-    with np.errstate(over="ignore"):  # a run that is lost is cut just below
-        values = member.state_scale.physical(deviations, out=deviations)
-    return cut_divergence(values, member.state_scale, task.histories[:, -1:])
+    return free_runs(member, task.histories, task.inputs, task.steps, scratch)
 
 
 def member_radius(

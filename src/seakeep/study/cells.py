@@ -16,14 +16,13 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.core import metrics
-from seakeep.core.rollout import rollout
 from seakeep.errors import DataError, SeakeepError
 from seakeep.models import HankelDMDc, HankelDMDcModel
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.fitted_ensemble import HankelEnsemble
-from seakeep.models.forecasting import cut_divergence
 from seakeep.models.shelf import Layout, open_shelf
 from seakeep.models.summaries import STATISTICS, first_lost, reduce_members
+from seakeep.models.windows import free_runs
 from seakeep.study.calibration import calibration_arrays, calibration_name
 from seakeep.study.plan import Plan
 from seakeep.study.windows import TestWindow, TrainingSet
@@ -265,21 +264,8 @@ def _forecast(model: HankelDMDcModel, runs: Runs, windows: Windows) -> FloatArra
         return np.stack(
             [np.stack([each[n].values for n in model.states], axis=-1) for each in forecasts]
         )
-    at = windows.histories.shape[1]
-    a, b = model.top
-    inputs = windows.inputs[:, at - 1 - model.input_delays :]
-    if not inputs.shape[2]:
-        inputs = np.zeros((len(inputs), windows.measured.shape[1], 0))
-    deviations = rollout(
-        a,
-        b,
-        model.state_scale.deviations(windows.histories[:, at - 1 - model.state_delays :]),
-        model.input_scale.deviations(inputs),
-        n_states=len(model.states),
-    )
-    with np.errstate(over="ignore"):  # a run that is lost is cut just below
-        values = model.state_scale.physical(deviations, out=deviations)
-    return cut_divergence(values, model.state_scale, windows.histories[:, -1:])
+    steps = windows.measured.shape[1]
+    return free_runs(model, windows.histories, windows.inputs, steps)
 
 
 def training_moments(plan: Plan, runs: Runs, training: TrainingSet) -> FloatArray:
