@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from seakeep.core import embed, rollout, snapshot_matrices, solve, training_window
+from seakeep.core import embed, identify, rollout, snapshot_matrices, training_window
 from seakeep.errors import RequestError
 
 
@@ -155,10 +155,11 @@ def test_the_states_of_a_regressed_matrix_are_told_from_its_lower_rows(n, q, s, 
     window = training_window(119, None, s, z, "before")
     y, target = snapshot_matrices(series, driving, window, s, z, all_rows=True)
     size = n * (s + 1)
+    delays = {"state_delays": s, "input_delays": z, "ridge": 0.0}
     for fit in (
         np.linalg.solve(y @ y.T + ridge * np.eye(len(y)), y @ target.T).T,  # the paper's formula
-        solve(y, target, 0.0).coefficients,
-        solve(y, target, 0.0, rank=2 * n).coefficients,
+        identify([series], [driving], [window], **delays).coefficients,
+        identify([series], [driving], [window], **delays, rank=2 * n).coefficients,
     ):
         a, b = fit[:, :size], fit[:, size:]
         x, u = rng.standard_normal((2, size)), rng.standard_normal((2, 7, q * (z + 1)))

@@ -1,7 +1,7 @@
 """The mathematics of the method: arrays in, arrays out, numpy and scipy only."""
 
 from seakeep.core.embedding import embed, snapshot_matrices, training_window, unembed
-from seakeep.core.regression import Solution, identify, solve
+from seakeep.core.regression import Solution, identify
 from seakeep.core.rollout import rollout
 
 __all__ = [
@@ -10,7 +10,6 @@ __all__ = [
     "identify",
     "rollout",
     "snapshot_matrices",
-    "solve",
     "training_window",
     "unembed",
 ]

@@ -1,7 +1,7 @@
 r"""Tikhonov-regularised and rank-truncated least squares, :math:`\hat X' \approx G \hat Y`.
 
-:func:`solve` takes any regressors; :func:`identify` those of delayed series, whose Gram matrices
-come from their structure (:mod:`seakeep.core.gram`). Both choose the form in one way:
+Gram matrices of delayed series come from their structure (:mod:`seakeep.core.gram`), and the form
+is chosen by shape and conditioning:
 
 * primal, :math:`G = X' Y^T (Y Y^T + \lambda I)^{-1}` (the paper's formula), or dual,
   :math:`G = X' (Y^T Y + \lambda I)^{-1} Y^T`, the same matrix, whichever is less work;
@@ -27,7 +27,7 @@ from seakeep.core.lagged import lagged_sums
 from seakeep.core.scratch import Scratch
 from seakeep.errors import RequestError
 
-__all__ = ["Method", "Precision", "Solution", "check_single", "identify", "solve"]
+__all__ = ["Method", "Precision", "Solution", "check_single", "identify"]
 
 FloatArray = npt.NDArray[np.float64]
 Method = Literal["primal", "dual", "svd"]
@@ -70,72 +70,6 @@ class Solution:
     rank: int
 
 
-def solve(
-    regressors: FloatArray,
-    targets: FloatArray,
-    ridge: float,
-    rank: int | None = None,
-    method: Method | None = None,
-) -> Solution:
-    r"""Solve :math:`\min_G \|X' - G Y\|_F^2 + \lambda \|G\|_F^2`.
-
-    Parameters
-    ----------
-    regressors : ndarray, shape (rows, columns)
-        Y.
-    targets : ndarray, shape (targets, columns)
-        X'.
-    ridge : float
-        Effective λ, zero or positive. Zero gives the solution of least norm.
-    rank : int, optional
-        Number of singular values kept; then λ is not used (truncated-SVD DMD).
-    method : {"primal", "dual", "svd"}, optional
-        Forces a form; by default shape and conditioning decide.
-
-    Returns
-    -------
-    Solution
-        Coefficients and how they were found.
-    """
-    if rank is not None:
-        return _by_singular_values(regressors, targets, 0.0, rank)
-    chosen = method or choose_method(regressors, ridge)
-    if chosen == "svd":
-        return _by_singular_values(regressors, targets, ridge, None)
-    full_rank = min(regressors.shape)
-    if chosen == "primal":
-        factor = _factor(regressors @ regressors.T, ridge)
-        return Solution(_apply(factor, targets @ regressors.T), "primal", ridge, full_rank)
-    weights = _apply(_factor(regressors.T @ regressors, ridge), targets.copy())
-    return Solution(weights @ regressors.T, "dual", ridge, full_rank)
-
-
-def choose_method(regressors: FloatArray, ridge: float) -> Method:
-    """Form that keeps ten digits: a Gram matrix where λ allows it, else singular values.
-
-    Parameters
-    ----------
-    regressors : ndarray, shape (rows, columns)
-        Y.
-    ridge : float
-        Effective λ.
-
-    Returns
-    -------
-    {"primal", "dual", "svd"}
-        The form.
-    """
-    rows, columns = regressors.shape
-    trace = float(np.einsum("ij,ij->", regressors, regressors))
-    settled = _gram_suffices(ridge, trace, None)
-    if settled is None:
-        gram = regressors @ regressors.T if rows <= columns else regressors.T @ regressors
-        settled = _gram_suffices(ridge, trace, gram)
-    if not settled:
-        return "svd"
-    return "primal" if rows <= columns else "dual"
-
-
 def _gram_suffices(
     ridge: float, trace: float, gram: FloatArray | None, limit: float = GRAM_LIMIT
 ) -> bool | None:
@@ -171,13 +105,6 @@ def _factor(gram: FloatArray, ridge: float, beside: int = 0) -> FloatArray:
             "definite. Raise ridge, or use method='svd'."
         )
     return np.asarray(factor)
-
-
-def _apply(factor: FloatArray, right: FloatArray) -> FloatArray:
-    """`right` times the inverse of the factored matrix; shape of `right`, which is overwritten."""
-    potrs = lapack.spotrs if factor.dtype == np.float32 else lapack.dpotrs
-    solved, _ = potrs(factor, right.T, lower=1, overwrite_b=1)
-    return np.asarray(solved).T
 
 
 def _solve_beside(padded: FloatArray, right: FloatArray, ridge: float) -> FloatArray:
@@ -272,16 +199,16 @@ def identify(
     state_delays, input_delays : int
         s and z.
     ridge : float
-        λ.
+        λ, zero or positive. Zero gives the solution of least norm.
     per_snapshot : bool, optional
         Whether λ is multiplied by the number of columns.
     rank : int, optional
-        Number of singular values, instead of λ.
+        Number of singular values kept, instead of λ (truncated-SVD DMD).
     all_rows : bool, optional
         Whether the rows of the delayed states are regressed too, as in the paper, or the first N
         alone.
     method : {"primal", "dual", "svd"}, optional
-        As in :func:`solve`.
+        Forces a form; by default shape and conditioning decide.
     precision : {"double", "single"}, optional
         Precision of the result and, where the first N rows alone are regressed, of the factor and
         of what is solved with it. Sums over snapshots are made in double precision, and so are
