@@ -13,11 +13,10 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.channels import Group, read_groups
-from seakeep.campaign.checks import as_attribute, checked, warn_of_positions
+from seakeep.campaign.finish import Told, finished, reference_time
 from seakeep.campaign.instruments import open_loggers
-from seakeep.campaign.labels import attributes_of, cropped, role_of
+from seakeep.campaign.labels import attributes_of, role_of
 from seakeep.campaign.periods import counted, in_seconds, parse_periods
-from seakeep.campaign.plausibility import implausible, warn_of
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.resampling import on_one_axis, strays
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
@@ -229,7 +228,7 @@ class Campaign:
         self._run(name)
         found, settings, _, _ = self._whole([name], None, steps=False)
         groups = self._groups(name, found, settings)
-        dt = uniform_step(_reference_time(groups), f"run '{name}'")
+        dt = uniform_step(reference_time(groups), f"run '{name}'")
         dataset = on_one_axis(groups, dt, settings, name)
         attributes = self._attributes(name, dataset, dt, found, settings)
         return dataset.assign_attrs(attributes)
@@ -417,13 +416,13 @@ class Campaign:
             self._run(name)
         found, settings, period, dt = self._whole(wanted, progress, failures=failures)
         stated, first = dt is not None, ""
-        misplaced, doubted = set[str](), set[tuple[str, str]]()
+        told = Told()
         for done, name in enumerate(wanted, 1):
             try:
                 if failures is not None and name in failures:
                     raise failures[name]
                 groups = self._groups(name, found, settings)
-                reference = _reference_time(groups)
+                reference = reference_time(groups)
                 own = uniform_step(reference, f"run '{name}'")
                 dt, first = own if dt is None else dt, first or name
                 if not stated and strays(own, reference.size, dt):
@@ -431,7 +430,8 @@ class Campaign:
                         f"the runs differ in rate: '{first}' has a step of {dt:g} s and '{name}' "
                         f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                     )
-                run = self._finished(name, groups, dt, found, settings, misplaced, doubted)
+                run = finished(name, groups, dt, found, settings, told)
+                run.attrs.update(self._attributes(name, run, dt, found, settings))
             except SeakeepError as error:
                 spare(failures, name, error)
                 if progress is not None:
@@ -442,28 +442,6 @@ class Campaign:
             if progress is not None:
                 progress(done, len(wanted), name)
             yield name, run
-
-    def _finished(
-        self,
-        name: str,
-        groups: Group,
-        dt: float,
-        found: Survey,
-        settings: CampaignSettings,
-        misplaced: set[str],
-        doubted: set[tuple[str, str]],
-    ) -> xr.Dataset:
-        whole = on_one_axis(groups, dt, settings, name)
-        findings = checked(name, groups, whole, found.clocks[name], settings, found.left_out)
-        findings += implausible(name, groups, whole, settings, found.doubts)
-        warn_of_positions(findings, name, misplaced)
-        warn_of(findings, name, doubted)
-        reference = _reference_time(groups)
-        record = (float(reference[0]), float(reference[-1]))
-        run = cropped(whole, name, settings.runs[name], record)
-        run.attrs.update(self._attributes(name, run, dt, found, settings))
-        run.attrs["quality"] = as_attribute(findings)
-        return run
 
     def _whole(
         self,
@@ -496,10 +474,6 @@ class Campaign:
             "basis_sha256": self.basis_of(name),
         }
         return {**own, **attributes_of(name, run, dt, found.clocks[name], settings)}
-
-
-def _reference_time(groups: Group) -> Any:
-    return next(iter(groups.values()))["time"].to_numpy()
 
 
 def read_campaign(path: Path | str) -> Campaign:
