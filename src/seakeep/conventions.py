@@ -10,11 +10,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
-
-import pint
+from typing import TYPE_CHECKING, Any
 
 from seakeep.errors import RequestError, did_you_mean
+
+if TYPE_CHECKING:
+    import pint
 
 __all__ = [
     "Channel",
@@ -170,6 +171,8 @@ percent = 0.01 = pct
 
 @lru_cache(maxsize=1)
 def _registry() -> pint.UnitRegistry[Any]:
+    import pint  # here, because it takes a tenth of a second that not every command needs
+
     registry: pint.UnitRegistry[Any] = pint.UnitRegistry(None)
     for line in _UNITS.strip().splitlines():
         registry.define(line)

@@ -164,7 +164,7 @@ def test_drifts_that_differ_are_not_pooled():
 def test_words():
     assert Clock().describe() == "the same clock"
     clock = Clock(0.37, 25e-6, 1e-4, 1e-6, "trigger pulses", 13, 1e-4)
-    assert clock.describe() == "+370.00 ± 0.10 ms, +25.0 ± 1.0 ppm (trigger pulses, 13)"
+    assert clock.describe() == "+370.00 ± 0.10 ms, +25.0 ± 1.0 ppm (trigger pulses, n = 13)"
 
 
 def dim_video(drift, seed):

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 import xarray as xr
-from scipy import io
 
 from seakeep.campaign.columns import Columns, unique_names
 from seakeep.campaign.hdf5_mat import is_version_73, load_version_73
@@ -82,7 +82,7 @@ def _unwrapped(found: dict[str, Any]) -> dict[str, Any]:
 
 def _load_older(path: Path) -> dict[str, Any]:
     try:
-        content: dict[str, Any] = io.loadmat(path, simplify_cells=True)
+        content: dict[str, Any] = scipy.io.loadmat(path, simplify_cells=True)
     except (ValueError, TypeError, OSError, EOFError, NotImplementedError, KeyError, IndexError,
             zlib.error, struct.error, MemoryError) as error:  # fmt: skip
         raise DataError(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import butter, sosfiltfilt
+import scipy
 
 from seakeep.core.metrics import over_channels, paired
 from seakeep.core.samples import FloatArray
@@ -74,9 +74,9 @@ def split_bands(
             f"bands split at {frequency:g} Hz do not fit a time step of {dt:g} s; the split must "
             "lie between 0 and half the sampling rate."
         )
-    sections = butter(ORDER, frequency, fs=1.0 / dt, output="sos")
+    sections = scipy.signal.butter(ORDER, frequency, fs=1.0 / dt, output="sos")
     reach = min(x.shape[-2] - 1, round(1.0 / (frequency * dt)))
-    low: FloatArray = sosfiltfilt(sections, x, axis=-2, padtype="even", padlen=reach)
+    low: FloatArray = scipy.signal.sosfiltfilt(sections, x, axis=-2, padtype="even", padlen=reach)
     low = np.where(np.isfinite(x).all(axis=-2, keepdims=True), low, np.nan)
     return low, x - low
 

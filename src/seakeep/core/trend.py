@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import kendalltau
+import scipy
 
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.core.samples import FloatArray, as_series, whole_number
@@ -126,8 +126,8 @@ def trend_test(
         )
     block = resolve_block_length(residuals, block_length)
     drawn = residuals[bootstrap_indices(x.size, n_series, block, rng)]
-    tau = float(kendalltau(t, x).statistic)
-    others = np.array([kendalltau(t, row).statistic for row in drawn])
+    tau = float(scipy.stats.kendalltau(t, x).statistic)
+    others = np.array([scipy.stats.kendalltau(t, row).statistic for row in drawn])
     extreme = int(np.count_nonzero(np.abs(others) >= abs(tau)))
     low, high = np.quantile(drawn @ weights, [(1 - level) / 2, (1 + level) / 2])
     return TrendTest(

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import qmc
+import scipy
 
 from seakeep.errors import DataError
 from seakeep.models.settings import periods_to_samples
@@ -110,7 +110,7 @@ def draw_members(spec: BayesianHankelDMDc, dt: float, samples: Sequence[int]) ->
     points = np.empty((spec.n_members, 0))
     if spec.sampling == "sobol":
         scrambling = child(seed, spec.n_members)
-        engine = qmc.Sobol(4, scramble=True, rng=scrambling)
+        engine = scipy.stats.qmc.Sobol(4, scramble=True, rng=scrambling)
         # A power of two, the balance of which the net keeps; the first n_members are used.
         points = engine.random_base2(max(spec.n_members - 1, 1).bit_length())
     return [

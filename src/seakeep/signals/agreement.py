@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 import xarray as xr
-from scipy import interpolate, optimize
 
 from seakeep.conventions import conversion
 from seakeep.errors import DataError, RequestError, did_you_mean
@@ -168,7 +168,7 @@ def _compare(first: xr.DataArray, second: xr.DataArray, reach: float | None) -> 
             f"{max_lag:g} s are allowed for, fewer than {SHORTEST}. Bring them onto one clock, or "
             "search shorter lags."
         )
-    spline = interpolate.CubicSpline(t2, factor * y2)
+    spline = scipy.interpolate.CubicSpline(t2, factor * y2)
     if np.ptp(y1) == 0 or np.ptp(y2) == 0:
         which = "tracked" if np.ptp(y1) == 0 else "reference"
         raise DataError(f"the {which} '{name}' is constant: nothing to compare. Check the sensor.")
@@ -184,7 +184,7 @@ def _compare(first: xr.DataArray, second: xr.DataArray, reach: float | None) -> 
     at_limit = best in (0, lags.size - 1)
     if not at_limit:
         lag = float(
-            optimize.minimize_scalar(
+            scipy.optimize.minimize_scalar(
                 lambda shift: -correlation(shift),
                 bounds=(lags[best - 1], lags[best + 1]),
                 method="bounded",

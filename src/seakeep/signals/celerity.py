@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft, signal
+import scipy
+from scipy import fft
 
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.filters import as_series, positive
@@ -123,8 +124,8 @@ def phase_celerity(
         length = min(round(60.0 / step), first.size // 2)
     length, shared = welch_segments(first.size, step, length, None)
     options = {"fs": 1.0 / step, "window": "hamming", "nperseg": length, "noverlap": shared}
-    frequency, cross = signal.csd(first, second, **options)
-    power = [signal.welch(each, **options)[1] for each in (first, second)]
+    frequency, cross = scipy.signal.csd(first, second, **options)
+    power = [scipy.signal.welch(each, **options)[1] for each in (first, second)]
     kept = frequency > 0
     frequency, cross = frequency[kept], cross[kept]
     coherence = np.abs(cross) ** 2 / np.maximum(power[0][kept] * power[1][kept], 1e-300)

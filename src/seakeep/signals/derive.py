@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft, signal
+import scipy
+from scipy import fft
 
 from seakeep.errors import RequestError
 from seakeep.signals.filters import as_series, positive
@@ -108,8 +109,10 @@ def predicted_extension(
         for inward in (values[::-1], values):
             past = inward[-fitted:]
             denominator = np.concatenate([[1.0], -linear_prediction(past, order)])
-            state = signal.lfiltic([1.0], denominator, past[: -order - 1 : -1])
-            ends.append(signal.lfilter([1.0], denominator, np.zeros(count), zi=state)[0] * window)
+            state = scipy.signal.lfiltic([1.0], denominator, past[: -order - 1 : -1])
+            ends.append(
+                scipy.signal.lfilter([1.0], denominator, np.zeros(count), zi=state)[0] * window
+            )
         out[:, column] = np.concatenate([ends[0][::-1], values, ends[1]])
     return out.reshape((-1, *array.shape[1:]))
 

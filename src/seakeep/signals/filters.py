@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import signal
+import scipy
 
 from seakeep.errors import RequestError
 
@@ -89,9 +89,9 @@ def lowpass_taps(
 
 
 def _kaiser_taps(edges: tuple[float, float], attenuation: float) -> FloatArray:
-    count, beta = signal.kaiserord(attenuation, 2 * (edges[1] - edges[0]))
+    count, beta = scipy.signal.kaiserord(attenuation, 2 * (edges[1] - edges[0]))
     count += 1 - count % 2
-    taps: FloatArray = signal.firwin(
+    taps: FloatArray = scipy.signal.firwin(
         count, sum(edges) / 2, window=("kaiser", beta), fs=1.0, scale=True
     )
     return taps
@@ -172,5 +172,5 @@ def apply_taps(array: FloatArray, taps: FloatArray) -> FloatArray:
     half = taps.size // 2
     extended = odd_extension(array, half)
     columns = taps.reshape((-1,) + (1,) * (array.ndim - 1))
-    filtered: FloatArray = signal.oaconvolve(extended, columns, mode="valid", axes=0)
+    filtered: FloatArray = scipy.signal.oaconvolve(extended, columns, mode="valid", axes=0)
     return filtered

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline, PchipInterpolator
+import scipy
 
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.clocks import check_order, printed_tolerance
@@ -157,7 +157,7 @@ def onto_uniform(
         for begin_row, end_row in stretches(np.isfinite(source).all(axis=1), place):
             part = slice(begin_row, end_row)
             if end_row - begin_row >= 4:
-                spline = CubicSpline(t[part], source[part])
+                spline = scipy.interpolate.CubicSpline(t[part], source[part])
                 rows = place[part]
                 flat[rows] = spline(np.clip(grid[rows], t[begin_row], t[end_row - 1]))
     return grid, out
@@ -272,7 +272,9 @@ def bridge(series: npt.ArrayLike, dt: float, longest: float) -> Bridged:
         near = np.concatenate([left[left >= 0][::-1], right[right < x.size]])
         near = near[~missing[near]]
         if inner and near.size >= 2:
-            filled[begin:end] = PchipInterpolator(near, x[near])(np.arange(begin, end))
+            filled[begin:end] = scipy.interpolate.PchipInterpolator(near, x[near])(
+                np.arange(begin, end)
+            )
         else:
             filled[begin:end] = x[end] if begin == 0 else x[begin - 1]
     return Bridged(filled, short, long)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
+import scipy
 
 from seakeep.errors import DataError
 
@@ -173,7 +173,7 @@ def _pairs(own: FloatArray, reference: FloatArray, reach: float) -> tuple[IntArr
 
 def pulse_template(
     trigger: FloatArray, time: FloatArray, pulses: Pulses, centres: FloatArray
-) -> CubicSpline:
+) -> scipy.interpolate.CubicSpline:
     """Mean pulse of a record, as a function of the time from its centre.
 
     Parameters
@@ -187,7 +187,7 @@ def pulse_template(
 
     Returns
     -------
-    CubicSpline
+    scipy.interpolate.CubicSpline
         Over 1.5 widths to either side of the centre.
     """
     step = float(np.median(np.diff(time)))
@@ -198,11 +198,14 @@ def pulse_template(
     if not whole:
         whole = list(centres)
     mean = np.mean([np.interp(c + away, time, x) for c in whole], axis=0)
-    return CubicSpline(away, mean - np.median(x))
+    return scipy.interpolate.CubicSpline(away, mean - np.median(x))
 
 
 def time_pulses(
-    trigger: FloatArray, time: FloatArray, centres: FloatArray, template: CubicSpline
+    trigger: FloatArray,
+    time: FloatArray,
+    centres: FloatArray,
+    template: scipy.interpolate.CubicSpline,
 ) -> tuple[FloatArray, FloatArray]:
     """Instants of pulses by least squares of height, level and instant of a template.
 
@@ -212,7 +215,7 @@ def time_pulses(
         The record.
     centres : ndarray, shape (pulse,)
         First values, s.
-    template : CubicSpline
+    template : scipy.interpolate.CubicSpline
         From :func:`pulse_template`.
 
     Returns

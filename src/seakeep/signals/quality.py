@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy
 
 from seakeep.errors import RequestError
 from seakeep.signals.filters import as_series, odd_extension, positive
@@ -255,7 +255,7 @@ def level_drift(series: npt.ArrayLike, dt: float, period: float) -> tuple[float,
     if windows < 4:
         return 0.0, 0.0
     means = x[: windows * length].reshape(windows, length).mean(axis=1)
-    line = stats.linregress(np.arange(windows), means)
+    line = scipy.stats.linregress(np.arange(windows), means)
     sure = abs(line.slope) / line.stderr if line.stderr > 0 else 0.0
     return float(line.slope * x.size / length), float(sure)
 

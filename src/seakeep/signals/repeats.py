@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft, signal
+import scipy
+from scipy import fft
 
 from seakeep.errors import RequestError
 from seakeep.signals.filters import as_series, positive
@@ -141,7 +142,9 @@ def find_repeat(
 
 def _analytic(series: FloatArray) -> ComplexArray:
     centred = series - series.mean()
-    out: ComplexArray = signal.hilbert(centred, fft.next_fast_len(centred.size))[: centred.size]
+    out: ComplexArray = scipy.signal.hilbert(centred, fft.next_fast_len(centred.size))[
+        : centred.size
+    ]
     return out
 
 

@@ -13,7 +13,8 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft, signal
+import scipy
+from scipy import fft
 
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.filters import as_series, positive
@@ -310,7 +311,7 @@ def _spectra(
     a: FloatArray, b: FloatArray, dt: float, depth: float
 ) -> tuple[ComplexArray, float, FloatArray]:
     """Cross-spectrum where there is energy, the product of the records' norms, wavenumbers."""
-    taper = signal.windows.tukey(a.size, 0.2)
+    taper = scipy.signal.windows.tukey(a.size, 0.2)
     first, second = (fft.rfft(taper * (each - each.mean())) for each in (a, b))
     frequency = fft.rfftfreq(a.size, dt)
     cross = np.conj(first) * second

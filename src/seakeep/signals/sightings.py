@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
+import scipy
 
 from seakeep.errors import DataError
 from seakeep.signals.panel import CORNERS
@@ -254,7 +254,9 @@ def _jumps(
     away = np.zeros(at.size)
     for axis in ("x", "y"):
         place = seen[axis][at]
-        away = np.hypot(away, place - ndimage.median_filter(place, NEIGHBOURS, mode="nearest"))
+        away = np.hypot(
+            away, place - scipy.ndimage.median_filter(place, NEIGHBOURS, mode="nearest")
+        )
     # From the middle of the neighbours to either end; twice that where some of them are flagged.
     reach = limits.max_speed * limits.step * NEIGHBOURS / reference.metres_per_pixel
     return at[away > reach + limits.tolerance * reference.length]

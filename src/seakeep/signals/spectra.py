@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy import signal
+import scipy
 
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.filters import as_series, positive
@@ -376,7 +376,7 @@ def wave_spectrum(
             f"the transform must be at least as long as a segment ({length} samples); received "
             f"{padded}. Lengthen it, or leave it out."
         )
-    frequency, density = signal.welch(
+    frequency, density = scipy.signal.welch(
         x, rate, window=window, nperseg=length, noverlap=shared, nfft=padded
     )
     return frequency, density

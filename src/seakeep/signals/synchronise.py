@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
-from scipy.interpolate import CubicSpline
+import scipy
 
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.clocks import uniform_step
@@ -90,11 +89,16 @@ class Clock:
         """One line for people: offset and drift with their errors, and where they come from."""
         if self.method == Clock.method:
             return self.method
-        errors = (
-            f"{1e3 * self.offset:+.2f} ± {1e3 * self.offset_error:.2f} ms, "
-            f"{1e6 * self.drift:+.1f} ± {1e6 * self.drift_error:.1f} ppm"
+        found = (
+            f"{1e3 * self.offset:+.2f}{_error(1e3 * self.offset_error, 2)} ms, "
+            f"{1e6 * self.drift:+.1f}{_error(1e6 * self.drift_error, 1)} ppm"
         )
-        return f"{errors} ({self.method}, {self.count})"
+        return f"{found} ({self.method}, n = {self.count})"
+
+
+def _error(value: float, digits: int) -> str:
+    """A standard error behind its number; nothing where it is not known."""
+    return f" ± {value:.{digits}f}" if np.isfinite(value) else ""
 
 
 def _line(own: FloatArray, reference: FloatArray, errors: FloatArray | None) -> Clock:
@@ -249,7 +253,11 @@ def clock_from_correlation(
         )
     grid = begin + step * np.arange(int((end - begin) / step + 1e-9) + 1)
     lags = windowed_lags(
-        CubicSpline(c, a)(grid), CubicSpline(t, b)(grid), step, window, largest_lag
+        scipy.interpolate.CubicSpline(c, a)(grid),
+        scipy.interpolate.CubicSpline(t, b)(grid),
+        step,
+        window,
+        largest_lag,
     )
     good = lags.correlation >= least_correlation
     if good.sum() < 2:
@@ -296,7 +304,7 @@ def clock_from_shared(
     b, t = np.asarray(reference, float), np.asarray(reference_time, float)
     if np.median(np.diff(c)) < np.median(np.diff(t)):  # the spline goes through the faster one
         inverse = _refined(
-            b, t, CubicSpline(c, a), (c[0], c[-1]),
+            b, t, scipy.interpolate.CubicSpline(c, a), (c[0], c[-1]),
             (-first.offset / (1 + first.drift), 1 / (1 + first.drift) - 1),
         )  # fmt: skip
         (level, drift), (level_error, drift_error), rms, count = inverse
@@ -312,7 +320,7 @@ def clock_from_shared(
             centre=float(t.mean()),
         )
     (offset, drift), (offset_error, drift_error), rms, count = _refined(
-        a, c, CubicSpline(t, b), (t[0], t[-1]), (first.offset, first.drift)
+        a, c, scipy.interpolate.CubicSpline(t, b), (t[0], t[-1]), (first.offset, first.drift)
     )
     return Clock(
         offset,
@@ -392,7 +400,7 @@ def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
     drifts = np.array([c.drift for c in known])
     mean = float(weights @ drifts / weights.sum())
     error = float(weights.sum() ** -0.5)
-    if float(weights @ (drifts - mean) ** 2) > stats.chi2.ppf(0.999, len(known) - 1):
+    if float(weights @ (drifts - mean) ** 2) > scipy.stats.chi2.ppf(0.999, len(known) - 1):
         return list(clocks)
     pooled = []
     for clock in clocks:

@@ -21,8 +21,8 @@ from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 import xarray as xr
-from scipy import interpolate
 
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.signals.filters import low_pass, positive
@@ -362,7 +362,7 @@ def _bridged(
             filled[begin:end] = True
     if filled.any():
         at = np.flatnonzero(good)
-        between = interpolate.PchipInterpolator(at, table[at], axis=0)
+        between = scipy.interpolate.PchipInterpolator(at, table[at], axis=0)
         table = table.copy()
         table[filled] = between(np.flatnonzero(filled))
     return table, filled

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 import xarray as xr
-from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from seakeep.errors import RequestError
 from seakeep.files import replacing
@@ -250,7 +250,9 @@ def passive_damping(hydro: Hydrodynamics, step: float = 0.02) -> tuple[FloatArra
     omega = np.arange(0.0, TAIL_END + 0.5 * step, step)
     last = hydro.omega[-1]
     known = np.concatenate([np.zeros((1, *hydro.mass.shape)), _passive(hydro.damping)])
-    inside = PchipInterpolator(np.append(0.0, hydro.omega), known, axis=0)(np.minimum(omega, last))
+    inside = scipy.interpolate.PchipInterpolator(np.append(0.0, hydro.omega), known, axis=0)(
+        np.minimum(omega, last)
+    )
     tail = np.where(omega > last, (last / np.maximum(omega, last)) ** 3, 1.0)
     weight = np.ones((omega.size, len(hydro.names)))
     if hydro.pool is not None:
@@ -356,7 +358,7 @@ def excitation_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
     """
     wanted = _inside(hydro, omega)
     parts = np.stack([hydro.excitation.real, hydro.excitation.imag], axis=-1)
-    values = CubicSpline(hydro.omega, parts, axis=0)(wanted)
+    values = scipy.interpolate.CubicSpline(hydro.omega, parts, axis=0)(wanted)
     result: ComplexArray = np.asarray(values[..., 0] + 1j * values[..., 1], dtype=complex)
     return result
 
@@ -395,8 +397,8 @@ def response(
     """
     wanted = _inside(hydro, omega)
     if kernel is None:
-        added = CubicSpline(hydro.omega, hydro.added_mass, axis=0)(wanted)
-        radiated = CubicSpline(hydro.omega, hydro.damping, axis=0)(wanted)
+        added = scipy.interpolate.CubicSpline(hydro.omega, hydro.added_mass, axis=0)(wanted)
+        radiated = scipy.interpolate.CubicSpline(hydro.omega, hydro.damping, axis=0)(wanted)
     else:
         added, radiated = kernel_coefficients(kernel, wanted)
     w = wanted[:, None, None]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicHermiteSpline, CubicSpline
+import scipy
 
 from seakeep.tank.dynamics import Motion, Rig, tensions
 from seakeep.tank.seas import Sea
@@ -78,9 +78,17 @@ class Played:
     def states(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Position, velocity and acceleration at any instants, each of shape (dof, time)."""
         m = self.motion
-        position = CubicHermiteSpline(m.time, m.position, m.velocity, axis=1)(time)
-        velocity = CubicHermiteSpline(m.time, m.velocity, m.acceleration, axis=1)(time)
-        return position, velocity, CubicSpline(m.time, m.acceleration, axis=1)(time)
+        position = scipy.interpolate.CubicHermiteSpline(m.time, m.position, m.velocity, axis=1)(
+            time
+        )
+        velocity = scipy.interpolate.CubicHermiteSpline(m.time, m.velocity, m.acceleration, axis=1)(
+            time
+        )
+        return (
+            position,
+            velocity,
+            scipy.interpolate.CubicSpline(m.time, m.acceleration, axis=1)(time),
+        )
 
     def ramp(self, time: FloatArray) -> FloatArray:
         """Part of their height to which the waves have grown, shape (time,)."""

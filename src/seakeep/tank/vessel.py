@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
+import scipy
 
 from seakeep.errors import RequestError
 from seakeep.tank.settings import HullSettings, PoolGeometry
@@ -223,7 +223,9 @@ def _solve_shape(hull: HullSettings, density: float) -> tuple[float, float, floa
             f"of {hull.waterplane_area:g} m²; between {_waterplane(hull, 1.5):.3f} and "
             f"{_waterplane(hull, 40.0):.3f} m² is possible. Change waterplane_area."
         )
-    exponent = float(brentq(lambda n: _waterplane(hull, n) - hull.waterplane_area, 1.5, 40.0))
+    exponent = float(
+        scipy.optimize.brentq(lambda n: _waterplane(hull, n) - hull.waterplane_area, 1.5, 40.0)
+    )
     target = hull.mass / density
 
     def layer(midship: float) -> float:
@@ -239,14 +241,14 @@ def _solve_shape(hull: HullSettings, density: float) -> tuple[float, float, floa
             f"no draft between {lowest:g} and 1 m displaces {target:g} m³; received a mass of "
             f"{hull.mass:g} kg. Check the mass, the waterline's length and beam, and the shelf."
         )
-    draft = float(brentq(lambda d: volume(d) - target, lowest, 1.0, xtol=1e-12))
+    draft = float(scipy.optimize.brentq(lambda d: volume(d) - target, lowest, 1.0, xtol=1e-12))
 
     def lever(midship: float) -> float:
         moment = _volume(_patches(hull, draft, midship, exponent)[0])[1]
         return moment - (0.0 if hull.pool is None else layer(midship) * hull.pool.centre)
 
     quarter = 0.25 * hull.length_waterline
-    midship = float(brentq(lever, -quarter, quarter, xtol=1e-12))
+    midship = float(scipy.optimize.brentq(lever, -quarter, quarter, xtol=1e-12))
     return draft, midship, exponent
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import spearmanr
+import scipy
 
 from seakeep.report.figures.common import line_of, model_colour, model_words
 from seakeep.report.style import figure_style, new_figure
@@ -143,5 +143,5 @@ def _scatter(axes: Any, drawn: FloatArray, errors: FloatArray, colour: str) -> N
     axes.scatter(drawn, errors, s=9, color=colour, alpha=0.6, linewidths=0)
     known = np.isfinite(errors)
     if known.sum() > 2 and np.ptp(errors[known]) > 0:
-        rank = float(spearmanr(drawn[known], errors[known]).statistic)
+        rank = float(scipy.stats.spearmanr(drawn[known], errors[known]).statistic)
         axes.set_title(f"rank correlation {rank:+.2f}", loc="right", fontsize=7, pad=2)
