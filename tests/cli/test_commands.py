@@ -18,7 +18,9 @@ from seakeep.cli import modelling
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial"
-VERBS = ("tank", "init", "prepare", "fit", "forecast", "compare", "datasets", "info")
+VERBS = (
+    *("tank", "init", "prepare", "fit", "calibrate", "forecast", "compare", "datasets", "info"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -225,6 +227,43 @@ def test_compare_judges_the_mean_of_an_ensemble_and_its_band(run, place):
     assert float(heave["nrmse"]) == pytest.approx(float(expected["heave"]), rel=1e-12)
 
 
+def test_calibrate_widens_the_band_that_compare_and_forecast_show(run, place):
+    calibrate = f"calibrate ensemble.nc {CAMPAIGN} --run unseen --stop 60 --steps 200 -o wide.nc"
+    status, out, err = run(f"{calibrate} --level 0.9")
+    assert status == 0, err
+    assert "Margin of the 90 % band, from 3 windows of 200 instants (unseen)" in out
+    assert "Judge it elsewhere with: seakeep compare wide.nc" in err
+    ensemble = seakeep.load_model(place / "ensemble.nc")
+    unseen = seakeep.read_campaign(place / CAMPAIGN).prepare(names=["unseen"])["unseen"]
+    part = unseen.sel(time=slice(None, 60.001))
+    expected = ensemble.calibrate(part, steps=200, level=0.9)
+    margin = expected.calibration.found.margin
+    found = seakeep.load_model(place / "wide.nc").calibration
+    np.testing.assert_array_equal(found.found.margin, margin)
+    assert re.search(rf"heave +m +{margin[0]:.4g} ".replace(".", r"\."), out)
+
+    options = f"{CAMPAIGN} --start 60 --steps 200"
+    held = {}
+    for name in ("members", "calibrated"):
+        level = "--level 0.9 " if name == "members" else ""  # a calibrated band knows its own
+        status, out, err = run(f"compare wide.nc {options} {level}--band {name} -o {name}")
+        assert status == 0, err
+        held[name] = {key: float(row["coverage"]) for key, row in judged_rows(place / name).items()}
+        word = "calibrated " if name == "calibrated" else ""
+        assert f"90 % {word}band against measurement" in out
+        assert f"unseen: the 90 % {word}band of 40 members holds" in out
+    assert all(held["calibrated"][key] >= held["members"][key] for key in held["members"])
+    assert np.mean(list(held["calibrated"].values())) > np.mean(list(held["members"].values())) + 5
+
+    status, _, err = run(f"forecast wide.nc {FROM_20} --band calibrated -o wide_band.nc")
+    assert "mean, std and 90 % calibrated band of 40 members" in err
+    with xr.open_dataset(place / "wide_band.nc", engine="h5netcdf") as stored:
+        band = ensemble.forecast_summary(unseen, 20.0, 50, 0.9)["heave"]
+        np.testing.assert_array_equal(
+            stored["heave"].sel(statistic="upper"), band.sel(statistic="upper") + margin[0]
+        )
+
+
 def judged_rows(folder):
     """Rows of a comparison's CSV by their channel."""
     lines = (folder / "comparison.csv").read_text(encoding="utf-8").splitlines()
@@ -336,6 +375,42 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
             f"forecast ensemble.nc {FROM_20} --members --level 0.9 -o f.nc",
             2,
             r"--level belongs to the band, and --members writes the members without it\. Leave one",
+        ),
+        (
+            f"forecast ensemble.nc {FROM_20} --members --band members -o f.nc",
+            2,
+            r"--band belongs to the band, and --members writes the members without it\. Leave one",
+        ),
+        (
+            f"compare ensemble.nc {CAMPAIGN} --band calibrated",
+            2,
+            r"the ensemble is not calibrated.*seakeep calibrate",
+        ),
+        (
+            f"compare ensemble.nc {CAMPAIGN} --band wide",
+            2,
+            r"--band must be members or calibrated; received 'wide'\.",
+        ),
+        (f"compare model.nc {CAMPAIGN} --band members", 2, r"--band is for ensembles, and"),
+        (
+            f"calibrate model.nc {CAMPAIGN} --steps 100 -o c.nc",
+            2,
+            r"model\.nc holds a single model, which has no band\. Fit an ensemble",
+        ),
+        (
+            f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unsen -o c.nc",
+            2,
+            r"the campaign has no run 'unsen'\. Did you mean 'unseen'",
+        ),
+        (
+            f"calibrate ensemble.nc {CAMPAIGN} --steps 900 --run unseen --stop 30 -o c.nc",
+            2,
+            r"no window of 900 steps with \d+ samples of history lies in unseen outside of what",
+        ),
+        (
+            f"forecast ensemble.nc {FROM_20} --workers 2 --scheduler tcp://h:1 -o f.nc",
+            2,
+            r"--workers 2 counts processes on this machine, and --scheduler tcp://h:1 hands all",
         ),
         (
             f"forecast ensemble.nc {FROM_20} --level 95 -o f.nc",

@@ -118,6 +118,16 @@ def test_no_window_touches_what_a_member_has_read(ensemble, calibrated, run):
     np.testing.assert_allclose(calibrated.calibration.found.margin, expected.margin, rtol=1e-12)
 
 
+def test_progress_counts_members_over_the_runs(ensemble):
+    told = []
+    runs = {name: sea(3, 500, name) for name in ("other", "third")}
+    runs["short"] = sea(4, 20, "short")
+    ensemble.calibrate(runs, steps=40, progress=lambda *each: told.append(each))
+    assert [done for done, _, _ in told] == list(range(1, 17))
+    assert {total for _, total, _ in told} == {16}
+    assert (told[0][2], told[-1][2]) == ("other, member 1", "third, member 8")
+
+
 def test_another_run_is_used_whole(ensemble):
     found = ensemble.calibrate({"other": sea(3, 500, "other")}, steps=40).calibration
     assert found.windows == {"other": (500 - ensemble.history_samples) // 40}

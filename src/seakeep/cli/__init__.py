@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from seakeep.cli import campaigns, information, modelling, tank, tracking
+from seakeep.cli import calibrating, campaigns, information, modelling, tank, tracking
 from seakeep.cli import study as studying
 from seakeep.cli.console import messages, tell_warnings
 from seakeep.errors import SeakeepError
@@ -54,6 +54,7 @@ app.command("tank")(tank.tank)
 app.command("init")(campaigns.init)
 app.command("prepare")(campaigns.prepare)
 app.command("fit")(modelling.fit)
+app.command("calibrate")(calibrating.calibrate)
 app.command("forecast")(modelling.forecast)
 app.command("compare")(modelling.compare)
 app.command("study")(studying.study)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,8 +16,9 @@ from seakeep.campaign.prepare import Progress as Report
 from seakeep.errors import SeakeepWarning
 from seakeep.interruption import check_interrupted
 
-__all__ = ["messages", "progress_bar", "results", "tell_warnings", "worker_count"]
+__all__ = ["messages", "progress_bar", "quietly", "results", "tell_warnings", "worker_count"]
 
+SECONDS_BETWEEN_LINES = 5.0
 PIPE_WIDTH = 140
 """Columns of a table that goes to a file or a pipe, where nobody can widen the window."""
 
@@ -93,3 +95,18 @@ def tell_warnings() -> Iterator[None]:
         warnings.simplefilter("always", SeakeepWarning)
         warnings.showwarning = show
         yield
+
+
+def quietly(progress: Report) -> Report:
+    """Tell every few seconds where each step would be a line of its own."""
+    if sys.stderr.isatty():
+        return progress
+    told = time.monotonic()
+
+    def tell(done: int, total: int, what: str) -> None:
+        nonlocal told
+        if time.monotonic() - told > SECONDS_BETWEEN_LINES:
+            told = time.monotonic()
+            progress(done, total, what)
+
+    return tell

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-import time
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,8 +10,19 @@ import typer
 import xarray as xr
 
 from seakeep.campaign import Campaign, load_prepared, read_campaign
-from seakeep.campaign.prepare import Progress
-from seakeep.cli.console import messages, progress_bar, results, worker_count
+from seakeep.cli.console import messages, progress_bar, quietly, results
+from seakeep.cli.options import (
+    DEFAULT_LEVEL,
+    BandKind,
+    CampaignFile,
+    FullScale,
+    Level,
+    ModelFile,
+    Scheduler,
+    Steps,
+    Workers,
+    crew,
+)
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import check_place, make_folder
 from seakeep.models import HankelDMDcModel, HankelEnsemble, load_model
@@ -39,44 +48,6 @@ from seakeep.study.lengths import instant_of, samples_of
 
 __all__ = ["compare", "fit", "forecast"]
 
-DEFAULT_LEVEL = 0.95
-SECONDS_BETWEEN_LINES = 5.0
-
-CampaignFile = Annotated[Path, typer.Argument(help="Campaign file.", metavar="CAMPAIGN.toml")]
-FullScale = Annotated[
-    bool,
-    typer.Option(
-        "--full-scale",
-        help="Convert results by Froude's law with the campaign's scale factor; START and STEPS "
-        "stay at model scale.",
-    ),
-]
-Level = Annotated[
-    float | None,
-    typer.Option(
-        "--level",
-        help="Of an ensemble: probability between the bounds of the band; by default 0.95.",
-    ),
-]
-Steps = Annotated[
-    str | None,
-    typer.Option(
-        "--steps",
-        help="Number of instants, or encounter periods such as '15 T'; by default to the end.",
-    ),
-]
-Workers = Annotated[
-    int | None,
-    typer.Option(
-        "--workers",
-        help="Processes for members of a large ensemble; by default one a core.",
-        min=1,
-    ),
-]
-ModelFile = Annotated[
-    Path, typer.Argument(help="Model file written by seakeep fit.", metavar="MODEL.nc")
-]
-
 
 def fit(
     campaign: CampaignFile,
@@ -86,6 +57,7 @@ def fit(
         typer.Option("--model", help="Key in [models.NAME]; by default the table [model]."),
     ] = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Identify a model, or an ensemble of models, from the training runs of a campaign.
 
@@ -100,8 +72,8 @@ def fit(
         identified = fit_campaign(read_campaign(campaign), model, progress)
     if isinstance(identified, HankelEnsemble):
         with progress_bar("Stability") as progress:
-            tell = _quietly(progress)
-            identified.spectral_radii(workers=worker_count(workers), backend="auto", progress=tell)
+            tell = quietly(progress)
+            identified.spectral_radii(**crew(workers, scheduler), progress=tell)
     typer.echo(identified.summary())
     identified.save(out)
     messages().print(f"Wrote {out}. Judge it with: seakeep compare {out} {campaign}")
@@ -121,11 +93,13 @@ def forecast(
     out: Annotated[Path, typer.Option("-o", "--out", help="Result: .nc or .csv.")],
     steps: Steps = None,
     level: Level = None,
+    band: BandKind = None,
     members: Annotated[
         bool,
         typer.Option("--members", help="Of an ensemble: write each member, and no statistics."),
     ] = False,
     workers: Workers = None,
+    scheduler: Scheduler = None,
     full_scale: FullScale = False,
 ) -> None:
     """Forecast a run: the model runs freely after START, driven by the measured waves.
@@ -147,27 +121,24 @@ def forecast(
     identified = load_model(model)
     read = read_campaign(campaign)
     if isinstance(identified, HankelDMDcModel):
-        _refuse_for_one(model, {"--level": level is not None, "--members": members})
-    elif members and level is not None:
+        given = {"--level": level is not None, "--band": band is not None, "--members": members}
+        _refuse_for_one(model, given)
+    elif members and (level is not None or band is not None):
         raise RequestError(
-            "--level belongs to the band, and --members writes the members without it. Leave one "
-            "of them out."
+            f"--{'level' if band is None else 'band'} belongs to the band, and --members writes "
+            "the members without it. Leave one of them out."
         )
     prepared = _prepared(read, run)
     first = instant_of(start, read, [prepared], "--start")
     count = None if steps is None else samples_of(steps, read, [prepared], identified.dt, "--steps")
     if isinstance(identified, HankelEnsemble):
         with progress_bar("Forecasting") as progress:
-            how: dict[str, Any] = {
-                "workers": worker_count(workers),
-                "backend": "auto",
-                "progress": _quietly(progress),
-            }
+            how = crew(workers, scheduler) | {"progress": quietly(progress)}
             if members:
                 result = identified.forecast(prepared, first, count, **how)
             else:
                 result = identified.forecast_summary(
-                    prepared, first, count, DEFAULT_LEVEL if level is None else level, **how
+                    prepared, first, count, **_band(identified, level, band), **how
                 )
     else:
         result = identified.forecast(prepared, start=first, steps=count)
@@ -212,7 +183,9 @@ def compare(
         bool, typer.Option("--radians", help="Show angles in radians instead of degrees.")
     ] = False,
     level: Level = None,
+    band: BandKind = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
     full_scale: FullScale = False,
 ) -> None:
     """Forecast test runs and judge the forecasts against the measurement.
@@ -228,7 +201,7 @@ def compare(
         raise RequestError(f"--format must be png, svg or pdf; received '{format_}'.")
     identified = load_model(model)
     if isinstance(identified, HankelDMDcModel):
-        _refuse_for_one(model, {"--level": level is not None})
+        _refuse_for_one(model, {"--level": level is not None, "--band": band is not None})
     with progress_bar("Comparing") as progress:
         read = read_campaign(campaign)
         comparisons = compare_runs(
@@ -238,9 +211,9 @@ def compare(
             start,
             steps,
             progress,
-            members=_quietly(progress),
-            level=DEFAULT_LEVEL if level is None else level,
-            workers=worker_count(workers),
+            members=quietly(progress),
+            **_band(identified, level, band),
+            **crew(workers, scheduler),
         )
     if full_scale:
         scale = _scale(read)
@@ -298,23 +271,20 @@ def _refuse_for_one(model: Path, given: dict[str, bool]) -> None:
             )
 
 
+def _band(
+    identified: HankelDMDcModel | HankelEnsemble, level: float | None, band: str | None
+) -> dict[str, Any]:
+    """Level and kind of band that were asked for; a calibrated one knows its level."""
+    if band not in (None, "members", "calibrated"):
+        raise RequestError(f"--band must be members or calibrated; received '{band}'.")
+    kept = identified.calibration if isinstance(identified, HankelEnsemble) else None
+    if level is None:
+        level = kept.found.level if kept and band == "calibrated" else DEFAULT_LEVEL
+    return {"level": level, "band": band or "members"}
+
+
 def _usable(result: xr.Dataset) -> bool:
     """Whether there is a forecast at all instants, of one member at least."""
     if "member" in result.dims:
         return int(result.attrs["diverged"]) < result.sizes["member"]
     return str(result.attrs["status"]) == "ok"
-
-
-def _quietly(progress: Progress) -> Progress:
-    """Tell every few seconds where each step would be a line of its own."""
-    if sys.stderr.isatty():
-        return progress
-    told = time.monotonic()
-
-    def tell(done: int, total: int, what: str) -> None:
-        nonlocal told
-        if time.monotonic() - told > SECONDS_BETWEEN_LINES:
-            told = time.monotonic()
-            progress(done, total, what)
-
-    return tell

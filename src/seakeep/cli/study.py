@@ -13,7 +13,8 @@ from rich import box
 from rich.table import Table
 
 from seakeep.campaign.prepare import Progress
-from seakeep.cli.console import progress_bar, results, worker_count
+from seakeep.cli.console import progress_bar, results
+from seakeep.cli.options import Scheduler, checked_count
 from seakeep.errors import RequestError
 from seakeep.report.page import write_report
 from seakeep.report.study_tables import ReportTable, overview_table
@@ -32,14 +33,6 @@ Workers = Annotated[
         help="Processes on this machine, each on one core; by default one a core.",
         min=1,
         metavar="N",
-    ),
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(
-        "--scheduler",
-        help="Scheduler of a running Dask cluster that does the work instead: tcp://HOST:8786.",
-        metavar="ADDRESS",
     ),
 ]
 
@@ -61,7 +54,7 @@ def study(
     """
     asked = read_study(study_file)
     folder = out or study_file.parent / f"{study_file.stem}-results"
-    count = _count(workers, scheduler)
+    count = checked_count(workers, scheduler)
     _run(
         folder,
         lambda tell: run_study(asked, folder, workers=count, scheduler=scheduler, progress=tell),
@@ -96,7 +89,7 @@ def reproduce(
     chosen: Preset = "paper" if preset == "paper" else "recommended"
     size = Size.quick() if quick else Size()
     # The few cells of the quick study are done before another process has started.
-    count = 1 if quick and workers is None else _count(workers, scheduler)
+    count = 1 if quick and workers is None else checked_count(workers, scheduler)
     _run(
         out,
         lambda tell: reproduce_study(
@@ -122,15 +115,6 @@ def report(
     with _Progress("Report") as tell:
         page = write_report(found, tell)
     typer.echo(str(page))
-
-
-def _count(workers: int | None, scheduler: str | None) -> int:
-    if workers is not None and scheduler is not None:
-        raise RequestError(
-            f"--workers {workers} counts processes on this machine, and --scheduler {scheduler} "
-            "hands all work to a cluster. Give one of the two."
-        )
-    return 1 if scheduler is not None else worker_count(workers)
 
 
 class _Progress:

@@ -15,6 +15,7 @@ from seakeep.core.calibration import ConformalMargin, band_scores, conformal_mar
 from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.ensemble_series import shelved
+from seakeep.models.progress import Progress
 from seakeep.models.summaries import STATISTICS, check_level, reduce_members
 from seakeep.models.windows import read_windows
 from seakeep.models.workers import Crew
@@ -65,11 +66,16 @@ class Calibration:
 
 
 def calibrate(
-    ensemble: HankelEnsemble, runs: labelled.Runs, steps: int, level: float, crew: Crew
+    ensemble: HankelEnsemble,
+    runs: labelled.Runs,
+    steps: int,
+    level: float,
+    crew: Crew,
+    progress: Progress | None = None,
 ) -> Calibration:
     """Find the margins of an ensemble; see :meth:`HankelEnsemble.calibrate`."""
     named = labelled.as_runs(runs)
-    scores = held_out_scores(ensemble, named, steps, level, crew)
+    scores = held_out_scores(ensemble, named, steps, level, crew, progress)
     if not scores:
         raise RequestError(
             f"no window of {steps} steps with {ensemble.history_samples} samples of history lies "
@@ -81,7 +87,12 @@ def calibrate(
 
 
 def held_out_scores(
-    ensemble: HankelEnsemble, runs: Mapping[str, xr.Dataset], steps: int, level: float, crew: Crew
+    ensemble: HankelEnsemble,
+    runs: Mapping[str, xr.Dataset],
+    steps: int,
+    level: float,
+    crew: Crew,
+    progress: Progress | None = None,
 ) -> dict[str, FloatArray]:
     """Scores of the band in windows end to end, none of which a member has read.
 
@@ -97,6 +108,8 @@ def held_out_scores(
         Probability between the bounds.
     crew : Crew
         Who does the work.
+    progress : callable, optional
+        Called as ``progress(done, total, what)`` after each member in each run.
 
     Returns
     -------
@@ -104,13 +117,14 @@ def held_out_scores(
         Runs in which there is such a window.
     """
     level = check_level(level)
-    found = {}
-    for name, run in runs.items():
-        starts = _unread_starts(ensemble, name, run, steps)
-        if not starts:
-            continue
+    found: dict[str, FloatArray] = {}
+    free = {name: _unread_starts(ensemble, name, run, steps) for name, run in runs.items()}
+    free = {name: starts for name, starts in free.items() if starts}
+    for number, (name, starts) in enumerate(free.items()):
+        run = runs[name]
+        tell = None if progress is None else _counted(progress, number, len(free), name)
         windows = read_windows(ensemble, run, starts, steps)
-        with shelved(ensemble, run, windows, crew) as (shelf, lost):
+        with shelved(ensemble, run, windows, crew, tell) as (shelf, lost):
             values = reduce_members(shelf, lost, level, crew.workers)
         lower, upper = (values[:, STATISTICS.index(key)] for key in ("lower", "upper"))
         measured = np.stack(
@@ -118,6 +132,13 @@ def held_out_scores(
         )
         found[name] = band_scores(lower, upper, measured)
     return found
+
+
+def _counted(progress: Progress, before: int, runs: int, name: str) -> Progress:
+    """Progress over the members of one run, as part of several."""
+    return lambda done, total, what: progress(
+        before * total + done, runs * total, f"{name}, {what}"
+    )
 
 
 def _unread_starts(ensemble: HankelEnsemble, name: str, run: xr.Dataset, steps: int) -> list[float]:
@@ -169,8 +190,8 @@ def check_band(ensemble: HankelEnsemble, level: float, band: Band) -> None:
         raise RequestError(f"band must be 'members' or 'calibrated'; received {band!r}.")
     if ensemble.calibration is None:
         raise RequestError(
-            "the ensemble is not calibrated. Call ensemble.calibrate(runs, steps) with runs that "
-            "its members did not learn from, and forecast with what it returns."
+            "the ensemble is not calibrated. Call ensemble.calibrate(runs, steps), or seakeep "
+            "calibrate, with runs that its members did not learn from, and use the result."
         )
     known = ensemble.calibration.found.level
     if abs(known - level) > 1e-12:

@@ -12,22 +12,16 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.errors import RequestError
 from seakeep.models import ensemble_forecasts, ensemble_store, ensemble_summary, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.calibration import Band, Calibration, calibrate
 from seakeep.models.draws import Draw
 from seakeep.models.ensemble_summary import warn_of_unstable
 from seakeep.models.labelled import ChannelLabel, Runs
-from seakeep.models.members import (
-    TrainingArrays,
-    identify_member,
-    member_radius,
-)
+from seakeep.models.members import TrainingArrays, member_model, member_radius, window_ends
 from seakeep.models.model import HankelDMDcModel
 from seakeep.models.progress import Progress, told
 from seakeep.models.settings import HankelSettings
-from seakeep.models.training import Training
 from seakeep.models.workers import Backend, Crew, side_by_side
 
 __all__ = ["HankelEnsemble"]
@@ -127,7 +121,11 @@ class HankelEnsemble:
         """First and last instant of the training windows in each run that trains a member, s."""
         spans: dict[str, tuple[float, float]] = {}
         for run, name in enumerate(self.arrays.names):
-            ends = [self._ends(draw, run) for draw in self.members if draw.run in (None, run)]
+            ends = [
+                window_ends(self.arrays, draw, run, self.dt)
+                for draw in self.members
+                if draw.run in (None, run)
+            ]
             if ends:
                 spans[name] = min(first for first, _ in ends), max(stop for _, stop in ends)
         return spans
@@ -141,14 +139,6 @@ class HankelEnsemble:
             for name, begin, x in zip(arrays.names, arrays.begins, arrays.states, strict=True)
             if len(x)
         }
-
-    def _ends(self, draw: Draw, run: int) -> tuple[float, float]:
-        """First and last instant of a member's training window in a run, s."""
-        arrays = self.arrays
-        last = len(arrays.states[run]) - 1 if draw.last is None else draw.last - arrays.offsets[run]
-        stop = arrays.begins[run] + last * self.dt
-        samples = last + 1 if draw.window is None else draw.window
-        return stop - (samples - 1) * self.dt, stop
 
     def member(self, number: int) -> HankelDMDcModel:
         """One member as a model of its own.
@@ -168,40 +158,7 @@ class HankelEnsemble:
         RequestError
             If there is no such member.
         """
-        if not 0 <= number < self.n_members:
-            raise RequestError(
-                f"there is no member {number!r}: the ensemble has {self.n_members}, counted from "
-                f"0 to {self.n_members - 1}."
-            )
-        draw = self.members[number]
-        found = identify_member(self.arrays, self.settings, draw)
-        settings = replace(
-            self.settings,
-            state_delays=draw.state_delays,
-            input_delays=draw.input_delays,
-            ridge=draw.ridge,
-            window=draw.window,
-        )
-        ends = [self._ends(draw, run) for run in found.runs]
-        return HankelDMDcModel(
-            settings=settings,
-            coefficients=found.solution.coefficients,
-            dt=self.dt,
-            state_labels=self.state_labels,
-            input_labels=self.input_labels,
-            state_scale=found.state_scale,
-            input_scale=found.input_scale,
-            training=Training(
-                runs=tuple(self.arrays.names[run] for run in found.runs),
-                first=tuple(first for first, _ in ends),
-                stop=tuple(stop for _, stop in ends),
-                columns=tuple(window.columns for window in found.windows),
-                method=found.solution.method,
-                ridge=found.solution.ridge,
-                rank=found.solution.rank,
-            ),
-            alignment=self.alignment,
-        )
+        return member_model(self, number)
 
     def spectral_radii(
         self,
@@ -344,6 +301,7 @@ class HankelEnsemble:
         workers: int = 1,
         backend: Backend = "processes",
         scheduler: str | None = None,
+        progress: Progress | None = None,
     ) -> Self:
         """Widen the band so that it holds unseen measurements as often as it says.
 
@@ -360,8 +318,8 @@ class HankelEnsemble:
             Instants of a window: as many as will be forecast.
         level : float, optional
             Probability that the band is to have.
-        workers, backend, scheduler
-            As in :meth:`forecast`.
+        workers, backend, scheduler, progress
+            As in :meth:`forecast`; a step is a member in one of the runs.
 
         Returns
         -------
@@ -376,7 +334,7 @@ class HankelEnsemble:
             If a run cannot be used.
         """
         crew = Crew(workers, backend, scheduler)
-        return replace(self, calibration=calibrate(self, runs, steps, level, crew))
+        return replace(self, calibration=calibrate(self, runs, steps, level, crew, progress))
 
     def forecast_windows(
         self,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +12,16 @@ import numpy.typing as npt
 from seakeep.core.embedding import History, TrainingWindow, training_window
 from seakeep.core.regression import Solution, identify
 from seakeep.core.scratch import Scratch
+from seakeep.errors import RequestError
 from seakeep.models.draws import Draw
 from seakeep.models.identification import Scale, moments
+from seakeep.models.model import HankelDMDcModel
 from seakeep.models.settings import HankelSettings
+from seakeep.models.training import Training
 from seakeep.models.windows import free_runs
+
+if TYPE_CHECKING:
+    from seakeep.models.fitted_ensemble import HankelEnsemble
 
 __all__ = [
     "Member",
@@ -22,7 +29,9 @@ __all__ = [
     "TrainingArrays",
     "forecast_member",
     "identify_member",
+    "member_model",
     "member_radius",
+    "window_ends",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -197,6 +206,53 @@ def forecast_member(task: Task, draw: Draw, scratch: Scratch) -> FloatArray:
     member = identify_member(task.arrays, task.settings, draw, scratch)
     scratch.reset()
     return free_runs(member, task.histories, task.inputs, task.steps, scratch)
+
+
+def window_ends(arrays: TrainingArrays, draw: Draw, run: int, dt: float) -> tuple[float, float]:
+    """First and last instant of a member's training window in a run, s."""
+    last = len(arrays.states[run]) - 1 if draw.last is None else draw.last - arrays.offsets[run]
+    stop = arrays.begins[run] + last * dt
+    samples = last + 1 if draw.window is None else draw.window
+    return stop - (samples - 1) * dt, stop
+
+
+def member_model(ensemble: HankelEnsemble, number: int) -> HankelDMDcModel:
+    """One member as a model of its own; see :meth:`HankelEnsemble.member`."""
+    arrays = ensemble.arrays
+    if not 0 <= number < ensemble.n_members:
+        raise RequestError(
+            f"there is no member {number!r}: the ensemble has {ensemble.n_members}, counted from "
+            f"0 to {ensemble.n_members - 1}."
+        )
+    draw = ensemble.members[number]
+    found = identify_member(arrays, ensemble.settings, draw)
+    settings = replace(
+        ensemble.settings,
+        state_delays=draw.state_delays,
+        input_delays=draw.input_delays,
+        ridge=draw.ridge,
+        window=draw.window,
+    )
+    ends = [window_ends(arrays, draw, run, ensemble.dt) for run in found.runs]
+    return HankelDMDcModel(
+        settings=settings,
+        coefficients=found.solution.coefficients,
+        dt=ensemble.dt,
+        state_labels=ensemble.state_labels,
+        input_labels=ensemble.input_labels,
+        state_scale=found.state_scale,
+        input_scale=found.input_scale,
+        training=Training(
+            runs=tuple(arrays.names[run] for run in found.runs),
+            first=tuple(first for first, _ in ends),
+            stop=tuple(stop for _, stop in ends),
+            columns=tuple(window.columns for window in found.windows),
+            method=found.solution.method,
+            ridge=found.solution.ridge,
+            rank=found.solution.rank,
+        ),
+        alignment=ensemble.alignment,
+    )
 
 
 def member_radius(

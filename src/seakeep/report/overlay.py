@@ -54,7 +54,7 @@ def _draw(comparison: Comparison) -> Figure:
     states = [str(name) for name in comparison.measured.data_vars]
     inputs = [str(name) for name in comparison.inputs.data_vars]
     rows = len(states) + bool(inputs)
-    period = _period_if_long(comparison.measured[states[0]])
+    period = _period_if_long(_counted(comparison))
     columns = 1 if period is None else 2
     figure = new_figure(7.5 if columns == 1 else 11.0, 1.0 + 1.45 * rows)
     axes = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
@@ -113,6 +113,14 @@ def _title(comparison: Comparison) -> str:
     return " · ".join(part for part in parts if part)
 
 
+def _counted(comparison: Comparison) -> xr.DataArray:
+    """Series whose periods are counted: a wave elevation, for a state may be a slow motion."""
+    waves = [name for name in comparison.inputs.data_vars if str(name).startswith("eta")]
+    if waves:
+        return comparison.inputs[waves[0]]
+    return comparison.measured[next(iter(comparison.measured.data_vars))]
+
+
 def _period_if_long(series: xr.DataArray) -> float | None:
     """Mean period of a record that is too long for lines, s."""
     time = series["time"].values
@@ -135,7 +143,9 @@ def _band_of(comparison: Comparison, name: str) -> tuple[xr.DataArray, xr.DataAr
     if comparison.band is None:
         return None
     lower, upper = (comparison.band[name].sel(statistic=key) for key in ("lower", "upper"))
-    return lower, upper, f"{100 * float(comparison.forecast.attrs['level']):g} % band"
+    attrs = comparison.forecast.attrs
+    kind = "calibrated " if attrs.get("band") == "calibrated" else ""
+    return lower, upper, f"{100 * float(attrs['level']):g} % {kind}band"
 
 
 def _draw_state(axes: Any, comparison: Comparison, name: str) -> None:

@@ -121,7 +121,7 @@ def rich_bands(table: xr.Dataset) -> Table:
         A row a run and channel, and the average of the channels that are judged below each run.
     """
     level = 100.0 * float(table["level"].values[0])
-    title = f"{level:g} % band against measurement"
+    title = f"{level:g} % {_kind(str(table['band'].values[0]))}band against measurement"
     out = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
     for heading in ("run", "channel", "unit"):
         out.add_column(heading, no_wrap=True)
@@ -166,12 +166,23 @@ def band_findings(table: xr.Dataset) -> list[str]:
         words = "as it claims" if abs(found - level) <= 5.0 else "not what it claims"
         if found < level - 20.0:
             words = "far too little"
+        kind = str(rows["band"].values)
         said.append(
-            f"{run}: the {level:g} % band of {members - lost} members holds {found:.0f} % of the "
-            f"measured instants, {words}. It carries the spread of the members, and no noise or "
-            f"model error{left_out}."
+            f"{run}: the {level:g} % {_kind(kind)}band of {members - lost} members holds "
+            f"{found:.0f} % of the measured instants, {words}. {_CARRIES[kind]}{left_out}."
         )
     return said
+
+
+def _kind(band: str) -> str:
+    """Word before a band that is not that of the members."""
+    return "calibrated " if band == "calibrated" else ""
+
+
+_CARRIES = {
+    "members": "It carries the spread of the members, and no noise or model error",
+    "calibrated": "It carries the errors of the sea and the horizon that it was calibrated on",
+}
 
 
 def write_csv(table: xr.Dataset, path: Path) -> Path:
@@ -259,5 +270,6 @@ def forecast_words(forecast: xr.Dataset) -> str:
     if "statistic" in forecast.dims:
         level = 100.0 * float(forecast.attrs["level"])
         kept = int(forecast.attrs["members"]) - int(forecast.attrs["diverged"])
-        return f"mean, std and {level:g} % band of {kept} members at "
+        kind = _kind(str(forecast.attrs.get("band", "members")))
+        return f"mean, std and {level:g} % {kind}band of {kept} members at "
     return f"{forecast.sizes['member']} members at " if "member" in forecast.dims else ""

@@ -16,8 +16,10 @@ from seakeep.campaign.prepare import Progress
 from seakeep.conventions import conversion
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import HankelDMDcModel, HankelEnsemble
+from seakeep.models.calibration import Band
 from seakeep.models.forecasting import status_at_clock
 from seakeep.models.identification import is_constant
+from seakeep.models.workers import Backend
 from seakeep.signals import froude_factor, to_full_scale
 from seakeep.study.lengths import instant_of, samples_of
 from seakeep.study.repeats import warn_of_repeats
@@ -186,7 +188,10 @@ def compare(
     *,
     members: Progress | None = None,
     level: float = 0.95,
+    band: Band = "members",
     workers: int = 1,
+    backend: Backend = "auto",
+    scheduler: str | None = None,
 ) -> list[Comparison]:
     """Forecast runs of a campaign and put the measurement beside.
 
@@ -210,9 +215,11 @@ def compare(
         Called as ``members(done, total, what)`` while members of an ensemble are at work.
     level : float, optional
         Probability between the bounds of an ensemble's band.
-    workers : int, optional
-        Members of an ensemble at work at a time, on processes where these save time. A script
-        then needs ``if __name__ == "__main__":``.
+    band : {"members", "calibrated"}, optional
+        Of an ensemble: quantiles of the members, or these moved outwards as
+        :meth:`seakeep.models.HankelEnsemble.calibrate` found.
+    workers, backend, scheduler
+        As in :meth:`seakeep.models.HankelEnsemble.forecast`.
 
     Returns
     -------
@@ -255,7 +262,15 @@ def compare(
             return model.forecast(run, start=start, steps=steps)
         tell = None if members is None else _named(members, str(run.attrs["run"]))
         return model.forecast_summary(
-            run, start, steps, level, workers=workers, backend="auto", progress=tell
+            run,
+            start,
+            steps,
+            level,
+            band=band,
+            workers=workers,
+            backend=backend,
+            scheduler=scheduler,
+            progress=tell,
         )
 
     return [
@@ -336,8 +351,8 @@ def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
         run has none. Of an ensemble also ``coverage``, the part of the measured instants that lie
         in the band (%), ``band_width``, its mean width (in ``channel_units``), and
         ``relative_band_width`` (in measured standard deviations); over ``run``:
-        ``mean_coverage`` over the channels that can be judged, ``members``, ``diverged`` and
-        ``level``.
+        ``mean_coverage`` over the channels that can be judged, ``members``, ``diverged``,
+        ``level`` and ``band`` ("members" or "calibrated").
     """
     rows = [_row(comparison) for comparison in comparisons]
     table = xr.concat(rows, dim="run")
@@ -420,4 +435,5 @@ def _band_entries(comparison: Comparison, slack: xr.Dataset) -> dict[str, Any]:
         "members": int(attrs["members"]),
         "diverged": int(attrs["diverged"]),
         "level": float(attrs["level"]),
+        "band": str(attrs.get("band", "members")),
     }

@@ -1,0 +1,110 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from seakeep.cli.console import worker_count
+from seakeep.errors import RequestError
+
+__all__ = [
+    "BandKind",
+    "CampaignFile",
+    "FullScale",
+    "Level",
+    "ModelFile",
+    "Scheduler",
+    "Steps",
+    "Workers",
+    "crew",
+]
+
+DEFAULT_LEVEL = 0.95
+
+CampaignFile = Annotated[Path, typer.Argument(help="Campaign file.", metavar="CAMPAIGN.toml")]
+FullScale = Annotated[
+    bool,
+    typer.Option(
+        "--full-scale",
+        help="Convert results by Froude's law with the campaign's scale factor; START and STEPS "
+        "stay at model scale.",
+    ),
+]
+Level = Annotated[
+    float | None,
+    typer.Option(
+        "--level",
+        help="Of an ensemble: probability between the bounds of the band; by default 0.95.",
+    ),
+]
+Steps = Annotated[
+    str | None,
+    typer.Option(
+        "--steps",
+        help="Number of instants, or encounter periods such as '15 T'; by default to the end.",
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers",
+        help="Processes for members of a large ensemble; by default one a core.",
+        min=1,
+    ),
+]
+ModelFile = Annotated[
+    Path, typer.Argument(help="Model file written by seakeep fit.", metavar="MODEL.nc")
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        help="Scheduler of a running Dask cluster that does the work instead: tcp://HOST:8786.",
+        metavar="ADDRESS",
+    ),
+]
+BandKind = Annotated[
+    str | None,
+    typer.Option(
+        "--band",
+        help="Of an ensemble: 'members', the quantiles of its members, or 'calibrated', which "
+        "seakeep calibrate made; by default members.",
+    ),
+]
+
+
+def crew(workers: int | None, scheduler: str | None) -> dict[str, Any]:
+    """Who works on the members of an ensemble, as the methods of an ensemble take it.
+
+    Parameters
+    ----------
+    workers : int or None
+        As asked for; by default one a core.
+    scheduler : str or None
+        Address of a Dask cluster.
+
+    Returns
+    -------
+    dict
+        ``workers``, ``backend`` and ``scheduler``.
+
+    Raises
+    ------
+    RequestError
+        If both are given.
+    """
+    count = checked_count(workers, scheduler)
+    return {"workers": count, "backend": "auto", "scheduler": scheduler}
+
+
+def checked_count(workers: int | None, scheduler: str | None) -> int:
+    """Number of local workers; one where a cluster does the work."""
+    if workers is not None and scheduler is not None:
+        raise RequestError(
+            f"--workers {workers} counts processes on this machine, and --scheduler {scheduler} "
+            "hands all work to a cluster. Give one of the two."
+        )
+    return 1 if scheduler is not None else worker_count(workers)
