@@ -207,7 +207,7 @@ def test_distributions_of_scipy_are_named_in_the_table():
         ),
         (
             '{ distribution = "gamma", parameters = { scale = 2.0 } }',
-            r"'parameters' of 'gamma' are a, loc, scale \(",
+            r"'parameters' of 'gamma' are a, loc, scale, of which loc and scale may be left out; ",
         ),
         (
             '{ distribution = "norm", parameters = { scale = -1.0 } }',

@@ -289,9 +289,13 @@ class PriorSettings(Table):
             )
         try:
             median = float(found(**self.parameters).ppf(0.5))
-        except TypeError as error:
+        except TypeError:
             shapes = f"{found.shapes}, loc, scale" if found.shapes else "loc, scale"
-            raise ValueError(f"'parameters' of '{found.name}' are {shapes} ({error})") from None
+            stated = ", ".join(self.parameters) or "none"
+            raise ValueError(
+                f"'parameters' of '{found.name}' are {shapes}, of which loc and scale may be left "
+                f"out; stated: {stated}"
+            ) from None
         if not math.isfinite(median):
             raise ValueError(f"'{found.name}' with these 'parameters' has no median; correct them")
 

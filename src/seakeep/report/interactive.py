@@ -12,6 +12,7 @@ import numpy.typing as npt
 from seakeep.conventions import canonical_channel, conversion
 from seakeep.report.figures.common import line_of, model_colour, model_words
 from seakeep.report.figures.histories import shown_cells
+from seakeep.report.style import shown_unit
 from seakeep.study import StudyResult
 
 __all__ = ["DASH_DOT", "dashes", "history_data", "pack"]
@@ -107,10 +108,10 @@ def _channel(
 ) -> dict[str, Any]:
     channels = result.groups["channels"].sel(name=name)
     units = str(channels["units"].values)
-    factor, shown_units = 1.0, units
+    factor, target = 1.0, units
     if units.split("/")[0] == "rad":
-        shown_units = units.replace("rad", "deg")
-        factor = conversion(units, shown_units)
+        target = units.replace("rad", "deg")
+        factor = conversion(units, target)
     known = canonical_channel(name)
     models = []
     for model in result.models:
@@ -132,7 +133,7 @@ def _channel(
     return {
         "name": name,
         "label": known.long_name if known else name.replace("_", " "),
-        "unit": shown_units,
+        "unit": shown_unit(target),
         "measured": pack(factor * cell["measured"].values[:, column]),
         "models": models,
     }

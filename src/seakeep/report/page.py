@@ -29,6 +29,7 @@ from seakeep.report.study_tables import (
     write_latex_table,
 )
 from seakeep.report.study_words import (
+    clock_table,
     findings,
     quality_table,
     run_table,
@@ -106,6 +107,7 @@ def report_tables(result: StudyResult) -> dict[str, list[ReportTable]]:
         "data": [
             sign_table(result),
             run_table(result),
+            *([clocks] if (clocks := clock_table(result)) is not None else []),
             *(quality_table(result, name) for name in result.prepared),
         ],
         "settings": [settings_table(result), training_table(result)],

@@ -405,6 +405,7 @@ _LATEX = {
     "–": "--", "×": r"$\times$", "λ": r"$\lambda$", "ε": r"$\varepsilon$", "τ": r"$\tau$",
     "−": r"$-$", "η": r"$\eta$", "≥": r"$\ge$", "²": r"$^2$", "±": r"$\pm$", "°": r"$^\circ$",
     "→": r"$\to$", "σ": r"$\sigma$", "Δ": r"$\Delta$", "√": r"$\surd$", "π": r"$\pi$",
+    "·": r"$\cdot$", "³": r"$^3$",
     "T̂": r"$\hat T$", "τ̂": r"$\hat\tau$",
 }  # fmt: skip
 
@@ -421,6 +422,12 @@ def latex_text(text: str) -> str:
     return "".join(_LATEX.get(each, each) for each in text).replace("\0", r"$\hat T$")
 
 
+WIDE = 40
+"""Characters of a cell from which on its column breaks lines in LaTeX."""
+PAGE = 45
+"""Rows from which on a LaTeX table breaks pages."""
+
+
 def write_latex_table(table: ReportTable, path: Path) -> Path:
     r"""Write a table as LaTeX with booktabs rules.
 
@@ -429,33 +436,46 @@ def write_latex_table(table: ReportTable, path: Path) -> Path:
     table : ReportTable
         The table.
     path : Path
-        The file; ``\input`` it where ``booktabs`` is loaded.
+        The file; ``\input`` it where ``booktabs`` is loaded, and ``longtable`` for tables that are
+        longer than a page.
 
     Returns
     -------
     Path
         The file.
     """
-    form = "".join("r" if k in table.numeric else "l" for k in range(len(table.columns)))
 
     def line(cells: Sequence[str]) -> str:
         return " & ".join(map(latex_text, cells)) + r" \\"
 
-    lines = [
-        r"\begin{table}",
-        r"\centering",
-        rf"\caption{{{latex_text(table.title)}. {latex_text(table.note)}}}",
-        rf"\label{{tab:{table.name}}}",
-        rf"\begin{{tabular}}{{{form}}}",
-        r"\toprule",
-        line(table.columns),
-        r"\midrule",
-    ]
+    body = []
     for number, row in enumerate(table.rows):
         if number in table.averages:
-            lines.append(r"\midrule")
-        lines.append(line(row))
-    lines += [r"\bottomrule", r"\end{tabular}", r"\end{table}", ""]
+            body.append(r"\midrule")
+        body.append(line(row))
+    words = latex_text(f"{table.title}. {table.note}".strip())
+    caption = rf"\caption{{{words}}}"
+    label, head = rf"\label{{tab:{table.name}}}", [r"\toprule", line(table.columns), r"\midrule"]
+    form = _latex_columns(table)
+    if len(table.rows) > PAGE:
+        lines = [rf"\begin{{longtable}}{{{form}}}", rf"{caption}{label}\\", *head, r"\endfirsthead"]
+        lines += [*head, r"\endhead", *body, r"\bottomrule", r"\end{longtable}", ""]
+    else:
+        lines = [r"\begin{table}", r"\centering", caption, label, rf"\begin{{tabular}}{{{form}}}"]
+        lines += [*head, *body, r"\bottomrule", r"\end{tabular}", r"\end{table}", ""]
     with replacing(path) as temporary:
         temporary.write_text("\n".join(lines), encoding="utf-8")
     return path
+
+
+def _latex_columns(table: ReportTable) -> str:
+    """Columns of numbers to the right, of text to the left, of long text in lines that break."""
+    longest = [
+        max(len(cell) for cell in column) for column in zip(table.columns, *table.rows, strict=True)
+    ]
+    wide = [length for length in longest if length > WIDE]
+    part = 0.65 / max(len(wide), 1)
+    return "".join(
+        rf"p{{{part:.2f}\linewidth}}" if length > WIDE else "r" if k in table.numeric else "l"
+        for k, length in enumerate(longest)
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from seakeep.campaign.checks import findings_of
 from seakeep.report.figures.common import HEADING, model_words
 from seakeep.report.quality_sheet import channel_rows
 from seakeep.report.study_tables import ReportTable, channel_words
+from seakeep.report.style import shown_unit
 from seakeep.study import StudyResult
 
 __all__ = [
@@ -128,13 +130,50 @@ def settings_table(result: StudyResult) -> ReportTable:
                 walk(f"{prefix}.{key}" if prefix else key, inner)
         elif value not in (None, "", []):
             shown = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
-            rows.append((prefix, shown))
+            rows.append((prefix, _setting_words(prefix, shown)))
 
     settings = {k: v for k, v in result.settings.items() if k != "models"}
     walk("", settings)
     for model, spec in json.loads(result.attrs["specs"]).items():
-        rows += [(f"models.{model}.{key}", value) for key, value in spec.items()]
+        rows += [(f"models.{model}.{key}", _setting_words(key, v)) for key, v in spec.items()]
     return ReportTable("settings", "Settings, defaults included", ("setting", "value"), tuple(rows))
+
+
+_UNIT_OF_SETTING = {
+    **dict.fromkeys(("length", "split_period"), "T̂"),
+    **dict.fromkeys(("train_length", "state_delay", "input_delay"), "T̂"),
+    **dict.fromkeys(("state_delays", "input_delays", "window"), "samples"),
+    **dict.fromkeys(("startup", "encounter_period"), "s"),
+}
+_PRIOR = re.compile(r"(Uniform|LogUniform|Fixed)\((?:low|value)=([^,)]*)(?:, high=([^)]*))?\)")
+
+
+def _setting_words(key: str, value: str) -> str:
+    """A setting as people read it, with its unit.
+
+    Examples
+    --------
+    >>> _setting_words("state_delay", "LogUniform(low=0.5, high=1.5)")
+    'log-uniform, 0.5 to 1.5 T̂'
+    >>> _setting_words("tests.irregular.length", "15.0"), _setting_words("rank", "None")
+    ('15 T̂', 'none')
+    """
+    name = key.rpartition(".")[2]
+    if value == "None":
+        return "all samples" if name in ("window", "train_length") else "none"
+    if value in ("True", "False"):
+        return "yes" if value == "True" else "no"
+    unit = f" {_UNIT_OF_SETTING[name]}" if name in _UNIT_OF_SETTING else ""
+    if prior := _PRIOR.fullmatch(value):
+        kind, low, high = prior.groups()
+        words = {"Uniform": "uniform, ", "LogUniform": "log-uniform, ", "Fixed": ""}[kind]
+        return f"{words}{_plain(low)}{f' to {_plain(high)}' if high else ''}{unit}"
+    return _plain(value) + unit if _plain(value) != value or value.isdigit() else value
+
+
+def _plain(value: str) -> str:
+    """A number without digits that nobody reads."""
+    return f"{float(value):.6g}" if re.fullmatch(r"-?\d+\.\d+(e[-+]?\d+)?", value) else value
 
 
 def sign_table(result: StudyResult) -> ReportTable:
@@ -144,7 +183,7 @@ def sign_table(result: StudyResult) -> ReportTable:
         (
             channel_words(str(name)),
             str(at["use"].values),
-            str(at["units"].values),
+            shown_unit(str(at["units"].values)),
             str(at["positive"].values),
             str(at["source"].values),
         )
@@ -162,15 +201,10 @@ def sign_table(result: StudyResult) -> ReportTable:
 
 
 def run_table(result: StudyResult) -> ReportTable:
-    """What preparation found in each run: part used, clocks, number of findings."""
+    """What preparation found in each run: part used, number of findings."""
     runs, rows = result.groups["runs"], []
     for name, run in result.prepared.items():
         found = findings_of(run)
-        clocks = [
-            f"{key.removeprefix('clock_')}: {value}"
-            for key, value in run.attrs.items()
-            if key.startswith("clock_") and isinstance(value, str)
-        ]
         others = [
             f"{each.channel}: {each.text}" for each in found if each.channel not in run.data_vars
         ]
@@ -182,18 +216,42 @@ def run_table(result: StudyResult) -> ReportTable:
                 f"{float(run['time'][0]):.2f} to {float(run['time'][-1]):.2f} s",
                 str(len(found)),
                 ", ".join(words) or "nothing found",
-                "; ".join(clocks + others),
+                "; ".join(others),
             )
         )
     return ReportTable(
         "runs",
         "Data quality of the runs, as preparation found it",
-        ("run", "sea state", "part used", "findings", "channels", "clocks against the reference"),
+        ("run", "sea state", "part used", "findings", "channels", "of loggers and the run"),
         tuple(rows),
         "Checks flag and tell; nothing is repaired unless the campaign asks for it, and what was "
         "repaired is in the tables below. A finding concerns the whole record, the part that is "
         "cut off too.",
         (3,),
+    )
+
+
+def clock_table(result: StudyResult) -> ReportTable | None:
+    """Clocks of the loggers against the reference, a row a run and logger; None for one logger."""
+    rows = []
+    for name, run in result.prepared.items():
+        for key, value in run.attrs.items():
+            if not key.startswith("clock_") or not isinstance(value, str):
+                continue
+            numbers, _, origin = value.partition(" (")
+            offset, _, drift = numbers.partition(", ")
+            cells = (offset, drift, origin.removesuffix(")"))
+            rows.append((name, key.removeprefix("clock_"), *cells))
+    if not rows:
+        return None
+    return ReportTable(
+        "clocks",
+        "Clocks of the loggers against the reference",
+        ("run", "logger", "offset", "drift", "from"),
+        tuple(rows),
+        "Offset: what the logger's clock reads when the reference reads zero. n: pulses, windows "
+        "or samples that it rests on. ±: one standard error.",
+        folded=True,
     )
 
 
@@ -230,7 +288,7 @@ def quality_table(result: StudyResult, name: str) -> ReportTable:
             (
                 channel_words(channel),
                 "yes" if channel in used else "",
-                each["units"],
+                shown_unit(each["units"]),
                 mean,
                 spread,
                 low,
@@ -243,7 +301,7 @@ def quality_table(result: StudyResult, name: str) -> ReportTable:
         )
     return ReportTable(
         f"quality_{name}",
-        f"Data quality of {name.replace('_', ' ')}, channel by channel (SI units)",
+        f"Data quality of {name}, channel by channel (SI units)",
         ("channel", "used", "unit", "mean", "SD", "min", "max", "frozen %", "slack %", "flagged",
          "found, and done about it"),
         tuple(rows),

@@ -17,7 +17,15 @@ from seakeep.files import replacing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "LINES", "axis_label", "figure_style", "new_figure", "save_figure"]
+__all__ = [
+    "COLOURS",
+    "LINES",
+    "axis_label",
+    "figure_style",
+    "new_figure",
+    "save_figure",
+    "shown_unit",
+]
 
 COLOURS = {
     "measured": "#000000",
@@ -136,7 +144,18 @@ def axis_label(name: str, units: str) -> str:
     words = channel.long_name if channel else name.replace("_", " ")
     symbol = f"${channel.symbol}$ " if channel else ""
     lines = "\n".join(_balanced(words))
-    return f"{lines}\n{symbol}[{units or '?'}]"
+    return f"{lines}\n{symbol}[{shown_unit(units) or '?'}]"
+
+
+def shown_unit(unit: str) -> str:
+    """A unit as people read it.
+
+    Examples
+    --------
+    >>> shown_unit("m/s^2"), shown_unit("N*m")
+    ('m/s²', 'N·m')
+    """
+    return unit.replace("^2", "²").replace("^3", "³").replace("*", "·")
 
 
 def _balanced(words: str) -> list[str]:

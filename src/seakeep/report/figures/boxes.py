@@ -37,6 +37,10 @@ JITTER = np.random.default_rng(7).uniform(-1, 1, 4096)
 """Sideways places of the single values; the same in every figure."""
 
 
+DECADE = 10.0
+"""Ratio of the channels' medians from which on an axis is logarithmic."""
+
+
 def draw_box_violin(
     axes: Any, values: npt.ArrayLike, place: float, width: float, colour: str
 ) -> None:
@@ -45,7 +49,7 @@ def draw_box_violin(
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-        Where.
+        Where; on a logarithmic axis the violin is the density of the logarithm.
     values : array_like
         Numbers; those that are not finite are left out.
     place, width : float
@@ -57,9 +61,14 @@ def draw_box_violin(
     x = x[np.isfinite(x)]
     if x.size == 0:
         return
+    logarithmic = axes.get_yscale() == "log"
     if x.size >= FEWEST and np.ptp(x) > 0:
-        violin = axes.violinplot([x], [place], widths=width, showextrema=False, points=120)
+        spread = np.log10(x) if logarithmic else x
+        violin = axes.violinplot([spread], [place], widths=width, showextrema=False, points=120)
         for body in violin["bodies"]:
+            if logarithmic:
+                vertices = body.get_paths()[0].vertices
+                vertices[:, 1] = 10.0 ** vertices[:, 1]
             body.set(facecolor=colour, edgecolor=colour, alpha=0.18, linewidth=0.6)
     sideways = place + 0.16 * width * np.resize(JITTER, x.size)
     axes.scatter(sideways, x, s=7, color=colour, alpha=0.5, linewidths=0, rasterized=True)
@@ -136,8 +145,11 @@ def channel_boxes(result: StudyResult, test: str) -> Figure:
     """
     with figure_style():
         figure = new_figure(8.5, 5.6)
+        logarithmic = _span_decades(result, test)
         for axes, measure in zip(figure.subplots(2, 1, sharex=True), HEADING, strict=True):
             tallest = 0.0
+            if logarithmic:
+                axes.set_yscale("log")
             for number, model in enumerate(result.models):
                 cells = _cells(result, test, model, measure)
                 for place in range(cells.shape[1]):
@@ -145,14 +157,32 @@ def channel_boxes(result: StudyResult, test: str) -> Figure:
                     column = cells[:, place][np.isfinite(cells[:, place])]
                     if column.size:
                         tallest = max(tallest, box_statistics(column).upper_whisker)
+            if logarithmic:
+                shown = [_cells(result, test, model, measure) for model in result.models]
+                axes.set_ylim(0.8 * np.nanmin(shown), 1.25 * np.nanmax(shown))
             heading = "NRMSE" if measure == "nrmse" else "NAMMAE"
             _finish(axes, [short_label(name) for name in result.channels], heading)
-            if tallest > 0 and axes.get_ylim()[1] > 3 * tallest:
+            if logarithmic:
+                axes.set_title("logarithmic axis", loc="right", fontsize=7)
+            elif tallest > 0 and axes.get_ylim()[1] > 3 * tallest:
                 axes.set_ylim(0, 1.15 * tallest)
                 axes.set_title("values above the axis are not shown", loc="right", fontsize=7)
         axes.set_xlim(-0.6, len(result.channels) - 0.4)
         _legend(figure, result)
         return figure
+
+
+def _span_decades(result: StudyResult, test: str) -> bool:
+    """Whether the channels' medians differ by so much that a common axis would hide most."""
+    far = False
+    for measure in HEADING:
+        cells = np.concatenate([_cells(result, test, model, measure) for model in result.models])
+        known = cells[:, np.isfinite(cells).any(axis=0)]
+        if not known.size or np.nanmin(known) <= 0:
+            return False
+        medians = np.nanmedian(known, axis=0)
+        far |= bool(medians.max() > DECADE * np.median(medians))
+    return far
 
 
 def _draw_beside(
@@ -173,8 +203,22 @@ def _narrow(label: str) -> str:
 def _finish(axes: Any, labels: Sequence[str], heading: str) -> None:
     axes.set_xticks(range(len(labels)), labels)
     axes.set_ylabel(f"{heading} [measured SD]")
-    axes.set_ylim(bottom=0)
+    if axes.get_yscale() == "log":
+        _plain_decades(axes)
+    else:
+        axes.set_ylim(bottom=0)
     axes.grid(axis="x", visible=False)
+
+
+def _plain_decades(axes: Any) -> None:
+    """Ticks of a logarithmic axis as numbers, not as powers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = axes.get_ylim()
+    if high < 100.0 * low:
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _legend(figure: Figure, result: StudyResult) -> None:
