@@ -58,6 +58,17 @@ def test_few_members_stay_in_memory_and_many_do_not(monkeypatch, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("shared", [True, False])
+def test_a_temporary_folder_that_cannot_be_used_is_told(monkeypatch, tmp_path, shared):
+    monkeypatch.setattr(shelf.tempfile, "tempdir", str(tmp_path / "gone"))
+    monkeypatch.setattr(shelf, "HELD", 0)
+    with (
+        pytest.raises(RequestError, match=r"cannot keep .* folder .*gone: No such file or direct"),
+        open_shelf(Layout(1, 1, 4, 1, 4), shared=shared),
+    ):
+        pass
+
+
 def test_a_shared_place_that_is_gone_is_told():
     layout = Layout(1, 1, 4, 1, 4)
     with open_shelf(layout, shared=True) as kept:

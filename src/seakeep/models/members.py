@@ -96,12 +96,12 @@ class Member:
 
     @property
     def state_delays(self) -> int:
-        """S."""
+        """Delayed copies of the states, s."""
         return self.draw.state_delays
 
     @property
     def input_delays(self) -> int:
-        """Z."""
+        """Delayed copies of the inputs, z."""
         return self.draw.input_delays
 
 

@@ -227,13 +227,14 @@ def open_shelf(layout: Layout, *, shared: bool = False, whole: bool = False) -> 
         yield _Held(layout)
         return
     with ExitStack() as stack:
-        place: BinaryIO | Path
-        if shared:
-            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="seakeep-"))
-            place = Path(folder) / "members"
-            place.touch()
-        else:
-            place = stack.enter_context(tempfile.TemporaryFile(prefix="seakeep-", buffering=0))
+        with _spilling(layout.bytes):
+            place: BinaryIO | Path
+            if shared:
+                folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="seakeep-"))
+                place = Path(folder) / "members"
+                place.touch()
+            else:
+                place = stack.enter_context(tempfile.TemporaryFile(prefix="seakeep-", buffering=0))
         shelf = _Spilled(layout, place)
         shelf.reserve()
         yield shelf

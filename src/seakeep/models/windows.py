@@ -37,11 +37,11 @@ class Linear(Protocol):
 
     @property
     def state_delays(self) -> int:
-        """S."""
+        """Delayed copies of the states, s."""
 
     @property
     def input_delays(self) -> int:
-        """Z."""
+        """Delayed copies of the inputs, z."""
 
     @property
     def state_scale(self) -> Scale:
