@@ -11,6 +11,7 @@ from seakeep.cli.console import worker_count
 from seakeep.errors import RequestError
 
 __all__ = [
+    "DEFAULT_LEVEL",
     "BandKind",
     "CampaignFile",
     "FullScale",
@@ -19,6 +20,7 @@ __all__ = [
     "Scheduler",
     "Steps",
     "Workers",
+    "checked_count",
     "crew",
 ]
 
