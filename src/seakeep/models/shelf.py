@@ -63,7 +63,7 @@ class Layout:
     @property
     def pieces(self) -> int:
         """Pieces of a window."""
-        return math.ceil(self.steps / self.length)
+        return -(-self.steps // self.length)
 
     @property
     def shape(self) -> tuple[int, int, int, int, int]:
@@ -81,9 +81,10 @@ class Layout:
 
     def parts(self, series: FloatArray) -> Iterator[tuple[int, int, FloatArray]]:
         """Window, piece and values of each part of a member's series, (window, steps, N)."""
+        length, pieces = self.length, range(self.pieces)
         for window, values in enumerate(series):
-            for piece in range(self.pieces):
-                yield window, piece, values[self.instants(piece)]
+            for piece in pieces:
+                yield window, piece, values[piece * length : (piece + 1) * length]
 
 
 class Shelf(ABC):
@@ -167,24 +168,36 @@ class _Spilled(Shelf):
                 yield self._place
 
     def put(self, member: int, series: FloatArray) -> None:
-        with _spilling(self.layout.bytes), self._opened() as file:
-            for window, piece, part in self.layout.parts(series):
-                left = np.ascontiguousarray(part).data.cast("B")
-                self._seek(file, window, piece, member)
-                while left:
-                    left = left[file.write(left) :]
+        # Without the helpers above: they would cost as much as the writing.
+        try:
+            if isinstance(self._place, Path):
+                with open(self._place, "r+b", buffering=0) as file:  # noqa: PTH123
+                    self._write(file, member, series)
+            else:
+                with self._lock:
+                    self._write(self._place, member, series)
+        except OSError as error:
+            raise _no_room(self.layout.bytes, error) from error
+
+    def _write(self, file: BinaryIO, member: int, series: FloatArray) -> None:
+        for window, piece, part in self.layout.parts(series):
+            left = np.ascontiguousarray(part).data.cast("B")
+            file.seek(self._offset(window, piece, member))
+            while left:
+                left = left[file.write(left) :]
 
     def _read(self, window: int, piece: int, windows: int) -> FloatArray:
         shape = (windows, *self.layout.shape[2:])
         with self._opened() as file:
-            self._seek(file, window, piece, 0)
+            file.seek(self._offset(window, piece, 0))
             found = np.fromfile(file, dtype=np.float64, count=math.prod(shape))
         return found.reshape(shape)
 
-    def _seek(self, file: BinaryIO, window: int, piece: int, member: int) -> None:
-        *places, length, channels = self.layout.shape
-        number = np.ravel_multi_index((window, piece, member), places)
-        file.seek(8 * int(number) * length * channels)
+    def _offset(self, window: int, piece: int, member: int) -> int:
+        """Byte at which a piece of a member begins."""
+        layout = self.layout
+        number = (window * layout.pieces + piece) * layout.members + member
+        return 8 * number * layout.length * layout.channels
 
 
 @contextmanager
@@ -192,12 +205,16 @@ def _spilling(size: int) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise RequestError(
-            f"cannot keep {size / 2**20:.0f} MiB of members in the temporary folder "
-            f"{tempfile.gettempdir()}: {error.strerror or error}. Free space there, name a folder "
-            "on another disk in the environment variable TMPDIR, or ask for fewer steps, windows "
-            "or members at a time."
-        ) from error
+        raise _no_room(size, error) from error
+
+
+def _no_room(size: int, error: OSError) -> RequestError:
+    return RequestError(
+        f"cannot keep {size / 2**20:.0f} MiB of members in the temporary folder "
+        f"{tempfile.gettempdir()}: {error.strerror or error}. Free space there, name a folder on "
+        "another disk in the environment variable TMPDIR, or ask for fewer steps, windows or "
+        "members at a time."
+    )
 
 
 @contextmanager
