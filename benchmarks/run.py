@@ -189,7 +189,7 @@ def read_arguments() -> argparse.Namespace:
     )
     parser.add_argument("--no-peers", action="store_true", help="leave other packages out")
     parts = ["one", "ensemble", "study", "single", "scaling"]
-    parser.add_argument("--only", choices=parts, help="one part alone")
+    parser.add_argument("--only", choices=parts, help="one part alone; the others are kept")
     return parser.parse_args()
 
 
@@ -230,7 +230,8 @@ def main() -> None:
         sections[title] = timing.interleave(contenders, arguments.study_rounds, memory=False)
     if arguments.only in (None, "single"):
         sections |= precision(arguments)
-    print(timing.write(arguments.out, sections, notes, survey))
+    part = arguments.only is not None
+    print(timing.write(arguments.out, sections, notes, survey, part))
     if arguments.only is None:
         print(scaling.run(arguments.out, arguments.figures))
 

@@ -149,6 +149,7 @@ def write(
     sections: Mapping[str, list[Timing]],
     notes: Mapping[str, Mapping[str, float]],
     survey: Mapping[str, Mapping[str, float]],
+    part: bool = False,
 ) -> str:
     """Write the tables as JSON and Markdown beside each other, and return the Markdown.
 
@@ -162,6 +163,8 @@ def write(
         A number more a contender, by the title of its table: the accuracy.
     survey : mapping of str to mapping of str to float
         Milliseconds on another machine, by the title of their table.
+    part : bool, optional
+        Whether the other tables of the folder are kept.
 
     Returns
     -------
@@ -170,6 +173,11 @@ def write(
     """
     facts = machine()
     path.mkdir(parents=True, exist_ok=True)
+    if part and (path / "benchmark.json").exists():
+        before = json.loads((path / "benchmark.json").read_text("utf-8"))
+        old = {name: [Timing(**row) for row in rows] for name, rows in before["tables"].items()}
+        sections = old | dict(sections)
+        notes, survey = before["accuracy"] | dict(notes), before["survey"] | dict(survey)
     data = {name: [asdict(row) for row in rows] for name, rows in sections.items()}
     everything = {"machine": facts, "accuracy": dict(notes), "survey": dict(survey), "tables": data}
     (path / "benchmark.json").write_text(json.dumps(everything, indent=1), "utf-8")
