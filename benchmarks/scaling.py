@@ -27,7 +27,7 @@ import seakeep
 from seakeep.core import identify, rollout, training_window
 from seakeep.core import scratch as memory
 from seakeep.core.lagged import BLOCK_WIDTH
-from seakeep.core.propagation import doublings
+from seakeep.core.propagation import doublings, shifting_steps
 from seakeep.core.scratch import Scratch
 from seakeep.report.style import COLOURS, figure_style, new_figure, save_figure
 
@@ -112,8 +112,10 @@ def forecast_bytes(size: Size, rows: str) -> float:
     a, b = size.extended, size.inputs * (size.z + 1)
     result = 2 * size.steps * size.windows * size.states
     if rows == "exact":
-        block = 192 + size.states
-        return 8 * (result + block * (a + b) + size.steps * size.windows * (b + 192) / 18)
+        K = shifting_steps(size.states, size.steps)
+        block = (K + 1) * size.states
+        rows = size.steps * size.windows / K
+        return 8 * (result + block * (a + b) + rows * (b + K * size.states))
     if size.windows == 1:
         times = doublings(a, b, 1, size.steps)[0]
         whole = size.steps * (a + b) / 2**times
@@ -368,6 +370,7 @@ def draw(
             panel.set_xticks(x, [str(value) for value in x])
             low, high = panel.get_ylim()
             steps = (1, 10, 100) if high / low > 100 else (1, 2, 5)
+            steps = (1, 1.5, 2, 3, 4, 5, 7) if high / low < 4 else steps
             decades = 10.0 ** np.arange(-2, 5)
             ticks = sorted({d * k for d in decades for k in steps if low <= d * k <= high})
             panel.set_yticks(ticks, [f"{tick:g}" for tick in ticks])

@@ -33,6 +33,7 @@ __all__ = [
     "doublings",
     "mirrored",
     "shifting_propagator",
+    "shifting_steps",
     "square_propagator",
     "step_cost",
 ]
@@ -97,9 +98,7 @@ def shifting_propagator(a: FloatArray, b: FloatArray, channels: int, steps: int)
         Of as many steps as cost least, and about ``OUTPUT_ROWS / N`` at most.
     """
     N, size = a.shape
-    step, fixed, state = SHIFTING_COST
-    K = round(np.sqrt(steps * step / (fixed + state * N)))
-    K = max(1, min(steps, K, -(-OUTPUT_ROWS // N)))
+    K = shifting_steps(N, steps)
     width = b.shape[1]
     output_state = np.empty((K * N, size), a.dtype)
     output_input = np.zeros((K * N, width + (K - 1) * channels), a.dtype)
@@ -120,6 +119,26 @@ def shifting_propagator(a: FloatArray, b: FloatArray, channels: int, steps: int)
         ]
         output_input[at : at + N, begin + step * channels :] += head @ b
     return Propagator(K, output_state, output_input)
+
+
+def shifting_steps(states: int, steps: int) -> int:
+    """Steps of an exact-shift propagator that cost least over a free run.
+
+    Parameters
+    ----------
+    states : int
+        N.
+    steps : int
+        Steps of the free run.
+
+    Returns
+    -------
+    int
+        K, at most about ``OUTPUT_ROWS / N``.
+    """
+    step, fixed, state = SHIFTING_COST
+    best = round(np.sqrt(steps * step / (fixed + state * states)))
+    return max(1, min(steps, best, -(-OUTPUT_ROWS // states)))
 
 
 def step_cost(size: int, windows: int, width: float = 1.0) -> float:
