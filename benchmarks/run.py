@@ -175,15 +175,26 @@ def precision(arguments: argparse.Namespace) -> dict[str, list[timing.Timing]]:
 
 def read_arguments() -> argparse.Namespace:
     """Read the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.ArgumentDefaultsHelpFormatter
+    )
     parser.add_argument("--rounds", type=int, default=31, help="repetitions of one model")
     parser.add_argument("--many-rounds", type=int, default=7, help="repetitions of ensembles")
     parser.add_argument("--members", type=int, default=100, help="members of the ensemble")
-    parser.add_argument("--study-members", type=int, default=10, help="draws of the study")
-    parser.add_argument("--trainings", type=int, default=1, help="training windows of the study")
+    parser.add_argument(
+        "--study-members", type=int, default=10, help="draws of the study; the paper's is 100"
+    )
+    parser.add_argument(
+        "--trainings", type=int, default=1, help="training windows of the study; the paper's is 10"
+    )
     parser.add_argument("--study-rounds", type=int, default=3, help="repetitions of the study")
     parser.add_argument("--workers", type=int, default=2, help="workers compared with one")
-    parser.add_argument("--out", type=Path, default=Path("benchmarks/results"))
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("benchmarks/results"),
+        help="folder of the tables and figures; the default holds those that are published",
+    )
     parser.add_argument(
         "--figures", type=Path, help="copy the figures of the scaling here, such as docs/figures"
     )

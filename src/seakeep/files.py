@@ -55,18 +55,20 @@ def replacing(path: Path) -> Iterator[Path]:
         ) from error
 
 
-def check_place(path: Path) -> None:
+def check_place(path: Path, suffix: str | None = None) -> None:
     """Refuse a path at which no file can be written, before the work and not after it.
 
     Parameters
     ----------
     path : Path
         The file wanted.
+    suffix : str, optional
+        What its name must end with, where only one kind of file is written.
 
     Raises
     ------
     RequestError
-        If it is a folder, or its own folder does not exist.
+        If it is a folder, its own folder does not exist, or its name says another kind.
     """
     if path.is_dir():
         raise RequestError(
@@ -79,6 +81,11 @@ def check_place(path: Path) -> None:
     if not path.parent.is_dir():
         raise RequestError(
             f"cannot write {path}: the folder {path.parent} does not exist. Create it first."
+        )
+    if suffix is not None and path.suffix != suffix:
+        raise RequestError(
+            f"{path} ends in '{path.suffix}', and a file of the kind {suffix} is written. Name it "
+            f"{path.with_suffix(suffix)}."
         )
 
 

@@ -232,6 +232,7 @@ def test_calibrate_widens_the_band_that_compare_and_forecast_show(run, place):
     status, out, err = run(f"{calibrate} --level 0.9")
     assert status == 0, err
     assert "Margin of the 90 % band, from 3 windows of 200 instants (unseen)" in out
+    assert "Calibrated on unseen 9.52 to 57.52 s: judge it on other instants." in out
     assert "Judge it elsewhere with: seakeep compare wide.nc" in err
     ensemble = seakeep.load_model(place / "ensemble.nc")
     unseen = seakeep.read_campaign(place / CAMPAIGN).prepare(names=["unseen"])["unseen"]
@@ -262,6 +263,22 @@ def test_calibrate_widens_the_band_that_compare_and_forecast_show(run, place):
         np.testing.assert_array_equal(
             stored["heave"].sel(statistic="upper"), band.sel(statistic="upper") + margin[0]
         )
+
+
+def test_compare_tells_where_a_forecast_shows_memory_or_a_band_does_not_hold(run):
+    calibrate = f"calibrate ensemble.nc {CAMPAIGN} --run unseen --stop 60 --steps 200 -o known.nc"
+    assert run(calibrate)[0] == 0
+    _, _, err = run(f"compare known.nc {CAMPAIGN} --start 60 --steps 200 --band calibrated -o k")
+    assert "Note" not in err
+    _, _, err = run(f"compare known.nc {CAMPAIGN} --start 40 --steps 100 -o k")
+    assert "Note: the ensemble is calibrated, and the band shown is that of its members" in err
+    assert "memory" not in err
+    _, _, err = run(f"compare known.nc {CAMPAIGN} --start 40 --band calibrated -o k")
+    assert "the band was calibrated on a part of this forecast (9.52 to 57.52 s): this show" in err
+    assert "the forecast of unseen is longer than the 200 instants that the band was calib" in err
+    _, _, err = run(f"compare model.nc {CAMPAIGN} --run first --start 20 --steps 100 -o k")
+    assert "the forecast of first lies in what trained the model (0 to " in err
+    assert "repeats training input" not in err
 
 
 def judged_rows(folder):
@@ -398,6 +415,27 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
             r"model\.nc holds a single model, which has no band\. Fit an ensemble",
         ),
         (
+            f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unseen -o c.csv",
+            2,
+            r"c\.csv ends in '\.csv', and a file of the kind \.nc is written\. Name it c\.nc\.",
+        ),
+        (f"fit {CAMPAIGN} -o m.mat", 2, r"m\.mat ends in '\.mat', and a file of the kind \.nc"),
+        (
+            f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unseen --stop 900 -o c.nc",
+            2,
+            r"--stop 900 \(900 s\) lies after the end of unseen \([\d.]+ s\)",
+        ),
+        (
+            f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unseen --stop nan -o c.nc",
+            2,
+            r"--stop nan",
+        ),
+        (
+            f"forecast model.nc {FROM_20} --scheduler tcp://127.0.0.1:9 -o f.nc",
+            2,
+            r"--scheduler is for ensembles, and",
+        ),
+        (
             f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unsen -o c.nc",
             2,
             r"the campaign has no run 'unsen'\. Did you mean 'unseen'",
@@ -405,7 +443,7 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
         (
             f"calibrate ensemble.nc {CAMPAIGN} --steps 900 --run unseen --stop 30 -o c.nc",
             2,
-            r"no window of 900 steps with \d+ samples of history lies in unseen outside of what",
+            r"no window of 900 steps with 120 samples of history is free in unseen, .* most 256",
         ),
         (
             f"forecast ensemble.nc {FROM_20} --workers 2 --scheduler tcp://h:1 -o f.nc",

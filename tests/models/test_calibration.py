@@ -157,7 +157,10 @@ def test_what_is_refused(ensemble, calibrated, run):
         calibrated.forecast_summary(run, 120.0, 30, level=0.9, band="calibrated")
     with pytest.raises(RequestError, match="must be 'members' or 'calibrated'; received 'x'"):
         calibrated.forecast_summary(run, 120.0, 30, band="x")
-    with pytest.raises(RequestError, match=r"no window of 400 steps .* outside of what"):
+    with pytest.raises(
+        RequestError,
+        match=r"no window of 400 steps .* is free in sea, as given here: members have read",
+    ):
         ensemble.calibrate(run.sel(time=slice(None, 62.0)), steps=400)
     with pytest.raises(RequestError, match="steps must be a positive integer; received 0"):
         ensemble.calibrate(run, steps=0)

@@ -128,9 +128,14 @@ def test_a_package_that_is_missing_on_the_workers_is_told():
 
 def test_an_address_where_nobody_answers(monkeypatch):
     monkeypatch.setattr(cluster, "PATIENCE", 0.5)
-    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
-        with pytest.raises(RequestError, match=r"no Dask scheduler answers at .*`dask scheduler`"):
-            list(side_by_side(side_work.square, 1, [1], Crew(scheduler=address)))
+    with pytest.raises(RequestError, match=r"no Dask scheduler answers at .*`dask scheduler`"):
+        list(side_by_side(side_work.square, 1, [1], Crew(scheduler="tcp://127.0.0.1:9")))
+
+
+@pytest.mark.parametrize("address", ["nonsense", "http://127.0.0.1:8786", "tcp://host", "tcp://"])
+def test_what_is_no_address_is_told_at_once(address):
+    with pytest.raises(RequestError, match=rf"'{address}' is no address of a Dask scheduler"):
+        list(side_by_side(side_work.square, 1, [1], Crew(scheduler=address)))
 
 
 def test_a_scheduler_without_workers(monkeypatch, tmp_path):

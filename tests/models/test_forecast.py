@@ -174,6 +174,8 @@ def test_windows_side_by_side_are_single_forecasts(model, test_run):
         assert together.attrs == {"run": alone.attrs["run"]}
     with pytest.raises(RequestError, match=r"starts is empty: name at least one instant"):
         model.forecast_windows(test_run, [], steps=60)
+    with pytest.raises(RequestError, match=r"starts must be a list of instants; received 5.0"):
+        model.forecast_windows(test_run, 5.0, steps=60)
     with pytest.raises(RequestError, match=r"start = 0.1 s leaves 3 samples of history"):
         model.forecast_windows(test_run, [5.0, 0.1], steps=60)
 

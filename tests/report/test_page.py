@@ -101,6 +101,11 @@ def test_figures_and_tables_are_files_too(page):
     latex = (tables / "jsd_bayesian_paper.tex").read_text("utf-8")
     assert r"\begin{tabular}" in latex
     assert r"\toprule" in latex
+    for path in tables.glob("*.tex"):
+        text = path.read_text("utf-8")
+        # What pdfLaTeX prints without further packages.
+        strange = {each for each in text if ord(each) > 127} - set("äöüßÄÖÜéèêçÂÅåøØæ")
+        assert not strange, path
 
 
 def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page):

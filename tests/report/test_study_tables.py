@@ -16,13 +16,15 @@ def latex(tmp_path, rows, **options):
 
 
 def test_columns_of_long_text_break_lines_and_those_of_numbers_stand_to_the_right(tmp_path):
-    text = latex(tmp_path, [("a", "m/s²", "1.5"), ("b", "x" * 41, "-2")], numeric=(2,))
-    assert r"\begin{tabular}{lp{0.65\linewidth}r}" in text
+    text = latex(tmp_path, [("a", "m/s²", "1.5"), ("b", "x" * 91, "-2")], numeric=(2,))
+    # 90 characters are a line: 6 go to "name" and 8 to "number", with the space beside them.
+    assert r"\begin{tabular}{lp{0.84\linewidth}r}" in text
     assert r"a & m/s$^2$ & 1.5 \\" in text
     assert r"& $-$2 \\" in text
     assert r"\caption{Title.}" in text
-    two = latex(tmp_path, [("y" * 50, "x" * 41, "1")])
-    assert r"{p{0.33\linewidth}p{0.33\linewidth}l}" in two
+    two = latex(tmp_path, [("y" * 60, "x" * 40, "1")])
+    assert r"{p{0.55\linewidth}p{0.36\linewidth}l}" in two
+    assert r"{lll}" in latex(tmp_path, [("y" * 30, "x" * 40, "1")])
 
 
 @pytest.mark.parametrize("rows", [PAGE, PAGE + 1])
@@ -50,6 +52,16 @@ def test_a_table_longer_than_a_page_breaks_and_repeats_its_head(tmp_path, rows):
         ("train_length", "Fixed(value=20)", "20 T̂"),
         ("train_length", "scipy.stats.norm(loc=15.0, scale=1.0)", None),
         ("name", "Virtual CK-14e", None),
+        (
+            "alignment",
+            "ProbeAlignment(mode='effective', surge='measured', celerity=None, offset=0.0)",
+            "elevation carried to the vessel, celerity estimated; surge measured",
+        ),
+        (
+            "alignment",
+            "ProbeAlignment(mode='dispersion', surge='none', celerity=None, offset=0.0)",
+            "elevation carried to the vessel, by linear dispersion; surge none",
+        ),
     ],
 )
 def test_settings_are_words_and_not_code(key, value, words):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -17,6 +18,7 @@ from seakeep.conventions import conversion
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import check_place
 from seakeep.models import HankelEnsemble, load_model
+from seakeep.models.forecasting import counted
 from seakeep.study.lengths import instant_of, samples_of
 from seakeep.study.workflow import between
 
@@ -62,7 +64,7 @@ def calibrate(
     Example: seakeep calibrate ensemble.nc docs/tutorial/campaign.toml --run unseen --stop 60
     --steps 200 -o calibrated.nc
     """
-    check_place(out)
+    check_place(out, ".nc")
     fitted = load_model(ensemble)
     if not isinstance(fitted, HankelEnsemble):
         raise RequestError(
@@ -87,6 +89,12 @@ def calibrate(
         prepared = load_prepared(read, names=wanted, progress=progress)
     every = list(prepared.values())
     last = None if stop is None else instant_of(stop, read, every, "--stop")
+    if last is not None and not any(last <= float(each["time"][-1]) for each in every):
+        end = max(float(each["time"][-1]) for each in every)
+        raise RequestError(
+            f"--stop {stop} ({last:g} s) lies after the end of {', '.join(prepared)} ({end:g} s). "
+            "Name an instant inside, or leave --stop out to use all."
+        )
     count = samples_of(steps, read, every, fitted.dt, "--steps")
     parts = {name: _part(each, last) for name, each in prepared.items()}
     with progress_bar("Calibrating") as progress:
@@ -98,6 +106,9 @@ def calibrate(
             progress=quietly(progress),
         )
     results().print(_table(calibrated))
+    assert calibrated.calibration is not None
+    used = [f"{n} {a:.10g} to {b:.10g} s" for n, (a, b) in calibrated.calibration.spans.items()]
+    results().print(f"Calibrated on {', '.join(used)}: judge it on other instants.", soft_wrap=True)
     calibrated.save(out)
     messages().print(
         f"Wrote {out}. Judge it elsewhere with: seakeep compare {out} {campaign} --band calibrated"
@@ -116,8 +127,9 @@ def _table(ensemble: HankelEnsemble) -> Table:
     assert ensemble.calibration is not None
     found, windows = ensemble.calibration.found, ensemble.calibration.windows
     title = (
-        f"Margin of the {100 * found.level:g} % band, from {sum(windows.values())} windows of "
-        f"{ensemble.calibration.steps} instants ({', '.join(windows)})"
+        f"Margin of the {100 * found.level:g} % band, from "
+        f"{counted(sum(windows.values()), 'window')} of {ensemble.calibration.steps} instants "
+        f"({', '.join(windows)})"
     )
     table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
     table.add_column("channel", no_wrap=True)
@@ -134,6 +146,6 @@ def _table(ensemble: HankelEnsemble) -> Table:
             f"{factor * found.margin[k]:.4g}",
             f"{found.margin[k] / ensemble.state_spread[k]:.3f}",
             f"{found.blocks[k]:.0f}",
-            f"{100 * found.warranted[k]:.0f}",
+            f"{math.floor(1e4 * found.warranted[k] + 1e-6) / 100:g}",
         )
     return table

@@ -67,7 +67,7 @@ def fit(
 
     An ensemble: seakeep fit docs/tutorial/campaign.toml --model ensemble -o ensemble.nc
     """
-    check_place(out)
+    check_place(out, ".nc")
     with progress_bar("Preparing") as progress:
         identified = fit_campaign(read_campaign(campaign), model, progress)
     if isinstance(identified, HankelEnsemble):
@@ -122,7 +122,7 @@ def forecast(
     read = read_campaign(campaign)
     if isinstance(identified, HankelDMDcModel):
         given = {"--level": level is not None, "--band": band is not None, "--members": members}
-        _refuse_for_one(model, given)
+        _refuse_for_one(model, given | {"--scheduler": scheduler is not None})
     elif members and (level is not None or band is not None):
         raise RequestError(
             f"--{'level' if band is None else 'band'} belongs to the band, and --members writes "
@@ -201,7 +201,8 @@ def compare(
         raise RequestError(f"--format must be png, svg or pdf; received '{format_}'.")
     identified = load_model(model)
     if isinstance(identified, HankelDMDcModel):
-        _refuse_for_one(model, {"--level": level is not None, "--band": band is not None})
+        given = {"--level": level is not None, "--band": band is not None}
+        _refuse_for_one(model, given | {"--scheduler": scheduler is not None})
     with progress_bar("Comparing") as progress:
         read = read_campaign(campaign)
         comparisons = compare_runs(
@@ -278,6 +279,11 @@ def _band(
     if band not in (None, "members", "calibrated"):
         raise RequestError(f"--band must be members or calibrated; received '{band}'.")
     kept = identified.calibration if isinstance(identified, HankelEnsemble) else None
+    if kept is not None and band is None:
+        messages().print(
+            "Note: the ensemble is calibrated, and the band shown is that of its members. "
+            "--band calibrated shows the calibrated one."
+        )
     if level is None:
         level = kept.found.level if kept and band == "calibrated" else DEFAULT_LEVEL
     return {"level": level, "band": band or "members"}

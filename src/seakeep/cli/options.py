@@ -39,7 +39,8 @@ Level = Annotated[
     float | None,
     typer.Option(
         "--level",
-        help="Of an ensemble: probability between the bounds of the band; by default 0.95.",
+        help="Of an ensemble: probability between the bounds of the band; by default 0.95, or what "
+        "a calibrated band was made for.",
     ),
 ]
 Steps = Annotated[

@@ -21,6 +21,7 @@ of :math:`O_K` costs little: its product with the shift moves it by N, and that 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -137,7 +138,7 @@ def shifting_steps(states: int, steps: int) -> int:
         K, at most about ``OUTPUT_ROWS / N``.
     """
     step, fixed, state = SHIFTING_COST
-    best = round(np.sqrt(steps * step / (fixed + state * states)))
+    best = round(math.sqrt(steps * step / (fixed + state * states)))
     return max(1, min(steps, best, -(-OUTPUT_ROWS // states)))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -42,16 +42,21 @@ class Calibration:
         Number of windows in each run.
     steps : int
         Instants of a window.
+    spans : dict of str to (float, float)
+        First start and last instant of the windows in each run, s; empty where a file does not
+        say.
     """
 
     found: ConformalMargin
     windows: dict[str, int]
     steps: int
+    spans: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def to_json(self) -> str:
         """As text; a margin that is infinite is kept as such."""
         arrays = {key: getattr(self.found, key).tolist() for key in NUMBERS}
         words = {"level": self.found.level, "windows": self.windows, "steps": self.steps}
+        words["spans"] = self.spans
         return json.dumps(arrays | words)
 
     @classmethod
@@ -62,7 +67,8 @@ class Calibration:
             return None
         arrays = {key: np.array(kept[key]) for key in NUMBERS}
         found = ConformalMargin(**arrays, level=float(kept["level"]))
-        return cls(found, dict(kept["windows"]), int(kept["steps"]))
+        spans = {name: (float(a), float(b)) for name, (a, b) in kept.get("spans", {}).items()}
+        return cls(found, dict(kept["windows"]), int(kept["steps"]), spans)
 
 
 def calibrate(
@@ -77,13 +83,22 @@ def calibrate(
     named = labelled.as_runs(runs)
     scores = held_out_scores(ensemble, named, steps, level, crew, progress)
     if not scores:
+        longest = max(run.sizes["time"] for run in named.values()) - ensemble.history_samples
+        reason = "members have read what is left of them"
+        if longest < steps:
+            reason = f"at most {max(longest, 0)} steps fit into the longest of them"
         raise RequestError(
-            f"no window of {steps} steps with {ensemble.history_samples} samples of history lies "
-            f"in {', '.join(named)} outside of what the members learnt from. Give runs that do not "
-            "train, or fewer steps."
+            f"no window of {steps} steps with {ensemble.history_samples} samples of history is "
+            f"free in {', '.join(named)}, as given here: {reason}. Give fewer steps, longer parts, "
+            "or runs that do not train."
         )
     margin = conformal_margin(np.concatenate(list(scores.values())), level)
-    return Calibration(margin, {name: len(each) for name, each in scores.items()}, steps)
+    windows = {name: len(each) for name, each in scores.items()}
+    spans = {}
+    for name in scores:
+        starts = _unread_starts(ensemble, name, named[name], steps)
+        spans[name] = (starts[0], starts[-1] + steps * ensemble.dt)
+    return Calibration(margin, windows, steps, spans)
 
 
 def held_out_scores(

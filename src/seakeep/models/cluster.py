@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import pickle
 import platform
+import re
 import threading
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
@@ -191,6 +192,13 @@ def _connected(scheduler: str) -> Iterator[Any]:
             f"work on a Dask cluster needs {error.name}, which is not installed. Install it with: "
             "pip install 'seakeep[cluster]'"
         ) from error
+    if re.fullmatch(r"(tcp|tls|ucx|wss?|inproc)://\S+", scheduler) is None or not (
+        scheduler.startswith("inproc") or re.search(r":\d+/?$", scheduler)
+    ):
+        raise RequestError(
+            f"'{scheduler}' is no address of a Dask scheduler. Give protocol, host and port, as "
+            "`dask scheduler` prints them: tcp://HOST:8786."
+        )
     try:
         client = Client(
             scheduler,

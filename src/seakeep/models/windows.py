@@ -124,6 +124,10 @@ def read_windows(
     RequestError, DataError
         As :meth:`HankelDMDcModel.forecast`, or if there is no start.
     """
+    if np.ndim(starts) == 0:
+        raise RequestError(
+            f"starts must be a list of instants; received {starts!r}. Write [{starts}]."
+        )
     windows = [read_window(model, run, float(start), steps) for start in starts]
     if not windows:
         raise RequestError("starts is empty: name at least one instant to forecast from.")

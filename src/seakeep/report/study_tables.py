@@ -405,7 +405,7 @@ _LATEX = {
     "–": "--", "×": r"$\times$", "λ": r"$\lambda$", "ε": r"$\varepsilon$", "τ": r"$\tau$",
     "−": r"$-$", "η": r"$\eta$", "≥": r"$\ge$", "²": r"$^2$", "±": r"$\pm$", "°": r"$^\circ$",
     "→": r"$\to$", "σ": r"$\sigma$", "Δ": r"$\Delta$", "√": r"$\surd$", "π": r"$\pi$",
-    "·": r"$\cdot$", "³": r"$^3$",
+    "·": r"$\cdot$", "³": r"$^3$", "φ": r"$\varphi$", "θ": r"$\theta$", "ω": r"$\omega$",
     "T̂": r"$\hat T$", "τ̂": r"$\hat\tau$",
 }  # fmt: skip
 
@@ -422,9 +422,11 @@ def latex_text(text: str) -> str:
     return "".join(_LATEX.get(each, each) for each in text).replace("\0", r"$\hat T$")
 
 
-WIDE = 40
-"""Characters of a cell from which on its column breaks lines in LaTeX."""
-PAGE = 45
+WIDE = 24
+"""Characters of a cell from which on its column may break lines in LaTeX."""
+LINE = 90
+"""Characters, about, that fit beside each other on a page of an article in small type."""
+PAGE = 35
 """Rows from which on a LaTeX table breaks pages."""
 
 
@@ -458,10 +460,22 @@ def write_latex_table(table: ReportTable, path: Path) -> Path:
     label, head = rf"\label{{tab:{table.name}}}", [r"\toprule", line(table.columns), r"\midrule"]
     form = _latex_columns(table)
     if len(table.rows) > PAGE:
-        lines = [rf"\begin{{longtable}}{{{form}}}", rf"{caption}{label}\\", *head, r"\endfirsthead"]
-        lines += [*head, r"\endhead", *body, r"\bottomrule", r"\end{longtable}", ""]
+        lines = [
+            r"\begingroup\small",
+            rf"\begin{{longtable}}{{{form}}}",
+            rf"{caption}{label}\\",
+            *head,
+            r"\endfirsthead",
+        ]
+        lines += [*head, r"\endhead", *body, r"\bottomrule", r"\end{longtable}", r"\endgroup", ""]
     else:
-        lines = [r"\begin{table}", r"\centering", caption, label, rf"\begin{{tabular}}{{{form}}}"]
+        lines = [
+            r"\begin{table}",
+            r"\centering\small",
+            caption,
+            label,
+            rf"\begin{{tabular}}{{{form}}}",
+        ]
         lines += [*head, *body, r"\bottomrule", r"\end{tabular}", r"\end{table}", ""]
     with replacing(path) as temporary:
         temporary.write_text("\n".join(lines), encoding="utf-8")
@@ -474,8 +488,14 @@ def _latex_columns(table: ReportTable) -> str:
         max(len(cell) for cell in column) for column in zip(table.columns, *table.rows, strict=True)
     ]
     wide = [length for length in longest if length > WIDE]
-    part = 0.65 / max(len(wide), 1)
+    room = 1.0 - sum(length + 2 for length in longest if length <= WIDE) / LINE
+    part = max(room, 0.12 * len(wide)) / max(sum(wide), 1)
+    breaks = sum(longest) > LINE
     return "".join(
-        rf"p{{{part:.2f}\linewidth}}" if length > WIDE else "r" if k in table.numeric else "l"
+        rf"p{{{part * length:.2f}\linewidth}}"
+        if breaks and length > WIDE
+        else "r"
+        if k in table.numeric
+        else "l"
         for k, length in enumerate(longest)
     )

@@ -133,6 +133,8 @@ def settings_table(result: StudyResult) -> ReportTable:
             rows.append((prefix, _setting_words(prefix, shown)))
 
     settings = {k: v for k, v in result.settings.items() if k != "models"}
+    calibrated = any(str(name).startswith("calibration/") for name in result.groups)
+    settings["statistics"] = {**settings["statistics"], "calibrate": calibrated}
     walk("", settings)
     for model, spec in json.loads(result.attrs["specs"]).items():
         rows += [(f"models.{model}.{key}", _setting_words(key, v)) for key, v in spec.items()]
@@ -161,6 +163,13 @@ def _setting_words(key: str, value: str) -> str:
     name = key.rpartition(".")[2]
     if value == "None":
         return "all samples" if name in ("window", "train_length") else "none"
+    if value.startswith("ProbeAlignment("):
+        stated = dict(re.findall(r"(\w+)='?([^',)]*)'?", value.partition("(")[2]))
+        speed = {"None": "celerity estimated"}.get(
+            stated.get("celerity", ""), f"celerity {stated.get('celerity')} m/s"
+        )
+        how = speed if stated.get("mode") == "effective" else "by linear dispersion"
+        return f"elevation carried to the vessel, {how}; surge {stated.get('surge')}"
     if value in ("True", "False"):
         return "yes" if value == "True" else "no"
     unit = f" {_UNIT_OF_SETTING[name]}" if name in _UNIT_OF_SETTING else ""
@@ -215,14 +224,14 @@ def run_table(result: StudyResult) -> ReportTable:
                 str(runs["sea_state"].sel(run=name).values),
                 f"{float(run['time'][0]):.2f} to {float(run['time'][-1]):.2f} s",
                 str(len(found)),
-                ", ".join(words) or "nothing found",
+                ", ".join(words) or "none",
                 "; ".join(others),
             )
         )
     return ReportTable(
         "runs",
         "Data quality of the runs, as preparation found it",
-        ("run", "sea state", "part used", "findings", "channels", "of loggers and the run"),
+        ("run", "sea state", "part used", "findings", "channel (kind)", "findings of loggers"),
         tuple(rows),
         "Checks flag and tell; nothing is repaired unless the campaign asks for it, and what was "
         "repaired is in the tables below. A finding concerns the whole record, the part that is "

@@ -38,7 +38,7 @@ _BAND_HEADINGS = {
     "relative_band_width": ("width in SD", "{:.3f}"),
 }
 _OF_RUNS = ("start", "status", "anrmse", "conditional_on", "probe_offset", "probe_offset_spread")
-_OF_BANDS = ("level", "members", "diverged")
+_OF_BANDS = ("band", "level", "members", "diverged")
 
 
 def rich_comparison(table: xr.Dataset) -> Table:

@@ -273,9 +273,46 @@ def compare(
             progress=tell,
         )
 
-    return [
+    compared = [
         _compare_run(model, forecast, run, name, first, count) for name, run in prepared.items()
     ]
+    for each in compared:
+        _warn_of_known(model, each)
+    return compared
+
+
+def _warn_of_known(model: HankelDMDcModel | HankelEnsemble, compared: Comparison) -> None:
+    """Warn where a forecast lies in what the model, or its calibrated band, was made from."""
+    name, first, last = compared.run, compared.start, float(compared.measured["time"][-1])
+
+    def touches(span: tuple[float, float] | None) -> bool:
+        return span is not None and first < span[1] - 0.5 * model.dt and last > span[0]
+
+    told = []
+    if touches(span := model.training_spans.get(name)):
+        told.append(f"the forecast of {name} lies in what trained the model ({_from_to(span)})")
+    calibration = model.calibration if isinstance(model, HankelEnsemble) else None
+    if calibration is not None and compared.forecast.attrs.get("band") == "calibrated":
+        if touches(span := calibration.spans.get(name)):
+            told.append(f"the band was calibrated on a part of this forecast ({_from_to(span)})")
+        if compared.measured.sizes["time"] > calibration.steps:
+            told.append(
+                f"the forecast of {name} is longer than the {calibration.steps} instants that the "
+                "band was calibrated for"
+            )
+    for text in told:
+        warnings.warn(
+            f"{text}: this shows memory, not skill. Test elsewhere (--run, --start, --steps)."
+            if "longer" not in text
+            else f"{text}: its coverage is not warranted there. Calibrate with longer windows.",
+            SeakeepWarning,
+            stacklevel=3,
+        )
+
+
+def _from_to(span: tuple[float, float] | None) -> str:
+    assert span is not None
+    return f"{span[0]:.10g} to {span[1]:.10g} s"
 
 
 def _named(tell: Progress, run: str) -> Progress:

@@ -52,8 +52,11 @@ def warn_of_repeats(
         for name, (first, stop) in training.items()
     }
     for name, run in tested.items():
-        if campaign.settings.runs[name].waves != "regular":
-            _warn(model.inputs, pieces, name, _test_part(run, pieces.get(name)), model.dt)
+        part = _test_part(run, pieces.get(name))
+        # What a member leaves of a training run is too short to be judged.
+        enough = name not in training or part.sizes["time"] >= model.history_samples
+        if enough and campaign.settings.runs[name].waves != "regular":
+            _warn(model.inputs, pieces, name, part, model.dt)
 
 
 def _test_part(run: xr.Dataset, trained: xr.Dataset | None) -> xr.Dataset:

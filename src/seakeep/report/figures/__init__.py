@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from seakeep.report.figures.boxes import FEWEST, average_boxes, channel_boxes
 from seakeep.report.figures.common import model_words
 from seakeep.report.figures.densities import density_figure
@@ -69,11 +71,16 @@ def report_figures(result: StudyResult) -> list[ReportFigure]:
                 "waves",
                 "Power spectral density of the wave elevation: nominal where it is known, and "
                 "measured (mean over the irregular runs, or over all where none is) with the "
-                "paper's Welch segments and with long ones. Dashed: the regular waves.",
+                "paper's Welch segments and with long ones." + _regular_words(result),
                 partial(spectrum_figure, result),
             )
         )
     return [*figures, *_boxes(result), *_histories(result), *_judgements(result), *_data(result)]
+
+
+def _regular_words(result: StudyResult) -> str:
+    regular = bool(np.isfinite(result.groups["runs"]["wave_frequency"].values).any())
+    return " Vertical lines: the regular waves." if regular else ""
 
 
 def _data(result: StudyResult) -> list[ReportFigure]:
