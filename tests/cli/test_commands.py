@@ -438,7 +438,7 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
         (
             f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unsen -o c.nc",
             2,
-            r"the campaign has no run 'unsen'\. Did you mean 'unseen'",
+            r"campaign\.toml has no run 'unsen'\. Did you mean 'unseen'",
         ),
         (
             f"calibrate ensemble.nc {CAMPAIGN} --steps 900 --run unseen --stop 30 -o c.nc",

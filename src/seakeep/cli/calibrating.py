@@ -15,7 +15,7 @@ from seakeep.campaign import load_prepared, read_campaign
 from seakeep.cli.console import messages, progress_bar, quietly, results
 from seakeep.cli.options import DEFAULT_LEVEL, CampaignFile, Level, Scheduler, Workers, crew
 from seakeep.conventions import conversion
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import RequestError
 from seakeep.files import check_place
 from seakeep.models import HankelEnsemble, load_model
 from seakeep.models.forecasting import counted
@@ -72,14 +72,7 @@ def calibrate(
             "'bayesian_hankel_dmdc' in [model])."
         )
     read = read_campaign(campaign)
-    known = list(read.settings.runs)
     wanted = run or [name for name in read.training_runs if name in fitted.training_spans]
-    unknown = [name for name in wanted if name not in known]
-    if unknown:
-        raise RequestError(
-            f"the campaign has no run '{unknown[0]}'.{did_you_mean(unknown[0], known)} "
-            f"Runs: {', '.join(known)}."
-        )
     if not wanted:
         raise RequestError(
             "the campaign has none of the runs that the ensemble was trained on. Name runs of the "

@@ -90,8 +90,8 @@ class Clock:
         if self.method == Clock.method:
             return self.method
         found = (
-            f"{1e3 * self.offset:+.2f}{_error(1e3 * self.offset_error, 2)} ms, "
-            f"{1e6 * self.drift:+.1f}{_error(1e6 * self.drift_error, 1)} ppm"
+            f"{1e3 * self.offset:+z.2f}{_error(1e3 * self.offset_error, 2)} ms, "
+            f"{1e6 * self.drift:+z.1f}{_error(1e6 * self.drift_error, 1)} ppm"
         )
         return f"{found} ({self.method}, n = {self.count})"
 
@@ -450,7 +450,7 @@ def without_doubtful_drift(clock: Clock) -> Clock:
     doubtful = 0 < abs(clock.drift) <= 2.0 * clock.drift_error
     if not doubtful:
         return clock
-    told = f"offset only: a drift of {1e6 * clock.drift:+.1f} ppm is not certain"
+    told = f"offset only: a drift of {1e6 * clock.drift:+z.1f} ppm is not certain"
     return replace(
         clock,
         offset=clock.offset + clock.drift * clock.centre,
