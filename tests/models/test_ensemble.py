@@ -229,7 +229,11 @@ def test_windows_side_by_side_equal_single_forecasts(run):
         for name in STATES:
             # Two windows are one product: other roundings.
             np.testing.assert_allclose(together[name][window], alone[name], atol=1e-10)
-    summary = ensemble.summarize_windows(run, starts, steps=60)
+    told = []
+    summary = ensemble.summarize_windows(
+        run, starts, steps=60, progress=lambda *each: told.append(each)
+    )
+    assert told == [(k, 6, f"member {k}") for k in range(1, 7)]
     expected = seakeep.summarize(together)
     for name in STATES:
         np.testing.assert_array_equal(summary[name], expected[name])

@@ -81,11 +81,16 @@ def summary(
 
 
 def all_members_of_windows(
-    ensemble: HankelEnsemble, run: xr.Dataset, starts: Sequence[float], steps: int, crew: Crew
+    ensemble: HankelEnsemble,
+    run: xr.Dataset,
+    starts: Sequence[float],
+    steps: int,
+    crew: Crew,
+    progress: Progress | None,
 ) -> xr.Dataset:
     """Free runs; see :meth:`HankelEnsemble.forecast_windows`."""
     windows = read_windows(ensemble, run, starts, steps)
-    with shelved(ensemble, run, windows, crew, whole=True) as (shelf, lost):
+    with shelved(ensemble, run, windows, crew, progress, whole=True) as (shelf, lost):
         values = shelf.all()
     variables = _labelled(ensemble, values, ("window", "member", "lead"))
     status = [
@@ -104,12 +109,13 @@ def summary_of_windows(
     level: float,
     band: Band,
     crew: Crew,
+    progress: Progress | None,
 ) -> xr.Dataset:
     """Statistics; see :meth:`HankelEnsemble.summarize_windows`."""
     level = check_level(level)
     check_band(ensemble, level, band)
     windows = read_windows(ensemble, run, starts, steps)
-    with shelved(ensemble, run, windows, crew) as (shelf, lost):
+    with shelved(ensemble, run, windows, crew, progress) as (shelf, lost):
         values = widened(ensemble, reduce_members(shelf, lost, level, crew.workers), band)
     variables = _labelled(ensemble, values, ("window", "statistic", "lead"))
     variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))

@@ -345,12 +345,13 @@ class HankelEnsemble:
         workers: int = 1,
         backend: Backend = "processes",
         scheduler: str | None = None,
+        progress: Progress | None = None,
     ) -> xr.Dataset:
         """Free runs of all members from several starts side by side.
 
         Parameters
         ----------
-        run, steps, workers, backend, scheduler
+        run, steps, workers, backend, scheduler, progress
             As in :meth:`forecast`; `steps` holds for all.
         starts : sequence of float
             Instants of the last measured state, s.
@@ -367,7 +368,7 @@ class HankelEnsemble:
             As :meth:`forecast`.
         """
         return ensemble_forecasts.all_members_of_windows(
-            self, run, starts, steps, Crew(workers, backend, scheduler)
+            self, run, starts, steps, Crew(workers, backend, scheduler), progress
         )
 
     def summarize_windows(
@@ -381,12 +382,13 @@ class HankelEnsemble:
         workers: int = 1,
         backend: Backend = "processes",
         scheduler: str | None = None,
+        progress: Progress | None = None,
     ) -> xr.Dataset:
         """Mean, standard deviation and band from several starts, never all members at once.
 
         Parameters
         ----------
-        run, starts, steps, workers, backend, scheduler
+        run, starts, steps, workers, backend, scheduler, progress
             As in :meth:`forecast_windows`.
         level : float, optional
             Probability between ``lower`` and ``upper``.
@@ -403,8 +405,9 @@ class HankelEnsemble:
         RequestError, DataError
             As :meth:`forecast`.
         """
+        crew = Crew(workers, backend, scheduler)
         return ensemble_forecasts.summary_of_windows(
-            self, run, starts, steps, level, band, Crew(workers, backend, scheduler)
+            self, run, starts, steps, level, band, crew, progress
         )
 
     def save(self, path: str | Path) -> Path:
