@@ -15,8 +15,9 @@ from seakeep.errors import RequestError
 from seakeep.report.deviations import test_overlap as overlap_of_tests
 from seakeep.report.glossary import few_cells, plain_symbol
 from seakeep.report.interactive import dashes, pack
+from seakeep.report.latex import latex_text
 from seakeep.report.published import PUBLISHED
-from seakeep.report.study_tables import coverage_table, latex_text, number
+from seakeep.report.study_tables import coverage_table, number
 from seakeep.report.study_words import findings
 from seakeep.report.style import LINES
 from seakeep.study import read_result, read_study, run_study

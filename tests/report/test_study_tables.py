@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import pytest
 import xarray as xr
 
-from seakeep.report.study_tables import PAGE, ReportTable, write_latex_table
+from seakeep.report.latex import PAGE, write_latex_table
+from seakeep.report.study_tables import ReportTable
 from seakeep.report.study_words import _setting_words, clock_table
 
 

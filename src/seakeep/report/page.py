@@ -17,6 +17,7 @@ from seakeep.report.deviations import deviations, test_overlap, training_overlap
 from seakeep.report.figures import ReportFigure, report_figures
 from seakeep.report.glossary import few_cells, glossary
 from seakeep.report.interactive import history_data
+from seakeep.report.latex import write_latex_table
 from seakeep.report.regular import response_table, response_words
 from seakeep.report.study_tables import (
     ReportTable,
@@ -26,7 +27,6 @@ from seakeep.report.study_tables import (
     overview_table,
     trend_table,
     write_csv_table,
-    write_latex_table,
 )
 from seakeep.report.study_words import (
     clock_table,
