@@ -61,11 +61,8 @@ def summary(
     progress: Progress | None,
 ) -> xr.Dataset:
     """Statistics; see :meth:`HankelEnsemble.forecast_summary`."""
-    level = check_level(level)
-    check_band(ensemble, level, band)
-    (window,) = read_windows(ensemble, run, [start], steps)
-    with shelved(ensemble, run, [window], crew, progress) as (shelf, lost):
-        values = widened(ensemble, reduce_members(shelf, lost, level, crew.workers), band)
+    windows, values, lost = _reduced(ensemble, run, [start], steps, level, band, crew, progress)
+    window = windows[0]
     variables = _labelled(ensemble, values[0], ("statistic", "time"))
     variables["status"] = xr.Variable(("member",), statuses(lost[:, 0], window.time.values))
     counts = {"start": window.start} | _counted(ensemble, level, band) | verdict(lost)
@@ -112,17 +109,32 @@ def summary_of_windows(
     progress: Progress | None,
 ) -> xr.Dataset:
     """Statistics; see :meth:`HankelEnsemble.summarize_windows`."""
-    level = check_level(level)
-    check_band(ensemble, level, band)
-    windows = read_windows(ensemble, run, starts, steps)
-    with shelved(ensemble, run, windows, crew, progress) as (shelf, lost):
-        values = widened(ensemble, reduce_members(shelf, lost, level, crew.workers), band)
+    windows, values, lost = _reduced(ensemble, run, starts, steps, level, band, crew, progress)
     variables = _labelled(ensemble, values, ("window", "statistic", "lead"))
     variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
     coords = window_coords(windows, ensemble.dt)
     coords["statistic"] = statistic_coordinate(level, band == "calibrated")
     attrs = _attributes(ensemble, run, windows[0]) | _counted(ensemble, level, band)
     return xr.Dataset(variables, coords=coords, attrs=attrs)
+
+
+def _reduced(
+    ensemble: HankelEnsemble,
+    run: xr.Dataset,
+    starts: Sequence[float],
+    steps: int | None,
+    level: float,
+    band: Band,
+    crew: Crew,
+    progress: Progress | None,
+) -> tuple[list[ForecastWindow], FloatArray, npt.NDArray[np.int64]]:
+    """Windows, statistics (window, 4, steps, N), and where members were lost (member, window)."""
+    level = check_level(level)
+    check_band(ensemble, level, band)
+    windows = read_windows(ensemble, run, starts, steps)
+    with shelved(ensemble, run, windows, crew, progress) as (shelf, lost):
+        values = widened(ensemble, reduce_members(shelf, lost, level, crew.workers), band)
+    return windows, values, lost
 
 
 def _labelled(

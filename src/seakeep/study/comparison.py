@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -285,34 +285,28 @@ def _warn_of_known(model: HankelDMDcModel | HankelEnsemble, compared: Comparison
     """Warn where a forecast lies in what the model, or its calibrated band, was made from."""
     name, first, last = compared.run, compared.start, float(compared.measured["time"][-1])
 
-    def touches(span: tuple[float, float] | None) -> bool:
-        return span is not None and first < span[1] - 0.5 * model.dt and last > span[0]
+    def part_in(spans: Mapping[str, tuple[float, float]]) -> str:
+        """Span of the run that the forecast touches, in words; empty if it does not."""
+        begin, end = spans.get(name, (np.inf, -np.inf))
+        touches = first < end - 0.5 * model.dt and last > begin
+        return f"({begin:.10g} to {end:.10g} s)" if touches else ""
 
+    memory = "this shows memory, not skill. Test elsewhere (--run, --start, --steps)."
     told = []
-    if touches(span := model.training_spans.get(name)):
-        told.append(f"the forecast of {name} lies in what trained the model ({_from_to(span)})")
+    if part := part_in(model.training_spans):
+        told.append(f"the forecast of {name} lies in what trained the model {part}: {memory}")
     calibration = model.calibration if isinstance(model, HankelEnsemble) else None
     if calibration is not None and compared.forecast.attrs.get("band") == "calibrated":
-        if touches(span := calibration.spans.get(name)):
-            told.append(f"the band was calibrated on a part of this forecast ({_from_to(span)})")
+        if part := part_in(calibration.spans):
+            told.append(f"the band was calibrated on a part of this forecast {part}: {memory}")
         if compared.measured.sizes["time"] > calibration.steps:
             told.append(
                 f"the forecast of {name} is longer than the {calibration.steps} instants that the "
-                "band was calibrated for"
+                "band was calibrated for: its coverage is not warranted there. Calibrate with "
+                "longer windows."
             )
     for text in told:
-        warnings.warn(
-            f"{text}: this shows memory, not skill. Test elsewhere (--run, --start, --steps)."
-            if "longer" not in text
-            else f"{text}: its coverage is not warranted there. Calibrate with longer windows.",
-            SeakeepWarning,
-            stacklevel=3,
-        )
-
-
-def _from_to(span: tuple[float, float] | None) -> str:
-    assert span is not None
-    return f"{span[0]:.10g} to {span[1]:.10g} s"
+        warnings.warn(text, SeakeepWarning, stacklevel=3)
 
 
 def _named(tell: Progress, run: str) -> Progress:
