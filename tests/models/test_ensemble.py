@@ -339,6 +339,10 @@ def test_members_that_diverge_say_when():
 
 def test_the_summary_says_what_the_members_are(run):
     ensemble = fitted(run, train_length=Uniform(30, 40), n_members=20, ridge=STABLE)
+    assert repr(ensemble) == (
+        "HankelEnsemble(n_members=20, states=['heave', 'pitch'], inputs=['eta'], dt=0.1; "
+        "print(ensemble.summary()) says more)"
+    )
     text = ensemble.summary()
     draws = ensemble.draws
     for words in (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -58,16 +58,22 @@ class HankelEnsemble:
         By how much the calibrated band is wider than that of the members; see :meth:`calibrate`.
     """
 
-    settings: HankelSettings = field(repr=False)
+    settings: HankelSettings
     origin: dict[str, Any]
-    members: tuple[Draw, ...] = field(repr=False)
-    arrays: TrainingArrays = field(repr=False)
+    members: tuple[Draw, ...]
+    arrays: TrainingArrays
     dt: float
     state_labels: tuple[ChannelLabel, ...]
     input_labels: tuple[ChannelLabel, ...]
     alignment: FittedAlignment | None = None
-    radii: FloatArray | None = field(default=None, repr=False)
-    calibration: Calibration | None = field(default=None, repr=False)
+    radii: FloatArray | None = None
+    calibration: Calibration | None = None
+
+    def __repr__(self) -> str:
+        return (
+            f"{type(self).__name__}(n_members={self.n_members}, states={self.states}, "
+            f"inputs={self.inputs}, dt={self.dt:g}; print(ensemble.summary()) says more)"
+        )
 
     @property
     def n_members(self) -> int:
