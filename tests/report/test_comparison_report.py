@@ -234,7 +234,7 @@ def test_figure_has_a_row_a_channel_with_units_and_no_overlap():
         "heave\n$z$ [m]",
         "pitch\n$\\theta$ [deg]",
         "stern mooring load\n$M_\\mathrm{stern}$ [N]",
-        "input\n[m]",
+        "wave elevation fwd\n$\\eta_\\mathrm{fwd}$ [m]",
     ]
     figure.draw_without_rendering()
     boxes = [axes.get_tightbbox() for axes in figure.axes]
@@ -242,6 +242,27 @@ def test_figure_has_a_row_a_channel_with_units_and_no_overlap():
         assert upper.y0 >= lower.y1 - 1  # a pixel of line width
     assert "ANRMSE 0.100" in figure.get_suptitle()
     assert figure.axes[-1].get_xlabel() == "time [s]"
+
+
+def test_inputs_share_a_panel_with_those_of_their_unit_only():
+    pytest.importorskip("matplotlib")
+    from seakeep.report.overlay import overlay_figure
+
+    judged = comparison()
+    elevation = judged.inputs["eta_fwd"]
+    more = judged.inputs.assign(
+        rudder=elevation.assign_attrs(units="deg"), eta_aft=elevation, fin=elevation
+    )
+    more["fin"].attrs = {"units": "deg"}
+    figure = overlay_figure(replace(judged, inputs=more))
+    *_, waves, angles = figure.axes
+    assert waves.get_ylabel() == "wave elevations\n[m]"
+    assert angles.get_ylabel() == "inputs\n[deg]"
+    told = [[text.get_text() for text in axes.get_legend().get_texts()] for axes in (waves, angles)]
+    assert told == [["eta_fwd", "eta_aft"], ["rudder", "fin"]]
+    figure.draw_without_rendering()
+    boxes = [axes.get_tightbbox() for axes in (waves, angles)]
+    assert boxes[0].y0 >= boxes[1].y1 - 1  # a pixel of line width
 
 
 def lengthened(short):

@@ -25,6 +25,8 @@ from seakeep.study import read_result, read_study, run_study
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
 from seakeep.report.figures.boxes import FEWEST, draw_box_violin
+from seakeep.report.figures.eigenvalues import eigenvalue_figure
+from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import write_report
 
 STUDY = """
@@ -120,6 +122,32 @@ def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page):
     assert rows[-1] == ["average", *(f"{float(value):.2f}" for value in expected)]
     windows = found.groups["calibration/bayesian"]["windows"].values
     assert f"A training set had {windows.min()}" in page.read_text("utf-8")
+
+
+def test_a_history_shows_the_calibrated_band_around_that_of_the_members(page):
+    found = read_result(page.parent)
+    ((test, training, window), *_) = shown_cells(found)
+    figure = history_figure(found, test, training, window)
+    cell = found.tests[test].isel(training=training, window=window)
+    margins = found.groups["calibration/bayesian"]["margin"].isel(training=training)
+    for axes, name in zip(figure.axes, found.channels, strict=True):
+        one = cell.sel(channel=name)
+        (lower,) = (line for line in axes.lines if line.get_label() == "calibrated")
+        wider = one["bayesian_lower"].values - float(margins.sel(channel=name))
+        mean, spread = float(one["training_mean"]), float(one["training_std"])
+        np.testing.assert_allclose(lower.get_ydata(), (wider - mean) / spread, rtol=1e-10)
+    (legend,) = figure.legends
+    assert "calibrated" in [text.get_text() for text in legend.get_texts()]
+    without = {n: g for n, g in found.groups.items() if not n.startswith("calibration/")}
+    plain = history_figure(replace(found, groups=without), test, training, window)
+    assert "calibrated" not in [text.get_text() for text in plain.legends[0].get_texts()]
+
+
+def test_the_legend_of_the_eigenvalues_stands_over_none_of_them(page):
+    figure = eigenvalue_figure(read_result(page.parent))
+    figure.draw_without_rendering()
+    (legend,) = figure.legends
+    assert all(legend.get_window_extent().y0 >= axes.get_window_extent().y1 for axes in figure.axes)
 
 
 def test_the_data_quality_is_in_the_page_for_every_run_and_channel(page):

@@ -8,7 +8,14 @@ import numpy as np
 import xarray as xr
 
 from seakeep.errors import DataError
-from seakeep.report.style import COLOURS, LINES, axis_label, figure_style, new_figure
+from seakeep.report.style import (
+    COLOURS,
+    LINES,
+    axis_label,
+    figure_style,
+    new_figure,
+    shown_unit,
+)
 from seakeep.signals import encounter_period
 from seakeep.study import Comparison, comparison_table
 
@@ -53,7 +60,11 @@ def overlay_figure(comparison: Comparison) -> Figure:
 def _draw(comparison: Comparison) -> Figure:
     states = [str(name) for name in comparison.measured.data_vars]
     inputs = [str(name) for name in comparison.inputs.data_vars]
-    rows = len(states) + bool(inputs)
+    units_of = {name: str(comparison.inputs[name].attrs.get("units", "")) for name in inputs}
+    alike = [
+        [n for n in inputs if units_of[n] == unit] for unit in dict.fromkeys(units_of.values())
+    ]
+    rows = len(states) + len(alike)
     period = _period_if_long(_counted(comparison))
     columns = 1 if period is None else 2
     figure = new_figure(7.5 if columns == 1 else 11.0, 1.0 + 1.45 * rows)
@@ -66,18 +77,17 @@ def _draw(comparison: Comparison) -> Figure:
         units = str(comparison.measured[name].attrs.get("units", ""))
         axes[row, 0].set_ylabel(axis_label(name, units), fontsize=LABEL)
         axes[row, 0].set_title(_judgement(table.sel(channel=name)), loc="right", fontsize=8, pad=2)
-    if inputs:
+    for names, (first, last) in zip(alike, axes[len(states) :, [0, -1]], strict=True):
         if period is not None:
-            _draw_input_envelopes(axes[-1, 0], comparison.inputs, inputs, period)
-        _draw_inputs(axes[-1, -1], comparison.inputs, inputs)
-        units = str(comparison.inputs[inputs[0]].attrs.get("units", ""))
-        axes[-1, 0].set_ylabel(f"input\n[{units}]", fontsize=LABEL)
-        axes[-1, 0].legend(
-            *axes[-1, -1].get_legend_handles_labels(),
+            _draw_input_envelopes(first, comparison.inputs, names, period)
+        _draw_inputs(last, comparison.inputs, names)
+        first.set_ylabel(_input_label(names, units_of[names[0]]), fontsize=LABEL)
+        first.legend(
+            *last.get_legend_handles_labels(),
             loc="lower left",
             bbox_to_anchor=(0.0, 0.98),
             borderaxespad=0.0,
-            ncols=min(len(inputs), 4),
+            ncols=min(len(names), 4),
             fontsize=LABEL,
         )
     for column in range(columns):
@@ -96,6 +106,13 @@ def _draw(comparison: Comparison) -> Figure:
     figure.legend(keys.values(), keys.keys(), loc="outside lower center", ncols=len(keys))
     figure.suptitle(_title(comparison), x=0.01, ha="left")
     return figure
+
+
+def _input_label(names: list[str], units: str) -> str:
+    if len(names) == 1:
+        return axis_label(names[0], units)
+    waves = all(name.startswith("eta") for name in names)
+    return f"{'wave elevations' if waves else 'inputs'}\n[{shown_unit(units) or '?'}]"
 
 
 def _judgement(rows: xr.Dataset) -> str:

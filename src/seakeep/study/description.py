@@ -130,7 +130,7 @@ def _prepared(run: xr.Dataset) -> xr.Dataset:
 
 def _training(plan: Plan, runs: Runs) -> xr.Dataset:
     spans = [
-        ", ".join(f"{run} {begin:.4g} to {stop:.4g} s" for run, begin, stop in each.spans)
+        ", ".join(f"{run}, {begin:.2f} to {stop:.2f} s" for run, begin, stop in each.spans)
         for each in plan.training
     ]
     single = all(len(each.spans) == 1 for each in plan.training)
@@ -222,7 +222,7 @@ def _frequency(plan: Plan, run: xr.Dataset) -> float:
 
 def _span(run: xr.Dataset, key: str) -> str:
     span = run.attrs.get(key)
-    return "" if span is None else f"{float(span[0]):.4g} to {float(span[1]):.4g} s"
+    return "" if span is None else f"{float(span[0]):.2f} to {float(span[1]):.2f} s"
 
 
 def _spectra(plan: Plan, runs: Runs) -> xr.Dataset | None:

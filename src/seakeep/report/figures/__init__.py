@@ -128,13 +128,15 @@ def _boxes(result: StudyResult) -> list[ReportFigure]:
 
 def _histories(result: StudyResult) -> list[ReportFigure]:
     level = 100 * float(result.settings["statistics"]["level"])
+    calibrated = any(name.startswith("calibration/") for name in result.groups)
+    edges = ", and that band calibrated (dotted)" if calibrated else ""
     return [
         ReportFigure(
             f"history_{test}_{window:03d}",
             "histories",
             f"Time histories, {result.label_of(test)}: deviations from the training mean in "
             "training standard deviations; measured, deterministic forecast, and the ensemble's "
-            f"mean with its {level:g} % band.",
+            f"mean with its {level:g} % band{edges}.",
             partial(history_figure, result, test, training, window),
         )
         for test, training, window in shown_cells(result)

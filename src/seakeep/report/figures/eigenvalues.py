@@ -33,7 +33,7 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
     matplotlib.figure.Figure
     """
     with figure_style():
-        figure = new_figure(8.5, 2.8)
+        figure = new_figure(8.5, 3.0)
         plane, decay = figure.subplots(1, 2)
         circle = np.exp(1j * np.linspace(0, np.pi, 400))
         plane.plot(circle.real, circle.imag, color="#56606B", linewidth=0.8)
@@ -51,8 +51,13 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
         decay.set(xlabel="frequency [Hz]", ylabel="modulus")
         decay.set_xlim(0, 3 / float(result.attrs["encounter_period"]))
         decay.set_ylim(LOWEST, 1.01)
-        legend = decay.legend(fontsize=7, loc="lower right", markerscale=2)
-        for handle in legend.legend_handles:
+        legend = figure.legend(
+            *decay.get_legend_handles_labels(),
+            loc="outside upper right",
+            ncols=len(order),
+            markerscale=2,
+        )
+        for handle in filter(None, legend.legend_handles):
             handle.set_alpha(0.9)
         return figure
 

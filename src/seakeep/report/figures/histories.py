@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 __all__ = ["history_figure", "shown_cells"]
 
+EDGE: dict[str, Any] = {"linewidth": 0.7, "linestyle": (0, (1, 1))}
+"""Bounds of a calibrated band."""
+
 
 def shown_cells(result: StudyResult) -> list[tuple[str, int, int]]:
     """Cells that are drawn: test set, training set and window.
@@ -65,21 +68,30 @@ def history_figure(result: StudyResult, test: str, training: int, window: int) -
         names = result.channels
         figure = new_figure(7.5, 0.9 + 0.95 * len(names))
         axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+        margins = {
+            model: result.groups[f"calibration/{model}"]["margin"].isel(training=training)
+            for model in result.models
+            if f"calibration/{model}" in result.groups
+        }
         for each, name in zip(axes, names, strict=True):
-            _draw_channel(each, result, cell.sel(channel=name), name)
+            wider = {model: float(margin.sel(channel=name)) for model, margin in margins.items()}
+            _draw_channel(each, result, cell.sel(channel=name), name, wider)
         axes[-1].set_xlabel(r"time after the last measured state, in encounter periods")
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper right", ncols=len(handles))
-        run = str(cell["run"].values)
+        run, learnt = str(cell["run"].values), str(cell["training"].values)
         axes[0].set_title(
-            f"{run}, from {float(cell['start']):.1f} s; trained on {cell['training'].values}",
+            f"{run}, from {float(cell['start']):.1f} s; trained "
+            + (learnt if learnt.startswith("without ") else f"on {learnt}"),
             loc="left",
             fontsize=8,
         )
         return figure
 
 
-def _draw_channel(axes: Any, result: StudyResult, cell: Any, name: str) -> None:
+def _draw_channel(
+    axes: Any, result: StudyResult, cell: Any, name: str, margins: dict[str, float]
+) -> None:
     mean, spread = float(cell["training_mean"]), float(cell["training_std"])
 
     def standard(key: str) -> Any:
@@ -100,6 +112,11 @@ def _draw_channel(axes: Any, result: StudyResult, cell: Any, name: str) -> None:
                 linewidth=0,
                 label=f"{level:g} % band",
             )
+            if np.isfinite(margin := margins.get(model, np.nan) / spread):
+                bounds = (standard(f"{model}_lower") - margin, standard(f"{model}_upper") + margin)
+                for number, bound in enumerate(bounds):
+                    label = "calibrated" if number == 0 else None
+                    axes.plot(time, bound, label=label, **{**style, **EDGE})
         words = f"{model_words(model)} mean" if result.is_ensemble(model) else model_words(model)
         axes.plot(time, standard(f"{model}_mean"), label=words, **style)
     axes.set_ylabel(short_label(name), rotation=0, ha="right", va="center")
