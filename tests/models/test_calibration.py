@@ -133,6 +133,37 @@ def test_another_run_is_used_whole(ensemble):
     assert found.windows == {"other": (500 - ensemble.history_samples) // 40}
 
 
+def unnamed(run):
+    plain = run.copy()
+    del plain.attrs["run"]
+    return plain
+
+
+def test_runs_without_names_are_known_by_their_samples(run):
+    spec = seakeep.BayesianHankelDMDc(
+        encounter_period=1.6,
+        train_length=seakeep.Uniform(10, 16),
+        state_delay=seakeep.Fixed(0.5),
+        input_delay=seakeep.Fixed(1.0),
+        ridge=seakeep.Fixed(300.0),
+        n_members=2,
+    )
+    first, second, third = (unnamed(sea(seed, 500)) for seed in (0, 3, 4))
+    ensemble = spec.fit([first, second], STATES, INPUTS)
+    # Up to 256 of its 500 samples and their history were read, so that none of 250 steps is free.
+    # `second` was read under the name "run 2"; alone it is "run", in a list of one "run 1".
+    for again in (second, [second], second.isel(time=slice(0, 300)), {"other": second}):
+        with pytest.raises(RequestError, match="members have read what is left of them"):
+            ensemble.calibrate(again, steps=250)
+    free = (500 - ensemble.history_samples) // 40
+    assert ensemble.calibrate(third, steps=40).calibration.windows == {"run": free}
+    assert ensemble.calibrate([third], steps=40).calibration.windows == {"run 1": free}
+    # A run that has a name and other samples may have been prepared in another way.
+    named = spec.fit(sea(0, 500, "a"), STATES, INPUTS)
+    with pytest.raises(RequestError, match="members have read what is left of them"):
+        named.calibrate(1.001 * sea(0, 500, "a").assign_attrs(run="a"), steps=250)
+
+
 def test_a_file_keeps_the_calibration(calibrated, ensemble, run, tmp_path):
     calibrated.save(tmp_path / "ensemble.nc")
     kept = seakeep.load_model(tmp_path / "ensemble.nc")

@@ -162,7 +162,7 @@ def _unread_starts(ensemble: HankelEnsemble, name: str, run: xr.Dataset, steps: 
         raise RequestError(f"steps must be a positive integer; received {steps!r}.")
     time = np.asarray(run["time"].values, dtype=float)
     slack = 1e-6 * ensemble.dt
-    read = ensemble.read_spans.get(name)
+    read = _read_span(ensemble, name, run)
     starts, at = [], ensemble.history_samples - 1
     while at + steps < time.size:
         # The instants at + 1 … at + steps are forecast.
@@ -173,6 +173,34 @@ def _unread_starts(ensemble: HankelEnsemble, name: str, run: xr.Dataset, steps: 
         starts.append(float(time[at]))
         at += steps
     return starts
+
+
+def _read_span(ensemble: HankelEnsemble, name: str, run: xr.Dataset) -> tuple[float, float] | None:
+    """What members have read of a run: of the one that holds their samples, else of its name.
+
+    A name that was made up for a run without one says nothing.
+    """
+    arrays, spans = ensemble.arrays, ensemble.read_spans
+    for key, begin, states in zip(arrays.names, arrays.begins, arrays.states, strict=True):
+        if key in spans and _holds(run, ensemble, name, begin, states):
+            return spans[key]
+    return None if labelled.is_made_up(name, run) else spans.get(name)
+
+
+def _holds(
+    run: xr.Dataset, ensemble: HankelEnsemble, name: str, begin: float, states: FloatArray
+) -> bool:
+    """Whether a run has the same states at the same instants, as far as both reach."""
+    time = np.asarray(run["time"].values, dtype=float)
+    if not time.size:
+        return False
+    ahead = round((begin - time[0]) / ensemble.dt)  # samples of the run before the states
+    first, skipped = max(ahead, 0), max(-ahead, 0)
+    count = min(time.size - first, len(states) - skipped)
+    if count < 1 or abs(time[first] - begin - skipped * ensemble.dt) > 0.5 * ensemble.dt:
+        return False
+    held = labelled.channel_matrix(run, ensemble.states, name, slice(first, first + count))
+    return bool(np.array_equal(held, states[skipped : skipped + count]))
 
 
 def _measured(
