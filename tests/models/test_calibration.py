@@ -1,12 +1,14 @@
 """The calibrated band of an ensemble: on windows that no member read, kept in its file."""
 
+import warnings
+
 import numpy as np
 import pytest
 import xarray as xr
 
 import seakeep
 from seakeep.core.calibration import band_scores, conformal_margin
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, SeakeepWarning
 
 STATES, INPUTS, DT = ["heave", "pitch"], ["eta"], 0.1
 
@@ -179,6 +181,22 @@ def test_a_file_keeps_the_calibration(calibrated, ensemble, run, tmp_path):
 def test_the_summary_says_it(calibrated, ensemble):
     assert "calibrated for 0.95 on 20 windows of 40 steps" in calibrated.summary()
     assert "calibrated" not in ensemble.summary()
+
+
+def test_a_longer_forecast_than_the_calibrated_ones_is_told(calibrated, run):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        calibrated.forecast_summary(run, 112.0, 40, band="calibrated")
+        calibrated.forecast_summary(run, 112.0, 41)
+    for ask in (
+        lambda: calibrated.forecast_summary(run, 112.0, 41, band="calibrated"),
+        lambda: calibrated.summarize_windows(run, [112.0], 41, band="calibrated"),
+    ):
+        with pytest.warns(
+            SeakeepWarning, match="forecast of sea is longer than the 40 instants"
+        ) as told:
+            ask()
+        assert told[0].filename == __file__
 
 
 def test_what_is_refused(ensemble, calibrated, run):

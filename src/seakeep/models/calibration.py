@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
@@ -12,7 +13,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.core.calibration import ConformalMargin, band_scores, conformal_margin
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import labelled
 from seakeep.models.ensemble_series import shelved
 from seakeep.models.progress import Progress
@@ -23,7 +24,15 @@ from seakeep.models.workers import Crew
 if TYPE_CHECKING:
     from seakeep.models.fitted_ensemble import HankelEnsemble
 
-__all__ = ["Band", "Calibration", "calibrate", "check_band", "held_out_scores", "widened"]
+__all__ = [
+    "Band",
+    "Calibration",
+    "calibrate",
+    "check_band",
+    "held_out_scores",
+    "warn_of_horizon",
+    "widened",
+]
 
 FloatArray = npt.NDArray[np.float64]
 Band = Literal["members", "calibrated"]
@@ -241,6 +250,18 @@ def check_band(ensemble: HankelEnsemble, level: float, band: Band) -> None:
         raise RequestError(
             f"the band was calibrated for level = {known:g}, and {level:g} was asked for. "
             "Calibrate for that level."
+        )
+
+
+def warn_of_horizon(ensemble: HankelEnsemble, name: str, steps: int) -> None:
+    """Warn where a forecast is longer than those that its calibrated band was made from."""
+    if ensemble.calibration is not None and steps > ensemble.calibration.steps:
+        warnings.warn(
+            f"the forecast of {name} is longer than the {ensemble.calibration.steps} instants that "
+            "the band was calibrated for: its coverage is not warranted there. Calibrate with "
+            "longer windows.",
+            SeakeepWarning,
+            stacklevel=5,
         )
 
 
