@@ -253,7 +253,7 @@ def check_band(ensemble: HankelEnsemble, level: float, band: Band) -> None:
         )
 
 
-def warn_of_horizon(ensemble: HankelEnsemble, name: str, steps: int) -> None:
+def warn_of_horizon(ensemble: HankelEnsemble, name: str, steps: int, stacklevel: int = 5) -> None:
     """Warn where a forecast is longer than those that its calibrated band was made from."""
     if ensemble.calibration is not None and steps > ensemble.calibration.steps:
         warnings.warn(
@@ -261,7 +261,7 @@ def warn_of_horizon(ensemble: HankelEnsemble, name: str, steps: int) -> None:
             "the band was calibrated for: its coverage is not warranted there. Calibrate with "
             "longer windows.",
             SeakeepWarning,
-            stacklevel=5,
+            stacklevel=stacklevel,
         )
 
 
