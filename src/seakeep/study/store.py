@@ -7,7 +7,7 @@ import json
 import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata
@@ -203,7 +203,7 @@ class CellFolder:
                 np.load(opened, allow_pickle=False) as file,
             ):
                 arrays = {key: file[key] for key in file.files}
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile):
             return None
         return arrays if str(arrays.pop("digest", "")) == self.digest else None
 
@@ -213,9 +213,10 @@ class CellFolder:
 
     def clear(self) -> None:
         """Remove the cells; for when all of them are in the result."""
-        for path in (self.folder / CELLS).glob("*"):
+        for path in (self.folder / CELLS).glob("*.npz*"):
             path.unlink(missing_ok=True)
-        (self.folder / CELLS).rmdir()
+        with suppress(OSError):  # somebody else's files stay
+            (self.folder / CELLS).rmdir()
 
 
 def _read_header(path: Path) -> dict[str, Any]:
@@ -380,7 +381,7 @@ def read_result(folder: Path | str) -> StudyResult:
         for name in names:
             with xr.open_dataset(path, engine="h5netcdf", group=name, decode_times=False) as opened:
                 groups[name] = opened.load()
-    except (OSError, KeyError, ValueError, TypeError) as error:
+    except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
         raise DataError(
             f"{path} is damaged or no NetCDF file: {type(error).__name__} while reading it. Remove "
             "it and run the study again."
