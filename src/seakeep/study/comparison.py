@@ -97,10 +97,10 @@ def in_degrees(comparison: Comparison) -> Comparison:
     """
     return replace(
         comparison,
-        forecast=_degrees(comparison.forecast),
-        measured=_degrees(comparison.measured),
-        inputs=_degrees(comparison.inputs),
-        band=None if comparison.band is None else _degrees(comparison.band),
+        forecast=with_degrees(comparison.forecast),
+        measured=with_degrees(comparison.measured),
+        inputs=with_degrees(comparison.inputs),
+        band=None if comparison.band is None else with_degrees(comparison.band),
     )
 
 
@@ -163,7 +163,18 @@ def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
     return out
 
 
-def _degrees(run: xr.Dataset) -> xr.Dataset:
+def with_degrees(run: xr.Dataset) -> xr.Dataset:
+    """Turn the angles of a run or a forecast, and their rates, into degrees.
+
+    Parameters
+    ----------
+    run : Dataset
+        In SI units.
+
+    Returns
+    -------
+    Dataset
+    """
     out = run.copy()
     for name, variable in run.data_vars.items():
         units = str(variable.attrs.get("units", ""))
