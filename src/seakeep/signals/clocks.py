@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 from scipy import special
@@ -15,6 +17,61 @@ FloatArray = npt.NDArray[np.float64]
 
 STEP_TOLERANCE = 0.01
 """A time axis is uniform if no instant is further than this part of a step from its grid."""
+
+
+def as_seconds(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
+    """Return times as floats; refuse dates, words and what else is not a number of seconds.
+
+    Parameters
+    ----------
+    time : array_like
+        Instants, s.
+    name : str, optional
+        What the message calls the owner of the times.
+
+    Returns
+    -------
+    ndarray
+        The times, of the same shape.
+
+    Raises
+    ------
+    DataError
+        If they are not numbers.
+    """
+    t = np.asarray(time)
+    if t.dtype.kind not in "iuf":
+        raise DataError(
+            f"the times of {name} are of type {t.dtype}; seconds as numbers are expected. "
+            "Subtract the first instant and divide by one second."
+        )
+    return t.astype(float, copy=False)
+
+
+def instant_text(instant: float, dt: float) -> str:
+    """Write an instant to a thousandth of a time step, whatever it is counted from.
+
+    Parameters
+    ----------
+    instant : float
+        s.
+    dt : float
+        Time step, s.
+
+    Returns
+    -------
+    str
+        Without the unit, and without zeros at its end.
+
+    Examples
+    --------
+    >>> instant_text(1700000034.35, 0.05), instant_text(2.0, 0.05)
+    ('1700000034.35', '2')
+    """
+    wanted = 3 - math.floor(math.log10(dt)) if dt > 0 else 0
+    known = 15 - len(f"{abs(instant):.0f}")  # digits of a double
+    text = f"{instant:.{max(0, min(wanted, known))}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
@@ -35,9 +92,9 @@ def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
     Raises
     ------
     DataError
-        If a time is not finite, repeated, or smaller than the one before.
+        If a time is no number, not finite, repeated, or smaller than the one before.
     """
-    t = np.asarray(time, dtype=float)
+    t = as_seconds(time, name)
     if t.ndim != 1 or t.size < 2:
         raise DataError(f"{name} has {t.size} instant(s); a time axis needs at least two.")
     if not np.all(np.isfinite(t)):
@@ -81,15 +138,15 @@ def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
     Raises
     ------
     DataError
-        If the times are unsorted, repeated, or further from a uniform grid than a hundredth of a
-        step and than the decimals explain with which they were written.
+        If the times are no numbers, unsorted, repeated, or further from a uniform grid than a
+        hundredth of a step and than the decimals explain with which they were written.
 
     Examples
     --------
     >>> uniform_step([0.0, 0.1, 0.2, 0.3])
     0.1
     """
-    t = np.asarray(time, dtype=float)
+    t = as_seconds(time, name)
     if t.ndim != 1 or t.size < 2:
         check_order(t, name)
     step = float((t[-1] - t[0]) / (t.size - 1))
@@ -189,7 +246,7 @@ def resample(
     True
     """
     array = as_series(series)
-    t, wanted = np.asarray(time, dtype=float), np.asarray(new_time, dtype=float)
+    t, wanted = as_seconds(time, "the series"), as_seconds(new_time, "the new time axis")
     dt, new_dt = uniform_step(t, "the series"), uniform_step(wanted, "the new time axis")
     if array.shape[0] != t.size:
         raise DataError(
