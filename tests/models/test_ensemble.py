@@ -12,6 +12,7 @@ from seakeep import (
     DataError,
     Fixed,
     HankelDMDc,
+    ProbeAlignment,
     RequestError,
     SeakeepWarning,
     Uniform,
@@ -131,8 +132,7 @@ def test_a_member_does_not_depend_on_the_number_of_members(run, sampling):
     few = fitted(run, sampling=sampling).draws
     many = fitted(run, sampling=sampling, n_members=8).draws
     kept = many.isel(member=slice(6))
-    if sampling == "monte_carlo":
-        xr.testing.assert_equal(few, kept)
+    xr.testing.assert_equal(few, kept)
     assert not np.allclose(few.ridge, fitted(run, sampling=sampling, seed=4).draws.ridge)
 
 
@@ -158,6 +158,38 @@ def test_priors_that_never_fit_are_refused(run):
     )
     with pytest.raises(DataError, match=text):
         fitted(run, train_length=Fixed(50))
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of scipy, about its parameters
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"ridge": Uniform(-2, -1)}, r"gave ridge = -1\.\d+, which is negative\. Move the prior"),
+        ({"state_delay": Fixed(-1)}, r"gave state_delays = -16, which is negative"),
+        ({"ridge": stats.uniform(np.nan, 1)}, r"gave ridge = nan\. Check the parameters of that"),
+        ({"input_delay": stats.uniform(0, np.inf)}, r"gave input_delay = inf\. Check the"),
+        ({"train_length": Fixed(0.05)}, r"a window of 1 samples, and 2 are needed\. Raise train"),
+        (
+            {"train_length": Fixed(1), "input_delay": Fixed(2), "history": "inside"},
+            r"window of 16 samples with delays of \d and 32 inside it, and 34 are needed",
+        ),
+    ],
+)
+def test_priors_that_give_nothing_to_train_with_are_refused(run, changes, text):
+    with pytest.raises(DataError, match=rf"no feasible draw in 1000: the last one .*{text}"):
+        fitted(run, **changes)
+
+
+def test_an_infinite_quantile_is_drawn_again(run):
+    class Rare:
+        def ppf(self, q):
+            return np.inf if q > 0.5 else q
+
+        dist = stats.uniform  # the name that a file gives it
+
+    draws = fitted(run, state_delay=Rare(), n_members=20).draws
+    assert draws.attrs["redrawn"] > 0
+    assert np.all(draws.state_delay <= 0.5)
 
 
 def test_the_same_seed_gives_the_same_arrays_for_any_workers(run):
@@ -284,6 +316,22 @@ def test_a_file_gives_back_the_ensemble_to_the_last_bit(run, tmp_path):
     xr.testing.assert_identical(
         back.forecast(run, start=65.0, steps=20), ensemble.forecast(run, start=65.0, steps=20)
     )
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"ridge": Fixed(0.0), "rank": np.int64(5)},
+        {"standardize": np.bool_(True)},
+        {"alignment": ProbeAlignment(surge="none", celerity=np.float32(2.5))},
+        {"alignment": ProbeAlignment(surge="none", celerity=np.int64(2))},
+    ],
+)
+def test_numbers_of_numpy_are_kept_in_a_file(run, tmp_path, changes):
+    ensemble = fitted(run, **changes)
+    back = seakeep.load_model(ensemble.save(tmp_path / "ensemble.nc"))
+    assert back.settings == ensemble.settings
+    assert back.alignment == ensemble.alignment
 
 
 def test_a_damaged_file_is_refused(run, tmp_path):
