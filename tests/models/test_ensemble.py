@@ -356,6 +356,14 @@ def test_diverged_members_are_counted_and_left_out(run):
     assert summary.attrs["members"] == 6
 
 
+def test_members_of_whole_numbers_are_summarised():
+    counts = xr.Dataset({"slams": (("member", "time"), [[1, 2, 7], [2, 4, 9]])})
+    summary = seakeep.summarize(counts, level=0.5)
+    expected = seakeep.summarize(counts.astype(float), level=0.5)
+    xr.testing.assert_identical(summary, expected)
+    assert summary.slams.sel(statistic="mean").values.tolist() == [1.5, 3.0, 8.0]
+
+
 def test_members_that_diverge_say_when():
     # Explosive data make explosive members.
     rng = np.random.default_rng(0)

@@ -70,7 +70,12 @@ def instant_text(instant: float, dt: float) -> str:
     """
     wanted = 3 - math.floor(math.log10(dt)) if dt > 0 else 0
     known = 15 - len(f"{abs(instant):.0f}")  # digits of a double
-    text = f"{instant:.{max(0, min(wanted, known))}f}"
+    return fixed(instant, max(0, min(wanted, known)))
+
+
+def fixed(value: float, decimals: int) -> str:
+    """Write a number to so many decimals, without zeros at its end."""
+    text = f"{value:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
