@@ -265,6 +265,9 @@ def test_messages_tell_samples_apart_whatever_the_times_count_from(run, channels
         model.forecast(late, start=1700000000.13, steps=5)
     with pytest.raises(RequestError, match=r"from 1700000010 s .* ends at 1700000019\.95 s"):
         model.forecast(late, start=1700000010.0, steps=201)
+    gap = late.isel(time=[*range(50), *range(57, 400)])
+    with pytest.raises(DataError, match=r"1 gap\(s\): after t = 1700000002\.45 s, 7 sample"):
+        model.forecast(gap, start=1700000010.0, steps=5)
     with pytest.raises(RequestError, match=r"runs from 1700000000 to 1700000019\.95 s"):
         model.forecast(late, start=30.0, steps=5)
     assert "run: 391 pairs, 1700000000 to 1700000019.95 s" in model.summary()
