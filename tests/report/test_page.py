@@ -254,10 +254,10 @@ def test_packing_loses_a_step_of_the_range_at_most():
 
 
 def test_the_interactive_lines_have_the_dashes_of_the_figures():
-    import matplotlib as mpl
-
-    assert dashes(LINES["ensemble"]["linestyle"]) == mpl.rcParamsDefault["lines.dashdot_pattern"]
-    assert dashes(LINES["forecast"]["linestyle"]) == list(LINES["forecast"]["linestyle"][1])
+    for key in ("ensemble", "forecast"):
+        assert dashes(LINES[key]["linestyle"]) == list(LINES[key]["linestyle"][1])
+    assert LINES["measured"]["linestyle"] == "-"
+    assert dashes("-") == []
 
 
 def test_boxes_and_whiskers_are_matplotlibs():
