@@ -13,11 +13,11 @@ from tutorial_study import put_tutorial
 
 from seakeep.errors import RequestError
 from seakeep.report.deviations import test_overlap as overlap_of_tests
-from seakeep.report.glossary import few_cells, plain_symbol
-from seakeep.report.interactive import dashes, pack
+from seakeep.report.glossary import few_cells, glossary, plain_symbol
+from seakeep.report.interactive import dashes, history_data, pack
 from seakeep.report.latex import latex_text
 from seakeep.report.published import PUBLISHED
-from seakeep.report.study_tables import coverage_table, number
+from seakeep.report.study_tables import coverage_table, error_table, number
 from seakeep.report.study_words import findings
 from seakeep.report.style import LINES
 from seakeep.study import read_result, read_study, run_study
@@ -141,6 +141,52 @@ def test_a_history_shows_the_calibrated_band_around_that_of_the_members(page):
     without = {n: g for n, g in found.groups.items() if not n.startswith("calibration/")}
     plain = history_figure(replace(found, groups=without), test, training, window)
     assert "calibrated" not in [text.get_text() for text in plain.legends[0].get_texts()]
+
+
+def test_histories_state_their_unit_and_hide_no_line_behind_another(page):
+    found = read_result(page.parent)
+    figure = history_figure(found, *shown_cells(found)[0])
+    assert figure.get_supylabel() == "deviation from the training mean, in training SD"
+    axes = figure.axes[0]
+    lines = {line.get_label(): line for line in axes.lines}
+    measured, mean = lines["measured"], lines["Bayesian mean"]
+    (band,) = axes.collections
+    assert band.get_zorder() < measured.get_zorder() <= lines["deterministic"].get_zorder()
+    assert measured.get_linewidth() < mean.get_linewidth()
+    figure.draw_without_rendering()
+    (words,) = (text.get_window_extent() for text in figure.texts)
+    assert all(words.x1 <= each.get_tightbbox().x0 + 1 for each in figure.axes)
+
+
+def test_tables_say_what_the_campaign_calls_a_channel(page):
+    found = read_result(page.parent)
+    channels = found.groups["channels"]
+    words = [
+        "Trim angle (MRU-5)" if name == "pitch" else "free" if name == "heave" else str(old)
+        for name, old in zip(channels["name"].values, channels["long_name"].values, strict=True)
+    ]
+    told = channels.assign(long_name=("name", words))
+    other = replace(found, groups={**found.groups, "channels": told})
+    assert ("Trim angle (MRU-5)",) in [row[:1] for row in error_table(other, "unseen").rows]
+    assert "θ Trim angle (MRU-5); " in dict(glossary(other))["in figures"]
+    assert '"label":"Trim angle (MRU-5)"' in history_data(other)
+    # A free name has no symbol: it is said once.
+    lone = replace(found, groups={**found.groups, "channels": _renamed(channels)})
+    assert "kraft bug; " in dict(glossary(lone))["in figures"]
+    assert "kraft bug kraft bug" not in dict(glossary(lone))["in figures"]
+
+
+def _renamed(channels):
+    """A channel of a free name in place of heave."""
+    names = [name if name != "heave" else "kraft_bug" for name in channels["name"].values]
+    states = [name if name != "heave" else "kraft_bug" for name in channels["channel"].values]
+    words = [
+        "kraft bug" if name == "kraft_bug" else str(old)
+        for name, old in zip(names, channels["long_name"].values, strict=True)
+    ]
+    return channels.assign_coords(name=names).assign(
+        channel=("channel", states), long_name=("name", words)
+    )
 
 
 def test_the_legend_of_the_eigenvalues_stands_over_none_of_them(page):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.conventions import canonical_channel, conversion
+from seakeep.conventions import conversion
 from seakeep.report.figures.common import line_of, model_colour, model_words
 from seakeep.report.figures.histories import shown_cells
 from seakeep.report.style import shown_unit
@@ -108,7 +108,6 @@ def _channel(
     if units.split("/")[0] == "rad":
         target = units.replace("rad", "deg")
         factor = conversion(units, target)
-    known = canonical_channel(name)
     models = []
     for model in result.models:
         ensemble = result.is_ensemble(model)
@@ -128,7 +127,7 @@ def _channel(
         models.append(entry)
     return {
         "name": name,
-        "label": known.long_name if known else name.replace("_", " "),
+        "label": result.words_of(name),
         "unit": shown_unit(target),
         "measured": pack(factor * cell["measured"].values[:, column]),
         "models": models,

@@ -14,6 +14,7 @@ from seakeep.errors import DataError
 from seakeep.report.style import (
     COLOURS,
     LINES,
+    THIN,
     axis_label,
     figure_style,
     new_figure,
@@ -52,8 +53,6 @@ SHADES: tuple[tuple[str, Any], ...] = (
 ACROSS = 84
 """Letters of a legend that stand beside each other over a panel."""
 BAND: dict[str, Any] = {"color": COLOURS["ensemble"], "alpha": 0.35, "linewidth": 0.6}
-THIN = {**LINES["measured"], "linewidth": 0.8}
-"""Measured, between a band and its mean: a band is often little wider than a line."""
 
 
 def overlay_figure(comparison: Comparison) -> Figure:

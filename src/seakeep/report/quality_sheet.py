@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.checks import Finding, check_pairs, findings_of
-from seakeep.campaign.settings import CampaignSettings
+from seakeep.campaign.settings import CampaignSettings, long_name_of
 from seakeep.files import replacing
 from seakeep.report.style import COLOURS, axis_label, figure_style, new_figure
 from seakeep.signals.quality import FLAGS, LATE, Agreement
@@ -90,6 +90,7 @@ def channel_rows(run: xr.Dataset) -> list[dict[str, Any]]:
         rows.append(
             {
                 "channel": name,
+                "words": long_name_of(name, run[name].attrs.get("long_name")),
                 "units": units,
                 "numbers": [float(each) for each in numbers] or [float("nan")] * 4,
                 "flagged": ", ".join(shares),
@@ -129,7 +130,7 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
             colour = COLOURS["forecast"] if name in found else COLOURS["measured"]
             at.plot(time, x, color=colour, linewidth=0.6)
             _mark(at, time, x, flags)
-            at.set_ylabel(axis_label(name, units), fontsize=8)
+            at.set_ylabel(axis_label(name, units, run[name].attrs.get("long_name")), fontsize=8)
             at.margins(x=0.005)
         for at, name in zip(axes[len(names) :], lagging, strict=True):
             each = agreements[name]

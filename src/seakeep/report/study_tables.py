@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.conventions import canonical_channel
 from seakeep.files import replacing
 from seakeep.report.figures.common import HEADING, model_words
 from seakeep.report.figures.errors import BAND_WORDS
@@ -76,12 +75,6 @@ def number(value: float, digits: int = 3) -> str:
     return text.removeprefix("-") if float(text) == 0 else text
 
 
-def channel_words(name: str) -> str:
-    """Name of a channel for a table."""
-    known = canonical_channel(name)
-    return known.long_name if known else name.replace("_", " ")
-
-
 def error_table(result: StudyResult, test: str) -> ReportTable:
     """Medians and inter-quartile ranges of both measures, average and per channel.
 
@@ -104,7 +97,7 @@ def error_table(result: StudyResult, test: str) -> ReportTable:
     rows, left_out = [], 0
     names = [str(name) for name in boxes["channel"].values]
     for name in [*names[1:], names[0]]:
-        row = ["average" if name == "average" else channel_words(name)]
+        row = ["average" if name == "average" else result.words_of(name)]
         for measure in HEADING:
             for model in result.models:
                 at = boxes.sel(model=model, measure=measure, channel=name)
@@ -199,7 +192,7 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> ReportTab
     rows = []
     for name in result.channels:
         one = at.sel(channel=name)
-        row = [channel_words(name), *(number(float(one[key]), 4) for key in numbers)]
+        row = [result.words_of(name), *(number(float(one[key]), 4) for key in numbers)]
         row.append(str(int(one["block_length"])) if np.isfinite(one["block_length"]) else MISSING)
         rows.append((*row, PUBLISHED.get(name, MISSING)) if comparable else tuple(row))
     means = [number(float(at[key].mean()), 4) for key in numbers]
@@ -250,7 +243,7 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
     names = [*result.channels, "average"]
     rows = []
     for name in names:
-        row = ["average" if name == "average" else channel_words(name)]
+        row = ["average" if name == "average" else result.words_of(name)]
         for data in tables.values():
             at = data.sel(channel=name)
             first, *others = (number(float(v), 2) for v in at[f"{prefix}inside"].values)

@@ -11,7 +11,7 @@ import numpy as np
 from seakeep.campaign.checks import findings_of
 from seakeep.report.figures.common import HEADING, model_words
 from seakeep.report.quality_sheet import channel_rows
-from seakeep.report.study_tables import ReportTable, channel_words
+from seakeep.report.study_tables import ReportTable
 from seakeep.report.style import shown_unit
 from seakeep.study import StudyResult
 
@@ -190,7 +190,7 @@ def sign_table(result: StudyResult) -> ReportTable:
     channels = result.groups["channels"]
     rows = [
         (
-            channel_words(str(name)),
+            result.words_of(str(name)),
             str(at["use"].values),
             shown_unit(str(at["units"].values)),
             str(at["positive"].values),
@@ -295,7 +295,7 @@ def quality_table(result: StudyResult, name: str) -> ReportTable:
         low, high, mean, spread = (f"{value:.4g}" for value in each["numbers"])
         rows.append(
             (
-                channel_words(channel),
+                each["words"],
                 "yes" if channel in used else "",
                 shown_unit(each["units"]),
                 mean,

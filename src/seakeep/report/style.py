@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "COLOURS",
     "LINES",
+    "THIN",
     "axis_label",
     "figure_style",
     "new_figure",
@@ -50,6 +51,9 @@ LINES: dict[str, dict[str, Any]] = {
     "input": {"color": COLOURS["input"], "linewidth": 0.9, "linestyle": "-"},
 }
 """Lines differ in dash and width as well as in colour."""
+
+THIN: dict[str, Any] = {**LINES["measured"], "linewidth": 0.8}
+"""Measured, between a band and its mean: a band is often little wider than a line."""
 
 WIDEST = 18
 """Letters of a label on one line: what the height of a panel holds."""

@@ -302,6 +302,10 @@ class StudyResult:
         """Words for a test set."""
         return str(self.settings["tests"][test]["label"] or test.replace("_", " "))
 
+    def words_of(self, channel: str) -> str:
+        """Words for a channel of the study: what the campaign calls it."""
+        return str(self.groups["channels"]["long_name"].sel(name=channel).values)
+
 
 def write_result(
     folder: Path, attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]
