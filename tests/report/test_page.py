@@ -12,12 +12,21 @@ import pytest
 from tutorial_study import put_tutorial
 
 from seakeep.errors import RequestError
+from seakeep.report.deviations import deviations, training_windows_overlap
 from seakeep.report.deviations import test_overlap as overlap_of_tests
 from seakeep.report.glossary import few_cells, glossary, plain_symbol
 from seakeep.report.interactive import dashes, history_data, pack
 from seakeep.report.latex import latex_text
 from seakeep.report.published import PUBLISHED
-from seakeep.report.study_tables import coverage_table, error_table, number
+from seakeep.report.study_tables import (
+    coverage_table,
+    divergence_table,
+    error_table,
+    number,
+    probability,
+    small_number,
+    trend_table,
+)
 from seakeep.report.study_words import findings
 from seakeep.report.style import LINES
 from seakeep.study import read_result, read_study, run_study
@@ -25,6 +34,7 @@ from seakeep.study import read_result, read_study, run_study
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
 from seakeep.report.figures.boxes import FEWEST, draw_box_violin
+from seakeep.report.figures.common import grid_of_axes
 from seakeep.report.figures.eigenvalues import eigenvalue_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import write_report
@@ -284,6 +294,55 @@ def test_numbers_have_a_minus_and_zero_has_none():
     assert number(-0.0004) == "0.000"
     assert number(-0.4) == "-0.400"
     assert latex_text("-0.12 [-0.3, 0.1] a-1") == r"$-$0.12 [$-$0.3, 0.1] a-1"
+
+
+def test_small_numbers_keep_two_digits_and_probabilities_are_no_zero(page):
+    result = read_result(page.parent)
+    for table in (divergence_table(result, "bayesian", "recommended"), trend_table(result)):
+        cells = [cell for row in table.rows for k, cell in enumerate(row) if k in table.numeric]
+        assert not [cell for cell in cells if re.search(r"\b0\.0000\b", cell)]
+    assert (probability(0.0004), probability(0.0386)) == ("< 0.001", "0.039")
+    assert small_number(0.0) == "0"
+
+
+def test_training_windows_that_do_not_overlap_are_no_warning(page):
+    result = read_result(page.parent)
+    text = page.read_text("utf-8")
+    notices = re.findall(r'<p class="notice">(.*?)</p>', text, flags=re.S)
+    assert training_windows_overlap(result) == any("A training window" in n for n in notices)
+    stops = result.groups["training"]["stop"]
+    for apart, overlaps in ((2.0, False), (0.5, True)):
+        length = float(result.attrs["longest_training"])
+        moved = stops.copy(data=length * (1 + apart * np.arange(stops.size)))
+        runs = result.groups["training"]["run"]
+        same = result.groups["training"].assign(stop=moved, run=runs.copy(data=["a"] * runs.size))
+        other = replace(result, groups={**result.groups, "training": same})
+        assert training_windows_overlap(other) == overlaps
+        windows = {row[0]: row[2] for row in deviations(other).rows}["training windows"]
+        assert windows.startswith("2 windows, placed at random; ")
+        assert ("they do not overlap" in windows) != overlaps
+
+
+def test_the_date_stands_in_one_piece_and_titles_have_the_width_of_the_page(page):
+    text = page.read_text("utf-8")
+    (when,) = re.findall(r'finished\s<span class="whole">(.*?)</span>', text)
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC", when)
+    assert ".whole { white-space: nowrap; }" in text
+    assert "<caption>" not in text  # as narrow as its table
+    for name in re.findall(r'<div class="table" id="table-([^"]+)"', text):
+        assert f'aria-labelledby="caption-{name}"' in text
+
+
+@pytest.mark.parametrize(
+    ("channels", "rows"), [(3, [3]), (5, [3, 2]), (6, [3, 3]), (11, [4, 4, 3])]
+)
+def test_panels_fill_their_rows(channels, rows):
+    from matplotlib.figure import Figure
+
+    axes = grid_of_axes(Figure(), channels, 4)
+    places = [each.get_subplotspec().rowspan.start for each in axes]
+    assert [places.count(row) for row in range(len(rows))] == rows
+    assert axes[0].get_subplotspec().get_gridspec().ncols == rows[0]
 
 
 def test_letters_that_latex_reads_otherwise():

@@ -14,7 +14,14 @@ from seakeep.report.study_tables import ReportTable
 from seakeep.study import StudyResult
 from seakeep.study.windows import windows_overlap
 
-__all__ = ["alignment_words", "deviations", "prior_words", "test_overlap", "training_overlap"]
+__all__ = [
+    "alignment_words",
+    "deviations",
+    "prior_words",
+    "test_overlap",
+    "training_overlap",
+    "training_windows_overlap",
+]
 
 APART = 0.005
 """Windows that share less than this part of their length are apart."""
@@ -52,6 +59,12 @@ def training_overlap(result: StudyResult) -> str:
         "another. They are not independent, and the boxes show the spread over test windows more "
         "than that over training data."
     )
+
+
+def training_windows_overlap(result: StudyResult) -> bool:
+    """Whether training windows share a part of their length that counts."""
+    found = _overlap(result)
+    return found is not None and found[0] > 1 and found[3] >= APART
 
 
 def test_overlap(result: StudyResult) -> str:
@@ -204,13 +217,16 @@ def _study_rows(result: StudyResult) -> Rows:
     overlap: Rows = []
     if found is not None:
         count, length, span, share = found
-        shared = f"they share {100 * share:.0f} % of their length" if share >= APART else "apart"
-        if count == 1:
-            shared = "one"
+        shared = ""
+        if count > 1:
+            shared = "; they do not overlap"
+        if training_windows_overlap(result):
+            shared = f"; they share {100 * share:.0f} % of their length"
+        windows = "1 window" if count == 1 else f"{count} windows"
         overlap = [
             ("training windows", "ten, drawn at random, which cannot but overlap",
-             f"{count}, placed {_placed(training['placement'])}; the largest draw reads "
-             f"{length:.1f} T̂ of a span of {span:.0f} T̂; {shared}"),
+             f"{windows}, placed {_placed(training['placement'])}; the largest draw reads "
+             f"{length:.1f} T̂ of a span of {span:.0f} T̂{shared}"),
         ]  # fmt: skip
     placements = {each["placement"] for each in result.settings["tests"].values()}
     return [

@@ -13,7 +13,12 @@ from typing import TYPE_CHECKING
 
 from seakeep.campaign.prepare import Progress
 from seakeep.files import replacing
-from seakeep.report.deviations import deviations, test_overlap, training_overlap
+from seakeep.report.deviations import (
+    deviations,
+    test_overlap,
+    training_overlap,
+    training_windows_overlap,
+)
 from seakeep.report.figures import ReportFigure, report_figures
 from seakeep.report.glossary import few_cells, glossary
 from seakeep.report.interactive import history_data
@@ -31,6 +36,7 @@ from seakeep.report.study_tables import (
 from seakeep.report.study_words import (
     clock_table,
     findings,
+    finished,
     quality_table,
     run_table,
     settings_table,
@@ -270,7 +276,7 @@ def _page(
 <p class="lead">{lead}</p>
 <p class="lead">Preset <strong>{html.escape(str(result.attrs["preset"]))}</strong>, seed
 {int(result.attrs["seed"])}, digest <code>{digest}</code>, finished
-{html.escape(str(result.attrs["created"]))}.</p>
+<span class="whole">{html.escape(finished(result))}</span>.</p>
 {sections}
 </main>
 </div>
@@ -313,7 +319,7 @@ def _summary(result: StudyResult) -> str:
     notices = [
         str(result.attrs.get("preparation_note", "")),
         few_cells(result),
-        training_overlap(result),
+        training_overlap(result) if training_windows_overlap(result) else "",
         test_overlap(result),
     ]
     conditional = str(result.attrs.get("conditional_on", ""))
@@ -403,7 +409,8 @@ def _table(table: ReportTable) -> str:
     note = f'<p class="note">{html.escape(table.note)}</p>' if table.note else ""
     text = (
         f'<div class="table" id="table-{table.name}"><button class="copy">Copy table</button>'
-        f'<div class="scroll"><table><caption>{html.escape(table.title)}</caption>'
+        f'<p class="caption" id="caption-{table.name}">{html.escape(table.title)}</p>'
+        f'<div class="scroll"><table aria-labelledby="caption-{table.name}">'
         f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>{note}"
         f"<p class='note only-screen'>Files: tables/{table.name}.csv, .tex.</p></div>"
     )

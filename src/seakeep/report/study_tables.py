@@ -75,6 +75,25 @@ def number(value: float, digits: int = 3) -> str:
     return text.removeprefix("-") if float(text) == 0 else text
 
 
+def small_number(value: float) -> str:
+    """Text of a number of four decimals, or as many more as two digits of it need.
+
+    Examples
+    --------
+    >>> small_number(0.0186), small_number(0.00023), small_number(-1.4e-5), small_number(3e-9)
+    ('0.0186', '0.00023', '-0.000014', '3.0e-09')
+    """
+    if not np.isfinite(value) or value == 0:
+        return number(value, 0)
+    decimals = max(4, 1 - int(np.floor(np.log10(abs(value)))))
+    return f"{value:.{decimals}f}" if decimals <= 7 else f"{value:.1e}"
+
+
+def probability(value: float) -> str:
+    """Text of a p-value."""
+    return "< 0.001" if value < 0.001 else number(value)
+
+
 def error_table(result: StudyResult, test: str) -> ReportTable:
     """Medians and inter-quartile ranges of both measures, average and per channel.
 
@@ -192,10 +211,10 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> ReportTab
     rows = []
     for name in result.channels:
         one = at.sel(channel=name)
-        row = [result.words_of(name), *(number(float(one[key]), 4) for key in numbers)]
+        row = [result.words_of(name), *(small_number(float(one[key])) for key in numbers)]
         row.append(str(int(one["block_length"])) if np.isfinite(one["block_length"]) else MISSING)
         rows.append((*row, PUBLISHED.get(name, MISSING)) if comparable else tuple(row))
-    means = [number(float(at[key].mean()), 4) for key in numbers]
+    means = [small_number(float(at[key].mean())) for key in numbers]
     rows.append(("average", *means, "", *((JSD_MEAN,) if comparable else ())))
     columns = ("channel", "EV", "q0.025", "q0.975", "U", "noise floor", "block (samples)")
     test = result.label_of(str(data.attrs["test"]))
@@ -333,7 +352,7 @@ def trend_table(result: StudyResult) -> ReportTable:
         for band, words in BAND_WORDS.items():
             for model in result.models:
                 at = data.sel(model=model, band=band)
-                interval = ", ".join(number(float(at[key]), 4) for key in ("lower", "upper"))
+                interval = ", ".join(small_number(float(at[key])) for key in ("lower", "upper"))
                 rows.append(
                     (
                         result.label_of(test),
@@ -341,9 +360,9 @@ def trend_table(result: StudyResult) -> ReportTable:
                         model_words(model),
                         number(float(at["error_mean"].mean())),
                         number(float(at["change"])),
-                        f"{number(float(at['slope']), 4)} [{interval}]",
+                        f"{small_number(float(at['slope']))} [{interval}]",
                         number(float(at["kendall_tau"]), 2),
-                        number(float(at["p_value"])),
+                        probability(float(at["p_value"])),
                     )
                 )
     period = float(result.settings["statistics"]["split_period"])

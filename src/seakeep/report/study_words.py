@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from seakeep.study import StudyResult
 
 __all__ = [
     "findings",
+    "finished",
     "quality_table",
     "run_table",
     "settings_table",
@@ -352,6 +354,11 @@ def training_table(result: StudyResult) -> ReportTable:
     )
 
 
+def finished(result: StudyResult) -> str:
+    """Day and time at which the study was finished, as people read them."""
+    return f"{datetime.fromisoformat(str(result.attrs['created'])):%Y-%m-%d %H:%M:%S %Z}"
+
+
 def versions_table(result: StudyResult) -> ReportTable:
     """Digest, seed, versions."""
     versions = json.loads(result.attrs["versions"])
@@ -362,7 +369,7 @@ def versions_table(result: StudyResult) -> ReportTable:
         ("campaign digest", str(result.attrs["campaign_digest"])),
         ("preset", str(result.attrs["preset"])),
         ("seed", str(result.attrs["seed"])),
-        ("finished", str(result.attrs["created"])),
+        ("finished", finished(result)),
         *((name, str(version)) for name, version in versions.items()),
     ]
     return ReportTable("versions", "Versions and digest", ("what", "value"), tuple(rows))
