@@ -37,7 +37,7 @@ from seakeep.report.figures.boxes import FEWEST, draw_box_violin
 from seakeep.report.figures.common import grid_of_axes
 from seakeep.report.figures.eigenvalues import eigenvalue_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
-from seakeep.report.page import write_report
+from seakeep.report.page import headings, write_report
 
 STUDY = """
 [study]
@@ -87,11 +87,10 @@ def test_no_id_stands_twice(page):
 
 def test_what_it_holds(page):
     text = page.read_text("utf-8")
-    for section in ("summary", "deviations", "errors", "explore", "densities", "versions"):
-        assert f'<section id="{section}">' in text
+    wanted = ["summary", "errors", "explore", "densities", "settings", "deviations", "versions"]
+    found = re.findall(r'<section id="(.*?)">', text)
+    assert [each for each in found if each in wanted] == wanted
     assert "a &amp; b &lt; c" in text
-    assert "paper: EV, another data set" in text
-    assert PUBLISHED["heave"] in text
     assert "noise floor" in text
     assert "@media print" in text
     digest = read_result(page.parent).attrs["digest"]
@@ -106,7 +105,7 @@ def test_figures_and_tables_are_files_too(page):
     tables = page.parent / "tables"
     with (tables / "jsd_bayesian_paper.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
-    assert rows[0][-1] == "paper: EV, another data set"
+    assert rows[0][-1] == "block (samples)"
     assert all(len(row) == len(rows[0]) for row in rows)
     with (tables / "trend.csv").open(encoding="utf-8", newline="") as file:
         bands = [row[1] for row in csv.reader(file)][1:]
@@ -221,14 +220,29 @@ def test_the_data_quality_is_in_the_page_for_every_run_and_channel(page):
 
 
 def test_the_deviations_name_what_is_in_effect(page):
-    with (page.parent / "tables" / "deviations.csv").open(encoding="utf-8", newline="") as file:
-        rows = {row[0]: row[2] for row in csv.reader(file)}
+    with (page.parent / "tables" / "method.csv").open(encoding="utf-8", newline="") as file:
+        rows = {row[0]: row[1] for row in csv.reader(file)}
     assert rows["preset"].startswith("'recommended'")
     assert rows["alignment of the waves to the vessel"].startswith("none: ")
     assert rows["measured outputs read after the start"] == "none: forecasts in the strict sense"
     assert rows["rows of Â that shift the delays"] == "exact shifts"
     assert not any("None" in value or "celerity=" in value for value in rows.values())
     assert " T̂ of " in rows["training windows"]
+
+
+def test_the_paper_stands_beside_a_study_that_asks_for_it(page):
+    plain = read_result(page.parent)
+    assert list(headings(plain))[-2:] == ["deviations", "versions"]
+    assert deviations(plain).columns == ("subject", "in effect")
+    settings = plain.settings
+    settings["output"]["paper"] = True
+    asked = replace(plain, attrs={**plain.attrs, "settings": json.dumps(settings)})
+    assert list(headings(asked))[:2] == ["summary", "deviations"]
+    assert set(headings(asked)) == set(headings(plain))
+    assert deviations(asked).columns == ("subject", "the paper", "in effect here")
+    table = divergence_table(asked, "bayesian", "paper")
+    assert table.columns[-1] == "paper: EV, another data set"
+    assert [row[-1] for row in table.rows if row[0] == "heave"] == [PUBLISHED["heave"]]
 
 
 def test_words_and_symbols_are_said_once(page):
@@ -318,7 +332,7 @@ def test_training_windows_that_do_not_overlap_are_no_warning(page):
         same = result.groups["training"].assign(stop=moved, run=runs.copy(data=["a"] * runs.size))
         other = replace(result, groups={**result.groups, "training": same})
         assert training_windows_overlap(other) == overlaps
-        windows = {row[0]: row[2] for row in deviations(other).rows}["training windows"]
+        windows = {row[0]: row[-1] for row in deviations(other).rows}["training windows"]
         assert windows.startswith("2 windows, placed at random; ")
         assert ("they do not overlap" in windows) != overlaps
 

@@ -125,6 +125,7 @@ def deviations(result: StudyResult) -> ReportTable:
     Returns
     -------
     ReportTable
+        The paper has a column where the study asks for it.
     """
     preset = str(result.attrs["preset"])
     rows = [
@@ -133,12 +134,18 @@ def deviations(result: StudyResult) -> ReportTable:
         *_model_rows(result),
         *_study_rows(result),
     ]
+    note = str(result.attrs.get("preparation_note", ""))
+    if not result.shows_paper:
+        chosen = tuple((subject, here) for subject, _, here in rows)
+        return ReportTable(
+            "method", f"Method in effect (preset {preset})", ("subject", "in effect"), chosen, note
+        )
     return ReportTable(
         "deviations",
         f"What the paper leaves open, and what is in effect here (preset {preset})",
         ("subject", "the paper", "in effect here"),
         tuple(rows),
-        str(result.attrs.get("preparation_note", "")),
+        note,
     )
 
 
@@ -172,7 +179,7 @@ def _data_rows(result: StudyResult) -> Rows:
          " and ".join(filtered) or "none"),
         *([("places of the probes", "48.24 m and 48.42 m for the same pole", ", ".join(places))]
           if places else []),
-        ("wave spectra", "Welch segments of 8.2 s", "both: those, and segments of 60 s"),
+        ("wave spectra", "Welch segments of 8.2 s", "Welch segments of 8.2 s and of 60 s"),
     ]  # fmt: skip
 
 
@@ -192,8 +199,8 @@ def _model_rows(result: StudyResult) -> Rows:
         ("measured outputs read after the start", "surge, through the alignment",
          f"{conditional}: every error, band and density here is conditional on measured "
          f"{conditional}" if conditional else "none: forecasts in the strict sense"),
-        ("standardisation", "z-score on the training window", {
-            "True": "the same", "False": "none"}.get(each("standardize"), each("standardize"))),
+        ("standardisation", "z-score on the training window",
+         each("standardize", _standardisation)),
         ("history of the training window", "its sizes hold only before it",
          each("history", _history)),
         ("rows of Â that shift the delays", "ridge on all rows", each("delay_rows", _delay_rows)),
@@ -202,7 +209,8 @@ def _model_rows(result: StudyResult) -> Rows:
         ("delays to samples", "nearest integer in the text, floor in the box", "nearest"),
         ("end of a training window", "where it lies is unstated", "its stop, for all draws"),
         ("band", "'95 % confidence interval'", "quantiles of the members, point by point"),
-        ("'Bayesian'", "the prior pushed forward", "the same: there is no likelihood"),
+        ("'Bayesian'", "the prior pushed forward",
+         "the prior pushed forward: there is no likelihood"),
     ]  # fmt: skip
 
 
@@ -248,6 +256,10 @@ def _study_rows(result: StudyResult) -> Rows:
 
 def _placed(placement: str) -> str:
     return {"random": "at random", "apart": "without overlap"}[placement]
+
+
+def _standardisation(word: str) -> str:
+    return {"True": "z-score on the training window", "False": "none"}.get(word, word)
 
 
 def _history(word: str) -> str:

@@ -78,6 +78,27 @@ SECTIONS = {
 }
 
 
+def headings(result: StudyResult) -> dict[str, str]:
+    """Headings of the sections, in their order.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    dict of str to str
+        Where the paper is not asked for, what it leaves open is a matter of settings.
+    """
+    if result.shows_paper:
+        return SECTIONS
+    others = {
+        key: words for key, words in SECTIONS.items() if key not in ("deviations", "versions")
+    }
+    return {**others, "deviations": "Method in effect", "versions": SECTIONS["versions"]}
+
+
 def report_tables(result: StudyResult) -> dict[str, list[ReportTable]]:
     """All tables of a study, by section.
 
@@ -244,13 +265,12 @@ def _page(
     tables: dict[str, list[ReportTable]],
     drawn: dict[str, list[tuple[ReportFigure, str]]],
 ) -> str:
-    bodies = {key: _section(result, key, tables, drawn) for key in SECTIONS}
+    titles = headings(result)
+    bodies = {key: _section(result, key, tables, drawn) for key in titles}
     shown = {key: body for key, body in bodies.items() if body}
-    contents = "".join(
-        f'<li><a href="#{key}">{html.escape(SECTIONS[key])}</a></li>' for key in shown
-    )
+    contents = "".join(f'<li><a href="#{key}">{html.escape(titles[key])}</a></li>' for key in shown)
     sections = "\n".join(
-        f'<section id="{key}"><h2>{html.escape(SECTIONS[key])}</h2>\n{body}</section>'
+        f'<section id="{key}"><h2>{html.escape(titles[key])}</h2>\n{body}</section>'
         for key, body in shown.items()
     )
     title = html.escape(f"{result.attrs['study']}: study report")

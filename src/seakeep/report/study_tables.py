@@ -189,7 +189,7 @@ def conditional(result: StudyResult) -> str:
 
 
 def divergence_table(result: StudyResult, model: str, variant: str) -> ReportTable:
-    """Jensen–Shannon divergence of all channels beside its noise floor and the paper's.
+    """Jensen–Shannon divergence of all channels beside its noise floor and, if asked, the paper's.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> ReportTab
     data = result.groups["statistics/divergence"]
     at = data.sel(model=model, variant=variant)
     numbers = ("mean", "lower", "upper", "uncertainty", "noise_floor")
-    comparable = result.is_ensemble(model)
+    comparable = result.is_ensemble(model) and result.shows_paper
     rows = []
     for name in result.channels:
         one = at.sel(channel=name)
