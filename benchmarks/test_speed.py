@@ -5,6 +5,7 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 from problem import DT, STEPS, as_run, linear_system, names
 
@@ -35,3 +36,14 @@ def test_ensemble_of_ten(benchmark, delay_rows):
     paper = seakeep.BayesianHankelDMDc.paper(encounter_period=32 * DT, dt=DT, n_members=10)
     ensemble = dataclasses.replace(paper, delay_rows=delay_rows).fit(RUN, STATES, INPUTS, stop=STOP)
     benchmark(ensemble.forecast_summary, RUN, start=STOP, steps=STEPS)
+
+
+@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
+def test_band_of_a_hundred_held_members(benchmark, delay_rows):
+    """Mean and band on board, from arrays."""
+    paper = seakeep.BayesianHankelDMDc.paper(encounter_period=32 * DT, dt=DT, n_members=100)
+    ensemble = dataclasses.replace(paper, delay_rows=delay_rows).fit(RUN, STATES, INPUTS, stop=STOP)
+    held, now = ensemble.hold(), PROBLEM.stop
+    x, u = (np.stack([RUN[key].values for key in group], axis=1) for group in (STATES, INPUTS))
+    after = u[now + 1 : now + STEPS]
+    benchmark(held.forecast_arrays, x[: now + 1], u[: now + 1], after, STEPS)
