@@ -198,6 +198,19 @@ def test_a_finished_study_is_not_run_again(study_folder, finished):
     same(finished, again)
 
 
+def test_other_words_reach_a_finished_study(study_folder, finished):
+    assert not finished.shows_paper
+    change(study_folder, "seed = 3", 'seed = 3\nname = "renamed"')
+    with (study_folder / "study.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[output]\npaper = true\n")
+    again = run_study(read_study(study_folder / "study.toml"), study_folder / "out")
+    kept = store.read_result(study_folder / "out")
+    for found in (again, kept):
+        assert found.attrs["study"] == "renamed"
+        assert found.shows_paper
+        same(finished, found)
+
+
 def test_a_folder_of_another_study_is_refused(study_folder, finished):
     change(study_folder, "seed = 3", "seed = 4")
     with pytest.raises(RequestError, match=r"holds the results of another study.*-o"):

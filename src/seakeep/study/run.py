@@ -23,7 +23,15 @@ from seakeep.study.settings import Study
 from seakeep.study.slow import warn_of_slow_study
 from seakeep.study.specs import Spec
 from seakeep.study.statistics import judge
-from seakeep.study.store import RESULT, CellFolder, StudyResult, read_result, versions, write_result
+from seakeep.study.store import (
+    RESULT,
+    CellFolder,
+    StudyResult,
+    read_result,
+    retell,
+    versions,
+    write_result,
+)
 
 __all__ = ["run_study"]
 
@@ -88,7 +96,7 @@ def run_study(
     cells = CellFolder(out, study.digest)
     cells.check()
     if (found := _finished(study, out, tell)) is not None:
-        return found
+        return retell(found, _words_of_study(study))
     check_crew(crew)
     plan, runs = make_plan(study, lambda done, total, name: tell(done, total, f"preparing {name}"))
     warn_of_slow_study(plan, runs)
@@ -119,13 +127,22 @@ def _finished(study: Study, out: Path, tell: Progress) -> StudyResult | None:
     return found
 
 
+def _words_of_study(study: Study) -> dict[str, str]:
+    """Attributes in which a study may change without becoming another one: names and labels."""
+    general, campaign = study.settings.study, study.campaign.settings.campaign
+    return {
+        "study": study.name,
+        "description": general.description or campaign.description,
+        "settings": study.settings.model_dump_json(),
+    }
+
+
 def _attributes(
     study: Study, plan: Plan, groups: Mapping[str, xr.Dataset]
 ) -> dict[str, str | float | int]:
     general = study.settings.study
     return {
-        "study": study.name,
-        "description": general.description or study.campaign.settings.campaign.description,
+        **_words_of_study(study),
         "campaign": study.campaign.name,
         "preset": general.preset,
         "seed": general.seed,
@@ -135,7 +152,6 @@ def _attributes(
         "dt": plan.dt,
         "longest_training": plan.needs.training * plan.dt,
         "preparation": study.campaign.settings.preparation.model_dump_json(),
-        "settings": study.settings.model_dump_json(),
         "specs": json.dumps({name: _fields(spec) for name, spec in plan.specs.items()}),
         "conditional_on": _conditional(plan),
         "versions": json.dumps(versions()),

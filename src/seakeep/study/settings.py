@@ -150,12 +150,17 @@ class StatisticsSettings(Table):
 
 
 class OutputSettings(Table):
-    """``[output]``: what is kept beside the arrays that are judged."""
+    """``[output]``: what is kept beside the arrays that are judged, and what a report shows."""
 
     shown_windows: Annotated[int, Field(ge=0)] = Field(
         default=2, description="windows of the first test set whose members are kept for figures"
     )
     eigenvalues: bool = Field(default=True, description="true or false")
+    paper: bool = Field(
+        default=False,
+        description="whether the report puts the paper's choices and published numbers beside "
+        "those of the study",
+    )
 
 
 def _default_models() -> dict[str, StudyModelSettings]:
@@ -252,6 +257,7 @@ class Study:
             del content["study"][key]
         for each in content["tests"].values():
             del each["label"]
+        del content["output"]["paper"]
         content["channels"] = [list(self.states), list(self.inputs)]
         content["campaign"] = self.campaign.digest
         content["files"] = {n: self.campaign.checksum_of(n) for n in self.campaign.runs}

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import errno
 import json
+import shutil
 import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -28,6 +29,7 @@ __all__ = [
     "StorageError",
     "StudyResult",
     "read_result",
+    "retell",
     "versions",
     "write_result",
 ]
@@ -295,6 +297,11 @@ class StudyResult:
         names = [str(name) for name in self.groups["runs"]["run"].values]
         return {name: self.groups[f"prepared/{name}"] for name in names}
 
+    @property
+    def shows_paper(self) -> bool:
+        """Whether a report puts the paper's choices and numbers beside those of the study."""
+        return bool(self.settings["output"].get("paper", False))
+
     def is_ensemble(self, model: str) -> bool:
         """Whether a model is an ensemble."""
         return str(self.settings["models"][model]["kind"]).startswith("bayesian")
@@ -302,6 +309,10 @@ class StudyResult:
     def label_of(self, test: str) -> str:
         """Words for a test set."""
         return str(self.settings["tests"][test]["label"] or test.replace("_", " "))
+
+    def words_of(self, channel: str) -> str:
+        """Words for a channel of the study: what the campaign calls it."""
+        return str(self.groups["channels"]["long_name"].sel(name=channel).values)
 
 
 def write_result(
@@ -339,6 +350,36 @@ def write_result(
             }
             group.to_netcdf(temporary, engine="h5netcdf", mode="a", group=name, encoding=packed)
     return StudyResult(folder, kept, dict(groups))
+
+
+def retell(result: StudyResult, words: Mapping[str, str]) -> StudyResult:
+    """Write other words into a finished result: attributes on which no array depends.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The result.
+    words : mapping of str to str
+        Attributes.
+
+    Returns
+    -------
+    StudyResult
+        With these words.
+
+    Raises
+    ------
+    StorageError
+        If the file cannot be written.
+    """
+    changed = {key: value for key, value in words.items() if result.attrs.get(key) != value}
+    if not changed:
+        return result
+    path = result.folder / RESULT
+    with uninterrupted(), storing(result.folder), replacing(path) as temporary:
+        shutil.copyfile(path, temporary)
+        xr.Dataset(attrs=changed).to_netcdf(temporary, engine="h5netcdf", mode="a")
+    return replace(result, attrs={**result.attrs, **changed})
 
 
 def read_result(folder: Path | str) -> StudyResult:
