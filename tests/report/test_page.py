@@ -12,7 +12,12 @@ import pytest
 from tutorial_study import put_tutorial
 
 from seakeep.errors import RequestError
-from seakeep.report.deviations import deviations, training_windows_overlap
+from seakeep.report.deviations import (
+    deviations,
+    training_overlap,
+    training_windows_overlap,
+    unequal_training,
+)
 from seakeep.report.deviations import test_overlap as overlap_of_tests
 from seakeep.report.glossary import few_cells, glossary, plain_symbol
 from seakeep.report.interactive import dashes, history_data, pack
@@ -27,7 +32,7 @@ from seakeep.report.study_tables import (
     small_number,
     trend_table,
 )
-from seakeep.report.study_words import findings
+from seakeep.report.study_words import findings, training_table
 from seakeep.report.style import LINES
 from seakeep.study import read_result, read_study, run_study
 
@@ -131,6 +136,32 @@ def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page):
     assert rows[-1] == ["average", *(f"{float(value):.2f}" for value in expected)]
     windows = found.groups["calibration/bayesian"]["windows"].values
     assert f"A training set had {windows.min()}" in page.read_text("utf-8")
+
+
+def test_models_that_learn_from_unequal_lengths_are_told(page):
+    result = read_result(page.parent)
+    said = unequal_training(result)
+    assert said in findings(result)
+    spans = [re.findall(r"[\d.]+", each)[-2:] for each in result.groups["training"]["spans"].values]
+    period = result.attrs["encounter_period"]
+    lengths = sorted((float(end) - float(begin)) / period for begin, end in spans)
+    assert (
+        f"deterministic from all of a training set ({lengths[0]:.0f} to {lengths[-1]:.0f}" in said
+    )
+    assert "Bayesian from a part (uniform from 10 to 20 T̂)" in said
+    assert "(all of it: deterministic)" in training_table(result).note
+    # In one run both sets begin where its span begins, so that the shorter lies in the longer.
+    training = result.groups["training"]
+    training = training.assign(run=training["run"].copy(data=["a"] * training.sizes["training"]))
+    one = replace(result, groups={**result.groups, "training": training})
+    assert "where deterministic reads them, they share" in training_overlap(one)
+    assert training_windows_overlap(one)
+    specs = json.loads(result.attrs["specs"])
+    for window in ("300", "None"):
+        specs["deterministic"]["window"] = window
+        specs["bayesian"]["train_length"] = window
+        alike = replace(result, attrs={**result.attrs, "specs": json.dumps(specs)})
+        assert unequal_training(alike) == ""
 
 
 def test_a_history_shows_the_calibrated_band_around_that_of_the_members(page):
@@ -325,12 +356,15 @@ def test_training_windows_that_do_not_overlap_are_no_warning(page):
     notices = re.findall(r'<p class="notice">(.*?)</p>', text, flags=re.S)
     assert training_windows_overlap(result) == any("A training window" in n for n in notices)
     stops = result.groups["training"]["stop"]
+    specs = json.loads(result.attrs["specs"])
+    specs["deterministic"]["window"] = "300"  # without one it reads each span from its begin
+    attrs = {**result.attrs, "specs": json.dumps(specs)}
     for apart, overlaps in ((2.0, False), (0.5, True)):
         length = float(result.attrs["longest_training"])
         moved = stops.copy(data=length * (1 + apart * np.arange(stops.size)))
         runs = result.groups["training"]["run"]
         same = result.groups["training"].assign(stop=moved, run=runs.copy(data=["a"] * runs.size))
-        other = replace(result, groups={**result.groups, "training": same})
+        other = replace(result, attrs=attrs, groups={**result.groups, "training": same})
         assert training_windows_overlap(other) == overlaps
         windows = {row[0]: row[-1] for row in deviations(other).rows}["training windows"]
         assert windows.startswith("2 windows, placed at random; ")

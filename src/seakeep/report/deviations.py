@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -21,6 +22,8 @@ __all__ = [
     "test_overlap",
     "training_overlap",
     "training_windows_overlap",
+    "unequal_training",
+    "whole_readers",
 ]
 
 APART = 0.005
@@ -50,21 +53,107 @@ def training_overlap(result: StudyResult) -> str:
     )
     if count == 1:
         return f"{room}; there is one."
+    nested = _nested(result)
+    whole = (
+        f" From the begins of their spans, where {_listed(whole_readers(result))} reads them, they "
+        f"share {100 * nested:.0f} %."
+        if nested >= APART
+        else ""
+    )
     if share < APART:
         runs = len(set(result.groups["training"]["run"].values.tolist()))
         where = f", which lie in {runs} runs," if runs > 1 else ""
-        return f"{room}; the {count} windows{where} do not overlap."
+        return f"{room}; the {count} windows{where} do not overlap.{whole}"
     return (
         f"{room}: so the {count} windows share {100 * share:.0f} % of their length with one "
-        "another. They are not independent, and the boxes show the spread over test windows more "
-        "than that over training data."
+        f"another.{whole} They are not independent, and the boxes show the spread over test "
+        "windows more than that over training data."
     )
+
+
+def whole_readers(result: StudyResult) -> list[str]:
+    """Models that read all of a training set, whatever its length.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    list of str
+        Their names.
+    """
+    return [model for model, length in _stated_lengths(result).items() if length == "None"]
+
+
+def unequal_training(result: StudyResult) -> str:
+    """Sentence on models that learn from different lengths of data.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    str
+        Empty where all of them read all, or none does.
+    """
+    stated, whole = _stated_lengths(result), whole_readers(result)
+    others = [model for model in stated if model not in whole]
+    if not (whole and others):
+        return ""
+    period = float(result.attrs["encounter_period"])
+    sets = [sum(end - begin for begin, end in each) / period for each in _spans(result)]
+    low, high = f"{min(sets):.0f}", f"{max(sets):.0f}"
+    told = []
+    for model in others:
+        if result.is_ensemble(model):
+            length = prior_words(stated[model])
+        else:
+            length = f"{int(stated[model]) * float(result.attrs['dt']) / period:.3g}"
+        told.append(f"{model_words(model)} from a part ({length} T̂)")
+    return (
+        f"Models learn from different amounts of data: {_listed(whole)} from all of a training set "
+        f"({low if low == high else f'{low} to {high}'} T̂), {', '.join(told)}. A difference "
+        "between them is one of training data too."
+    )
+
+
+def _listed(models: list[str]) -> str:
+    return ", ".join(map(model_words, models))
+
+
+def _stated_lengths(result: StudyResult) -> dict[str, str]:
+    """Training length of each model as it was stated; "None" where it reads all."""
+    specs: dict[str, dict[str, str]] = json.loads(result.attrs["specs"])
+    return {
+        m: spec["train_length" if "train_length" in spec else "window"] for m, spec in specs.items()
+    }
+
+
+def _spans(result: StudyResult) -> list[list[tuple[float, float]]]:
+    """Begin and end of each span of each training set, s."""
+    return [
+        [(float(a), float(b)) for a, b in re.findall(r"(-?[\d.]+) to (-?[\d.]+) s", str(text))]
+        for text in result.groups["training"]["spans"].values
+    ]
+
+
+def _nested(result: StudyResult) -> float:
+    """Part of a training set that others hold too, as models without a window read them."""
+    training = result.groups["training"]
+    if not whole_readers(result):
+        return 0.0
+    runs = [str(run) for run in training["run"].values]
+    return windows_overlap([(r, *span) for r, (span,) in zip(runs, _spans(result), strict=True)])
 
 
 def training_windows_overlap(result: StudyResult) -> bool:
     """Whether training windows share a part of their length that counts."""
     found = _overlap(result)
-    return found is not None and found[0] > 1 and found[3] >= APART
+    return found is not None and found[0] > 1 and max(found[3], _nested(result)) >= APART
 
 
 def test_overlap(result: StudyResult) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from seakeep.campaign.checks import findings_of
+from seakeep.report.deviations import unequal_training, whole_readers
 from seakeep.report.figures.common import HEADING, model_words
 from seakeep.report.quality_sheet import channel_rows
 from seakeep.report.study_tables import ReportTable
@@ -55,6 +56,8 @@ def findings(result: StudyResult) -> list[str]:
             if singles and ensembles:
                 parts[-1] += _verdict(medians[singles[0]], medians[ensembles[0]])
         said.append(f"{_capital(result.label_of(test))}: " + "; ".join(parts) + ".")
+    if unequal := unequal_training(result):
+        said.append(unequal)
     for model in ensembles:
         said += _coverage_findings(result, model)
     return said + _windows_found(result)
@@ -328,6 +331,8 @@ def training_table(result: StudyResult) -> ReportTable:
     """Training sets and test windows."""
     training = result.groups["training"]
     reads = float(result.attrs["longest_training"])
+    every = ", ".join(map(model_words, whole_readers(result)))
+    whole = f" (all of it: {every})" if every else ""
     rows = [
         ("training", str(n), str(s), str(left) or "")
         for n, s, left in zip(
@@ -349,8 +354,8 @@ def training_table(result: StudyResult) -> ReportTable:
         ("use", "set", "instants", "left out"),
         tuple(rows),
         "Of a training set: from the begin of its span to its stop, of which a draw reads the last "
-        f"part, {reads:.2f} s at most, delay history included. The delay history of a forecast is "
-        "measured data just before the start; it may reach into a training span.",
+        f"part, {reads:.2f} s at most, delay history included{whole}. The delay history of a "
+        "forecast is measured data just before the start; it may reach into a training span.",
     )
 
 
