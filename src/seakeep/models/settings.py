@@ -51,11 +51,16 @@ def periods_to_samples(periods: float, encounter_period: float, dt: float) -> in
     Raises
     ------
     RequestError
-        If period or step are not positive.
+        If period or step are not positive, or the step is as long as the period.
     """
     for name, value in (("encounter_period", encounter_period), ("dt", dt)):
         if not (math.isfinite(value) and value > 0):
             raise RequestError(f"{name} must be a positive number of seconds; received {value!r}.")
+    if dt >= encounter_period:
+        raise RequestError(
+            f"the time step dt = {dt:g} s is no shorter than the encounter period of "
+            f"{encounter_period:g} s. Are the two swapped?"
+        )
     return math.floor(periods * encounter_period / dt + 0.5)
 
 
