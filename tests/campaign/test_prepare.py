@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import FrozenInstanceError
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -498,7 +499,7 @@ class TestFiles:
             (tank / "prepared" / "half").write_text("")
             raise OSError("disk full")
 
-        monkeypatch.setattr(xr.Dataset, "to_netcdf", fail)
+        monkeypatch.setattr(Path, "write_bytes", fail)
         with pytest.raises(RequestError, match=r"cannot write .*first\.nc: disk full"):
             write_prepared(campaign)
         assert [p.name for p in (tank / "prepared").iterdir()] == ["half"]
