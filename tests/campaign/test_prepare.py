@@ -469,7 +469,7 @@ class TestFiles:
             assert run.attrs["water_depth"] == 3.6
             assert run["time"].dtype == float
 
-    @pytest.mark.parametrize("change", ["settings", "file", "version"])
+    @pytest.mark.parametrize("change", ["settings", "file", "version", "name"])
     def test_stale_files_are_not_used(self, campaign, tank, edited, change, monkeypatch):
         path = write_prepared(campaign)["second"]
         with xr.open_dataset(path) as opened:
@@ -479,6 +479,8 @@ class TestFiles:
         assert float(load_prepared(campaign)["second"]["heave"].std()) == 0.0
         if change == "settings":
             campaign = read_campaign(edited(("sampling_rate = 10", "sampling_rate = 12")))
+        elif change == "name":
+            campaign = read_campaign(edited(("Small tank", "Smaller tank")))
         elif change == "file":
             write_csv(tank / "second.csv", tank_columns(5))
         else:

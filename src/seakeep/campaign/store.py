@@ -111,8 +111,9 @@ def load_prepared(
     Returns
     -------
     dict of str to xarray.Dataset
-        As :meth:`Campaign.prepare` gives them. A file is fresh if the campaign's digest, the
-        checksum of the raw file and the version of seakeep are those it was written with.
+        As :meth:`Campaign.prepare` gives them. A file is fresh if the campaign's name and digest,
+        the checksums of the raw files on which the run depends (through period and clocks too) and
+        the version of seakeep are those it was written with.
 
     Raises
     ------
