@@ -54,3 +54,14 @@ def test_a_run_of_the_tank(benchmark):
     sea = Sea(omega, np.full(100, 0.003), np.linspace(0.0, 5.0, 100), k)
     simulate(rig, sea, 1.0)  # compiles
     benchmark(simulate, rig, sea, 210.0)
+
+
+@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
+def test_band_of_a_hundred_held_members(benchmark, delay_rows):
+    """Mean and band on board, from arrays."""
+    paper = seakeep.BayesianHankelDMDc.paper(encounter_period=32 * DT, dt=DT, n_members=100)
+    ensemble = dataclasses.replace(paper, delay_rows=delay_rows).fit(RUN, STATES, INPUTS, stop=STOP)
+    held, now = ensemble.hold(), PROBLEM.stop
+    x, u = (np.stack([RUN[key].values for key in group], axis=1) for group in (STATES, INPUTS))
+    after = u[now + 1 : now + STEPS]
+    benchmark(held.forecast_arrays, x[: now + 1], u[: now + 1], after, STEPS)

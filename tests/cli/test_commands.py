@@ -227,6 +227,24 @@ def test_compare_judges_the_mean_of_an_ensemble_and_its_band(run, place):
     assert float(heave["nrmse"]) == pytest.approx(float(expected["heave"]), rel=1e-12)
 
 
+def test_calibrate_takes_an_unread_part_of_a_run_that_trains(run, place):
+    text = (place / CAMPAIGN).read_text("utf-8").replace('role = "test"', "train = [0, 40]")
+    assert "train = [0, 40]" in text
+    (place / CAMPAIGN).with_name("half.toml").write_text(text, "utf-8")
+    half = str(CAMPAIGN).replace("campaign.toml", "half.toml")
+    calibrate = f"calibrate ensemble.nc {half} --run unseen --steps 200 -o half.nc"
+    spans = {}
+    for options in ("", "--stop 100", "--start 50 --stop inf"):
+        status, _, err = run(f"{calibrate} {options}")
+        assert status == 0, err
+        spans[options] = seakeep.load_model(place / "half.nc").calibration.spans["unseen"]
+        assert re.search(r"Note: errors that last .* \d+ windows? would warrant \d\d %", err)
+    assert spans[""][1] <= 40 < spans["--stop 100"][1] <= 100
+    # 200 steps of 0.08 s end to end: less than one window is left before the end of 120 s.
+    assert 50 <= spans["--start 50 --stop inf"][0] < 60
+    assert spans["--start 50 --stop inf"][1] > 104
+
+
 def test_calibrate_widens_the_band_that_compare_and_forecast_show(run, place):
     calibrate = f"calibrate ensemble.nc {CAMPAIGN} --run unseen --stop 60 --steps 200 -o wide.nc"
     status, out, err = run(f"{calibrate} --level 0.9")
@@ -424,7 +442,12 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
         (
             f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unseen --stop 900 -o c.nc",
             2,
-            r"--stop 900 \(900 s\) lies after the end of unseen \([\d.]+ s\)",
+            r"--stop 900 \(900 s\) lies in none of the runs \(unseen: [\d.]+ to [\d.]+ s\)",
+        ),
+        (
+            f"calibrate ensemble.nc {CAMPAIGN} --steps 9 --run unseen --start 20 --stop 20 -o c.nc",
+            2,
+            r"--start 20 \(20 s\) lies at or after --stop 20 \(20 s\)",
         ),
         (
             f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unseen --stop nan -o c.nc",

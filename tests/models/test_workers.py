@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 
@@ -118,6 +119,30 @@ def test_the_limit_of_blas_is_lifted_when_the_last_one_leaves():
         first.close()
         assert threads() == {1}
         second.close()
+        assert threads() == before
+
+
+def test_the_limit_of_blas_holds_in_any_thread_and_any_thread_may_lift_it():
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    def threads():
+        return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+    def work():
+        found.extend(side_by_side(side_work.blas_threads, None, range(2), Crew()))
+        next(held)
+        seen.append(threads())
+
+    with threadpool_limits(2, user_api="blas"):  # the limit is this thread's now
+        before = threads()
+        found, seen = [], []
+        held = side_by_side(side_work.blas_threads, None, range(2), Crew())
+        other = threading.Thread(target=work)
+        other.start()
+        other.join()
+        assert [set(each) for _, each in found] == [{1}, {1}]
+        assert seen == [{1}]
+        held.close()  # begun there, left here
         assert threads() == before
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.models import aligned
-from seakeep.models.calibration import Band, check_band, widened
+from seakeep.models.calibration import Band, check_band, warn_of_horizon, widened
 from seakeep.models.ensemble_labels import label_channels, statuses, verdict, window_coords
 from seakeep.models.ensemble_series import shelved
 from seakeep.models.forecasting import ForecastWindow
@@ -132,6 +132,8 @@ def _reduced(
     level = check_level(level)
     check_band(ensemble, level, band)
     windows = read_windows(ensemble, run, starts, steps)
+    if band == "calibrated":
+        warn_of_horizon(ensemble, windows[0].name, windows[0].steps)
     with shelved(ensemble, run, windows, crew, progress) as (shelf, lost):
         values = widened(ensemble, reduce_members(shelf, lost, level, crew.workers), band)
     return windows, values, lost

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from seakeep.models.identification import Scale
 
 if TYPE_CHECKING:
     from seakeep.models.alignment import FittedAlignment
+    from seakeep.models.fitted_ensemble import HankelEnsemble
     from seakeep.models.model import HankelDMDcModel
 
 __all__ = ["ForecastWindow", "label_forecast", "modes", "read_window", "summary"]
@@ -141,30 +143,42 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
 
 
 def check_arrays(
-    model: HankelDMDcModel,
+    model: HankelDMDcModel | HankelEnsemble,
     x_history: npt.ArrayLike,
     u_history: npt.ArrayLike,
     u_future: npt.ArrayLike,
     steps: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the histories cut to (s+1, N) and (z + steps, Q); arguments as ``forecast_arrays``."""
+    """Return the histories cut to (s+1, N) and (z + steps, Q); arguments as ``forecast_arrays``.
+
+    Columns that have names (a pandas DataFrame, a DataArray) are taken by name.
+    """
     if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
         raise RequestError(f"steps must be a positive integer; received {steps!r}.")
-    states, inputs = len(model.states), len(model.inputs)
+    states, inputs = model.states, model.inputs
     s, z = model.state_delays, model.input_delays
     x = _finite("x_history", _rows("x_history", x_history, s + 1, states, "s + 1")[-s - 1 :])
     if not inputs:
         return x, np.zeros((int(steps), 0))
     u = _finite("u_history", _rows("u_history", u_history, z + 1, inputs, "z + 1")[-z - 1 :])
-    future = np.asarray(u_future, dtype=float)
-    if future.size == 0:
-        future = np.zeros((0, inputs))
-    future = _rows("u_future", future, int(steps) - 1, inputs, "steps − 1")
-    return x, np.concatenate([u, _finite("u_future", future[: int(steps) - 1])])
+    future = np.zeros((0, len(inputs))) if np.size(u_future) == 0 else u_future
+    after = _rows("u_future", future, int(steps) - 1, inputs, "steps − 1")
+    return x, np.concatenate([u, _finite("u_future", after[: int(steps) - 1])])
 
 
-def _rows(name: str, value: npt.ArrayLike, least: int, channels: int, meaning: str) -> FloatArray:
-    array = np.asarray(value, dtype=float)
+def _rows(
+    name: str, value: npt.ArrayLike, least: int, names: Sequence[str], meaning: str
+) -> FloatArray:
+    plain = _by_name(name, value, names)
+    if np.iscomplexobj(plain):
+        raise RequestError(f"{name} holds complex numbers; channels are real.")
+    if np.ma.isMaskedArray(plain):
+        plain = np.ma.filled(np.ma.asarray(plain, dtype=float), np.nan)
+    try:
+        array = np.asarray(plain, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise RequestError(f"{name} is no array of numbers: {error}.") from None
+    channels = len(names)
     if array.ndim != 2 or array.shape[1] != channels or array.shape[0] < least:
         turned = array.ndim == 2 and array.shape[0] == channels and array.shape[1] >= least
         raise RequestError(
@@ -172,6 +186,24 @@ def _rows(name: str, value: npt.ArrayLike, least: int, channels: int, meaning: s
             f"({meaning}) and {channels} columns.{' It looks transposed.' if turned else ''}"
         )
     return array
+
+
+def _by_name(name: str, value: npt.ArrayLike, names: Sequence[str]) -> Any:
+    """Columns in the order of the model, where they have names."""
+    table: Any = value
+    columns = getattr(table, "columns", None)
+    if isinstance(table, xr.DataArray) and table.ndim == 2 and table.dims[1] in table.coords:
+        columns = table.indexes[table.dims[1]]
+    if columns is None or not all(isinstance(each, str) for each in columns):
+        return value
+    missing = [each for each in names if each not in list(columns)]
+    if missing:
+        raise RequestError(
+            f"{name} has no column '{missing[0]}'; its columns: {', '.join(columns)}."
+        )
+    if isinstance(table, xr.DataArray):
+        return table.sel({table.dims[1]: list(names)}).values
+    return table[list(names)].to_numpy()
 
 
 def _finite(name: str, needed: FloatArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
@@ -68,6 +69,11 @@ def as_runs(runs: Runs) -> dict[str, xr.Dataset]:
     for name, run in named.items():
         check_run(run, name)
     return named
+
+
+def is_made_up(name: str, run: xr.Dataset) -> bool:
+    """Whether a name was given by :func:`as_runs` to a run that has none."""
+    return "run" not in run.attrs and re.fullmatch(r"run( \d+)?", name) is not None
 
 
 def run_name(run: object, fallback: str) -> str:

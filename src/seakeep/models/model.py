@@ -297,10 +297,11 @@ class HankelDMDcModel:
         Parameters
         ----------
         x_history : array_like, shape (at least s + 1, N)
-            States up to and including instant k, oldest first, physical units.
+            States up to and including instant k, oldest first, physical units, in the order of
+            ``model.states``; columns with names (a DataFrame) are taken by name.
         u_history : array_like, shape (at least z + 1, Q)
-            Inputs up to and including instant k, aligned already if the model aligns them
-            (:meth:`aligned_inputs`).
+            Inputs up to and including instant k, in the order of ``model.inputs``, aligned already
+            if the model aligns them (:meth:`aligned_inputs`).
         u_future : array_like, shape (at least steps − 1, Q)
             Inputs at k + 1, k + 2, …; shape (0, 0) for a model without input.
         steps : int
@@ -314,7 +315,8 @@ class HankelDMDcModel:
         Raises
         ------
         RequestError
-            If a shape does not fit; a transposed array is refused, not turned.
+            If a shape does not fit (a transposed array is refused, not turned), a column is
+            missing, or a value that is needed is not finite or masked.
         """
         x, u = forecasting.check_arrays(self, x_history, u_history, u_future, steps)
         values: FloatArray = free_runs(self, x[None], u[None], int(steps))[0]

@@ -62,8 +62,9 @@ def find_repeat(
 
     A sea of equally spaced components comes back after one over their spacing, turned by a
     constant phase; the record itself then correlates poorly, its analytic signal fully. Each
-    stretch of the test record, without still water before and after the waves, is compared with all places in each training record by the modulus
-    of the normalised correlation of the analytic signals.
+    stretch of the test record, without still water before and after the waves, is compared with all
+    places in each training record by the modulus of the normalised correlation of the analytic
+    signals.
 
     Parameters
     ----------

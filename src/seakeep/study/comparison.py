@@ -296,15 +296,9 @@ def _warn_of_known(model: HankelDMDcModel | HankelEnsemble, compared: Comparison
     if part := part_in(model.training_spans):
         told.append(f"the forecast of {name} lies in what trained the model {part}: {memory}")
     calibration = model.calibration if isinstance(model, HankelEnsemble) else None
-    if calibration is not None and compared.forecast.attrs.get("band") == "calibrated":
-        if part := part_in(calibration.spans):
-            told.append(f"the band was calibrated on a part of this forecast {part}: {memory}")
-        if compared.measured.sizes["time"] > calibration.steps:
-            told.append(
-                f"the forecast of {name} is longer than the {calibration.steps} instants that the "
-                "band was calibrated for: its coverage is not warranted there. Calibrate with "
-                "longer windows."
-            )
+    known = {} if calibration is None else calibration.spans
+    if compared.forecast.attrs.get("band") == "calibrated" and (part := part_in(known)):
+        told.append(f"the band was calibrated on a part of this forecast {part}: {memory}")
     for text in told:
         warnings.warn(text, SeakeepWarning, stacklevel=3)
 
