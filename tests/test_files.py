@@ -109,6 +109,11 @@ def test_a_netcdf_file_holds_root_and_groups_packed_as_asked(tmp_path):
         assert found["heave"].encoding["zlib"]
         assert found["heave"].attrs == {"units": "m"}
         assert found.attrs["name"] == "Mörkö"
+    write_netcdf(tmp_path / "b.nc", xr.Dataset(attrs={"format": 4}), onto=path)
+    assert xr.load_dataset(path, engine="h5netcdf").attrs == {"format": 3}
+    assert xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf").attrs == {"format": 4}
+    found = xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf", group="prepared/two")
+    xr.testing.assert_equal(found, groups["prepared/two"])
 
 
 FULL = """
@@ -133,6 +138,9 @@ writers = {
     "hydrodynamics": lambda path: hydrodynamics.save_hydrodynamics(run, path),
     "study": lambda path: study.write_result(folder, {}, {"prepared": run}),
 }
+(folder / "old").mkdir()
+old = study.write_result(folder / "old", {"words": "old"}, {"prepared": run})
+writers["other words"] = lambda path: study.retell(old, {"words": "new"})
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
 told = {}
@@ -155,13 +163,13 @@ def test_whatever_is_written_as_netcdf_survives_a_disk_that_is_full(tmp_path):
     # Once HDF5 itself has failed to write, it ends the process by SIGSEGV.
     assert (done.returncode, done.stderr) == (0, "")
     told = json.loads(done.stdout)
-    kind, words = told.pop("study")
-    assert kind == "StorageError"
-    assert "File too large" in words
-    assert "Free space on the disk; the same command then goes on" in words
+    for kind, words in (told.pop("study"), told.pop("other words")):
+        assert kind == "StorageError"
+        assert "File too large" in words
+        assert "Free space on the disk; the same command then goes on" in words
     assert len(told) == 6
     for kind, words in told.values():
         assert kind == "RequestError"
         assert "file.nc: File too large" in words
         assert "Free space on the disk" in words
-    assert list(folder.iterdir()) == []
+    assert [path.name for path in folder.rglob("*")] == ["old", "study.nc"]

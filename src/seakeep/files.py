@@ -65,6 +65,7 @@ def write_netcdf(
     dataset: xr.Dataset,
     groups: Mapping[str, xr.Dataset] | None = None,
     packing: Callable[[xr.Dataset], Mapping[Any, Mapping[str, Any]]] | None = None,
+    onto: Path | None = None,
 ) -> None:
     """Write a NetCDF file; a disk that is full is told as by any other write.
 
@@ -81,18 +82,21 @@ def write_netcdf(
         What goes into groups, by their names.
     packing : callable, optional
         Gives the encoding of the variables of a Dataset, such as their compression.
+    onto : Path, optional
+        A NetCDF file whose content is taken over, and added to.
 
     Raises
     ------
     OSError
-        If the file cannot be written; :func:`replacing` tells it in words.
+        If a file cannot be read or written; :func:`replacing` tells it in words.
     """
     # Here, so that commands that write no such file start without HDF5.
     import h5netcdf
     from xarray.backends import H5NetCDFStore
 
-    made, parts = io.BytesIO(), [(None, dataset), *(groups or {}).items()]
-    with h5netcdf.File(made, "w") as file:
+    made = io.BytesIO(b"" if onto is None else onto.read_bytes())
+    parts = [(None, dataset), *(groups or {}).items()]
+    with h5netcdf.File(made, "w" if onto is None else "r+") as file:
         for name, each in parts:
             encoding = {} if packing is None else packing(each)
             each.dump_to_store(H5NetCDFStore(file, group=name, mode="a"), encoding=encoding)

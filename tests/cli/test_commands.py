@@ -227,6 +227,20 @@ def test_compare_judges_the_mean_of_an_ensemble_and_its_band(run, place):
     assert float(heave["nrmse"]) == pytest.approx(float(expected["heave"]), rel=1e-12)
 
 
+def test_angles_of_a_forecast_may_be_written_in_degrees(run, place):
+    for option, unit, name in (("", "rad", "r.csv"), ("--degrees", "deg", "d.csv")):
+        status, _, err = run(f"forecast model.nc {FROM_20} {option} -o {name}")
+        assert status == 0, err
+        assert f"pitch [{unit}]" in (place / name).read_text("utf-8").splitlines()[0]
+    columns = [
+        np.genfromtxt(place / name, delimiter=",", skip_header=1).T for name in ("r.csv", "d.csv")
+    ]
+    header = (place / "r.csv").read_text("utf-8").splitlines()[0].split(",")
+    for before, after, title in zip(*columns, header, strict=True):
+        factor = 180 / np.pi if "[rad" in title else 1.0
+        np.testing.assert_allclose(after, factor * before, rtol=1e-6)  # seven digits are written
+
+
 def test_calibrate_takes_an_unread_part_of_a_run_that_trains(run, place):
     text = (place / CAMPAIGN).read_text("utf-8").replace('role = "test"', "train = [0, 40]")
     assert "train = [0, 40]" in text
@@ -490,6 +504,11 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
             r"--start: received '4 /T'\. Give seconds",
         ),
         (
+            f"forecast model.nc {CAMPAIGN} --run unseen --start 20,5 -o f.nc",
+            2,
+            r"--start: received '20,5'\. Give seconds .*\. Write a decimal point, no comma\.",
+        ),
+        (
             f"compare model.nc {CAMPAIGN} --steps 12.5",
             2,
             r"steps: received '12\.5'\. Give a whole number such as 400, or encounter periods",
@@ -538,7 +557,7 @@ def test_ctrl_c_ends_with_130_and_says_what_is_kept(run, monkeypatch):
     monkeypatch.setattr(modelling, "fit_campaign", interrupt)
     status, _, err = run(f"fit {CAMPAIGN} -o m.nc")
     assert status == 130
-    assert "Interrupted. Files that were finished are kept: repeat the command to go on." in err
+    assert "Interrupted. Files that were finished are kept: the command takes them over" in err
 
 
 def test_an_unforeseen_error_asks_for_a_report(run, monkeypatch):

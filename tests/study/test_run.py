@@ -15,9 +15,11 @@ from started import started
 from seakeep.errors import DataError, RequestError
 from seakeep.models.labelled import nearest_sample
 from seakeep.statistics import band_error_over_time
-from seakeep.study import StorageError, read_result, read_study, run_study, store
+from seakeep.study import StorageError, read_result, read_study, run, run_study, store
+from seakeep.study.lock import LOCK
 from seakeep.study.plan import make_plan
 from seakeep.study.statistics import joined
+from seakeep.study.store import CELLS, CellFolder
 
 
 def change(folder, old, new):
@@ -149,6 +151,54 @@ def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished
     same(finished, again)
 
 
+def test_two_processes_do_not_work_in_one_folder(study_folder, finished, monkeypatch):
+    study, out = read_study(study_folder / "study.toml"), study_folder / "shared"
+    refused = []
+
+    def told(done, total, what):
+        if what == "statistics and densities":
+            with pytest.raises(RequestError, match=r"another process works on the study in .*sha"):
+                run_study(study, out)
+            refused.append(what)
+
+    same(finished, run_study(study, out, progress=told))
+    assert refused
+    assert not (out / LOCK).exists()
+    (out / "study.nc").unlink()
+    (out / "cells").mkdir()
+    (out / "cells" / "mine").mkdir()  # is not removed, and does not matter
+    same(finished, run_study(study, out))
+    assert (out / "cells" / "mine").exists()
+
+
+def test_who_waited_for_another_process_takes_its_result(study_folder, finished, monkeypatch):
+    study, out = read_study(study_folder / "study.toml"), study_folder / "behind"
+    usual = run.warn_of_slow_study
+
+    def overtaken(plan, runs):
+        monkeypatch.setattr(run, "warn_of_slow_study", usual)
+        run_study(study, out)
+
+    monkeypatch.setattr(run, "warn_of_slow_study", overtaken)
+    told = []
+    same(finished, run_study(study, out, progress=lambda *each: told.append(each[2])))
+    assert told[-1] == "finished before"
+    assert "fitting and forecasting" not in told
+
+
+@pytest.mark.parametrize("flag", [0x01, 0x20])
+def test_a_cell_whose_archive_was_damaged_is_computed_again(tmp_path, flag):
+    cells = CellFolder(tmp_path, "digest")
+    cells.open("study")
+    cells.write("one", {"mean": np.arange(3.0)})
+    path = tmp_path / CELLS / "one.npz"
+    content = bytearray(path.read_bytes())
+    entry = content.rindex(b"PK\x01\x02")  # flags of the last file: "encrypted", "patched"
+    content[entry + 8] |= flag
+    path.write_bytes(content)
+    assert not cells.has("one")
+
+
 def test_a_finished_study_is_not_run_again(study_folder, finished):
     told = []
     again = run_study(
@@ -158,6 +208,19 @@ def test_a_finished_study_is_not_run_again(study_folder, finished):
     )
     assert told == [(1, 1, "finished before")]
     same(finished, again)
+
+
+def test_other_words_reach_a_finished_study(study_folder, finished):
+    assert not finished.shows_paper
+    change(study_folder, "seed = 3", 'seed = 3\nname = "renamed"')
+    with (study_folder / "study.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[output]\npaper = true\n")
+    again = run_study(read_study(study_folder / "study.toml"), study_folder / "out")
+    kept = store.read_result(study_folder / "out")
+    for found in (again, kept):
+        assert found.attrs["study"] == "renamed"
+        assert found.shows_paper
+        same(finished, found)
 
 
 def test_a_folder_of_another_study_is_refused(study_folder, finished):

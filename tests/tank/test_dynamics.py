@@ -17,7 +17,6 @@ from seakeep.tank.dynamics import (
     tensions,
 )
 from seakeep.tank.hydrodynamics import response
-from seakeep.tank.moorings import slack_offset
 from seakeep.tank.seas import Sea, regular_sea
 from seakeep.tank.settings import DriftSettings, VesselSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber
@@ -98,8 +97,7 @@ def test_mean_offset_beyond_the_slack_limit(settings, rig):
     loads = tensions(no_drag, motion.position, motion.velocity)
     assert np.all(loads[1, late] == 0.0)  # the stern line is slack
     offset = motion.position[0, late].mean()
-    assert slack_offset(rig.lines, 1) == pytest.approx(0.8 / 1.33, rel=1e-12)
-    assert offset > slack_offset(rig.lines, 1)
+    assert offset > 0.8 / 1.33  # its pretension over its stiffness
     # The bow line is level to (heave / length)² = 1e-4, and the slow swing is down to millimetres.
     assert offset == pytest.approx((force - 0.8) / 1.89, rel=0.02)
 

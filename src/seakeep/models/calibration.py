@@ -6,7 +6,7 @@ import json
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,7 @@ import xarray as xr
 from seakeep.core.calibration import ConformalMargin, band_scores, conformal_margin
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import labelled
+from seakeep.models.checks import check_choice
 from seakeep.models.ensemble_series import shelved
 from seakeep.models.progress import Progress
 from seakeep.models.summaries import STATISTICS, check_level, reduce_members
@@ -236,10 +237,9 @@ def check_band(ensemble: HankelEnsemble, level: float, band: Band) -> None:
     RequestError
         If the ensemble was not calibrated, or for another level, or there is no such band.
     """
+    check_choice("band", band, get_args(Band))
     if band == "members":
         return
-    if band != "calibrated":
-        raise RequestError(f"band must be 'members' or 'calibrated'; received {band!r}.")
     if ensemble.calibration is None:
         raise RequestError(
             "the ensemble is not calibrated. Call ensemble.calibrate(runs, steps), or seakeep "

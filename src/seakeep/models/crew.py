@@ -15,6 +15,7 @@ import threadpoolctl
 
 from seakeep.core.scratch import Scratch
 from seakeep.errors import RequestError, SeakeepError
+from seakeep.models.checks import check_choice
 
 __all__ = [
     "Backend",
@@ -67,10 +68,7 @@ class Crew:
         workers: object = self.workers
         if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
             raise RequestError(f"workers must be a positive integer; received {workers!r}.")
-        if self.backend not in get_args(Backend):
-            raise RequestError(
-                f"backend must be 'processes', 'threads' or 'auto'; received {self.backend!r}."
-            )
+        check_choice("backend", self.backend, get_args(Backend))
         if self.scheduler is not None and workers != 1:
             raise RequestError(
                 f"workers = {workers} counts workers on this machine, and scheduler = "

@@ -41,7 +41,7 @@ def all_members(
     with shelved(ensemble, run, windows, crew, progress, whole=True) as (shelf, lost):
         (values,) = shelf.all()
     variables = _labelled(ensemble, values, ("member", "time"))
-    status = statuses(lost[:, 0], windows[0].time.values)
+    status = statuses(lost[:, 0], windows[0].time.values, ensemble.dt)
     variables["status"] = xr.Variable(("member",), status)
     return xr.Dataset(
         variables,
@@ -64,7 +64,8 @@ def summary(
     windows, values, lost = _reduced(ensemble, run, [start], steps, level, band, crew, progress)
     window = windows[0]
     variables = _labelled(ensemble, values[0], ("statistic", "time"))
-    variables["status"] = xr.Variable(("member",), statuses(lost[:, 0], window.time.values))
+    status = statuses(lost[:, 0], window.time.values, ensemble.dt)
+    variables["status"] = xr.Variable(("member",), status)
     counts = {"start": window.start} | _counted(ensemble, level, band) | verdict(lost)
     return xr.Dataset(
         variables,
@@ -91,7 +92,8 @@ def all_members_of_windows(
         values = shelf.all()
     variables = _labelled(ensemble, values, ("window", "member", "lead"))
     status = [
-        statuses(row, window.time.values) for row, window in zip(lost.T, windows, strict=True)
+        statuses(row, window.time.values, ensemble.dt)
+        for row, window in zip(lost.T, windows, strict=True)
     ]
     variables["status"] = xr.Variable(("window", "member"), np.stack(status))
     coords = window_coords(windows, ensemble.dt) | {"member": np.arange(ensemble.n_members)}

@@ -13,6 +13,7 @@ import xarray as xr
 from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.identification import Scale
+from seakeep.signals.clocks import fixed, instant_text
 
 if TYPE_CHECKING:
     from seakeep.models.alignment import FittedAlignment
@@ -92,13 +93,17 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
     time = np.asarray(run.variables["time"].values, dtype=float)
     at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
     needed = model.history_samples
+
+    def told(instant: float) -> str:
+        return instant_text(instant, model.dt)
+
     if at + 1 < needed:
         near = abs(float(start) - time[at]) <= 1e-6 * model.dt
-        snapped = "" if near else f" (nearest sample {time[at]:.10g} s)"
+        snapped = "" if near else f" (nearest sample {told(time[at])} s)"
         raise RequestError(
-            f"start = {float(start):.10g} s{snapped} leaves {at + 1} samples of history in "
+            f"start = {told(float(start))} s{snapped} leaves {at + 1} samples of history in "
             f"{name} and the model needs {needed} (the start included): {needed - at - 1} are "
-            f"missing. Start at {time[0] + (needed - 1) * model.dt:.10g} s or later."
+            f"missing. Start at {told(time[0] + (needed - 1) * model.dt)} s or later."
         )
     available = time.size - 1 - at
     count = available if steps is None else steps
@@ -113,8 +118,8 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
     most = available + 1 if model.inputs else count
     if count > most:
         raise RequestError(
-            f"{count} steps from {time[at]:.10g} s need the input up to "
-            f"{time[at] + (count - 1) * model.dt:.10g} s and {name} ends at {time[-1]:.10g} s. "
+            f"{count} steps from {told(time[at])} s need the input up to "
+            f"{told(time[at] + (count - 1) * model.dt)} s and {name} ends at {told(time[-1])} s. "
             f"At most {most} steps can be forecast from there."
         )
     first = at + 1 - needed
@@ -247,17 +252,18 @@ def cut_divergence(values: FloatArray, scale: Scale, begun: FloatArray) -> Float
     return values
 
 
-def status_text(lost: int, time: FloatArray) -> str:
+def status_text(lost: int, time: FloatArray, dt: float) -> str:
     """What ``status`` says of a free run whose first lost instant is `lost`, or −1 for none."""
-    return "ok" if lost < 0 else f"{DIVERGED_AT}{time[lost]:.10g} s"
+    return "ok" if lost < 0 else f"{DIVERGED_AT}{instant_text(time[lost], dt)} s"
 
 
 def status_at_clock(status: str, clock: float) -> str:
     """The same status where time runs by a factor `clock`, as at full scale."""
     if not status.startswith(DIVERGED_AT):
         return status
-    instant = float(status.removeprefix(DIVERGED_AT).removesuffix(" s"))
-    return f"{DIVERGED_AT}{clock * instant:.10g} s"
+    instant = status.removeprefix(DIVERGED_AT).removesuffix(" s")
+    decimals = max(3, len(instant.partition(".")[2]))
+    return f"{DIVERGED_AT}{fixed(clock * float(instant), decimals)} s"
 
 
 def label_forecast(
@@ -265,7 +271,7 @@ def label_forecast(
 ) -> xr.Dataset:
     """Dataset of a forecast of shape (steps, N), with units, spread in training, and status."""
     lost = np.flatnonzero(np.isnan(values).any(axis=1))
-    status = status_text(int(lost[0]) if lost.size else -1, window.time.values)
+    status = status_text(int(lost[0]) if lost.size else -1, window.time.values, model.dt)
     variables = {
         label.name: xr.Variable(
             ("time",),
@@ -338,7 +344,8 @@ def summary(model: HankelDMDcModel) -> str:
         f"{counted(len(training.runs), 'run')}",
     ]
     lines += [
-        f"    {name}: {columns} pairs, {first:.10g} to {stop:.10g} s"
+        f"    {name}: {columns} pairs, {instant_text(first, model.dt)} to "
+        f"{instant_text(stop, model.dt)} s"
         for name, columns, first, stop in zip(
             training.runs, training.columns, training.first, training.stop, strict=True
         )

@@ -19,7 +19,16 @@ from seakeep.files import replacing, write_netcdf
 from seakeep.models.identification import Scale
 from seakeep.models.labelled import ChannelLabel
 
-__all__ = ["FORMAT_VERSION", "HANKEL_DMDC", "checksum", "pack", "read", "unpack", "write"]
+__all__ = [
+    "FORMAT_VERSION",
+    "HANKEL_DMDC",
+    "as_json",
+    "checksum",
+    "pack",
+    "read",
+    "unpack",
+    "write",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -65,12 +74,12 @@ def pack(
             variables[f"{group}_{name}"] = (group, getattr(scale, name))
     attrs = {
         "dt": dt,
-        "settings": _json(settings),
-        "training": _json(training),
+        "settings": as_json(settings),
+        "training": as_json(training),
         "labels": json.dumps({k: [asdict(label) for label in v] for k, v in labels.items()}),
     }
     if alignment is not None:
-        attrs["alignment"] = _json(alignment)
+        attrs["alignment"] = as_json(alignment)
     return xr.Dataset(variables, attrs=attrs)
 
 
@@ -104,7 +113,8 @@ def _values(dataset: xr.Dataset, name: str, precision: str = "double") -> FloatA
     return np.ascontiguousarray(dataset[name].values, dtype=precision)
 
 
-def _json(value: object) -> str:
+def as_json(value: object) -> str:
+    """Write a dataclass as JSON; numbers of numpy become plain ones."""
     assert is_dataclass(value)
     assert not isinstance(value, type)
     return json.dumps(asdict(value), default=_plain)

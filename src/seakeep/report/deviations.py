@@ -14,7 +14,14 @@ from seakeep.report.study_tables import ReportTable
 from seakeep.study import StudyResult
 from seakeep.study.windows import windows_overlap
 
-__all__ = ["alignment_words", "deviations", "prior_words", "test_overlap", "training_overlap"]
+__all__ = [
+    "alignment_words",
+    "deviations",
+    "prior_words",
+    "test_overlap",
+    "training_overlap",
+    "training_windows_overlap",
+]
 
 APART = 0.005
 """Windows that share less than this part of their length are apart."""
@@ -52,6 +59,12 @@ def training_overlap(result: StudyResult) -> str:
         "another. They are not independent, and the boxes show the spread over test windows more "
         "than that over training data."
     )
+
+
+def training_windows_overlap(result: StudyResult) -> bool:
+    """Whether training windows share a part of their length that counts."""
+    found = _overlap(result)
+    return found is not None and found[0] > 1 and found[3] >= APART
 
 
 def test_overlap(result: StudyResult) -> str:
@@ -112,6 +125,7 @@ def deviations(result: StudyResult) -> ReportTable:
     Returns
     -------
     ReportTable
+        The paper has a column where the study asks for it.
     """
     preset = str(result.attrs["preset"])
     rows = [
@@ -120,12 +134,18 @@ def deviations(result: StudyResult) -> ReportTable:
         *_model_rows(result),
         *_study_rows(result),
     ]
+    note = str(result.attrs.get("preparation_note", ""))
+    if not result.shows_paper:
+        chosen = tuple((subject, here) for subject, _, here in rows)
+        return ReportTable(
+            "method", f"Method in effect (preset {preset})", ("subject", "in effect"), chosen, note
+        )
     return ReportTable(
         "deviations",
         f"What the paper leaves open, and what is in effect here (preset {preset})",
         ("subject", "the paper", "in effect here"),
         tuple(rows),
-        str(result.attrs.get("preparation_note", "")),
+        note,
     )
 
 
@@ -159,7 +179,7 @@ def _data_rows(result: StudyResult) -> Rows:
          " and ".join(filtered) or "none"),
         *([("places of the probes", "48.24 m and 48.42 m for the same pole", ", ".join(places))]
           if places else []),
-        ("wave spectra", "Welch segments of 8.2 s", "both: those, and segments of 60 s"),
+        ("wave spectra", "Welch segments of 8.2 s", "Welch segments of 8.2 s and of 60 s"),
     ]  # fmt: skip
 
 
@@ -179,8 +199,8 @@ def _model_rows(result: StudyResult) -> Rows:
         ("measured outputs read after the start", "surge, through the alignment",
          f"{conditional}: every error, band and density here is conditional on measured "
          f"{conditional}" if conditional else "none: forecasts in the strict sense"),
-        ("standardisation", "z-score on the training window", {
-            "True": "the same", "False": "none"}.get(each("standardize"), each("standardize"))),
+        ("standardisation", "z-score on the training window",
+         each("standardize", _standardisation)),
         ("history of the training window", "its sizes hold only before it",
          each("history", _history)),
         ("rows of Â that shift the delays", "ridge on all rows", each("delay_rows", _delay_rows)),
@@ -189,7 +209,8 @@ def _model_rows(result: StudyResult) -> Rows:
         ("delays to samples", "nearest integer in the text, floor in the box", "nearest"),
         ("end of a training window", "where it lies is unstated", "its stop, for all draws"),
         ("band", "'95 % confidence interval'", "quantiles of the members, point by point"),
-        ("'Bayesian'", "the prior pushed forward", "the same: there is no likelihood"),
+        ("'Bayesian'", "the prior pushed forward",
+         "the prior pushed forward: there is no likelihood"),
     ]  # fmt: skip
 
 
@@ -204,13 +225,16 @@ def _study_rows(result: StudyResult) -> Rows:
     overlap: Rows = []
     if found is not None:
         count, length, span, share = found
-        shared = f"they share {100 * share:.0f} % of their length" if share >= APART else "apart"
-        if count == 1:
-            shared = "one"
+        shared = ""
+        if count > 1:
+            shared = "; they do not overlap"
+        if training_windows_overlap(result):
+            shared = f"; they share {100 * share:.0f} % of their length"
+        windows = "1 window" if count == 1 else f"{count} windows"
         overlap = [
             ("training windows", "ten, drawn at random, which cannot but overlap",
-             f"{count}, placed {_placed(training['placement'])}; the largest draw reads "
-             f"{length:.1f} T̂ of a span of {span:.0f} T̂; {shared}"),
+             f"{windows}, placed {_placed(training['placement'])}; the largest draw reads "
+             f"{length:.1f} T̂ of a span of {span:.0f} T̂{shared}"),
         ]  # fmt: skip
     placements = {each["placement"] for each in result.settings["tests"].values()}
     return [
@@ -232,6 +256,10 @@ def _study_rows(result: StudyResult) -> Rows:
 
 def _placed(placement: str) -> str:
     return {"random": "at random", "apart": "without overlap"}[placement]
+
+
+def _standardisation(word: str) -> str:
+    return {"True": "z-score on the training window", "False": "none"}.get(word, word)
 
 
 def _history(word: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,13 @@ import numpy as np
 from seakeep.campaign.checks import findings_of
 from seakeep.report.figures.common import HEADING, model_words
 from seakeep.report.quality_sheet import channel_rows
-from seakeep.report.study_tables import ReportTable, channel_words
+from seakeep.report.study_tables import ReportTable
 from seakeep.report.style import shown_unit
 from seakeep.study import StudyResult
 
 __all__ = [
     "findings",
+    "finished",
     "quality_table",
     "run_table",
     "settings_table",
@@ -190,7 +192,7 @@ def sign_table(result: StudyResult) -> ReportTable:
     channels = result.groups["channels"]
     rows = [
         (
-            channel_words(str(name)),
+            result.words_of(str(name)),
             str(at["use"].values),
             shown_unit(str(at["units"].values)),
             str(at["positive"].values),
@@ -295,7 +297,7 @@ def quality_table(result: StudyResult, name: str) -> ReportTable:
         low, high, mean, spread = (f"{value:.4g}" for value in each["numbers"])
         rows.append(
             (
-                channel_words(channel),
+                each["words"],
                 "yes" if channel in used else "",
                 shown_unit(each["units"]),
                 mean,
@@ -352,6 +354,11 @@ def training_table(result: StudyResult) -> ReportTable:
     )
 
 
+def finished(result: StudyResult) -> str:
+    """Day and time at which the study was finished, as people read them."""
+    return f"{datetime.fromisoformat(str(result.attrs['created'])):%Y-%m-%d %H:%M:%S %Z}"
+
+
 def versions_table(result: StudyResult) -> ReportTable:
     """Digest, seed, versions."""
     versions = json.loads(result.attrs["versions"])
@@ -362,7 +369,7 @@ def versions_table(result: StudyResult) -> ReportTable:
         ("campaign digest", str(result.attrs["campaign_digest"])),
         ("preset", str(result.attrs["preset"])),
         ("seed", str(result.attrs["seed"])),
-        ("finished", str(result.attrs["created"])),
+        ("finished", finished(result)),
         *((name, str(version)) for name, version in versions.items()),
     ]
     return ReportTable("versions", "Versions and digest", ("what", "value"), tuple(rows))
