@@ -15,7 +15,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.errors import DataError, RequestError
-from seakeep.files import replacing
+from seakeep.files import replacing, write_netcdf
 from seakeep.models.identification import Scale
 from seakeep.models.labelled import ChannelLabel
 
@@ -156,10 +156,7 @@ def write(dataset: xr.Dataset, path: str | Path, kind: str) -> Path:
     )
     labelled.attrs["checksum"] = checksum(labelled)
     with replacing(target) as temporary:
-        try:
-            labelled.to_netcdf(temporary, engine="h5netcdf")
-        except RuntimeError as error:  # what HDF5 makes of a full disk when it closes the file
-            raise OSError("the file could not be written to its end") from error
+        write_netcdf(temporary, labelled)
     return target
 
 

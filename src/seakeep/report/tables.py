@@ -11,7 +11,7 @@ import xarray as xr
 from rich import box
 from rich.table import Table
 
-from seakeep.files import replacing
+from seakeep.files import replacing, write_netcdf
 
 __all__ = [
     "band_findings",
@@ -245,7 +245,7 @@ def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
     """
     with replacing(path) as temporary:
         if path.suffix == ".nc":
-            forecast.to_netcdf(temporary, engine="h5netcdf")
+            write_netcdf(temporary, forecast)
         else:
             # Instants are multiples of a step; nine decimals hide the rounding of the product.
             time = pd.Index(forecast["time"].values.round(9), name="time [s]")

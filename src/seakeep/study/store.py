@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import json
-import shutil
 import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -20,7 +19,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.errors import DataError, RequestError, SeakeepError
-from seakeep.files import replacing
+from seakeep.files import replacing, write_netcdf
 from seakeep.interruption import uninterrupted
 
 __all__ = [
@@ -341,15 +340,16 @@ def write_result(
     """
     kept = {**attrs, "format": FORMAT, "created": datetime.now(UTC).isoformat(timespec="seconds")}
     with uninterrupted(), storing(folder), replacing(folder / RESULT) as temporary:
-        xr.Dataset(attrs=kept).to_netcdf(temporary, engine="h5netcdf", mode="w")
-        for name, group in groups.items():
-            packed = {
-                key: {"zlib": True, "complevel": 1, "shuffle": True}
-                for key, variable in group.data_vars.items()
-                if variable.size > 4096 and variable.dtype.kind == "f"
-            }
-            group.to_netcdf(temporary, engine="h5netcdf", mode="a", group=name, encoding=packed)
+        write_netcdf(temporary, xr.Dataset(attrs=kept), groups, _packing)
     return StudyResult(folder, kept, dict(groups))
+
+
+def _packing(group: xr.Dataset) -> dict[str, dict[str, object]]:
+    return {
+        str(key): {"zlib": True, "complevel": 1, "shuffle": True}
+        for key, variable in group.data_vars.items()
+        if variable.size > 4096 and variable.dtype.kind == "f"
+    }
 
 
 def retell(result: StudyResult, words: Mapping[str, str]) -> StudyResult:
@@ -377,8 +377,7 @@ def retell(result: StudyResult, words: Mapping[str, str]) -> StudyResult:
         return result
     path = result.folder / RESULT
     with uninterrupted(), storing(result.folder), replacing(path) as temporary:
-        shutil.copyfile(path, temporary)
-        xr.Dataset(attrs=changed).to_netcdf(temporary, engine="h5netcdf", mode="a")
+        write_netcdf(temporary, xr.Dataset(attrs=changed), onto=path)
     return replace(result, attrs={**result.attrs, **changed})
 
 
