@@ -255,7 +255,10 @@ def test_a_mat_file_reproduces_the_forecast(model, make_run, tmp_path):
     content = io.loadmat(model.to_mat(tmp_path / "rom.mat"), squeeze_me=False)
     steps, start = 100, 60
     state = model.initial_state(run, start=float(run.time[start]))
+    x = np.stack([run.heave.values, run.pitch.values], axis=1)[: start + 1]
     u = np.stack([run.eta_fwd.values, run.eta_cog.values], axis=1)[start : start + steps + 1]
+    before = np.stack([run.eta_fwd.values, run.eta_cog.values], axis=1)[: start + 1]
+    np.testing.assert_array_equal(model.initial_state_arrays(x, before), state)
     outputs = []
     for row in u:
         deviation = row - content["InputOffset"][:, 0]
@@ -272,6 +275,12 @@ def test_a_mat_file_reproduces_the_forecast(model, make_run, tmp_path):
 def test_a_mat_file_carries_what_idss_asks_for(model, tmp_path):
     content = io.loadmat(model.to_mat(tmp_path / "rom.mat"))
     names = {key: [str(cell[0]) for cell in content[key][:, 0]] for key in content if "Name" in key}
+    entries = names.pop("StateName")
+    assert len(entries) == content["A"].shape[0]
+    assert entries[:3] + entries[7:10] == [
+        *("heave(k)", "pitch(k)", "heave(k-1)"),
+        *("pitch(k-3)", "eta_fwd(k-1)", "eta_cog(k-1)"),
+    ]
     assert names == {"InputName": ["eta_fwd", "eta_cog"], "OutputName": ["heave", "pitch"]}
     assert [str(cell[0]) for cell in content["OutputUnit"][:, 0]] == ["m", "rad"]
     assert float(content["Ts"][0, 0]) == model.dt

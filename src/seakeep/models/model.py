@@ -354,7 +354,7 @@ class HankelDMDcModel:
         return export.to_control(self)
 
     def to_mat(self, path: str | Path) -> Path:
-        """Write A, B, C, D, Ts, offsets, names and units for MATLAB.
+        """Write A, B, C, D, Ts, offsets, names (of the state's entries too) and units for MATLAB.
 
         Parameters
         ----------
@@ -396,6 +396,29 @@ class HankelDMDcModel:
         if self.alignment is not None:
             history = aligned.align_history(self, run, window)
         return export.initial_state(self, window.state_history, history)
+
+    def initial_state_arrays(
+        self, x_history: npt.ArrayLike, u_history: npt.ArrayLike
+    ) -> FloatArray:
+        """State of the exported system from arrays, for use in a loop or on board.
+
+        Parameters
+        ----------
+        x_history, u_history : array_like, shapes (at least s + 1, N) and (at least z + 1, Q)
+            As for :meth:`forecast_arrays`.
+
+        Returns
+        -------
+        ndarray, shape (N(s+1) + Qz,)
+            :math:`[x_k; x_{k-1}; …; x_{k-s}; u_{k-1}; …; u_{k-z}]`, less their means.
+
+        Raises
+        ------
+        RequestError
+            As :meth:`forecast_arrays`.
+        """
+        x, u = forecasting.check_arrays(self, x_history, u_history, [], 1)
+        return export.initial_state(self, x, u)
 
     def summary(self) -> str:
         """Text that says what the model is and how it was identified.
