@@ -10,7 +10,7 @@ import numpy as np
 import tomlkit
 from tomlkit.items import Table
 
-from seakeep.campaign.columns import Columns, is_unit
+from seakeep.campaign.columns import Columns
 from seakeep.campaign.draft_hints import (
     derived_examples,
     driving_wave,
@@ -27,9 +27,9 @@ from seakeep.campaign.guesses import (
     noise_of,
     waves_of,
 )
-from seakeep.campaign.readers import read_columns, time_column
+from seakeep.campaign.readers import read_columns, time_column, time_step_of
 from seakeep.campaign.settings import FileSettings
-from seakeep.conventions import canonical_channel, conversion
+from seakeep.conventions import canonical_channel
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import encounter_period
 
@@ -134,15 +134,8 @@ def _refuse(files: Sequence[File]) -> None:
 
 
 def _rate(table: Columns, time: str | None) -> float | None:
-    if time is None or time not in table.values or table.values[time].size < 3:
-        return table.sampling_rate
-    unit = table.units.get(time, "s").split(" since ")[0]
-    times = table.values[time]
-    step = float(times[-1] - times[0]) / (times.size - 1)
-    usual = float(np.median(np.diff(times)))
-    step = step if abs(step - usual) < 0.01 * abs(usual) else usual  # gaps do not count
-    step *= conversion(unit, "s", f"the time column '{time}'") if is_unit(unit) else 1.0
-    return 1.0 / step if step > 0 else None
+    step = None if time is None else time_step_of(table, time)
+    return table.sampling_rate if step is None else 1.0 / step
 
 
 def _wave_period(
