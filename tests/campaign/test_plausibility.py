@@ -61,6 +61,35 @@ def loggers(tmp_path):
     return write
 
 
+class TestClocksAndRates:
+    """What is assumed or contradicted about instants is a finding."""
+
+    def test_clocks_of_which_nothing_is_said_are_assumed_the_same(self, loggers, tmp_path):
+        found = clocks(loggers().prepare()["first"])
+        assert [channel for channel, _ in found] == ["mru"]
+        assert found[0][1].startswith("assumed the same as the reference's: state trigger, shared")
+        path = tmp_path / "campaign.toml"
+        one = path.read_text().replace("[instruments.mru]", "[instruments.mru]\noffset = 0")
+        path.write_text(one, encoding="utf-8")
+        assert not clocks(read_campaign(path).prepare()["first"])
+
+    @pytest.mark.parametrize(
+        ("files", "text"),
+        [('time = "Time"\nsampling_rate = 100', "samples at 50 Hz, as its times tell; 100 Hz are"),
+         ("sampling_rate = 25", "counted at the 25 Hz stated; the file's own times, which are "),
+         ('time = "Time"\nsampling_rate = 50', None), ("sampling_rate = 50", None)],
+    )  # fmt: skip
+    def test_a_rate_against_the_times(self, edited, files, text):
+        path = edited(("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"))
+        found = clocks(read_campaign(path).prepare(["first"])["first"])
+        assert [each[0] for each in found] == ([] if text is None else ["time"])
+        assert text is None or found[0][1].startswith(text)
+
+
+def clocks(run):
+    return [(each.channel, each.text) for each in findings_of(run) if each.kind == "clock"]
+
+
 def records(run):
     return [(each.channel, each.text) for each in findings_of(run) if each.kind == "record"]
 
@@ -225,3 +254,15 @@ def test_the_commands_show_step_and_period(edited, tank, capsys):
     assert words in " ".join(capsys.readouterr().err.split())
     page = (tank / "prepared" / "quality.html").read_text(encoding="utf-8")
     assert page.count(words) == 2
+
+
+def test_the_command_tells_what_was_found(loggers, tmp_path, capsys):
+    pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
+    loggers()
+    path = tmp_path / "mru.csv"
+    columns = {**tank_columns(), "Pitch (deg)": np.full(1001, 3.2)}
+    write_csv(path, {name: x for name, x in columns.items() if name != "WP fwd [mm]"})
+    assert cli.main(["prepare", str(tmp_path / "campaign.toml")]) == 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert "Found in first: pitch: constant at" in said
+    assert "Found in first: clock of mru: assumed the same as the reference's: state" in said

@@ -13,7 +13,7 @@ from seakeep.campaign.checks import check_samples
 from seakeep.campaign.columns import is_unit
 from seakeep.campaign.derivation import derive
 from seakeep.campaign.instruments import Logger, channels_of, homes
-from seakeep.campaign.readers import labelled_table
+from seakeep.campaign.readers import labelled_table, time_column, time_step_of
 from seakeep.campaign.settings import (
     CampaignSettings,
     ChannelSettings,
@@ -133,10 +133,20 @@ def _channels(
         _refuse_gaps(dataset, run, path)
     dataset = _bridged(_regular(dataset, preparation, f"run '{run}' ({path})"), preparation)
     dataset = check_samples(dataset, preparation.outliers == "replace")
+    if (aside := _time_aside(logger)) is not None:
+        dataset.attrs["time_column_step"] = aside
     for name, position in settings.rig.positions.items():
         if name in dataset:
             dataset[name].attrs["x_position"] = float(position)
     return dataset
+
+
+def _time_aside(logger: Logger) -> float | None:
+    """Step that the file's times tell, s, where a stated rate counts in their place."""
+    if logger.options.sampling_rate is None or logger.options.time is not None:
+        return None
+    name = time_column(logger.columns)
+    return None if name is None else time_step_of(logger.columns, name)
 
 
 def _regular(dataset: xr.Dataset, preparation: PreparationSettings, name: str) -> xr.Dataset:

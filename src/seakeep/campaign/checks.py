@@ -33,6 +33,7 @@ from seakeep.signals.quality import (
     level_drift,
 )
 from seakeep.signals.resolution import reading_step
+from seakeep.signals.synchronise import ASSUMED
 
 __all__ = [
     "Finding",
@@ -49,6 +50,10 @@ __all__ = [
 
 FloatArray = npt.NDArray[np.float64]
 
+RATE_TOLERANCE = 0.01
+"""Part by which a stated rate may differ from the times: rates are written with two digits or more,
+and quartzes keep theirs a thousand times better."""
+
 NO_SLOW_MOTION = ("heave", "roll", "pitch")
 """Besides wave elevations, channels whose level has no reason to change within a run."""
 
@@ -64,7 +69,7 @@ class Finding:
     kind : str
         ``constant``, ``missing``, ``outliers``, ``saturated``, ``stuck``, ``drift``, ``lag``,
         ``resolution``, ``agreement``, ``scale``, ``position``, ``clock``, ``record``, ``period``,
-        ``impossible``, ``unit`` or ``left out``.
+        ``rate``, ``impossible``, ``unit`` or ``left out``.
     text : str
         What, how much, and what was done about it.
     """
@@ -345,12 +350,32 @@ def check_clocks(
         if (jitter := float(group.attrs.get("time_jitter_rms", 0.0))) > 0:
             text = f"jitter of {1e3 * jitter:.3g} ms RMS; interpolated onto a uniform step"
             out.append(Finding(label, "clock", text))
-        nominal = settings.instruments[name].sampling_rate if name else None
-        if nominal is not None and abs(step * nominal - 1) > 0.01:
-            text = f"samples at {1 / step:.5g} Hz; {nominal:g} Hz are stated"
+        out += [Finding(label, "clock", text) for text in _other_rate(name, group, settings)]
+        if clock.method == ASSUMED:
+            text = (
+                f"{ASSUMED}: state trigger, shared, correlated or offset (0 where the two run on "
+                f"one clock) in [instruments.{name}]"
+            )
             out.append(Finding(label, "clock", text))
         if clock.offset_error > 0.25 * step or clock.residual > 0.5 * step:
             out.append(Finding(label, "clock", f"poorly known: {clock.describe()}"))
         if abs(clock.drift) > 2e-4:
             out.append(Finding(label, "clock", f"drifts by {1e6 * clock.drift:+.0f} ppm"))
     return out
+
+
+def _other_rate(name: str, group: xr.Dataset, settings: CampaignSettings) -> list[str]:
+    """Say that a rate is stated and the times tell another one."""
+    step = float(group["time"][1] - group["time"][0])
+    stated = settings.instruments[name].sampling_rate if name else settings.files.sampling_rate
+    aside = group.attrs.get("time_column_step")
+    if stated is None:
+        return []
+    if aside is not None and abs(aside * stated - 1) > RATE_TOLERANCE:
+        return [
+            f"counted at the {stated:g} Hz stated; the file's own times, which are left aside, "
+            f"tell {1 / aside:.5g} Hz. Leave sampling_rate out, or correct it"
+        ]
+    if abs(step * stated - 1) > RATE_TOLERANCE:
+        return [f"samples at {1 / step:.5g} Hz, as its times tell; {stated:g} Hz are stated"]
+    return []

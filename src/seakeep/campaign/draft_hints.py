@@ -164,11 +164,8 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
     model = tomlkit.table()
     model.add("preset", "recommended")
     model.add("states", list(states))
-    motions = any(moved)
     model["states"].comment(
-        "guessed: the motions that the model forecasts"
-        if motions
-        else "CORRECT IT: no motion was found; name the files of all loggers to init"
+        "guessed: the motions that the model forecasts" if any(moved) else _no_motion(guesses)
     )
     if left := [name for name in noise if any(name in kind for kind in kinds)]:
         model.add(tomlkit.comment(f"{', '.join(left)}: noise alone was found; left out."))
@@ -189,3 +186,13 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
     model.add(tomlkit.comment('ridge_scale = "per_snapshot"'))
     model.add(tomlkit.comment('delay_rows = "exact"'))
     return model
+
+
+def _no_motion(guesses: Sequence[Guess]) -> str:
+    """What to do where no column is called as a motion is."""
+    if all(guess.column.isdigit() for guess in guesses):
+        return (
+            "CORRECT IT: the files have no header; give [channels.…] their names, such as heave "
+            "or eta_1, and state units"
+        )
+    return "CORRECT IT: no motion was found; name the files of all loggers to init"

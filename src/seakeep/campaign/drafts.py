@@ -10,7 +10,7 @@ import numpy as np
 import tomlkit
 from tomlkit.items import Table
 
-from seakeep.campaign.columns import Columns
+from seakeep.campaign.columns import Columns, named_unit
 from seakeep.campaign.draft_hints import (
     derived_examples,
     driving_wave,
@@ -25,9 +25,10 @@ from seakeep.campaign.guesses import (
     guess_channels,
     is_trigger,
     noise_of,
+    rising_column,
     waves_of,
 )
-from seakeep.campaign.readers import read_columns, time_column, time_step_of
+from seakeep.campaign.readers import read_columns, time_column, time_step_of, time_unit_of
 from seakeep.campaign.settings import FileSettings
 from seakeep.conventions import canonical_channel
 from seakeep.errors import DataError, RequestError
@@ -38,6 +39,8 @@ __all__ = ["draft_campaign"]
 NOISE = 4.0
 """Standard deviations of a probe's noise that a wave must pass either way to count: one sample in
 16 000 of normal noise lies beyond."""
+
+REMOVE = "prepare warns of it: remove it"
 
 LED = 0.9
 """Where noise shortens the counted period to less than this part, the draft states a hysteresis."""
@@ -81,7 +84,7 @@ def draft_campaign(
     paths = [Path(file) for file in files]
     known = {key: value for key, value in (options or {}).items() if value is not None}
     tables = [read_columns(path, FileSettings.model_validate(known)) for path in paths]
-    read = arranged(paths, tables, [time_column(table) for table in tables])
+    read = arranged(paths, tables, _times(tables))
     guesses = guess_channels(read)
     if not any(guess.channel for guess in guesses):
         _refuse(read)
@@ -131,6 +134,15 @@ def _refuse(files: Sequence[File]) -> None:
         f"{first.path}: no column has numbers that a channel could be made of (columns: "
         f"{', '.join(first.table.names)}). Check delimiter and decimal mark of the file."
     )
+
+
+def _times(tables: Sequence[Columns]) -> list[str | None]:
+    """Time column of each file, by its name; else by its values, where no file tells its rate."""
+    named = [time_column(table) for table in tables]
+    return [
+        rising_column(table) if time is None and table.sampling_rate is None else time
+        for table, time in zip(tables, named, strict=True)
+    ]
 
 
 def _rate(table: Columns, time: str | None) -> float | None:
@@ -217,11 +229,20 @@ def _files_table(
     times = {file.time for file in files}
     if len(times) == 1 and (time := files[0].time) is not None:
         table.add("time", time)
-        table["time"].comment("guessed from its name")
-    elif not files[0].logger and files[0].table.sampling_rate is None:
+        table["time"].comment(_why_time(files[0].table, time))
+    elif not files[0].logger and None in times and files[0].table.sampling_rate is None:
         table.add("sampling_rate", 100.0)
         table["sampling_rate"].comment("ASSUMED: the files have no time column. Correct it")
+        table.add("sampling_rate_assumed", tomlkit.item(True).comment(REMOVE))
     document.add("files", table)
+
+
+def _why_time(table: Columns, time: str) -> str:
+    if time_column(table) is not None:
+        return "guessed from its name"
+    unit, step = time_unit_of(table, time), time_step_of(table, time)
+    rate = "" if step is None else f": {1 / step:.6g} samples a second"
+    return f"guessed: it rises evenly, as times do, in {unit}{rate}. Check it"
 
 
 def _channels(document: tomlkit.TOMLDocument, guesses: Sequence[Guess]) -> None:
@@ -237,16 +258,16 @@ def _channels(document: tomlkit.TOMLDocument, guesses: Sequence[Guess]) -> None:
         table.add("column", guess.column)
         if guess.logger:
             table.add("instrument", guess.logger)
-        if guess.assumed_unit:
+        if guess.named_unit:
+            table.add("unit", guess.unit)
+            table["unit"].comment("guessed: its name ends on it. Check it")
+        elif guess.assumed_unit:
             table.add("unit", guess.unit)
             table["unit"].comment("ASSUMED: the file states none. Correct it")
-            if guess.unit != "-":
-                table.add(
-                    "unit_assumed", tomlkit.item(True).comment("prepare warns of it: remove it")
-                )
+            table.add("unit_assumed", tomlkit.item(True).comment(REMOVE))
         canonical = canonical_channel(guess.channel)
         if canonical is None:
-            table.add("long_name", guess.column)
+            table.add("long_name", _label(guess))
         else:
             table["column"].comment(f"guessed: {canonical.long_name}; header '{guess.header}'")
         if guess.gaps:
@@ -257,6 +278,11 @@ def _channels(document: tomlkit.TOMLDocument, guesses: Sequence[Guess]) -> None:
         document.add(tomlkit.nl())
     for guess in skipped:
         document.add(tomlkit.comment(f"column '{guess.header}' left out: {guess.why}"))
+
+
+def _label(guess: Guess) -> str:
+    """Name of a column for labels, without a unit that the campaign converts."""
+    return named_unit(guess.column)[0] if guess.named_unit else guess.column
 
 
 def _instruments(
@@ -287,6 +313,7 @@ def _instruments(
         if file.time is None and file.table.sampling_rate is None:
             table.add("sampling_rate", 100.0)
             table["sampling_rate"].comment("ASSUMED: the file has no time column. Correct it")
+            table.add("sampling_rate_assumed", tomlkit.item(True).comment(REMOVE))
         elif rate := rates[file.logger]:
             table.add(tomlkit.comment(f"{rate:.6g} samples a second"))
         if all(triggers.values()):

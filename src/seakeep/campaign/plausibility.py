@@ -16,7 +16,7 @@ from seakeep.campaign.settings import CampaignSettings, RunSettings
 from seakeep.campaign.survey import used_span
 from seakeep.errors import SeakeepWarning
 
-__all__ = ["check_records", "check_values", "implausible", "warn_of"]
+__all__ = ["WARNED", "check_rates", "check_records", "check_values", "implausible", "warn_of"]
 
 LOST = 0.05
 """Part of a run's used span that a logger may miss: they are started and stopped by hand, seconds
@@ -94,6 +94,22 @@ def check_values(run: xr.Dataset, depth: float | None) -> list[Finding]:
     return out
 
 
+def _in(unit: str | None) -> str:
+    return "without a unit" if unit == "-" else f"in {unit}"
+
+
+def check_rates(groups: Mapping[str, xr.Dataset], settings: CampaignSettings) -> list[Finding]:
+    """Loggers whose rate is a guess, of kind ``rate``; the reference of one file is "time"."""
+    out = []
+    for name in groups:
+        own = settings.instruments[name] if name else settings.files
+        counted = own.sampling_rate is not None and own.time is None
+        if counted and own.sampling_rate_assumed:
+            text = f"at {own.sampling_rate:g} Hz, which is assumed: no file tells its rate"
+            out.append(Finding(name or "time", "rate", text))
+    return out
+
+
 def _reached(x: npt.NDArray[np.float64]) -> float:
     return float(np.percentile(np.abs(x), 99))
 
@@ -123,15 +139,16 @@ def implausible(
     Returns
     -------
     list of Finding
-        Records, values, assumed units and the period.
+        Records, values, assumed units and rates, and the period.
     """
     run = settings.runs[name]
     found = check_records(groups, run) + check_values(whole, settings.rig.water_depth)
     found += [
-        Finding(channel, "unit", f"in {each.unit}, which is assumed: no file states its unit")
+        Finding(channel, "unit", f"{_in(each.unit)}, which is assumed: no file states its unit")
         for channel, each in channels_of(settings, run).items()
         if each.unit_assumed and channel in whole
     ]
+    found += check_rates(groups, settings)
     if name in doubts and settings.wave_channel is not None:
         found.append(Finding(settings.wave_channel, "period", doubts[name]))
     return found
@@ -145,6 +162,8 @@ _MENDS = {
     "impossible": _UNIT,
 }
 """What to do about each kind of finding of which a warning is given."""
+WARNED = frozenset({"unit", "rate", "position", "period", "left out", *_MENDS})
+"""Kinds of findings that warnings tell while a campaign is prepared."""
 
 
 def warn_of(findings: Iterable[Finding], run: str, told: set[tuple[str, str]]) -> None:
@@ -175,6 +194,15 @@ def warn_of(findings: Iterable[Finding], run: str, told: set[tuple[str, str]]) -
             stacklevel=3,
         )
     for each in every:
+        if each.kind == "rate" and (each.channel, "rate") not in told:
+            table = "files" if each.channel == "time" else f"instruments.{each.channel}"
+            told.add((each.channel, "rate"))
+            warnings.warn(
+                f"{run}: sampled {each.text}. All periods and rates follow from it. Correct "
+                f"sampling_rate in [{table}], and remove sampling_rate_assumed there.",
+                SeakeepWarning,
+                stacklevel=3,
+            )
         if each.kind not in _MENDS or (each.channel, each.kind) in told:
             continue
         if each.kind != "record":

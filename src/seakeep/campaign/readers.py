@@ -225,22 +225,19 @@ def time_column(table: Columns, stated: str | None = None) -> str | None:
     if stated is not None:
         return table.find(stated)
     for name in table.names:
-        if name.strip().lower() in _TIMES or _named_time(name) is not None:
+        bare, unit = named_unit(name)
+        if unit is not None and si_unit(unit) != "s":
+            bare = name
+        if bare.strip().lower() in _TIMES:
             return name
     return None
-
-
-def _named_time(name: str) -> str | None:
-    """Unit of time that the name of a time column ends on, as of ``time_ms``."""
-    bare, unit = named_unit(name)
-    known = unit is not None and bare.lower() in _TIMES and si_unit(unit) == "s"
-    return unit if known else None
 
 
 def time_unit_of(table: Columns, name: str, stated: str | None = None) -> str:
     """Unit of a time column: as stated, as its header says, as its name ends, or seconds."""
     said = table.units.get(name, "").split(" since ")[0].strip()
-    return stated or said or _named_time(name) or "s"
+    named = named_unit(name)[1]
+    return stated or said or (named if named is not None and si_unit(named) == "s" else "s")
 
 
 def time_step_of(table: Columns, name: str) -> float | None:
