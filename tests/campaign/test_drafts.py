@@ -443,6 +443,17 @@ def test_one_logger_a_run_keeps_the_names_of_runs_and_logger(tmp_path):
     assert text.count("# guessed: irregular runs but the last train, the rest tests\n") == 4
 
 
+def test_what_has_gaps_is_left_out_with_a_word(tmp_path):
+    columns = tank_columns() | {"WP aft [mm]": tank_columns()["WP fwd [mm]"]}
+    for name in ("Heave [mm]", "WP aft [mm]"):
+        columns[name] = np.where(np.arange(1001) // 10 == 30, np.nan, columns[name])
+    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
+    assert (campaign.model().states, campaign.model().inputs) == (("pitch",), ("eta_fwd",))
+    for name, key in (("heave", "states"), ("eta_aft", "inputs")):
+        said = f"# {name} left out: it has gaps, and a model takes none. To be among the {key}, "
+        assert said in text
+
+
 def test_motions_that_are_noise_alone_are_no_states(tmp_path):
     columns = tank_columns(0, seconds=40.0)
     noise = np.random.default_rng(0).normal(0.0, 0.1, columns["Time [s]"].size)

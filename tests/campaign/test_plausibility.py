@@ -241,6 +241,24 @@ class TestValues:
         assert "scale" in kinds(run)
 
 
+@pytest.mark.parametrize(
+    ("begin", "why"),
+    [(300, "a gap of 2 s is longer than longest_gap = 0.25 s in [preparation]"),
+     (901, "it stands at an end of the record")],
+)  # fmt: skip
+def test_why_a_gap_is_not_bridged(edited, tank, begin, why):
+    columns = tank_columns(0)
+    columns["Heave [mm]"][begin : begin + 100] = np.nan
+    columns["Heave [mm]"][100:105] = np.nan  # short
+    write_csv(tank / "first.csv", columns)
+    path = edited(("[preparation]", '[preparation]\ngaps = "bridge"'))
+    said = findings_of(read_campaign(path).prepare(["first"])["first"])
+    missing, bridged = (each.text for each in said if each.kind == "missing")
+    assert missing.startswith("missing: 100 samples in 1 place(s)")
+    assert missing.endswith(f"; not bridged: {why}")
+    assert bridged.startswith("bridged: 5 samples in 1 place(s)")
+
+
 def kinds(run):
     return {each.kind for each in findings_of(run)}
 
@@ -264,5 +282,5 @@ def test_the_command_tells_what_was_found(loggers, tmp_path, capsys):
     write_csv(path, {name: x for name, x in columns.items() if name != "WP fwd [mm]"})
     assert cli.main(["prepare", str(tmp_path / "campaign.toml")]) == 0
     said = " ".join(capsys.readouterr().err.split())
-    assert "Found in first: pitch: constant at" in said
+    assert "Found in first: pitch: constant at 3.2 deg Found" in said
     assert "Found in first: clock of mru: assumed the same as the reference's: state" in said

@@ -283,6 +283,11 @@ def test_round_trip(tmp_path, values, delimiter, comma, units, compressed, newli
             " expected a header, then one row an instant and one column a channel",
         ),
         (
+            "0,0.1,0.2\n1,2,3\n",
+            DataError,
+            r"run\.csv: no header and more columns than rows, which looks transposed \(2 rows, 3",
+        ),
+        (
             "time,heave\n2024-05-01 12:00:00.1,1\n2024-05-01 12:00:00.2,2\n",
             DataError,
             "line 2, column 'time': '2024-05-01 12:00:00.1' is not a number. Write dates and clock",

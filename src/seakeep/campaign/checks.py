@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.campaign.settings import CampaignSettings
+from seakeep.campaign.settings import CampaignSettings, PreparationSettings
+from seakeep.conventions import displayed
 from seakeep.errors import SeakeepWarning
 from seakeep.signals import Clock, bridge, misplaced_probes
 from seakeep.signals.gaps import stretches
@@ -150,7 +151,7 @@ def checked(
 ) -> list[Finding]:
     """All findings of a run."""
     pairs, _ = check_pairs(whole, settings)
-    every = told_samples(groups) + check_levels(whole) + pairs
+    every = told_samples(groups, settings.preparation) + check_levels(whole) + pairs
     every += check_positions(whole, settings.rig.water_depth, settings.runs[run].waves)
     others = [Finding("other runs", "left out", words) for words in left_out.values()]
     return every + check_clocks(clocks, groups, settings) + others
@@ -160,7 +161,9 @@ _KINDS = {MISSING: "missing", OUTLIER: "outliers", SATURATED: "saturated", STUCK
           BRIDGED: "missing"}  # fmt: skip
 
 
-def told_samples(groups: Mapping[str, xr.Dataset]) -> list[Finding]:
+def told_samples(
+    groups: Mapping[str, xr.Dataset], preparation: PreparationSettings
+) -> list[Finding]:
     """Put flagged samples, and channels that are constant, into words."""
     out = []
     for group in groups.values():
@@ -170,8 +173,8 @@ def told_samples(groups: Mapping[str, xr.Dataset]) -> list[Finding]:
             if "derived_from" in group[name].attrs:
                 continue
             if not np.ptp(group[name].to_numpy()):
-                value = float(group[name][0])
-                out.append(Finding(str(name), "constant", f"constant at {value:g}"))
+                value = _in_words(group[name], float(group[name][0]), ".6g")
+                out.append(Finding(str(name), "constant", f"constant at {value}"))
             if f"{name}_flags" not in group.coords:
                 continue
             flags = group[f"{name}_flags"].to_numpy()
@@ -188,8 +191,26 @@ def told_samples(groups: Mapping[str, xr.Dataset]) -> list[Finding]:
                 )
                 if bit == OUTLIER and (flags & REPLACED).any():
                     text += "; replaced by interpolation"
+                if bit == MISSING and preparation.gaps == "bridge":
+                    text += f"; not bridged: {_why_open(parts, hit.size, dt, preparation)}"
                 out.append(Finding(str(name), _KINDS[bit], text))
     return out
+
+
+def _in_words(channel: xr.DataArray, value: float, form: str) -> str:
+    """Write a value of a channel with its unit, angles in degrees."""
+    factor, unit = displayed(str(channel.attrs["units"]))
+    return f"{factor * value:{form}}" + (f" {unit}" if unit not in ("1", "-") else "")
+
+
+def _why_open(
+    parts: Sequence[tuple[int, int]], size: int, dt: float, preparation: PreparationSettings
+) -> str:
+    inner = [(end - begin) * dt for begin, end in parts if begin > 0 and end < size]
+    if not inner:
+        return "it stands at an end of the record"
+    limit = f"longest_gap = {float(preparation.longest_gap):g} s in [preparation]"
+    return f"a gap of {max(inner):.3g} s is longer than {limit}"
 
 
 def check_levels(run: xr.Dataset) -> list[Finding]:
@@ -205,8 +226,7 @@ def check_levels(run: xr.Dataset) -> list[Finding]:
         change, sure = level_drift(x, dt, dominant_period(x, dt))
         # A level that moves by half the waves' spread shifts means and standardisation visibly.
         if abs(change) > 0.5 * x.std() and sure > 5:
-            units = run[name].attrs["units"]
-            text = f"level drifts by {change:+.3g} {units} over the record"
+            text = f"level drifts by {_in_words(run[name], change, '+.3g')} over the record"
             out.append(Finding(name, "drift", text))
     return out
 
@@ -253,7 +273,7 @@ def check_pairs(
             for fault in agreement.faults():
                 text = f"against {pair.channels[0]}: {fault}"
                 if (kind := _kind(fault)) == "resolution":
-                    text += f" ({step:.2g} {run[name].attrs['units']})"
+                    text += f" ({_in_words(run[name], step, '.2g')})"
                 out.append(Finding(name, kind, text))
             if not np.isfinite(agreement.period):
                 continue

@@ -169,6 +169,9 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
     )
     if left := [name for name in noise if any(name in kind for kind in kinds)]:
         model.add(tomlkit.comment(f"{', '.join(left)}: noise alone was found; left out."))
+    gapped = [str(guess.channel) for guess in guesses if guess.channel and guess.gaps]
+    if left := [name for name in gapped if any(name in kind for kind in kinds)]:
+        _add_gapped(model, left, "states")
     if loads:
         for line in (
             f"Loads ({', '.join(loads)}) may be added to the states to have them forecast too.",
@@ -178,6 +181,8 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
             model.add(tomlkit.comment(line))
     model.add("inputs", [wave for wave in waves if wave not in states])
     model["inputs"].comment("guessed: the wave probes that drive it; those behind it do not")
+    if left := [wave for wave in _waves(guesses) if wave not in waves]:
+        _add_gapped(model, left, "inputs")
     model.add(tomlkit.comment("in place of the preset's, in encounter periods T or in samples:"))
     for key, count in (("state_delays", 1), ("input_delays", 5)):
         about = f"  # about {round(count * steps)} samples" if steps is not None else ""
@@ -186,6 +191,16 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
     model.add(tomlkit.comment('ridge_scale = "per_snapshot"'))
     model.add(tomlkit.comment('delay_rows = "exact"'))
     return model
+
+
+def _add_gapped(model: Table, left: Sequence[str], key: str) -> None:
+    has = "it has" if len(left) == 1 else "they have"
+    model.add(
+        tomlkit.comment(
+            f"{', '.join(left)} left out: {has} gaps, and a model takes none. To be among the "
+            f"{key}, mend them in the files, or bridge them (gaps, longest_gap in [preparation])."
+        )
+    )
 
 
 def _no_motion(guesses: Sequence[Guess]) -> str:

@@ -148,12 +148,14 @@ def _write_sheet(
 
 
 def _tell_findings(runs: Mapping[str, xr.Dataset]) -> None:
-    """Tell what the checks found and no warning said: a line a channel and kind."""
-    found: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    """Tell what the checks found and no warning said: a line a channel and kind of fault."""
+    found: dict[tuple[str, str, str], list[tuple[str, str]]] = {}
     for name, run in runs.items():
         for each in (each for each in findings_of(run) if each.kind not in WARNED):
-            found.setdefault((each.channel, each.kind), []).append((name, each.text))
-    for (channel, kind), said in list(found.items())[:SHOWN]:
+            found.setdefault((each.channel, each.kind, each.text.split()[0]), []).append(
+                (name, each.text)
+            )
+    for (channel, kind, _), said in list(found.items())[:SHOWN]:
         whose = f"clock of {channel}" if kind == "clock" and channel != "time" else channel
         others = len({run for run, _ in said}) - 1
         alike = f" (and in {others} more run{'s' * (others > 1)})" if others else ""
