@@ -1,5 +1,6 @@
 """Whole records, and values that a vessel can reach: what prepare warns of and the sheet tells."""
 
+import re
 import warnings
 
 import numpy as np
@@ -84,6 +85,34 @@ class TestClocksAndRates:
         found = clocks(read_campaign(path).prepare(["first"])["first"])
         assert [each[0] for each in found] == ([] if text is None else ["time"])
         assert text is None or found[0][1].startswith(text)
+
+
+class TestSteps:
+    """A step that loses the waves, and one that is finer than what was recorded."""
+
+    # Five waves of 0.5 to 0.9 Hz, all of one height, two of them above 0.72 Hz, where a filter for
+    # 1.6 Hz has its middle: 40 %, give or take how they beat under the spectrum's window.
+    @pytest.mark.parametrize(
+        ("chain", "fate"),
+        [("sampling_rate = 1.6", "[345]. % of the energy of its waves .* is damped or lost at 1.6"),
+         ("sampling_rate = 1.5\nanti_alias = false", "0.75 Hz and is folded into slower waves"),
+         ("sampling_rate = 10", None), ("sampling_rate = 3", None), ("sampling_rate = 100", None)],
+    )  # fmt: skip
+    def test_what_a_coarse_step_loses_is_told(self, edited, chain, fate):
+        path = edited(("sampling_rate = 10", chain))
+        found = step_findings(read_campaign(path).prepare(["first"])["first"])
+        assert set(found) == ({"eta_fwd", "heave", "pitch"} if fate else set())
+        assert fate is None or re.search(fate, found["eta_fwd"])
+
+    def test_a_step_finer_than_the_files(self, edited):
+        path = edited(("sampling_rate = 10", "sampling_rate = 200"))
+        found = step_findings(read_campaign(path).prepare(["first"])["first"])
+        assert list(found) == ["time"]
+        assert found["time"].startswith("put on 200 Hz, and no logger records more than 50 Hz")
+
+
+def step_findings(run):
+    return {each.channel: each.text for each in findings_of(run) if each.kind == "step"}
 
 
 def clocks(run):

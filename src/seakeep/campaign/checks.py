@@ -70,7 +70,7 @@ class Finding:
     kind : str
         ``constant``, ``missing``, ``outliers``, ``saturated``, ``stuck``, ``drift``, ``lag``,
         ``resolution``, ``agreement``, ``scale``, ``position``, ``clock``, ``record``, ``period``,
-        ``rate``, ``impossible``, ``unit`` or ``left out``.
+        ``rate``, ``step``, ``impossible``, ``unit`` or ``left out``.
     text : str
         What, how much, and what was done about it.
     """
@@ -162,7 +162,7 @@ _KINDS = {MISSING: "missing", OUTLIER: "outliers", SATURATED: "saturated", STUCK
 
 
 def told_samples(
-    groups: Mapping[str, xr.Dataset], preparation: PreparationSettings
+    groups: Mapping[str, xr.Dataset], preparation: PreparationSettings | None = None
 ) -> list[Finding]:
     """Put flagged samples, and channels that are constant, into words."""
     out = []
@@ -191,7 +191,7 @@ def told_samples(
                 )
                 if bit == OUTLIER and (flags & REPLACED).any():
                     text += "; replaced by interpolation"
-                if bit == MISSING and preparation.gaps == "bridge":
+                if bit == MISSING and preparation is not None and preparation.gaps == "bridge":
                     text += f"; not bridged: {_why_open(parts, hit.size, dt, preparation)}"
                 out.append(Finding(str(name), _KINDS[bit], text))
     return out
