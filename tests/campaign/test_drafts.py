@@ -111,6 +111,33 @@ def test_fast_files_get_a_coarser_step(tmp_path):
     assert "# Hz; guessed: about 32 samples a wave of" in text
 
 
+def waves_of_period(folder, name, period, rate):
+    t = np.arange(0, max(40, 20 * period), 1 / rate)
+    x = np.sin(2 * np.pi * t / period)
+    return write_csv(folder / f"{name}.csv", {"Time [s]": t, "WP [mm]": 9 * x, "Heave [mm]": 5 * x})
+
+
+def test_the_step_suits_the_shortest_waves_of_all_runs(tmp_path):
+    files = [waves_of_period(tmp_path, f"run{i}", T, 200.0) for i, T in enumerate((1.5, 0.6, 1.0))]
+    still = {"Time [s]": np.arange(0, 40, 0.005)}
+    random = np.random.default_rng(0)
+    still |= {name: random.normal(size=8000) for name in ("WP [mm]", "Heave [mm]")}
+    files.append(write_csv(tmp_path / "still.csv", still))  # noise has no waves
+    text, campaign = drafted(tmp_path, files)
+    rate = campaign.settings.preparation.sampling_rate
+    assert rate == pytest.approx(200 / 3, rel=1e-5)  # 40 samples in 0.6 s; each fourth made 30
+    assert "# Hz; guessed: about 32 samples a wave of 0.6 s, the shortest" in text
+
+
+def test_no_step_is_finer_than_the_files(tmp_path):
+    """Of 13 samples a wave, as full-scale records have them, no 32 are made."""
+    text, campaign = drafted(tmp_path, [waves_of_period(tmp_path, "slow", 10.0, 1.25)])
+    settings = campaign.settings.preparation
+    assert (settings.sampling_rate, settings.steps_per_period) == (None, None)
+    assert "# sampling_rate = 1.25  # Hz; left out, the files' own" in text
+    assert "steps_per_period" not in text
+
+
 def test_one_file_trains(tmp_path):
     text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", tank_columns())])
     assert campaign.training_runs == ["run"]

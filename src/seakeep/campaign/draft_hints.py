@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 import tomlkit
 from tomlkit.items import Table
 
@@ -80,24 +81,26 @@ def preparation_table(
     rates : mapping of str to float or None
         Samples a second by logger.
     period : float or None
-        Period of the waves, s.
+        Period of the waves, s: the shortest of the runs.
 
     Returns
     -------
     Table
-        The table.
+        The table; no step is finer than that of the fastest logger.
     """
     table = tomlkit.table()
     known = [rate for rate in rates.values() if rate]
     for logger, rate in rates.items():
         if rate and not logger:
             table.add(tomlkit.comment(f"the files have {rate:.6g} samples a second"))
-    if len(rates) > 1 and period is not None:
+    fine = period is not None and STEPS / period > max(known, default=np.inf)
+    usual = f"sampling_rate = {float(f'{min([25.0, *known]):.6g}')}  # Hz"
+    if len(rates) > 1 and period is not None and not fine:
         table.add("steps_per_period", STEPS)
         table["steps_per_period"].comment(
             f"guessed: samples a mean period, here about {STEPS / period:.3g} Hz"
         )
-        table.add(tomlkit.comment("sampling_rate = 25.0  # Hz; instead of it"))
+        table.add(tomlkit.comment(f"{usual}; instead of it"))
     elif len(rates) > 1:
         table.add("sampling_rate", float(f"{min(known, default=25.0):.6g}"))
         table["sampling_rate"].comment("Hz; guessed: that of the slowest logger")
@@ -107,11 +110,13 @@ def preparation_table(
         if rate is not None and period is not None and every > 1:
             table.add("sampling_rate", float(f"{rate / every:.6g}"))
             table["sampling_rate"].comment(
-                f"Hz; guessed: about {STEPS} samples a wave of {period:.3g} s"
+                f"Hz; guessed: about {STEPS} samples a wave of {period:.3g} s, the shortest"
             )
         else:
-            table.add(tomlkit.comment("sampling_rate = 25.0  # Hz; left out, the files' own"))
-        table.add(tomlkit.comment(f"steps_per_period = {STEPS}  # instead: samples a mean period"))
+            table.add(tomlkit.comment(f"{usual}; left out, the files' own"))
+        if not fine:
+            said = f"steps_per_period = {STEPS}  # instead: samples a mean period"
+            table.add(tomlkit.comment(said))
     gapped = [str(guess.channel) for guess in guesses if guess.gaps]
     if gapped:
         bridged = bool(_waves(guesses)) and not _waves(guesses, whole=True)

@@ -23,6 +23,7 @@ from seakeep.campaign.guesses import (
     Guess,
     arranged,
     guess_channels,
+    is_noise,
     is_trigger,
     noise_of,
     rising_column,
@@ -90,7 +91,12 @@ def draft_campaign(
         _refuse(read)
     loggers = list({file.logger: file for file in reversed(read)}.values())[::-1]
     rates = {file.logger: _rate(file.table, file.time) for file in loggers}
-    period, hysteresis = _wave_period(loggers, guesses, rates)
+    wave = driving_wave(guesses)
+    counted = (
+        [] if wave is None else [_wave_period(f, wave) for f in read if f.logger == wave.logger]
+    )
+    period, hysteresis = counted[0] if counted else (None, 0.0)
+    shortest = min((each for each, _ in counted if each is not None), default=None)
     document = tomlkit.document()
     document.add(tomlkit.comment("Draft of a campaign. Read every line that says 'guessed', then"))
     document.add(tomlkit.comment("run: seakeep prepare THIS-FILE, and look at the sheet it makes"))
@@ -105,7 +111,7 @@ def draft_campaign(
         _instruments(document, loggers, guesses, rates)
     _runs(document, read, folder)
     kept = [guess for guess in guesses if guess.channel]
-    preparation = preparation_table(kept, rates, period)
+    preparation = preparation_table(kept, rates, shortest)
     document.add("preparation", preparation)
     document.add("model", model_table(kept, _steps(preparation, rates, period)))
     return tomlkit.dumps(document)
@@ -150,17 +156,12 @@ def _rate(table: Columns, time: str | None) -> float | None:
     return table.sampling_rate if step is None else 1.0 / step
 
 
-def _wave_period(
-    loggers: Sequence[File], guesses: Sequence[Guess], rates: dict[str, float | None]
-) -> tuple[float | None, float]:
-    """Period of the first file's waves, s, and the hysteresis that keeps noise from counting."""
-    wave = driving_wave(guesses)
-    if wave is None or (rate := rates[wave.logger]) is None:
-        return None, 0.0
-    table = next(file.table for file in loggers if file.logger == wave.logger)
-    series = table.values[wave.column]
+def _wave_period(file: File, wave: Guess) -> tuple[float | None, float]:
+    """Period of a file's waves, s, and the hysteresis that keeps noise from counting."""
+    rate = _rate(file.table, file.time)
+    series = file.table.values.get(wave.column, np.zeros(0))
     there = np.isfinite(series)
-    if there.sum() < LONG or not np.ptp(series[there]):
+    if rate is None or there.sum() < LONG or not np.ptp(series[there]) or is_noise(series):
         return None, 0.0
     at = np.arange(series.size)
     series = np.interp(at, at[there], series[there])

@@ -22,6 +22,7 @@ __all__ = [
     "arranged",
     "guess_channels",
     "is_acceleration",
+    "is_noise",
     "is_trigger",
     "noise_of",
     "rising_column",
@@ -231,13 +232,13 @@ def _guess(column: str, files: Sequence[File], taken: set[str]) -> Guess:
     assumed = unit is None
     canonical = canonical_channel(channel) if channel else None
     unit = unit if unit is not None else (canonical.units if canonical else "-")
-    noise = not why and all(_is_noise(file.table.values[column]) for file in files)
+    noise = not why and all(is_noise(file.table.values[column]) for file in files)
     return Guess(
         column, header, unit, channel, logger, why, assumed, named is not None, gaps, noise
     )
 
 
-def _is_noise(series: FloatArray) -> bool:
+def is_noise(series: FloatArray) -> bool:
     """Whether most of a column's variance has no memory from one sample to the next."""
     series = series[np.isfinite(series)]
     if series.size < LONG:
