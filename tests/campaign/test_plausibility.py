@@ -104,6 +104,12 @@ class TestSteps:
         assert set(found) == ({"eta_fwd", "heave", "pitch"} if fate else set())
         assert fate is None or re.search(fate, found["eta_fwd"])
 
+    def test_noise_has_nothing_to_lose(self, edited, tank):
+        noise = np.random.default_rng(0).normal(0.0, 1.0, 1001)
+        write_csv(tank / "first.csv", tank_columns() | {"Pitch (deg)": noise})
+        found = step_findings(read_campaign(edited()).prepare(["first"])["first"])
+        assert not found
+
     def test_a_step_finer_than_the_files(self, edited):
         path = edited(("sampling_rate = 10", "sampling_rate = 200"))
         found = step_findings(read_campaign(path).prepare(["first"])["first"])

@@ -70,7 +70,10 @@ def _band(period: float | None, rate: float) -> str:
 
 
 def preparation_table(
-    guesses: Sequence[Guess], rates: Mapping[str, float | None], period: float | None
+    guesses: Sequence[Guess],
+    rates: Mapping[str, float | None],
+    period: float | None,
+    shortest: float | None,
 ) -> Table:
     """Draft of ``[preparation]``: one step for all, and what to do about gaps.
 
@@ -80,8 +83,8 @@ def preparation_table(
         The channels.
     rates : mapping of str to float or None
         Samples a second by logger.
-    period : float or None
-        Period of the waves, s: the shortest of the runs.
+    period, shortest : float or None
+        Period of the first run's waves, and the shortest of all runs', s.
 
     Returns
     -------
@@ -106,11 +109,11 @@ def preparation_table(
         table["sampling_rate"].comment("Hz; guessed: that of the slowest logger")
     else:
         rate = known[0] if known else None
-        every = 1 if rate is None or period is None else int(period * rate / STEPS)
-        if rate is not None and period is not None and every > 1:
+        every = 1 if rate is None or shortest is None else int(shortest * rate / STEPS)
+        if rate is not None and shortest is not None and every > 1:
             table.add("sampling_rate", float(f"{rate / every:.6g}"))
             table["sampling_rate"].comment(
-                f"Hz; guessed: about {STEPS} samples a wave of {period:.3g} s, the shortest"
+                f"Hz; guessed: about {STEPS} samples a wave of {shortest:.3g} s, the shortest"
             )
         else:
             table.add(tomlkit.comment(f"{usual}; left out, the files' own"))

@@ -111,7 +111,7 @@ def draft_campaign(
         _instruments(document, loggers, guesses, rates)
     _runs(document, read, folder)
     kept = [guess for guess in guesses if guess.channel]
-    preparation = preparation_table(kept, rates, shortest)
+    preparation = preparation_table(kept, rates, period, shortest)
     document.add("preparation", preparation)
     document.add("model", model_table(kept, _steps(preparation, rates, period)))
     return tomlkit.dumps(document)

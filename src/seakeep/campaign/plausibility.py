@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.campaign.checks import Finding
-from seakeep.campaign.guesses import MOTIONS
+from seakeep.campaign.guesses import MOTIONS, is_noise
 from seakeep.campaign.instruments import channels_of
 from seakeep.campaign.settings import CampaignSettings, PreparationSettings, RunSettings
 from seakeep.campaign.survey import used_span
@@ -148,8 +148,9 @@ def check_step(
             wanted = name.startswith("eta_") or name in MOTIONS
             if not wanted or "derived_from" in group[name].attrs or steps[logger] >= dt:
                 continue
-            share, period = energy_above(group[name].to_numpy(), steps[logger], edge)
-            if share > LOST_ENERGY:
+            x = group[name].to_numpy()
+            share, period = energy_above(x, steps[logger], edge)
+            if share > LOST_ENERGY and not is_noise(x):
                 text = (
                     f"{100 * share:.2g} % of the energy of its waves (peak at {period:.3g} s) lies "
                     f"above {edge:.3g} Hz and {fate} at {1 / dt:.4g} Hz; take a finer step"
