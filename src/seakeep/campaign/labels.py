@@ -12,6 +12,7 @@ import xarray as xr
 
 from seakeep.campaign.resampling import inside
 from seakeep.campaign.settings import CampaignSettings, RunSettings
+from seakeep.conventions import instant
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import Clock
 
@@ -120,9 +121,9 @@ def cropped(
         finite = [edge for edge in span if np.isfinite(edge)]
         if any(not record[0] - dt < edge < record[1] + dt for edge in finite):
             raise RequestError(
-                f"runs.{name}.{key}: received [{span[0]:g}, {span[1]:g}] s, and the record "
-                f"runs from {record[0]:g} to {record[1]:g} s. Correct the span; 'inf' stands "
-                "for the end."
+                f"runs.{name}.{key}: received [{instant(span[0])}, {instant(span[1])}] s, and the "
+                f"record runs from {instant(record[0])} to {instant(record[1])} s. Correct the "
+                "span; 'inf' stands for the end."
             )
         _refuse_empty(f"runs.{name}.{key}", span, time, dt, record)
     if settings.span is None:
@@ -146,16 +147,17 @@ def _refuse_empty(
     """Refuse a span that holds too few of a run's instants, whose record is the reference's."""
     if (count := int(inside(time, span, dt).sum())) > 1:
         return
-    stated = f"{key}: [{span[0]:g}, {span[1]:g}] s holds {count} sample(s) at a step of {dt:g} s"
-    begin, end = float(time[0]), float(time[-1])
-    if begin > record[0] + 2 * dt or end < record[1] - 2 * dt:
+    stretch = f"[{instant(span[0])}, {instant(span[1])}]"
+    stated = f"{key}: {stretch} s holds {count} sample(s) at a step of {dt:.4g} s"
+    begin, end = instant(time[0]), instant(time[-1])
+    if time[0] > record[0] + 2 * dt or time[-1] < record[1] - 2 * dt:
         raise DataError(
-            f"{stated}, since all loggers recorded together only from {begin:g} to {end:g} s; the "
-            f"reference runs from {record[0]:g} to {record[1]:g} s. Check whether the files of the "
-            "other loggers are whole, or correct the span."
+            f"{stated}, since all loggers recorded together only from {begin} to {end} s; the "
+            f"reference runs from {instant(record[0])} to {instant(record[1])} s. Check whether "
+            "the files of the other loggers are whole, or correct the span."
         )
     raise RequestError(
-        f"{stated}. Lengthen the span, or move it into the run's {begin:g} to {end:g} s."
+        f"{stated}. Lengthen the span, or move it into the run's {begin} to {end} s."
     )
 
 

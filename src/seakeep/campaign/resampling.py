@@ -11,6 +11,7 @@ import xarray as xr
 from seakeep.campaign.channels import Group
 from seakeep.campaign.derivation import derive
 from seakeep.campaign.settings import CampaignSettings, PreparationSettings
+from seakeep.conventions import instant
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import low_pass, resample, uniform_step
 from seakeep.signals.quality import MISSING
@@ -26,7 +27,7 @@ def overlap(groups: Mapping[str, xr.Dataset], run: str) -> tuple[float, float]:
     end = min(float(each["time"][-1]) for each in groups.values())
     if end <= begin:
         spans = ", ".join(
-            f"{name} {float(each['time'][0]):g} to {float(each['time'][-1]):g} s"
+            f"{name} {instant(float(each['time'][0]))} to {instant(float(each['time'][-1]))} s"
             for name, each in groups.items()
         )
         raise DataError(

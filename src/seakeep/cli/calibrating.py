@@ -14,7 +14,7 @@ from rich.table import Table
 from seakeep.campaign import load_prepared, read_campaign
 from seakeep.cli.console import messages, progress_bar, quietly, results
 from seakeep.cli.options import DEFAULT_LEVEL, CampaignFile, Level, Scheduler, Workers, crew
-from seakeep.conventions import conversion
+from seakeep.conventions import conversion, instant
 from seakeep.errors import RequestError
 from seakeep.files import check_place
 from seakeep.models import HankelEnsemble, load_model
@@ -100,7 +100,9 @@ def calibrate(
         )
     results().print(_table(calibrated))
     assert calibrated.calibration is not None
-    used = [f"{n} {a:.10g} to {b:.10g} s" for n, (a, b) in calibrated.calibration.spans.items()]
+    used = [
+        f"{n} {instant(a)} to {instant(b)} s" for n, (a, b) in calibrated.calibration.spans.items()
+    ]
     results().print(f"Calibrated on {', '.join(used)}: judge it on other instants.", soft_wrap=True)
     calibrated.save(out)
     messages().print(

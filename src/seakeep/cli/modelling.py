@@ -23,6 +23,7 @@ from seakeep.cli.options import (
     Workers,
     crew,
 )
+from seakeep.conventions import instant
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import check_place, make_folder
 from seakeep.models import HankelDMDcModel, HankelEnsemble, load_model
@@ -151,7 +152,7 @@ def forecast(
     status = result.attrs["status"]
     messages().print(
         f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
-        f"t = {result.attrs['start']:.10g} s, status {status}.{scaled}"
+        f"t = {instant(result.attrs['start'])} s, status {status}.{scaled}"
     )
     if not _usable(result):
         raise typer.Exit(1)
