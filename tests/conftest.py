@@ -1,12 +1,18 @@
-"""Runs that the tests of the models share: made of known systems, quick to make."""
+"""What tests share: runs made of known systems, and what keeps a busy machine from failing them."""
 
-from collections.abc import Callable
+import signal as signals
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 import xarray as xr
+from hypothesis import HealthCheck, settings
 from scipy import linalg, signal
+
+# A process that has to wait for a core says nothing about the code: no example has a time limit.
+settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("patient")
 
 UNITS = {"heave": "m", "pitch": "rad", "surge": "m", "eta_fwd": "m", "eta_cog": "m"}
 
@@ -126,3 +132,20 @@ def oscillator() -> Oscillator:
 def channels() -> dict[str, list[str]]:
     """States and inputs of :func:`vessel_run`, as ``fit`` takes them."""
     return {"states": ["heave", "pitch"], "inputs": ["eta_fwd", "eta_cog"]}
+
+
+@pytest.fixture
+def patient_cluster(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A scheduler on a busy machine has minutes to answer, not the seconds that a user waits."""
+    monkeypatch.setattr("seakeep.models.cluster.PATIENCE", 300.0)
+
+
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """SIGINT as at a terminal, where the tests may have been started with it ignored.
+
+    Processes started meanwhile have it so too: what is ignored is inherited, a handler is not.
+    """
+    before = signals.signal(signals.SIGINT, signals.default_int_handler)
+    yield
+    signals.signal(signals.SIGINT, before)

@@ -16,6 +16,7 @@ FLOORS = {
     "conventions": 2,
     "signals": 2,
     "core": 2,
+    "pairing": 2,
     "metrics": 3,
     "statistics": 3,
     "tank": 3,
@@ -28,7 +29,7 @@ FLOORS = {
     "__init__": 7,
 }
 # Rooms on one floor that may look into another one beside them.
-NEIGHBOURS = {("signals", "conventions")}
+NEIGHBOURS = {("signals", "conventions"), ("pairing", "signals")}
 ONLY_IN_REPORT = {"matplotlib"}
 CORE_MAY_USE = {"numpy", "scipy", "seakeep"} | set(sys.stdlib_module_names)
 

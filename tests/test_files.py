@@ -1,12 +1,17 @@
 """Files are written whole or not at all."""
 
+import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray as xr
 
 from seakeep.errors import RequestError
-from seakeep.files import replacing
+from seakeep.files import replacing, write_netcdf
 
 
 def test_a_file_appears_when_it_is_whole(tmp_path):
@@ -85,3 +90,86 @@ def test_a_lack_of_permission_gets_its_own_mend(tmp_path):
         replacing(tmp_path / "a.txt"),
     ):
         raise PermissionError(13, os.strerror(13))
+
+
+def test_a_netcdf_file_holds_root_and_groups_packed_as_asked(tmp_path):
+    values = np.random.default_rng(0).standard_normal(5000)
+    heave = xr.Dataset(
+        {"heave": ("time", values, {"units": "m"}), "flag": ("time", values > 0)},
+        coords={"time": 0.1 * np.arange(5000)},
+        attrs={"name": "Mörkö", "span": (1.0, 2.0)},
+    )
+    root, path = xr.Dataset(attrs={"format": 3}), tmp_path / "a.nc"
+    groups = {"prepared/one": heave, "prepared/two": heave.isel(time=slice(7))}
+    write_netcdf(path, root, groups, lambda each: {key: {"zlib": True} for key in each.data_vars})
+    assert xr.load_dataset(path, engine="h5netcdf").attrs == {"format": 3}
+    for name, group in groups.items():
+        found = xr.load_dataset(path, engine="h5netcdf", group=name)
+        xr.testing.assert_equal(found, group)
+        assert found["heave"].encoding["zlib"]
+        assert found["heave"].attrs == {"units": "m"}
+        assert found.attrs["name"] == "Mörkö"
+    write_netcdf(tmp_path / "b.nc", xr.Dataset(attrs={"format": 4}), onto=path)
+    assert xr.load_dataset(path, engine="h5netcdf").attrs == {"format": 3}
+    assert xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf").attrs == {"format": 4}
+    found = xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf", group="prepared/two")
+    xr.testing.assert_equal(found, groups["prepared/two"])
+
+
+FULL = """
+import json, resource, signal, sys
+from pathlib import Path
+import numpy as np, xarray as xr
+from seakeep.campaign import store as campaign
+from seakeep.cli import tracking
+from seakeep.errors import SeakeepError
+from seakeep.models import store as models
+from seakeep.report import tables
+from seakeep.study import store as study
+from seakeep.tank import hydrodynamics, raw_files
+
+folder, run = Path(sys.argv[1]), xr.Dataset({"heave": ("time", np.random.rand(50_000))})
+writers = {
+    "campaign": lambda path: campaign._write(run, path),
+    "model": lambda path: models.write(run, path, "hankel_dmdc"),
+    "forecast": lambda path: tables.write_forecast(run, path),
+    "track": lambda path: tracking._write(run, path),
+    "raw file": lambda path: raw_files.write_dataset(run, path),
+    "hydrodynamics": lambda path: hydrodynamics.save_hydrodynamics(run, path),
+    "study": lambda path: study.write_result(folder, {}, {"prepared": run}),
+}
+(folder / "old").mkdir()
+old = study.write_result(folder / "old", {"words": "old"}, {"prepared": run})
+writers["other words"] = lambda path: study.retell(old, {"words": "new"})
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+told = {}
+for name, write in writers.items():
+    try:
+        write(folder / "file.nc")
+    except SeakeepError as error:
+        told[name] = [type(error).__name__, str(error)]
+print(json.dumps(told))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of file size are POSIX")
+def test_whatever_is_written_as_netcdf_survives_a_disk_that_is_full(tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, str(folder)], capture_output=True, text=True, check=False
+    )
+    # Once HDF5 itself has failed to write, it ends the process by SIGSEGV.
+    assert (done.returncode, done.stderr) == (0, "")
+    told = json.loads(done.stdout)
+    for kind, words in (told.pop("study"), told.pop("other words")):
+        assert kind == "StorageError"
+        assert "File too large" in words
+        assert "Free space on the disk; the same command then goes on" in words
+    assert len(told) == 6
+    for kind, words in told.values():
+        assert kind == "RequestError"
+        assert "file.nc: File too large" in words
+        assert "Free space on the disk" in words
+    assert [path.name for path in folder.rglob("*")] == ["old", "study.nc"]

@@ -7,6 +7,8 @@ import pytest
 from seakeep.cli.console import progress_bar
 from seakeep.interruption import check_interrupted, interruptible, uninterrupted
 
+pytestmark = pytest.mark.usefixtures("ctrl_c")
+
 
 class Swallows:
     """Python prints what a finaliser raises, and goes on."""

@@ -279,6 +279,13 @@ def test_lengths_that_differ_are_refused(measure):
         measure(**both(PREDICTED[:3]))
 
 
+def test_leading_axes_that_differ_are_refused():
+    with pytest.raises(
+        RequestError, match=r"\(3, 4, 2\) and measured \(2, 4, 2\); the axes before"
+    ):
+        metrics.nrmse(**both(np.stack([PREDICTED] * 3), np.stack([MEASURED] * 2)))
+
+
 def test_one_sample_has_no_spread():
     with pytest.raises(RequestError, match=r"a window of 1 sample\(s\) has no standard deviation"):
         metrics.nrmse(**both(PREDICTED[:1], MEASURED[:1]))

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from seakeep.errors import RequestError
 
-__all__ = ["check_place", "make_folder", "replacing"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["check_place", "make_folder", "replacing", "write_netcdf"]
 
 
 @contextmanager
@@ -53,6 +58,49 @@ def replacing(path: Path) -> Iterator[Path]:
             f"cannot write {path}: {error.strerror or error}. The file that was there before, if "
             f"any, is untouched. {mend}"
         ) from error
+
+
+def write_netcdf(
+    path: Path,
+    dataset: xr.Dataset,
+    groups: Mapping[str, xr.Dataset] | None = None,
+    packing: Callable[[xr.Dataset], Mapping[Any, Mapping[str, Any]]] | None = None,
+    onto: Path | None = None,
+) -> None:
+    """Write a NetCDF file; a disk that is full is told as by any other write.
+
+    HDF5 does not survive a write that fails: it raises errors of many kinds, keeps the file open,
+    and takes the process with it at its end. The file is therefore made in memory first.
+
+    Parameters
+    ----------
+    path : Path
+        The file, such as :func:`replacing` gives it; overwritten.
+    dataset : Dataset
+        What goes into the root of the file.
+    groups : mapping of str to Dataset, optional
+        What goes into groups, by their names.
+    packing : callable, optional
+        Gives the encoding of the variables of a Dataset, such as their compression.
+    onto : Path, optional
+        A NetCDF file whose content is taken over, and added to.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read or written; :func:`replacing` tells it in words.
+    """
+    # Here, so that commands that write no such file start without HDF5.
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
+    made = io.BytesIO(b"" if onto is None else onto.read_bytes())
+    parts = [(None, dataset), *(groups or {}).items()]
+    with h5netcdf.File(made, "w" if onto is None else "r+") as file:
+        for name, each in parts:
+            encoding = {} if packing is None else packing(each)
+            each.dump_to_store(H5NetCDFStore(file, group=name, mode="a"), encoding=encoding)
+    path.write_bytes(made.getbuffer())
 
 
 def check_place(path: Path, suffix: str | None = None) -> None:

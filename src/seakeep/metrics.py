@@ -2,10 +2,11 @@
 
 All take ``predicted=`` and ``measured=`` by keyword, in the same units. Arrays are
 ``(…, time, channel)``. With Datasets the channels of `predicted` are judged at its instants, each
-against the variable of the same name in `measured`; per-channel measures come back as a Dataset
-of numbers. A channel whose measured standard deviation in the window is below 1 % of its training
-standard deviation (a slack line) is NaN and left out of averages; forecasts carry the training
-standard deviation in the attribute ``training_std`` of each channel.
+against the variable of the same name in `measured`; words, such as the status of an ensemble's
+members, are no channels. Per-channel measures come back as a Dataset of numbers. A channel whose
+measured standard deviation in the window is below 1 % of its training standard deviation (a slack
+line) is NaN and left out of averages; forecasts carry the training standard deviation in the
+attribute ``training_std`` of each channel.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.core import metrics as core
-from seakeep.errors import DataError, RequestError, did_you_mean
-from seakeep.signals.clocks import check_order
+from seakeep.errors import RequestError
+from seakeep.pairing import pair
 
 __all__ = [
     "anrmse",
@@ -35,48 +36,6 @@ Histories = npt.ArrayLike | xr.Dataset
 Measure = Callable[..., npt.NDArray[Any]]
 
 
-def _pair(
-    predicted: xr.Dataset, measured: xr.Dataset
-) -> tuple[list[str], dict[str, npt.NDArray[np.float64]], tuple[str, ...]]:
-    names = [str(name) for name in predicted.data_vars]
-    known = [str(name) for name in measured.data_vars]
-    missing = [name for name in names if name not in known]
-    if missing:
-        raise RequestError(
-            f"measured has no channel '{missing[0]}'.{did_you_mean(missing[0], known)} "
-            f"It has: {', '.join(known)}. Select the channels to judge: predicted[['heave']]."
-        )
-    for name in names:
-        units = [side[name].attrs.get("units") for side in (predicted, measured)]
-        if all(units) and units[0] != units[1]:
-            raise DataError(
-                f"channel '{name}' is in '{units[0]}' in predicted and in '{units[1]}' in "
-                "measured. Convert one of them and its units attribute."
-            )
-    for side, data in (("predicted", predicted), ("measured", measured)):
-        if "time" not in data.coords:
-            raise DataError(
-                f"{side} has no coordinate 'time' (dimensions: {', '.join(map(str, data.dims))}). "
-                "Give every channel the dimension 'time' and the instants in seconds."
-            )
-        check_order(data["time"].values, side)
-    time = predicted["time"].values
-    step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
-    try:
-        at = measured[names].sel(time=time, method="nearest", tolerance=0.01 * step)
-    except KeyError as error:
-        raise DataError(
-            f"predicted runs from {time[0]:g} to {time[-1]:g} s and measured from "
-            f"{float(measured.time[0]):g} to {float(measured.time[-1]):g} s, and not every instant "
-            "of the first is one of the second. Judge where both exist, on one time axis."
-        ) from error
-    lead = tuple(str(dim) for dim in predicted.dims if dim != "time")
-    p = np.stack([predicted[name].transpose(*lead, "time").values for name in names], axis=-1)
-    m = np.stack([at[name].values for name in names], axis=-1)
-    spread = np.array([float(predicted[name].attrs.get("training_std", 0.0)) for name in names])
-    return names, {"predicted": p, "measured": m, "training_std": spread}, lead
-
-
 def _apply(
     measure: Measure, predicted: Histories, measured: Histories, training_std: npt.ArrayLike | None
 ) -> tuple[Any, list[str], tuple[str, ...]]:
@@ -86,10 +45,11 @@ def _apply(
             f"{type(predicted).__name__} and {type(measured).__name__}."
         )
     if isinstance(predicted, xr.Dataset) and isinstance(measured, xr.Dataset):
-        names, arrays, lead = _pair(predicted, measured)
-        if training_std is not None:
-            arrays["training_std"] = np.asarray(training_std, dtype=float)
-        return measure(**arrays), names, lead
+        pairs = pair(predicted=predicted, measured=measured)
+        if training_std is None:
+            told = [predicted[name].attrs.get("training_std", 0.0) for name in pairs.names]
+            training_std = np.array(told, dtype=float)
+        return measure(**pairs.arrays, training_std=training_std), pairs.names, pairs.lead
     result = measure(predicted=predicted, measured=measured, training_std=training_std)
     return result, [], ()
 
@@ -147,10 +107,11 @@ def is_slack(
     >>> is_slack(predicted=measured, measured=measured)
     array([False,  True])
     """
-    values, names, _ = _apply(core.is_slack, predicted, measured, training_std)
+    values, names, lead = _apply(core.is_slack, predicted, measured, training_std)
     if not names:
         return values
-    return xr.Dataset({name: ((), values[column]) for column, name in enumerate(names)})
+    dims = lead[: values.ndim - 1]
+    return xr.Dataset({name: (dims, values[..., column]) for column, name in enumerate(names)})
 
 
 def nrmse(

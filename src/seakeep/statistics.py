@@ -2,7 +2,8 @@
 
 Series are arrays or one-dimensional DataArrays of uniform samples without gaps.
 :func:`moving_block_bootstrap`, :func:`jsd_interval` and :func:`coverage` take Datasets too, channel
-by channel. Every draw comes from the `numpy.random.Generator` that is passed.
+by channel; words, such as the status of an ensemble's members, are no channels. Every draw comes
+from the `numpy.random.Generator` that is passed.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ from seakeep.core.density import (
 from seakeep.core.divergence import JsdInterval, jensen_shannon
 from seakeep.core.samples import as_generator
 from seakeep.core.trend import TrendTest, trend_test
-from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.pairing import channel_names, pair
 
 __all__ = [
     "BandCoverage",
@@ -79,42 +81,6 @@ def _all_or_none(named: dict[str, object]) -> bool:
         received = ", ".join(f"{name}: {type(item).__name__}" for name, item in named.items())
         raise RequestError(f"give Datasets throughout, or arrays throughout; received {received}.")
     return all(labelled)
-
-
-def _channels(of: xr.Dataset, other: xr.Dataset, name: str) -> list[str]:
-    names, known = [str(item) for item in of.data_vars], [str(item) for item in other.data_vars]
-    for channel in names:
-        if channel not in known:
-            raise RequestError(
-                f"{name} has no channel '{channel}'.{did_you_mean(channel, known)} "
-                f"It has: {', '.join(known)}."
-            )
-    if not names:
-        raise RequestError("the Dataset holds no channel; there is nothing to judge.")
-    return names
-
-
-def _at_instants(data: xr.Dataset, of: xr.Dataset, name: str) -> xr.Dataset:
-    if "time" not in data.coords or "time" not in of.coords:
-        if data.sizes.get("time") != of.sizes.get("time"):
-            raise RequestError(
-                f"{name} has {data.sizes.get('time')} samples along time and the other "
-                f"{of.sizes.get('time')}; judge where both exist."
-            )
-        return data
-    time = of["time"].values
-    if data.sizes["time"] == time.size and np.array_equal(data["time"].values, time):
-        return data
-    step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
-    try:
-        near = data.sel(time=time, method="nearest", tolerance=0.01 * step)
-    except (KeyError, ValueError) as error:
-        raise DataError(
-            f"{name} runs from {float(data.time[0]):g} to {float(data.time[-1]):g} s, and does "
-            f"not hold every instant from {time[0]:g} to {time[-1]:g} s once. Judge where both "
-            "exist, on one time axis."
-        ) from error
-    return near.assign_coords(time=time)
 
 
 def moving_block_bootstrap(
@@ -169,7 +135,7 @@ def moving_block_bootstrap(
         return _bootstrap.moving_block_bootstrap(
             series, n_series, block_length, rng, segments=segments
         )
-    names = _channels(series, series, "series")
+    names = channel_names(series, "series")
     wrong = [name for name in names if series[name].dims != ("time",)]
     if wrong:
         raise RequestError(
@@ -192,14 +158,13 @@ def moving_block_bootstrap(
 
 def _divergence_of(
     name: str,
-    predicted: xr.DataArray,
+    p: npt.NDArray[np.float64],
     measured: npt.NDArray[np.float64],
     block: int | BlockRule,
     rng: np.random.Generator,
     settings: dict[str, Any],
 ) -> JsdInterval:
     # The array core, its messages and warnings with the channel's name.
-    p = predicted.transpose(..., "time").values
     try:
         if isinstance(block, str):
             choice = choose_block_length(measured, block, segments=settings["segments"])
@@ -258,7 +223,7 @@ def jsd_interval(
     RequestError
         If channels, lengths or settings do not fit.
     DataError
-        If a series is constant, has gaps, or instants differ.
+        If a series is constant, has gaps, or units or instants differ.
     """
     settings: dict[str, Any] = {
         "n_series": n_series,
@@ -273,11 +238,24 @@ def jsd_interval(
     assert isinstance(measured, xr.Dataset)
     if grid is not None:
         raise RequestError("channels of a Dataset have grids of their own; leave grid out.")
-    names = _channels(predicted, measured, "measured")
-    truth = _at_instants(measured[names], predicted, "measured")
+    pairs = pair(predicted=predicted, measured=measured)
+    names, series = pairs.names, pairs.arrays
+    if series["measured"].ndim > 2:
+        raise RequestError(
+            f"measured has the dimensions {measured[names[0]].dims}; ('time',) is needed. Select "
+            "one run."
+        )
+    children = as_generator(rng).spawn(len(names))
     found = [
-        _divergence_of(name, predicted[name], truth[name].values, block_length, child, settings)
-        for name, child in zip(names, as_generator(rng).spawn(len(names)), strict=True)
+        _divergence_of(
+            name,
+            series["predicted"][..., column],
+            series["measured"][:, column],
+            block_length,
+            child,
+            settings,
+        )
+        for column, (name, child) in enumerate(zip(names, children, strict=True))
     ]
     numbers = [
         field.name
@@ -315,29 +293,23 @@ def coverage(lower: Labelled, upper: Labelled, measured: Labelled) -> Any:
     RequestError
         If shapes or channels do not fit, or the bounds are swapped.
     DataError
-        If the measurement has gaps, or instants differ.
+        If the measurement has gaps, or units or instants differ.
     """
     if not _all_or_none({"lower": lower, "upper": upper, "measured": measured}):
         return _coverage.coverage(lower, upper, measured)
     assert isinstance(lower, xr.Dataset)
     assert isinstance(upper, xr.Dataset)
     assert isinstance(measured, xr.Dataset)
-    names = _channels(lower, measured, "measured")
-    _channels(lower, upper, "upper")
-    truth = _at_instants(measured[names], lower, "measured")
-    above = _at_instants(upper[names], lower, "upper")
-    lead = tuple(str(dim) for dim in lower.dims if dim != "time")
-    order = (*lead, "time")
-    low = np.stack([lower[name].transpose(*order).values for name in names], axis=-1)
-    high = np.stack([above[name].transpose(*order).values for name in names], axis=-1)
-    m = np.stack([truth[name].transpose(..., "time").values for name in names], axis=-1)
+    pairs = pair(lower=lower, upper=upper, measured=measured)
+    names, lead = pairs.names, pairs.lead
+    m = pairs.arrays["measured"]
     for column, name in enumerate(names):
         if not np.all(np.isfinite(m[..., column])):
             raise DataError(
                 f"channel '{name}' of measured holds values that are NaN or infinite. Fill its "
                 "gaps first, or judge a window without them."
             )
-    band = _coverage.coverage(low, high, m)
+    band = _coverage.coverage(**pairs.arrays)
     units = [str(measured[name].attrs.get("units", "")) for name in names]
     return xr.Dataset(
         {

@@ -5,6 +5,7 @@ import pytest
 from seakeep.campaign import read_campaign
 from seakeep.campaign.settings import ModelSettings, PriorSettings
 from seakeep.errors import RequestError
+from seakeep.study import read_study
 
 
 def refusal(path) -> str:
@@ -298,6 +299,27 @@ def test_toml_that_is_none(tank):
     assert refusal(path) == (
         f"{path}, line 2: not UTF-8, which TOML asks for. Save the file as UTF-8."
     )
+
+
+def test_another_kind_of_file_is_told_by_what_it_holds(tank):
+    path = tank / "study.toml"
+    path.write_text('[study]\ncampaign = "campaign.toml"\n[tests.all]\n')
+    assert refusal(path) == (
+        f"{path} is a study file (it has [study], [tests]), and a campaign file is expected here. "
+        "Name the campaign that it names."
+    )
+    campaign = tank / "campaign.toml"
+    with pytest.raises(
+        RequestError, match=r"is a campaign file \(it has \[channels\], .*and a stu"
+    ):
+        read_study(campaign)
+    for content in (b"t [s];x [m]\n0;1\n", b"t [\xb5s];x\n"):
+        table = tank / "run.csv"
+        table.write_bytes(content)
+        assert refusal(table).endswith(
+            " If it holds measurements: a campaign file is expected here, whose name ends in "
+            ".toml. Draft a campaign with 'seakeep init run.csv'."
+        )
 
 
 def test_file_that_is_not_there(tank):

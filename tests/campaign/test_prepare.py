@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import FrozenInstanceError
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -468,7 +469,7 @@ class TestFiles:
             assert run.attrs["water_depth"] == 3.6
             assert run["time"].dtype == float
 
-    @pytest.mark.parametrize("change", ["settings", "file", "version"])
+    @pytest.mark.parametrize("change", ["settings", "file", "version", "name"])
     def test_stale_files_are_not_used(self, campaign, tank, edited, change, monkeypatch):
         path = write_prepared(campaign)["second"]
         with xr.open_dataset(path) as opened:
@@ -478,6 +479,8 @@ class TestFiles:
         assert float(load_prepared(campaign)["second"]["heave"].std()) == 0.0
         if change == "settings":
             campaign = read_campaign(edited(("sampling_rate = 10", "sampling_rate = 12")))
+        elif change == "name":
+            campaign = read_campaign(edited(("Small tank", "Smaller tank")))
         elif change == "file":
             write_csv(tank / "second.csv", tank_columns(5))
         else:
@@ -498,7 +501,7 @@ class TestFiles:
             (tank / "prepared" / "half").write_text("")
             raise OSError("disk full")
 
-        monkeypatch.setattr(xr.Dataset, "to_netcdf", fail)
+        monkeypatch.setattr(Path, "write_bytes", fail)
         with pytest.raises(RequestError, match=r"cannot write .*first\.nc: disk full"):
             write_prepared(campaign)
         assert [p.name for p in (tank / "prepared").iterdir()] == ["half"]

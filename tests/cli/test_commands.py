@@ -227,6 +227,38 @@ def test_compare_judges_the_mean_of_an_ensemble_and_its_band(run, place):
     assert float(heave["nrmse"]) == pytest.approx(float(expected["heave"]), rel=1e-12)
 
 
+def test_angles_of_a_forecast_may_be_written_in_degrees(run, place):
+    for option, unit, name in (("", "rad", "r.csv"), ("--degrees", "deg", "d.csv")):
+        status, _, err = run(f"forecast model.nc {FROM_20} {option} -o {name}")
+        assert status == 0, err
+        assert f"pitch [{unit}]" in (place / name).read_text("utf-8").splitlines()[0]
+    columns = [
+        np.genfromtxt(place / name, delimiter=",", skip_header=1).T for name in ("r.csv", "d.csv")
+    ]
+    header = (place / "r.csv").read_text("utf-8").splitlines()[0].split(",")
+    for before, after, title in zip(*columns, header, strict=True):
+        factor = 180 / np.pi if "[rad" in title else 1.0
+        np.testing.assert_allclose(after, factor * before, rtol=1e-6)  # seven digits are written
+
+
+def test_calibrate_takes_an_unread_part_of_a_run_that_trains(run, place):
+    text = (place / CAMPAIGN).read_text("utf-8").replace('role = "test"', "train = [0, 40]")
+    assert "train = [0, 40]" in text
+    (place / CAMPAIGN).with_name("half.toml").write_text(text, "utf-8")
+    half = str(CAMPAIGN).replace("campaign.toml", "half.toml")
+    calibrate = f"calibrate ensemble.nc {half} --run unseen --steps 200 -o half.nc"
+    spans = {}
+    for options in ("", "--stop 100", "--start 50 --stop inf"):
+        status, _, err = run(f"{calibrate} {options}")
+        assert status == 0, err
+        spans[options] = seakeep.load_model(place / "half.nc").calibration.spans["unseen"]
+        assert re.search(r"Note: errors that last .* \d+ windows? would warrant \d\d %", err)
+    assert spans[""][1] <= 40 < spans["--stop 100"][1] <= 100
+    # 200 steps of 0.08 s end to end: less than one window is left before the end of 120 s.
+    assert 50 <= spans["--start 50 --stop inf"][0] < 60
+    assert spans["--start 50 --stop inf"][1] > 104
+
+
 def test_calibrate_widens_the_band_that_compare_and_forecast_show(run, place):
     calibrate = f"calibrate ensemble.nc {CAMPAIGN} --run unseen --stop 60 --steps 200 -o wide.nc"
     status, out, err = run(f"{calibrate} --level 0.9")
@@ -424,7 +456,12 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
         (
             f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unseen --stop 900 -o c.nc",
             2,
-            r"--stop 900 \(900 s\) lies after the end of unseen \([\d.]+ s\)",
+            r"--stop 900 \(900 s\) lies in none of the runs \(unseen: [\d.]+ to [\d.]+ s\)",
+        ),
+        (
+            f"calibrate ensemble.nc {CAMPAIGN} --steps 9 --run unseen --start 20 --stop 20 -o c.nc",
+            2,
+            r"--start 20 \(20 s\) lies at or after --stop 20 \(20 s\)",
         ),
         (
             f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unseen --stop nan -o c.nc",
@@ -465,6 +502,11 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
             f"forecast model.nc {CAMPAIGN} --run unseen --start '4 /T' -o f.nc",
             2,
             r"--start: received '4 /T'\. Give seconds",
+        ),
+        (
+            f"forecast model.nc {CAMPAIGN} --run unseen --start 20,5 -o f.nc",
+            2,
+            r"--start: received '20,5'\. Give seconds .*\. Write a decimal point, no comma\.",
         ),
         (
             f"compare model.nc {CAMPAIGN} --steps 12.5",
@@ -515,7 +557,7 @@ def test_ctrl_c_ends_with_130_and_says_what_is_kept(run, monkeypatch):
     monkeypatch.setattr(modelling, "fit_campaign", interrupt)
     status, _, err = run(f"fit {CAMPAIGN} -o m.nc")
     assert status == 130
-    assert "Interrupted. Files that were finished are kept: repeat the command to go on." in err
+    assert "Interrupted. Files that were finished are kept: the command takes them over" in err
 
 
 def test_an_unforeseen_error_asks_for_a_report(run, monkeypatch):

@@ -153,9 +153,9 @@ def test_a_disk_that_fills_up_loses_no_finished_cell(
     assert "the same command then goes on where it stopped" in told
     before = {path.name: path.stat().st_mtime_ns for path in cells_in(folder)}
     assert len(before) == room
-    # Then there is room for the cells, and none for all of the result.
+    # Then there is room for the cells, and none for the result.
     with monkeypatch.context() as patch:
-        patch.setattr(xr.Dataset, "to_netcdf", filling(1, xr.Dataset.to_netcdf))
+        patch.setattr(Path, "write_bytes", filling(0, Path.write_bytes))
         assert study(folder) == 1
     assert "No space left on device. All cells that were" in capfd.readouterr().err
     assert not (folder / "out" / "study.nc").exists()

@@ -108,6 +108,15 @@ def test_a_model_without_input_runs_on_its_own():
     np.testing.assert_array_equal(out[0, :, 0], [4, 2, 1])
 
 
+@pytest.mark.parametrize("rows", [2, 8])
+def test_no_window_gives_no_window(rows):
+    a, b, histories, inputs = problem()
+    if rows > 2:
+        a, b = shifted(a, 2), np.vstack([b, np.zeros((6, b.shape[1]))])
+    out = rollout(a, b, histories[:0], inputs[:0])
+    assert out.shape == (0, 12, 2)
+
+
 def test_a_window_that_diverges_is_nan_from_there_on_and_the_others_go_on():
     # 1e200 squared overflows at the second step; the neighbour is at rest.
     out = rollout([[1e200]], [[0.0]], [[1.0], [0.0]], np.zeros((2, 5, 1)))
@@ -129,6 +138,7 @@ def test_a_window_that_was_given_up_does_not_come_back():
         ({"histories": np.zeros((2, 4, 2))}, r"both have one row a window"),
         ({"inputs": np.zeros((3, 16, 3))}, r"inputs with 3 channels do not fit B of shape"),
         ({"inputs": np.zeros((3, 4, 2))}, r"inputs of 4 samples do not reach one step: 4 delays"),
+        ({"B": np.zeros((2, 0))}, r"inputs with 2 channels .* shape \(window, steps, 0\)"),
         ({"n_states": 3}, r"A of shape \(2, 8\) does not belong to 3 states"),
     ],
 )
@@ -167,6 +177,22 @@ def test_the_states_of_a_regressed_matrix_are_told_from_its_lower_rows(n, q, s, 
         np.testing.assert_array_equal(rollout(a, b, x, u), rollout(a, b, x, u, n_states=n))
 
 
+@pytest.mark.parametrize("dead", [[0], [1], [2], [0, 2]])
+@pytest.mark.parametrize("ridge", [0.1, 200.0])
+def test_channels_that_stood_still_are_states_too(dead, ridge):
+    rng = np.random.default_rng(4)
+    series, driving = rng.standard_normal((120, 3)).cumsum(axis=0), rng.standard_normal((120, 1))
+    series[:, dead] = 0.0
+    window = training_window(119, None, 4, 2, "before")
+    for rank in (None, 6):
+        chosen = {"ridge": ridge} if rank is None else {"ridge": 0.0, "rank": rank}
+        fit = identify(
+            [series], [driving], [window], state_delays=4, input_delays=2, **chosen
+        ).coefficients
+        out = rollout(fit[:, :15], fit[:, 15:], np.zeros((1, 15)), np.zeros((1, 7, 3)))
+        assert out.shape == (1, 7, 3)
+
+
 @pytest.mark.parametrize(
     "a",
     [
@@ -174,8 +200,10 @@ def test_the_states_of_a_regressed_matrix_are_told_from_its_lower_rows(n, q, s, 
         0.5 * np.eye(4),
         np.diag([0.9, 0.8, 0.7, 0.6, 0.5, 0.4]),
         [[0.5, 0.1], [0.3, 0.4]],
+        [[0.5, 0.1, 0.0], [0.2, 0.0, 0.0], [0.0, 0.0, 0.3]],
+        np.zeros((4, 4)),
     ],
-    ids=["random", "half the identity", "diagonal", "two rows"],
+    ids=["random", "half the identity", "diagonal", "two rows", "some zeros", "zeros"],
 )
 def test_a_square_matrix_without_delays_returns_its_whole_state(a):
     size = len(a)

@@ -9,6 +9,8 @@ import time
 from pathlib import Path
 
 HELPERS = Path(__file__).parent
+LIMIT = 300
+"""Seconds in which a process must be ready: it takes 2 on an idle machine."""
 
 
 class Cluster:
@@ -17,36 +19,38 @@ class Cluster:
     def __init__(self, folder, workers):
         self.processes = []
         self._folder = folder
-        text = self._start("scheduler", "--port", "0", "--dashboard-address", "127.0.0.1:0")
-        self.address = self._read(text, r"Scheduler at:\s+(tcp://\S+)")
+        scheduler = self._start("scheduler", "--port", "0", "--dashboard-address", "127.0.0.1:0")
+        self.address = self._read(*scheduler, r"Scheduler at:\s+(tcp://\S+)")
         worker = ("worker", self.address, "--nthreads", "1", "--no-nanny")
-        logs = [self._start(*worker) for _ in range(workers)]
-        for log in logs:
-            self._read(log, r"Registered to:\s+(tcp://\S+)")
+        started = [self._start(*worker) for _ in range(workers)]
+        for process, log in started:
+            self._read(process, log, r"Registered to:\s+(tcp://\S+)")
 
     def _start(self, *arguments):
         log = self._folder / f"{arguments[0]}{len(self.processes)}.log"
         environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(HELPERS), *sys.path])}
         command = [sys.executable, "-m", "dask", *arguments]
         with log.open("w") as file:
-            self.processes.append(
-                subprocess.Popen(
-                    [*command, "--host", "127.0.0.1", "--no-dashboard"],
-                    stdout=file,
-                    stderr=subprocess.STDOUT,
-                    env=environment,
-                    cwd=self._folder,
-                )
+            process = subprocess.Popen(
+                [*command, "--host", "127.0.0.1", "--no-dashboard"],
+                stdout=file,
+                stderr=subprocess.STDOUT,
+                env=environment,
+                cwd=self._folder,
             )
-        return log
+        self.processes.append(process)
+        return process, log
 
-    def _read(self, log, pattern):
-        deadline = time.monotonic() + 60
-        while time.monotonic() < deadline:
+    def _read(self, process, log, pattern):
+        deadline = time.monotonic() + LIMIT
+        while True:
+            ended = process.poll() is not None  # asked first: its last words are in the log then
             if found := re.search(pattern, log.read_text("utf-8")):
                 return found.group(1)
+            if ended or time.monotonic() > deadline:
+                self.close()
+                raise AssertionError(log.read_text("utf-8"))
             time.sleep(0.05)
-        raise AssertionError(log.read_text("utf-8"))
 
     def close(self):
         for process in self.processes:

@@ -214,6 +214,19 @@ def test_a_window_needs_no_more_than_window_and_history(runs):
         spec(alignment).fit(gapped.assign(eta_fwd=runs[0]["eta_fwd"]), ["heave"], INPUTS)
 
 
+def test_a_history_inside_the_window_needs_nothing_before_it(runs):
+    alignment = ProbeAlignment(mode="dispersion", surge="measured")
+    gapped = runs[0].copy(deep=True)
+    before = gapped.sizes["time"] - 1000
+    for name in ("surge", "eta_fwd"):
+        gapped[name].values[:before] = np.nan
+    inside = replace(spec(alignment), window=1000, history="inside")
+    assert inside.fit(gapped, STATES, INPUTS).training.columns == (959,)
+    gapped["eta_fwd"].values[before] = np.nan
+    with pytest.raises(DataError, match=r"channel 'eta_fwd' of run 1 has 1 missing"):
+        inside.fit(gapped, STATES, INPUTS)
+
+
 def test_a_gap_in_the_surge_is_named_in_a_forecast(models):
     run = drifting_run(7)
     run["surge"].values[700] = np.nan

@@ -257,6 +257,36 @@ def test_messages_keep_the_digits_of_late_instants(model, run):
         model.forecast(late, start=1234567.25, steps=5)
 
 
+def test_messages_tell_samples_apart_whatever_the_times_count_from(run, channels):
+    late = run.assign_coords(time=run.time + 1.7e9)
+    model = SPEC.fit(late, **channels)
+    message = r"start = 1700000000\.13 s \(nearest sample 1700000000\.15 s\) .* at 1700000000\.4 s"
+    with pytest.raises(RequestError, match=message):
+        model.forecast(late, start=1700000000.13, steps=5)
+    with pytest.raises(RequestError, match=r"from 1700000010 s .* ends at 1700000019\.95 s"):
+        model.forecast(late, start=1700000010.0, steps=201)
+    gap = late.isel(time=[*range(50), *range(57, 400)])
+    with pytest.raises(DataError, match=r"1 gap\(s\): after t = 1700000002\.45 s, 7 sample"):
+        model.forecast(gap, start=1700000010.0, steps=5)
+    with pytest.raises(RequestError, match=r"runs from 1700000000 to 1700000019\.95 s"):
+        model.forecast(late, start=30.0, steps=5)
+    assert "run: 391 pairs, 1700000000 to 1700000019.95 s" in model.summary()
+
+
+@pytest.mark.parametrize(
+    ("starts", "steps", "message"),
+    [
+        ([5.0, 6.0], None, r"steps is None, .* from each of the 2 starts\. Give the number"),
+        (["a"], 5, "start must be an instant in seconds; received 'a'"),
+        ([], 5, "starts is empty"),
+        (5.0, 5, r"starts must be a list of instants; received 5\.0\. Write \[5\.0\]"),
+    ],
+)
+def test_wrong_starts_of_windows_are_refused(model, run, starts, steps, message):
+    with pytest.raises(RequestError, match=message):
+        model.forecast_windows(run, starts, steps)
+
+
 def test_a_forecast_beyond_the_input_is_told_what_is_possible(model, run):
     message = r"201 steps from 10 s need the input up to 20 s .* ends at 19\.95 s\. At most 200"
     with pytest.raises(RequestError, match=message):
@@ -307,6 +337,9 @@ def test_wrong_lists_of_channels_are_refused(run, states, inputs, message):
         (np.nan, r"stop = nan s is outside run"),
         ("5", "stop must be an instant in seconds; received '5'"),
         ([5.0, 6.0], "stop has 2 instants for 1 runs"),
+        (["5"], "each stop must be an instant in seconds; received '5'"),
+        ([True], "each stop must be an instant in seconds; received True"),
+        ({"run": "5"}, "stop of 'run' must be an instant in seconds; received '5'"),
         ({"rum": 5.0}, r"stop names the run 'rum', which is not among .*Did you mean 'run'\?"),
     ],
 )
@@ -365,6 +398,14 @@ def test_wrong_settings_are_refused(settings, message):
 def test_presets_ask_for_a_positive_period_and_step(preset, period, dt, name):
     with pytest.raises(RequestError, match=f"{name} must be a positive number of seconds"):
         preset(encounter_period=period, dt=dt)
+
+
+def test_a_period_and_a_step_that_were_swapped_are_told():
+    for make in (HankelDMDc.paper, HankelDMDc.recommended):
+        with pytest.raises(
+            RequestError, match=r"dt = 9 s is no shorter than .* 0\.1 s\. Are the tw"
+        ):
+            make(0.1, 9.0)
 
 
 def test_no_setting_hides_in_the_constructor():

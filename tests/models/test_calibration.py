@@ -1,12 +1,14 @@
 """The calibrated band of an ensemble: on windows that no member read, kept in its file."""
 
+import warnings
+
 import numpy as np
 import pytest
 import xarray as xr
 
 import seakeep
 from seakeep.core.calibration import band_scores, conformal_margin
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, SeakeepWarning
 
 STATES, INPUTS, DT = ["heave", "pitch"], ["eta"], 0.1
 
@@ -133,6 +135,37 @@ def test_another_run_is_used_whole(ensemble):
     assert found.windows == {"other": (500 - ensemble.history_samples) // 40}
 
 
+def unnamed(run):
+    plain = run.copy()
+    del plain.attrs["run"]
+    return plain
+
+
+def test_runs_without_names_are_known_by_their_samples(run):
+    spec = seakeep.BayesianHankelDMDc(
+        encounter_period=1.6,
+        train_length=seakeep.Uniform(10, 16),
+        state_delay=seakeep.Fixed(0.5),
+        input_delay=seakeep.Fixed(1.0),
+        ridge=seakeep.Fixed(300.0),
+        n_members=2,
+    )
+    first, second, third = (unnamed(sea(seed, 500)) for seed in (0, 3, 4))
+    ensemble = spec.fit([first, second], STATES, INPUTS)
+    # Up to 256 of its 500 samples and their history were read, so that none of 250 steps is free.
+    # `second` was read under the name "run 2"; alone it is "run", in a list of one "run 1".
+    for again in (second, [second], second.isel(time=slice(0, 300)), {"other": second}):
+        with pytest.raises(RequestError, match="members have read what is left of them"):
+            ensemble.calibrate(again, steps=250)
+    free = (500 - ensemble.history_samples) // 40
+    assert ensemble.calibrate(third, steps=40).calibration.windows == {"run": free}
+    assert ensemble.calibrate([third], steps=40).calibration.windows == {"run 1": free}
+    # A run that has a name and other samples may have been prepared in another way.
+    named = spec.fit(sea(0, 500, "a"), STATES, INPUTS)
+    with pytest.raises(RequestError, match="members have read what is left of them"):
+        named.calibrate(1.001 * sea(0, 500, "a").assign_attrs(run="a"), steps=250)
+
+
 def test_a_file_keeps_the_calibration(calibrated, ensemble, run, tmp_path):
     calibrated.save(tmp_path / "ensemble.nc")
     kept = seakeep.load_model(tmp_path / "ensemble.nc")
@@ -148,6 +181,22 @@ def test_a_file_keeps_the_calibration(calibrated, ensemble, run, tmp_path):
 def test_the_summary_says_it(calibrated, ensemble):
     assert "calibrated for 0.95 on 20 windows of 40 steps" in calibrated.summary()
     assert "calibrated" not in ensemble.summary()
+
+
+def test_a_longer_forecast_than_the_calibrated_ones_is_told(calibrated, run):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        calibrated.forecast_summary(run, 112.0, 40, band="calibrated")
+        calibrated.forecast_summary(run, 112.0, 41)
+    for ask in (
+        lambda: calibrated.forecast_summary(run, 112.0, 41, band="calibrated"),
+        lambda: calibrated.summarize_windows(run, [112.0], 41, band="calibrated"),
+    ):
+        with pytest.warns(
+            SeakeepWarning, match="forecast of sea is longer than the 40 instants"
+        ) as told:
+            ask()
+        assert told[0].filename == __file__
 
 
 def test_what_is_refused(ensemble, calibrated, run):

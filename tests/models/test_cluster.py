@@ -18,7 +18,10 @@ from seakeep.models.workers import Crew, WorkerLostError, as_finished, side_by_s
 distributed = pytest.importorskip(
     "distributed", reason="a Dask cluster needs distributed (extra 'cluster')"
 )
-pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning"),
+    pytest.mark.usefixtures("patient_cluster"),
+]
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +29,16 @@ def dask_cluster(tmp_path_factory):
     from dask_processes import Cluster
 
     started = Cluster(tmp_path_factory.mktemp("dask"), workers=2)
+    yield started
+    started.close()
+
+
+@pytest.fixture
+def fresh_cluster(tmp_path):
+    """One that has done nothing yet: what its workers count is the test's own."""
+    from dask_processes import Cluster
+
+    started = Cluster(tmp_path, workers=2)
     yield started
     started.close()
 
@@ -50,7 +63,7 @@ def problem():
     return spec.fit(run, ["heave"], ["eta"], stop=180.0), run
 
 
-def test_members_are_those_of_one_worker_and_data_travel_once(dask_cluster, problem, monkeypatch):
+def test_members_are_those_of_one_worker_and_data_travel_once(fresh_cluster, problem, monkeypatch):
     ensemble, run = problem
     pickled = []
 
@@ -62,10 +75,10 @@ def test_members_are_those_of_one_worker_and_data_travel_once(dask_cluster, prob
     monkeypatch.setattr(TrainingArrays, "__reduce_ex__", counting)
     size = len(pickle.dumps(ensemble.arrays, protocol=5))
     assert len(pickled) == 1, "the count does not count"
-    found = ensemble.forecast(run, start=181.0, steps=30, scheduler=dask_cluster.address)
+    found = ensemble.forecast(run, start=181.0, steps=30, scheduler=fresh_cluster.address)
     xr.testing.assert_identical(alone, found)
     assert len(pickled) == 2
-    with distributed.Client(dask_cluster.address, set_as_default=False) as client:
+    with distributed.Client(fresh_cluster.address, set_as_default=False) as client:
         sent = client.run(
             lambda dask_worker: [
                 (key, nbytes)
@@ -80,7 +93,7 @@ def test_members_are_those_of_one_worker_and_data_travel_once(dask_cluster, prob
     # Forty members in seven tasks of five and four of 2, 1, 1 and 1, and the data: both workers
     # worked, and no task came twice.
     assert sum(states.values()) == 7 + 4 + 1
-    summary = ensemble.forecast_summary(run, start=181.0, steps=30, scheduler=dask_cluster.address)
+    summary = ensemble.forecast_summary(run, start=181.0, steps=30, scheduler=fresh_cluster.address)
     xr.testing.assert_identical(summary, ensemble.forecast_summary(run, start=181.0, steps=30))
 
 
@@ -141,7 +154,12 @@ def test_what_is_no_address_is_told_at_once(address):
 def test_a_scheduler_without_workers(monkeypatch, tmp_path):
     from dask_processes import Cluster
 
-    monkeypatch.setattr(cluster, "PATIENCE", 1.0)
+    waits = distributed.Client.wait_for_workers
+
+    def briefly(self, count, timeout):  # the time to connect stays long
+        waits(self, count, timeout=0.5)
+
+    monkeypatch.setattr(distributed.Client, "wait_for_workers", briefly)
     alone = Cluster(tmp_path, workers=0)
     try:
         with pytest.raises(RequestError, match=r"has no workers. Start some with `dask worker tcp"):

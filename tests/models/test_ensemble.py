@@ -12,6 +12,7 @@ from seakeep import (
     DataError,
     Fixed,
     HankelDMDc,
+    ProbeAlignment,
     RequestError,
     SeakeepWarning,
     Uniform,
@@ -131,8 +132,7 @@ def test_a_member_does_not_depend_on_the_number_of_members(run, sampling):
     few = fitted(run, sampling=sampling).draws
     many = fitted(run, sampling=sampling, n_members=8).draws
     kept = many.isel(member=slice(6))
-    if sampling == "monte_carlo":
-        xr.testing.assert_equal(few, kept)
+    xr.testing.assert_equal(few, kept)
     assert not np.allclose(few.ridge, fitted(run, sampling=sampling, seed=4).draws.ridge)
 
 
@@ -158,6 +158,38 @@ def test_priors_that_never_fit_are_refused(run):
     )
     with pytest.raises(DataError, match=text):
         fitted(run, train_length=Fixed(50))
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of scipy, about its parameters
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"ridge": Uniform(-2, -1)}, r"gave ridge = -1\.\d+, which is negative\. Move the prior"),
+        ({"state_delay": Fixed(-1)}, r"gave state_delays = -16, which is negative"),
+        ({"ridge": stats.uniform(np.nan, 1)}, r"gave ridge = nan\. Check the parameters of that"),
+        ({"input_delay": stats.uniform(0, np.inf)}, r"gave input_delay = inf\. Check the"),
+        ({"train_length": Fixed(0.05)}, r"a window of 1 samples, and 2 are needed\. Raise train"),
+        (
+            {"train_length": Fixed(1), "input_delay": Fixed(2), "history": "inside"},
+            r"window of 16 samples with delays of \d and 32 inside it, and 34 are needed",
+        ),
+    ],
+)
+def test_priors_that_give_nothing_to_train_with_are_refused(run, changes, text):
+    with pytest.raises(DataError, match=rf"no feasible draw in 1000: the last one .*{text}"):
+        fitted(run, **changes)
+
+
+def test_an_infinite_quantile_is_drawn_again(run):
+    class Rare:
+        def ppf(self, q):
+            return np.inf if q > 0.5 else q
+
+        dist = stats.uniform  # the name that a file gives it
+
+    draws = fitted(run, state_delay=Rare(), n_members=20).draws
+    assert draws.attrs["redrawn"] > 0
+    assert np.all(draws.state_delay <= 0.5)
 
 
 def test_the_same_seed_gives_the_same_arrays_for_any_workers(run):
@@ -286,6 +318,22 @@ def test_a_file_gives_back_the_ensemble_to_the_last_bit(run, tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"ridge": Fixed(0.0), "rank": np.int64(5)},
+        {"standardize": np.bool_(True)},
+        {"alignment": ProbeAlignment(surge="none", celerity=np.float32(2.5))},
+        {"alignment": ProbeAlignment(surge="none", celerity=np.int64(2))},
+    ],
+)
+def test_numbers_of_numpy_are_kept_in_a_file(run, tmp_path, changes):
+    ensemble = fitted(run, **changes)
+    back = seakeep.load_model(ensemble.save(tmp_path / "ensemble.nc"))
+    assert back.settings == ensemble.settings
+    assert back.alignment == ensemble.alignment
+
+
 def test_a_damaged_file_is_refused(run, tmp_path):
     ensemble = fitted(run)
     damaged = ensemble.to_dataset().drop_vars("inputs_0")
@@ -306,6 +354,14 @@ def test_diverged_members_are_counted_and_left_out(run):
         np.testing.assert_array_equal(summary[name], rest[name])
     assert summary.attrs["diverged"] == 1
     assert summary.attrs["members"] == 6
+
+
+def test_members_of_whole_numbers_are_summarised():
+    counts = xr.Dataset({"slams": (("member", "time"), [[1, 2, 7], [2, 4, 9]])})
+    summary = seakeep.summarize(counts, level=0.5)
+    expected = seakeep.summarize(counts.astype(float), level=0.5)
+    xr.testing.assert_identical(summary, expected)
+    assert summary.slams.sel(statistic="mean").values.tolist() == [1.5, 3.0, 8.0]
 
 
 def test_members_that_diverge_say_when():
@@ -467,8 +523,8 @@ def test_an_ensemble_without_inputs(run):
     [
         ({"ridge": 100}, "ridge must be a prior; received 100"),
         ({"n_members": 0}, "n_members must be an integer of at least 1; received 0"),
-        ({"sampling": "grid"}, "sampling must be one of 'monte_carlo', 'sobol'; received 'grid'"),
-        ({"train_on": "half"}, "train_on must be one of 'all', 'runs', 'windows'; received 'half'"),
+        ({"sampling": "grid"}, "sampling must be 'monte_carlo' or 'sobol'; received 'grid'"),
+        ({"train_on": "half"}, "train_on must be 'all', 'runs' or 'windows'; received 'half'"),
         ({"seed": -1}, "seed must be an integer, zero or more, a SeedSequence or a Generator"),
         ({"encounter_period": 0}, "encounter_period must be a positive number of seconds"),
         ({"delay_rows": "none"}, "delay_rows must be 'ridge' or 'exact'"),

@@ -13,6 +13,7 @@ import xarray as xr
 from scipy import io
 
 from seakeep import DataError, HankelDMDc, RequestError, load_model
+from seakeep.models.store import FORMAT_VERSION, checksum
 
 FORECAST_ELSEWHERE = """
 import sys
@@ -39,6 +40,7 @@ def saved(make_run, channels, tmp_path):
 def edited(path, **attrs):
     """The file at `path` with other attributes."""
     dataset = xr.load_dataset(path, engine="h5netcdf").assign_attrs(attrs)
+    dataset.attrs["checksum"] = checksum(dataset)
     dataset.to_netcdf(path, engine="h5netcdf")
     return path
 
@@ -79,7 +81,7 @@ def test_a_model_without_input_comes_back(run, tmp_path):
 def test_a_file_holds_no_pickle_and_says_what_it_is(saved):
     dataset = xr.load_dataset(saved, engine="h5netcdf")
     assert dataset.attrs["seakeep_kind"] == "hankel_dmdc"
-    assert int(dataset.attrs["seakeep_format"]) == 1
+    assert int(dataset.attrs["seakeep_format"]) == FORMAT_VERSION
     assert json.loads(dataset.attrs["settings"])["state_delays"] == 3
     assert all(variable.dtype == np.float64 for variable in dataset.variables.values())
 
@@ -127,8 +129,39 @@ def test_a_foreign_netcdf_is_named_by_its_variables(run, tmp_path):
 
 
 def test_a_newer_layout_asks_for_an_update(saved):
-    edited(saved, seakeep_format=2, seakeep_version="9.0")
-    with pytest.raises(DataError, match=r"has layout 2, written by seakeep 9\.0; .* up to 1"):
+    edited(saved, seakeep_format=9, seakeep_version="9.0")
+    known = rf"has layout 9, written by seakeep 9\.0; .* up to {FORMAT_VERSION}\."
+    with pytest.raises(DataError, match=known):
+        load_model(saved)
+
+
+def test_a_file_of_the_first_layout_has_no_checksum_and_is_read(saved):
+    before = load_model(saved).A
+    dataset = xr.load_dataset(saved, engine="h5netcdf").assign_attrs(seakeep_format=1)
+    del dataset.attrs["checksum"]
+    dataset.to_netcdf(saved, engine="h5netcdf")
+    np.testing.assert_array_equal(load_model(saved).A, before)
+
+
+@pytest.mark.parametrize("part", ["coefficients", "state_std", "settings", "labels"])
+def test_a_single_bit_that_changed_is_noticed(saved, part):
+    content, dataset = saved.read_bytes(), xr.load_dataset(saved, engine="h5netcdf")
+    held = dataset.attrs[part].encode() if part in dataset.attrs else dataset[part].values.tobytes()
+    begin = content.index(held)
+    for place in np.linspace(begin, begin + len(held) - 1, 5).astype(int):
+        damaged = bytearray(content)
+        damaged[place] ^= 1
+        saved.write_bytes(damaged)
+        with pytest.raises(DataError, match="does not hold what was written into it"):
+            load_model(saved)
+
+
+@pytest.mark.parametrize("name", ["seakeep_format", "checksum", "dt"])
+def test_a_file_that_lacks_what_it_is_known_by_is_refused(saved, name):
+    dataset = xr.load_dataset(saved, engine="h5netcdf")
+    del dataset.attrs[name]
+    dataset.to_netcdf(saved, engine="h5netcdf")
+    with pytest.raises(DataError, match=r"rom\.nc does not hold what was written into it"):
         load_model(saved)
 
 
@@ -149,7 +182,8 @@ def test_a_file_with_broken_contents_is_incomplete(saved, attrs):
 
 def test_a_file_whose_matrices_do_not_fit_its_delays_is_refused(saved):
     dataset = xr.load_dataset(saved, engine="h5netcdf")
-    dataset.isel(regressor=slice(1, None)).to_netcdf(saved, engine="h5netcdf")
+    dataset = dataset.isel(regressor=slice(1, None))
+    dataset.assign_attrs(checksum=checksum(dataset)).to_netcdf(saved, engine="h5netcdf")
     with pytest.raises(DataError, match=r"rom\.nc is incomplete: .*coefficients"):
         load_model(saved)
 
@@ -176,11 +210,12 @@ def test_a_folder_that_cannot_be_written_is_named(model, tmp_path, monkeypatch):
 def test_an_interrupted_write_leaves_the_old_file(saved, model, monkeypatch):
     before = saved.read_bytes()
 
-    def fill_the_disk(self, path, **kwargs):
-        Path(path).write_bytes(b"half a mod")
+    def fill_the_disk(self, content):
+        with self.open("wb") as file:
+            file.write(content[:10])
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(xr.Dataset, "to_netcdf", fill_the_disk)
+    monkeypatch.setattr(Path, "write_bytes", fill_the_disk)
     with pytest.raises(RequestError, match=r"cannot write .*: No space left .* is untouched"):
         model.save(saved)
     assert saved.read_bytes() == before
@@ -209,7 +244,8 @@ def test_a_real_failure_of_the_operating_system_leaves_the_old_file(saved):
         text=True,
         check=False,
     )
-    assert "cannot write" in done.stdout, done.stderr
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "cannot write" in done.stdout
     assert saved.read_bytes() == before
     assert [path.name for path in saved.parent.iterdir()] == ["rom.nc"]
 
@@ -219,7 +255,10 @@ def test_a_mat_file_reproduces_the_forecast(model, make_run, tmp_path):
     content = io.loadmat(model.to_mat(tmp_path / "rom.mat"), squeeze_me=False)
     steps, start = 100, 60
     state = model.initial_state(run, start=float(run.time[start]))
+    x = np.stack([run.heave.values, run.pitch.values], axis=1)[: start + 1]
     u = np.stack([run.eta_fwd.values, run.eta_cog.values], axis=1)[start : start + steps + 1]
+    before = np.stack([run.eta_fwd.values, run.eta_cog.values], axis=1)[: start + 1]
+    np.testing.assert_array_equal(model.initial_state_arrays(x, before), state)
     outputs = []
     for row in u:
         deviation = row - content["InputOffset"][:, 0]
@@ -236,6 +275,12 @@ def test_a_mat_file_reproduces_the_forecast(model, make_run, tmp_path):
 def test_a_mat_file_carries_what_idss_asks_for(model, tmp_path):
     content = io.loadmat(model.to_mat(tmp_path / "rom.mat"))
     names = {key: [str(cell[0]) for cell in content[key][:, 0]] for key in content if "Name" in key}
+    entries = names.pop("StateName")
+    assert len(entries) == content["A"].shape[0]
+    assert entries[:3] + entries[7:10] == [
+        *("heave(k)", "pitch(k)", "heave(k-1)"),
+        *("pitch(k-3)", "eta_fwd(k-1)", "eta_cog(k-1)"),
+    ]
     assert names == {"InputName": ["eta_fwd", "eta_cog"], "OutputName": ["heave", "pitch"]}
     assert [str(cell[0]) for cell in content["OutputUnit"][:, 0]] == ["m", "rad"]
     assert float(content["Ts"][0, 0]) == model.dt

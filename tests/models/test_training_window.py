@@ -306,3 +306,11 @@ def test_runs_keep_the_names_that_were_given(make_run, channels):
     assert spec.fit(named, **channels).training.runs == ("3041_2",)
     assert spec.fit([named, make_run(seed=1)], **channels).training.runs == ("3041_2", "run 2")
     assert len(set(spec.fit([named, named], **channels).training.runs)) == 2
+
+
+def test_no_run_takes_the_name_of_another(make_run, channels):
+    runs = [make_run(seed=seed) for seed in range(4)]
+    for run, name in zip(runs, ["a", "a (3)", "a", "a (3)"], strict=True):
+        run.attrs["run"] = name
+    trained = HankelDMDc(3, 8, 1.0).fit(runs, **channels).training
+    assert trained.runs == ("a", "a (3)", "a (4)", "a (3) (4)")

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 import side_work
 import xarray as xr
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seakeep
@@ -59,7 +60,7 @@ def ensemble_of():
     return fit
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=12)
 @given(
     members=st.integers(1, 9),
     seed=st.integers(0, 2**31),
@@ -121,6 +122,30 @@ def test_the_limit_of_blas_is_lifted_when_the_last_one_leaves():
         assert threads() == before
 
 
+def test_the_limit_of_blas_holds_in_any_thread_and_any_thread_may_lift_it():
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    def threads():
+        return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+    def work():
+        found.extend(side_by_side(side_work.blas_threads, None, range(2), Crew()))
+        next(held)
+        seen.append(threads())
+
+    with threadpool_limits(2, user_api="blas"):  # the limit is this thread's now
+        before = threads()
+        found, seen = [], []
+        held = side_by_side(side_work.blas_threads, None, range(2), Crew())
+        other = threading.Thread(target=work)
+        other.start()
+        other.join()
+        assert [set(each) for _, each in found] == [{1}, {1}]
+        assert seen == [{1}]
+        held.close()  # begun there, left here
+        assert threads() == before
+
+
 def test_little_work_stays_in_this_process_and_much_goes_to_others(monkeypatch):
     def where():
         return [process for process, _ in side_by_side(side_work.square, 1, range(6), crew)]
@@ -161,9 +186,10 @@ def test_processes_stay_ready_for_the_next_call():
     def pids():
         return {pid for pid, _ in side_by_side(side_work.square, 1, range(8), Crew(2))}
 
-    first = pids()
-    assert os.getpid() not in first
-    assert pids() & first  # perhaps not the same: the second may have started too late for work
+    # Either process may have slept through a call; new ones for each call would be three or more.
+    found = pids() | pids() | pids()
+    assert os.getpid() not in found
+    assert len(found) <= 2
 
 
 def test_processes_end_when_nobody_wants_them_any_more(monkeypatch):
@@ -230,11 +256,11 @@ def test_a_parent_that_is_killed_leaves_no_process_behind(tmp_path):
 
 
 def _ends(pid):
-    """Whether a process is gone within some seconds; a zombie without other threads is gone too.
+    """Whether a process is gone within minutes; a zombie without other threads is gone too.
 
     While one of its threads still ends, its parent is told that it lives.
     """
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 120
     while time.monotonic() < deadline:
         try:
             state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.report.tables import band_findings, rich_bands, rich_comparison, write_csv
+from seakeep.report.style import LINES
+from seakeep.report.tables import (
+    band_findings,
+    rich_bands,
+    rich_comparison,
+    write_csv,
+    write_forecast,
+)
 from seakeep.study import (
     Comparison,
     at_full_scale,
@@ -309,6 +316,112 @@ def test_an_envelope_ends_where_a_forecast_is_lost():
     known = np.isfinite(reached.values)
     assert 0.4 < known.mean() < 0.6
     assert not np.any(known[np.argmin(known) :])
+
+
+def named(judged, **long_names):
+    """The same, with what a campaign calls channels."""
+    for name, words in long_names.items():
+        for data in (judged.measured, judged.forecast, judged.inputs):
+            if name in data:
+                data[name].attrs["long_name"] = words
+    return judged
+
+
+def test_labels_are_what_the_campaign_calls_a_channel():
+    pytest.importorskip("matplotlib")
+    from seakeep.report.overlay import overlay_figure
+
+    words = "Bow line LC-1 (FWD), 2 $ shackles, 1 $ pin"
+    judged = named(comparison(), pitch="Trim angle (MRU-5)", mooring_stern=words)
+    again = named(judged, heave="heave", eta_fwd="probe ahead of the bow")  # canonical words stay
+    figure = overlay_figure(in_degrees(again))
+    figure.draw_without_rendering()
+    shown = [axes.yaxis.label for axes in figure.axes]
+    assert shown[0].get_text() == "heave\n$z$ [m]"
+    assert shown[1].get_text() == "Trim angle (MRU-5)\n$\\theta$ [deg]"
+    lines = shown[2].get_text().replace(r"\$", "$").split("\n")
+    assert " ".join(lines[:-1]) == words
+    assert lines[-1] == "$M_\\mathrm{stern}$ [N]"
+    for axes, label in zip(figure.axes, shown, strict=True):
+        assert label.get_window_extent().height <= axes.get_window_extent().height
+    entry = figure.axes[-1].get_legend().get_texts()[0]
+    assert entry.get_text() == "probe ahead of the bow"
+
+
+def test_a_figure_at_full_scale_says_so_and_shows_loads_with_a_prefix(tmp_path):
+    pytest.importorskip("matplotlib")
+    from seakeep.report.overlay import overlay_figure
+
+    small = comparison()
+    large = at_full_scale(small, 120.0)
+    figure = overlay_figure(large)
+    title = figure.get_suptitle()
+    assert title.startswith("r1 · full scale, λ = 120 · sea state as stated: calm · ANRMSE")
+    assert "full scale" not in overlay_figure(small).get_suptitle()
+    load = figure.axes[2]
+    assert load.get_ylabel().endswith("[MN]")
+    # 1 N at model scale is 120³ N, water of one density.
+    values = load.lines[0].get_ydata()
+    assert values.max() == pytest.approx(1e-6 * 120**3 * small.measured["mooring_stern"].max())
+    assert not load.yaxis.get_offset_text().get_text()
+    table = comparison_table([large])
+    rows = list(csv.DictReader(write_csv(table, tmp_path / "t.csv").read_text().splitlines()))
+    assert {(row["scale"], row["scale_factor"]) for row in rows} == {("full", "120.0")}
+    assert "full scale (1:120)" in str(rich_comparison(table).title)
+    path = write_forecast(large.forecast, tmp_path / "f.csv")
+    lines = list(csv.DictReader(path.read_text().splitlines()))
+    assert {line["scale_factor"] for line in lines} == {"120.0"}
+    path = write_forecast(small.forecast, tmp_path / "s.csv")
+    assert "scale" not in path.read_text().splitlines()[0]
+
+
+@pytest.mark.parametrize(("count", "rows"), [(5, [3, 2]), (8, [4, 4]), (10, [4, 4, 2])])
+def test_many_inputs_are_told_apart_in_colour_and_in_grey(count, rows):
+    pytest.importorskip("matplotlib")
+    from seakeep.report.overlay import input_styles, overlay_figure
+
+    judged = comparison()
+    elevation = judged.inputs["eta_fwd"]
+    names = [f"eta_{number + 1}" for number in range(count)]
+    many = xr.Dataset(dict.fromkeys(names, elevation))
+    figure = overlay_figure(replace(judged, inputs=many))
+    styles = [(style["color"], style["linestyle"]) for style in input_styles(count)]
+    assert [line.get_color() for line in figure.axes[-1].lines[:count]] == [c for c, _ in styles]
+    assert len(set(styles)) == count
+    assert len({dash for _, dash in styles[:8]}) == min(count, 8)  # grey print: by dash alone
+    figure.draw_without_rendering()
+    texts = figure.axes[-1].get_legend().get_texts()
+    places = {}
+    for text in texts:
+        box = text.get_window_extent()
+        places.setdefault(round(box.y0), []).append((box.x0, text.get_text()))
+    order = [sorted(places[y]) for y in sorted(places, reverse=True)]
+    assert [len(row) for row in order] == rows
+    assert [word for row in order for _, word in row] == names  # read along the rows
+
+
+def test_a_mean_lies_over_a_thin_measurement_over_the_band():
+    pytest.importorskip("matplotlib")
+    from seakeep.report.overlay import overlay_figure
+
+    axes = overlay_figure(ensemble()).axes[0]
+    measured, mean = axes.lines[:2]
+    assert (measured.get_label(), mean.get_label()) == ("measured", "ensemble mean")
+    assert axes.collections[0].get_zorder() < measured.get_zorder() <= mean.get_zorder()
+    assert measured.get_linewidth() < mean.get_linewidth()
+    gaps = LINES["ensemble"]["linestyle"][1][1::2]
+    assert min(gaps) >= 2  # line widths, in which the measurement shows
+
+
+def test_envelopes_keep_off_the_frame():
+    pytest.importorskip("matplotlib")
+    from seakeep.report.overlay import overlay_figure
+
+    long = lengthened(comparison())
+    axes = overlay_figure(long).axes[0]
+    low, high = axes.get_ylim()
+    assert low < float(long.measured["heave"].min())
+    assert high > float(long.measured["heave"].max())
 
 
 def test_statuses_follow_the_clock_of_full_scale():

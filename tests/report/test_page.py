@@ -12,22 +12,37 @@ import pytest
 from tutorial_study import put_tutorial
 
 from seakeep.errors import RequestError
+from seakeep.report.deviations import (
+    deviations,
+    training_overlap,
+    training_windows_overlap,
+    unequal_training,
+)
 from seakeep.report.deviations import test_overlap as overlap_of_tests
-from seakeep.report.glossary import few_cells, plain_symbol
-from seakeep.report.interactive import dashes, pack
+from seakeep.report.glossary import few_cells, glossary, plain_symbol
+from seakeep.report.interactive import dashes, history_data, pack
 from seakeep.report.latex import latex_text
 from seakeep.report.published import PUBLISHED
-from seakeep.report.study_tables import coverage_table, number
-from seakeep.report.study_words import findings
+from seakeep.report.study_tables import (
+    coverage_table,
+    divergence_table,
+    error_table,
+    number,
+    probability,
+    small_number,
+    trend_table,
+)
+from seakeep.report.study_words import findings, training_table
 from seakeep.report.style import LINES
 from seakeep.study import read_result, read_study, run_study
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
 from seakeep.report.figures.boxes import FEWEST, draw_box_violin
+from seakeep.report.figures.common import grid_of_axes
 from seakeep.report.figures.eigenvalues import eigenvalue_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
-from seakeep.report.page import write_report
+from seakeep.report.page import headings, write_report
 
 STUDY = """
 [study]
@@ -77,11 +92,10 @@ def test_no_id_stands_twice(page):
 
 def test_what_it_holds(page):
     text = page.read_text("utf-8")
-    for section in ("summary", "deviations", "errors", "explore", "densities", "versions"):
-        assert f'<section id="{section}">' in text
+    wanted = ["summary", "errors", "explore", "densities", "settings", "deviations", "versions"]
+    found = re.findall(r'<section id="(.*?)">', text)
+    assert [each for each in found if each in wanted] == wanted
     assert "a &amp; b &lt; c" in text
-    assert "paper: EV, another data set" in text
-    assert PUBLISHED["heave"] in text
     assert "noise floor" in text
     assert "@media print" in text
     digest = read_result(page.parent).attrs["digest"]
@@ -96,7 +110,7 @@ def test_figures_and_tables_are_files_too(page):
     tables = page.parent / "tables"
     with (tables / "jsd_bayesian_paper.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
-    assert rows[0][-1] == "paper: EV, another data set"
+    assert rows[0][-1] == "block (samples)"
     assert all(len(row) == len(rows[0]) for row in rows)
     with (tables / "trend.csv").open(encoding="utf-8", newline="") as file:
         bands = [row[1] for row in csv.reader(file)][1:]
@@ -124,6 +138,32 @@ def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page):
     assert f"A training set had {windows.min()}" in page.read_text("utf-8")
 
 
+def test_models_that_learn_from_unequal_lengths_are_told(page):
+    result = read_result(page.parent)
+    said = unequal_training(result)
+    assert said in findings(result)
+    spans = [re.findall(r"[\d.]+", each)[-2:] for each in result.groups["training"]["spans"].values]
+    period = result.attrs["encounter_period"]
+    lengths = sorted((float(end) - float(begin)) / period for begin, end in spans)
+    assert (
+        f"deterministic from all of a training set ({lengths[0]:.0f} to {lengths[-1]:.0f}" in said
+    )
+    assert "Bayesian from a part (uniform from 10 to 20 T̂)" in said
+    assert "(all of it: deterministic)" in training_table(result).note
+    # In one run both sets begin where its span begins, so that the shorter lies in the longer.
+    training = result.groups["training"]
+    training = training.assign(run=training["run"].copy(data=["a"] * training.sizes["training"]))
+    one = replace(result, groups={**result.groups, "training": training})
+    assert "where deterministic reads them, they share" in training_overlap(one)
+    assert training_windows_overlap(one)
+    specs = json.loads(result.attrs["specs"])
+    for window in ("300", "None"):
+        specs["deterministic"]["window"] = window
+        specs["bayesian"]["train_length"] = window
+        alike = replace(result, attrs={**result.attrs, "specs": json.dumps(specs)})
+        assert unequal_training(alike) == ""
+
+
 def test_a_history_shows_the_calibrated_band_around_that_of_the_members(page):
     found = read_result(page.parent)
     ((test, training, window), *_) = shown_cells(found)
@@ -141,6 +181,52 @@ def test_a_history_shows_the_calibrated_band_around_that_of_the_members(page):
     without = {n: g for n, g in found.groups.items() if not n.startswith("calibration/")}
     plain = history_figure(replace(found, groups=without), test, training, window)
     assert "calibrated" not in [text.get_text() for text in plain.legends[0].get_texts()]
+
+
+def test_histories_state_their_unit_and_hide_no_line_behind_another(page):
+    found = read_result(page.parent)
+    figure = history_figure(found, *shown_cells(found)[0])
+    assert figure.get_supylabel() == "deviation from the training mean, in training SD"
+    axes = figure.axes[0]
+    lines = {line.get_label(): line for line in axes.lines}
+    measured, mean = lines["measured"], lines["Bayesian mean"]
+    (band,) = axes.collections
+    assert band.get_zorder() < measured.get_zorder() <= lines["deterministic"].get_zorder()
+    assert measured.get_linewidth() < mean.get_linewidth()
+    figure.draw_without_rendering()
+    (words,) = (text.get_window_extent() for text in figure.texts)
+    assert all(words.x1 <= each.get_tightbbox().x0 + 1 for each in figure.axes)
+
+
+def test_tables_say_what_the_campaign_calls_a_channel(page):
+    found = read_result(page.parent)
+    channels = found.groups["channels"]
+    words = [
+        "Trim angle (MRU-5)" if name == "pitch" else "free" if name == "heave" else str(old)
+        for name, old in zip(channels["name"].values, channels["long_name"].values, strict=True)
+    ]
+    told = channels.assign(long_name=("name", words))
+    other = replace(found, groups={**found.groups, "channels": told})
+    assert ("Trim angle (MRU-5)",) in [row[:1] for row in error_table(other, "unseen").rows]
+    assert "θ Trim angle (MRU-5); " in dict(glossary(other))["in figures"]
+    assert '"label":"Trim angle (MRU-5)"' in history_data(other)
+    # A free name has no symbol: it is said once.
+    lone = replace(found, groups={**found.groups, "channels": _renamed(channels)})
+    assert "kraft bug; " in dict(glossary(lone))["in figures"]
+    assert "kraft bug kraft bug" not in dict(glossary(lone))["in figures"]
+
+
+def _renamed(channels):
+    """A channel of a free name in place of heave."""
+    names = [name if name != "heave" else "kraft_bug" for name in channels["name"].values]
+    states = [name if name != "heave" else "kraft_bug" for name in channels["channel"].values]
+    words = [
+        "kraft bug" if name == "kraft_bug" else str(old)
+        for name, old in zip(names, channels["long_name"].values, strict=True)
+    ]
+    return channels.assign_coords(name=names).assign(
+        channel=("channel", states), long_name=("name", words)
+    )
 
 
 def test_the_legend_of_the_eigenvalues_stands_over_none_of_them(page):
@@ -165,14 +251,29 @@ def test_the_data_quality_is_in_the_page_for_every_run_and_channel(page):
 
 
 def test_the_deviations_name_what_is_in_effect(page):
-    with (page.parent / "tables" / "deviations.csv").open(encoding="utf-8", newline="") as file:
-        rows = {row[0]: row[2] for row in csv.reader(file)}
+    with (page.parent / "tables" / "method.csv").open(encoding="utf-8", newline="") as file:
+        rows = {row[0]: row[1] for row in csv.reader(file)}
     assert rows["preset"].startswith("'recommended'")
     assert rows["alignment of the waves to the vessel"].startswith("none: ")
     assert rows["measured outputs read after the start"] == "none: forecasts in the strict sense"
     assert rows["rows of Â that shift the delays"] == "exact shifts"
     assert not any("None" in value or "celerity=" in value for value in rows.values())
     assert " T̂ of " in rows["training windows"]
+
+
+def test_the_paper_stands_beside_a_study_that_asks_for_it(page):
+    plain = read_result(page.parent)
+    assert list(headings(plain))[-2:] == ["deviations", "versions"]
+    assert deviations(plain).columns == ("subject", "in effect")
+    settings = plain.settings
+    settings["output"]["paper"] = True
+    asked = replace(plain, attrs={**plain.attrs, "settings": json.dumps(settings)})
+    assert list(headings(asked))[:2] == ["summary", "deviations"]
+    assert set(headings(asked)) == set(headings(plain))
+    assert deviations(asked).columns == ("subject", "the paper", "in effect here")
+    table = divergence_table(asked, "bayesian", "paper")
+    assert table.columns[-1] == "paper: EV, another data set"
+    assert [row[-1] for row in table.rows if row[0] == "heave"] == [PUBLISHED["heave"]]
 
 
 def test_words_and_symbols_are_said_once(page):
@@ -240,6 +341,58 @@ def test_numbers_have_a_minus_and_zero_has_none():
     assert latex_text("-0.12 [-0.3, 0.1] a-1") == r"$-$0.12 [$-$0.3, 0.1] a-1"
 
 
+def test_small_numbers_keep_two_digits_and_probabilities_are_no_zero(page):
+    result = read_result(page.parent)
+    for table in (divergence_table(result, "bayesian", "recommended"), trend_table(result)):
+        cells = [cell for row in table.rows for k, cell in enumerate(row) if k in table.numeric]
+        assert not [cell for cell in cells if re.search(r"\b0\.0000\b", cell)]
+    assert (probability(0.0004), probability(0.0386)) == ("< 0.001", "0.039")
+    assert small_number(0.0) == "0"
+
+
+def test_training_windows_that_do_not_overlap_are_no_warning(page):
+    result = read_result(page.parent)
+    text = page.read_text("utf-8")
+    notices = re.findall(r'<p class="notice">(.*?)</p>', text, flags=re.S)
+    assert training_windows_overlap(result) == any("A training window" in n for n in notices)
+    stops = result.groups["training"]["stop"]
+    specs = json.loads(result.attrs["specs"])
+    specs["deterministic"]["window"] = "300"  # without one it reads each span from its begin
+    attrs = {**result.attrs, "specs": json.dumps(specs)}
+    for apart, overlaps in ((2.0, False), (0.5, True)):
+        length = float(result.attrs["longest_training"])
+        moved = stops.copy(data=length * (1 + apart * np.arange(stops.size)))
+        runs = result.groups["training"]["run"]
+        same = result.groups["training"].assign(stop=moved, run=runs.copy(data=["a"] * runs.size))
+        other = replace(result, attrs=attrs, groups={**result.groups, "training": same})
+        assert training_windows_overlap(other) == overlaps
+        windows = {row[0]: row[-1] for row in deviations(other).rows}["training windows"]
+        assert windows.startswith("2 windows, placed at random; ")
+        assert ("they do not overlap" in windows) != overlaps
+
+
+def test_the_date_stands_in_one_piece_and_titles_have_the_width_of_the_page(page):
+    text = page.read_text("utf-8")
+    (when,) = re.findall(r'finished\s<span class="whole">(.*?)</span>', text)
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC", when)
+    assert ".whole { white-space: nowrap; }" in text
+    assert "<caption>" not in text  # as narrow as its table
+    for name in re.findall(r'<div class="table" id="table-([^"]+)"', text):
+        assert f'aria-labelledby="caption-{name}"' in text
+
+
+@pytest.mark.parametrize(
+    ("channels", "rows"), [(3, [3]), (5, [3, 2]), (6, [3, 3]), (11, [4, 4, 3])]
+)
+def test_panels_fill_their_rows(channels, rows):
+    from matplotlib.figure import Figure
+
+    axes = grid_of_axes(Figure(), channels, 4)
+    places = [each.get_subplotspec().rowspan.start for each in axes]
+    assert [places.count(row) for row in range(len(rows))] == rows
+    assert axes[0].get_subplotspec().get_gridspec().ncols == rows[0]
+
+
 def test_letters_that_latex_reads_otherwise():
     assert latex_text("50 % of a_b & λ") == r"50 \% of a\_b \& $\lambda$"
 
@@ -254,10 +407,10 @@ def test_packing_loses_a_step_of_the_range_at_most():
 
 
 def test_the_interactive_lines_have_the_dashes_of_the_figures():
-    import matplotlib as mpl
-
-    assert dashes(LINES["ensemble"]["linestyle"]) == mpl.rcParamsDefault["lines.dashdot_pattern"]
-    assert dashes(LINES["forecast"]["linestyle"]) == list(LINES["forecast"]["linestyle"][1])
+    for key in ("ensemble", "forecast"):
+        assert dashes(LINES[key]["linestyle"]) == list(LINES[key]["linestyle"][1])
+    assert LINES["measured"]["linestyle"] == "-"
+    assert dashes("-") == []
 
 
 def test_boxes_and_whiskers_are_matplotlibs():

@@ -1,5 +1,6 @@
 """The data-quality sheet, and what it says of the measured ship section."""
 
+import itertools
 import os
 import re
 from pathlib import Path
@@ -10,7 +11,7 @@ import xarray as xr
 
 from seakeep import cli
 from seakeep.campaign import read_campaign
-from seakeep.campaign.checks import findings_of
+from seakeep.campaign.checks import Finding, as_attribute, findings_of
 
 pytest.importorskip("matplotlib", reason="needs the extra figures")
 
@@ -136,6 +137,42 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
     assert lag.get_ylim()[1] == pytest.approx(1.5 * LATE * found.period)
 
 
+def test_a_channel_with_findings_keeps_its_line_and_shows_its_marks():
+    from matplotlib.colors import to_rgb
+
+    from seakeep.report.quality_sheet import quality_figure
+    from seakeep.signals.quality import FLAGS
+
+    time = np.linspace(0.0, 10.0, 101)
+    flags = np.zeros(time.size, dtype=np.int16)
+    flags[40:45] = FLAGS["bridged"]
+    names = ("heave", "pitch", "surge")
+    run = xr.Dataset(
+        {name: ("time", np.sin(time), {"units": "m", "long_name": "way"}) for name in names},
+        {"time": time, "heave_flags": ("time", flags)},
+        {"quality": as_attribute([Finding("heave", "missing", "5 samples bridged")])},
+    )
+    figure = quality_figure(run, {})
+    heave, pitch, _ = figure.axes
+    assert heave.get_facecolor() != pitch.get_facecolor()
+    line, marks = heave.lines
+    assert line.get_color() == pitch.lines[0].get_color()
+
+    def grey(colour):
+        return float(np.dot(to_rgb(colour), (0.299, 0.587, 0.114)))
+
+    assert abs(grey(marks.get_color()) - grey(line.get_color())) > 0.3  # in grey print too
+    figure.draw_without_rendering()
+    for axes in figure.axes:  # instants can be read at every panel
+        assert axes.get_ylabel().startswith("way\n")
+        assert any(tick.label1.get_visible() for tick in axes.xaxis.get_major_ticks())
+    boxes = [axes.get_tightbbox() for axes in figure.axes]
+    for upper, lower in itertools.pairwise(boxes):
+        assert upper.y0 >= lower.y1 - 1  # a pixel of line width
+    places = {round(axes.yaxis.label.get_window_extent().x1, 3) for axes in figure.axes}
+    assert len(places) == 1
+
+
 def test_prepare_writes_a_page_that_needs_nothing_else(tmp_path, monkeypatch):
     from small_tank import CAMPAIGN as SMALL
     from small_tank import tank_columns, write_csv
@@ -153,7 +190,11 @@ def test_prepare_writes_a_page_that_needs_nothing_else(tmp_path, monkeypatch):
     page = (folder / "quality.html").read_text(encoding="utf-8")
     assert not re.search(r'(src|href)="(?!data:|#)', page)
     assert page.count("<img") == 2
-    assert "<th>span used</th>" in page
+    assert '<th class="n">findings</th>' in page  # heads stand over their numbers
+    for table in re.findall(r"<table.*?</table>", page):
+        heads = re.findall(r"<th( class=\"n\")?>", table)
+        cells = re.findall(r"<td( class=\"n\")?>", table.split("</tr>")[1])
+        assert heads == cells
     assert "outlier: 1 samples in 1 place(s)" in page
     before = (folder / "first.nc").stat().st_mtime_ns
     assert cli.main(["prepare", str(tmp_path / "campaign.toml"), "--no-sheet"]) == 0

@@ -31,7 +31,10 @@ def result(offsets, shift=2.0, ratio=0.5, slack=0.0):
     test = xr.Dataset({"run": ("window", ["wave"])}, coords={"channel": names})
     settings = {"models": {"m": {"kind": "hankel_dmdc"}}, "tests": {"t": {"label": ""}}}
     groups = {
-        "channels": xr.Dataset({"channel": ("channel", names)}),
+        "channels": xr.Dataset(
+            {"long_name": ("name", ["surge", "stern mooring load"])},
+            coords={"channel": names, "name": names},
+        ),
         "statistics/response/t": response,
         "runs": runs,
         "tests/t": test,

@@ -97,6 +97,16 @@ def test_a_peak_between_samples(lag, period):
             r"the second record is constant \(0\), so it correlates with nothing. Look for a dead",
         ),
         (
+            lambda a, b: effective_celerity(a, a, DT, 0.1, DEPTH),
+            DataError,
+            r"not later than the upstream one \(lag -?0 s, correlation 1\.000\).*not the same",
+        ),
+        (
+            lambda a, b: effective_celerity(a, 0.9 * a + 0.1 * np.roll(a, -1), DT, 0.1, DEPTH),
+            DataError,
+            r"not later than the upstream one \(lag -0\.00\d+ s",
+        ),
+        (
             lambda a, b: phase_celerity(a, b, DT, -1.0, DEPTH),
             RequestError,
             r"the separation must be positive \(m\); received -1.0",

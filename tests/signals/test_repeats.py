@@ -65,6 +65,18 @@ def test_still_water_and_short_training_repeat_nothing():
     assert find_repeat([sea()[:100]], sea(), DT) is None
 
 
+def test_still_water_before_the_waves_is_no_part_of_the_comparison():
+    # Two wave trains that build up after still water: they differ in all but that.
+    ramp = np.clip((TIME - 20.0) / 10.0, 0.0, 1.0)
+    trains = [ramp * np.sin(2 * np.pi * TIME / period) for period in (0.9, 0.63)]
+    assert find_repeat([trains[0]], trains[1], DT) is None
+    late = np.concatenate([np.zeros(600), sea()[:1400]])
+    found = find_repeat([sea()], late, DT)
+    assert found is not None
+    assert found.share == 1.0
+    assert found.test_start - found.training_start == pytest.approx(600 * DT, abs=DT)
+
+
 def test_a_threshold_is_a_part_of_one():
     with pytest.raises(RequestError, match=r"threshold must lie between 0 and 1; received 1\.5"):
         find_repeat([sea()], sea(), DT, threshold=1.5)

@@ -147,6 +147,18 @@ def test_unrelated_signals():
         clock_from_correlation(waves(t), t, waves(t), t, 98.0, 2.0)
 
 
+def test_a_signal_with_a_gap_is_named():
+    t = np.arange(2000) / 20
+    gap = waves(t)
+    gap[[500, 700]] = np.nan
+    for signals, owner in (((gap, waves(t)), "logger"), ((waves(t), gap), "reference")):
+        message = rf"the signal of the {owner} has 2 missing .*, the first at sample 500\. Bridge"
+        with pytest.raises(DataError, match=message):
+            clock_from_correlation(signals[0], t, signals[1], t, 20.0, 2.0)
+    with pytest.raises(RequestError, match=r"the signal of the logger has shape \(9,\) and its"):
+        clock_from_correlation(gap[:9], t, gap, t, 20.0, 2.0)
+
+
 def test_drifts_that_differ_are_not_pooled():
     def clock(drift):
         return Clock(0.1, drift, 1e-3, 2e-6, "trigger pulses", 13, 1e-3, centre=100.0)

@@ -56,6 +56,24 @@ def test_one_measurement_serves_many_bands():
     assert found.inside.tolist() == [[1.0], [0.0]]
 
 
+@pytest.mark.filterwarnings("error")
+def test_an_infinite_margin_holds_everything():
+    measured = np.array([[0.0, 0.0], [1.0, 5.0], [2.0, 0.0]])
+    lower, upper = np.full((3, 2), [-np.inf, -1.0]), np.full((3, 2), [np.inf, 1.0])
+    found = coverage(lower, upper, measured)
+    assert found.inside.tolist() == [1.0, pytest.approx(2 / 3, rel=1e-15)]  # two roundings
+    assert found.width.tolist() == [np.inf, 2.0]
+    assert found.relative_width[0] == np.inf
+
+
+def test_leading_axes_that_differ_are_refused():
+    bounds = np.zeros((3, 4, 2))
+    with pytest.raises(
+        RequestError, match=r"\(3, 4, 2\) and measured \(2, 4, 2\); the axes before"
+    ):
+        coverage(bounds, bounds, np.zeros((2, 4, 2)))
+
+
 def test_a_band_with_gaps_and_a_constant_measurement_give_nan():
     measured = np.stack([np.arange(4.0), np.ones(4)], axis=1)
     lower = measured - 1

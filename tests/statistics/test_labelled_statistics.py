@@ -1,11 +1,15 @@
 """The labelled face: Datasets in, the arrays' numbers out."""
 
+import inspect
+from typing import get_type_hints
+
 import numpy as np
 import pytest
 import xarray as xr
 
 from seakeep import statistics
 from seakeep.core import bootstrap as core_bootstrap
+from seakeep.core import coverage as core_coverage
 from seakeep.core import divergence as core_divergence
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 
@@ -22,8 +26,14 @@ MEASURED = xr.Dataset(
 PREDICTED = 0.9 * MEASURED[["pitch", "heave"]]
 
 
-def test_every_name_is_there():
-    assert all(hasattr(statistics, name) for name in statistics.__all__)
+def test_public_are_the_functions_and_what_they_return():
+    public = [getattr(statistics, name) for name in statistics.__all__]
+    functions = [each for each in public if inspect.isfunction(each)]
+    # What takes Datasets too has its counterpart for arrays, whose result has a kind.
+    functions += [core_divergence.jsd_interval, core_coverage.coverage]
+    returned = {get_type_hints(each)["return"] for each in functions}
+    kinds = {each for each in returned if getattr(each, "__module__", "").startswith("seakeep.")}
+    assert kinds == {each for each in public if inspect.isclass(each)}
 
 
 def test_a_dataset_is_redrawn_in_step():
@@ -126,10 +136,12 @@ def test_what_is_refused():
     with pytest.raises(RequestError, match=r"a numpy\.random\.Generator; received int"):
         statistics.jsd_interval(PREDICTED, MEASURED, block_length=4, rng=3)
     late = PREDICTED.assign_coords(time=TIME + 5.3)
-    with pytest.raises(DataError, match=r"does not hold every instant from 5.3"):
+    with pytest.raises(
+        DataError, match=r"lower runs from 5\.3 to .* not every instant of the first"
+    ):
         statistics.coverage(late, late, MEASURED)
     bare = PREDICTED.drop_vars("time").isel(time=slice(9))
-    with pytest.raises(RequestError, match="400 samples along time and the other 9"):
+    with pytest.raises(RequestError, match="400 samples along time and lower 9"):
         statistics.coverage(bare, bare, MEASURED)
     stacked = MEASURED.expand_dims(member=2)
     with pytest.raises(RequestError, match="Select one run and one member"):

@@ -14,6 +14,7 @@ distributed = pytest.importorskip(
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system knows no SIGKILL")
+@pytest.mark.usefixtures("patient_cluster")
 def test_a_worker_that_is_killed_costs_its_cells_alone(study_folder, tmp_path_factory):
     from dask_processes import Cluster
 

@@ -6,18 +6,20 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
 import xarray as xr
+from started import started
 
 from seakeep.errors import DataError, RequestError
 from seakeep.models.labelled import nearest_sample
 from seakeep.statistics import band_error_over_time
-from seakeep.study import StorageError, read_result, read_study, run_study, store
+from seakeep.study import StorageError, read_result, read_study, run, run_study, store
+from seakeep.study.lock import LOCK
 from seakeep.study.plan import make_plan
 from seakeep.study.statistics import joined
+from seakeep.study.store import CELLS, CellFolder
 
 
 def change(folder, old, new):
@@ -104,27 +106,39 @@ def test_what_is_read_back_is_what_was_found(study_folder, finished):
     assert not (study_folder / "out" / "cells").exists()
 
 
+WHOLE = 4  # one model of one training set on its three windows, and a cell of the next
+HALF_A_CELL = f"""
+import sys, time
+import numpy as np
+from seakeep.study import read_study, run_study
+
+whole, left = np.savez, iter(range({WHOLE}))
+
+def savez(file, **arrays):
+    if next(left, None) is not None:
+        return whole(file, **arrays)
+    file.write(b"PK")
+    file.flush()
+    print("half a cell", flush=True)
+    time.sleep(3600)
+
+if __name__ == "__main__":
+    np.savez = savez
+    run_study(read_study(sys.argv[1]), sys.argv[2], workers=1)
+"""
+
+
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system knows no SIGKILL")
 def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished):
     out = study_folder / "killed"
-    script = (
-        "import sys\n"
-        "from seakeep.study import read_study, run_study\n"
-        "if __name__ == '__main__':\n"
-        "    run_study(read_study(sys.argv[1]), sys.argv[2], workers=1)\n"
-    )
-    (study_folder / "go.py").write_text(script, "utf-8")
+    (study_folder / "go.py").write_text(HALF_A_CELL, "utf-8")
     command = [sys.executable, "go.py", "study.toml", str(out)]
-    process = subprocess.Popen(command, cwd=study_folder)
-    deadline = time.monotonic() + 120
-    unit = 3  # cells: one model of one training set, on the three windows
-    while len(list((out / "cells").glob("*.npz"))) < unit and time.monotonic() < deadline:
-        assert process.poll() is None, "the study ended before it could be killed"
-        time.sleep(0.002)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    kept = {path: path.stat().st_mtime_ns for path in (out / "cells").glob("*.npz")}
-    assert kept
+    with started(command, study_folder, stdout=subprocess.PIPE) as process:
+        assert process.stdout.readline() == "half a cell\n", "the study ended before it was killed"
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    assert len(list((out / "cells").glob("*.npz"))) == WHOLE
+    assert len(list((out / "cells").iterdir())) == WHOLE + 1
     assert not (out / "study.nc").exists()
     told = []
     again = run_study(
@@ -137,6 +151,54 @@ def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished
     same(finished, again)
 
 
+def test_two_processes_do_not_work_in_one_folder(study_folder, finished, monkeypatch):
+    study, out = read_study(study_folder / "study.toml"), study_folder / "shared"
+    refused = []
+
+    def told(done, total, what):
+        if what == "statistics and densities":
+            with pytest.raises(RequestError, match=r"another process works on the study in .*sha"):
+                run_study(study, out)
+            refused.append(what)
+
+    same(finished, run_study(study, out, progress=told))
+    assert refused
+    assert not (out / LOCK).exists()
+    (out / "study.nc").unlink()
+    (out / "cells").mkdir()
+    (out / "cells" / "mine").mkdir()  # is not removed, and does not matter
+    same(finished, run_study(study, out))
+    assert (out / "cells" / "mine").exists()
+
+
+def test_who_waited_for_another_process_takes_its_result(study_folder, finished, monkeypatch):
+    study, out = read_study(study_folder / "study.toml"), study_folder / "behind"
+    usual = run.warn_of_slow_study
+
+    def overtaken(plan, runs):
+        monkeypatch.setattr(run, "warn_of_slow_study", usual)
+        run_study(study, out)
+
+    monkeypatch.setattr(run, "warn_of_slow_study", overtaken)
+    told = []
+    same(finished, run_study(study, out, progress=lambda *each: told.append(each[2])))
+    assert told[-1] == "finished before"
+    assert "fitting and forecasting" not in told
+
+
+@pytest.mark.parametrize("flag", [0x01, 0x20])
+def test_a_cell_whose_archive_was_damaged_is_computed_again(tmp_path, flag):
+    cells = CellFolder(tmp_path, "digest")
+    cells.open("study")
+    cells.write("one", {"mean": np.arange(3.0)})
+    path = tmp_path / CELLS / "one.npz"
+    content = bytearray(path.read_bytes())
+    entry = content.rindex(b"PK\x01\x02")  # flags of the last file: "encrypted", "patched"
+    content[entry + 8] |= flag
+    path.write_bytes(content)
+    assert not cells.has("one")
+
+
 def test_a_finished_study_is_not_run_again(study_folder, finished):
     told = []
     again = run_study(
@@ -146,6 +208,19 @@ def test_a_finished_study_is_not_run_again(study_folder, finished):
     )
     assert told == [(1, 1, "finished before")]
     same(finished, again)
+
+
+def test_other_words_reach_a_finished_study(study_folder, finished):
+    assert not finished.shows_paper
+    change(study_folder, "seed = 3", 'seed = 3\nname = "renamed"')
+    with (study_folder / "study.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[output]\npaper = true\n")
+    again = run_study(read_study(study_folder / "study.toml"), study_folder / "out")
+    kept = store.read_result(study_folder / "out")
+    for found in (again, kept):
+        assert found.attrs["study"] == "renamed"
+        assert found.shows_paper
+        same(finished, found)
 
 
 def test_a_folder_of_another_study_is_refused(study_folder, finished):

@@ -1,5 +1,6 @@
 """Tables of a study: what they take of its cells, and that they are the named statistics."""
 
+import shutil
 import warnings
 
 import numpy as np
@@ -90,6 +91,16 @@ def test_a_truth_that_is_missing_is_named(place, tmp_path):
     other.write_text(text, "utf-8")
     with pytest.raises(DataError, match=r"truth of true channels, and unseen.nc is not in it"):
         run_study(read_study(other), tmp_path / "out")
+
+
+def test_results_belong_to_the_truth_that_was_read(place, found, tmp_path):
+    assert read_study(place / "study.toml").digest == found.attrs["digest"]
+    shutil.copytree(place, tmp_path / "place", ignore=shutil.ignore_patterns("out"))
+    study = tmp_path / "place" / "study.toml"
+    (tmp_path / "place" / "truth" / "unseen.nc").write_bytes(b"another truth")
+    changed = read_study(study).digest
+    study.write_text(study.read_text("utf-8").replace('truth = "truth"', ""), "utf-8")
+    assert len({changed, read_study(study).digest, found.attrs["digest"]}) == 3
 
 
 def test_all_training_windows_share_the_draws(place, found):

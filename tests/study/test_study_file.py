@@ -74,6 +74,8 @@ def test_the_digest_follows_settings_and_not_words(study_folder):
     before = read_study(path).digest
     path.write_text(text.replace("seed = 3", 'seed = 3\nname = "other"'), "utf-8")
     assert read_study(path).digest == before
+    path.write_text(f"{text}\n[output]\npaper = true\n", "utf-8")
+    assert read_study(path).digest == before
     path.write_text(text.replace("seed = 3", "seed = 4"), "utf-8")
     assert read_study(path).digest != before
 

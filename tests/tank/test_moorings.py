@@ -3,7 +3,7 @@ import pytest
 
 from seakeep.errors import RequestError
 from seakeep.tank.dynamics import tensions
-from seakeep.tank.moorings import line_table, mooring_stiffness, slack_offset, unstretched_length
+from seakeep.tank.moorings import line_table, mooring_stiffness, unstretched_length
 from seakeep.tank.settings import LineSettings
 
 pytest.importorskip("numba", reason="needs the extra tank")
@@ -51,11 +51,6 @@ def test_stiffness_is_the_slope_of_the_forces(rig):
     # Central differences of step 1e-6: rounding of 1e-10.
     assert mooring_stiffness(rig.lines) == pytest.approx(-np.array(slopes).T, abs=1e-8)
     assert mooring_stiffness(rig.lines)[0, 0] == pytest.approx(1.89 + 1.33, rel=1e-9)
-
-
-def test_slack_limits(rig):
-    assert slack_offset(rig.lines, 0) == pytest.approx(-0.8 / 1.89, rel=1e-9)
-    assert slack_offset(rig.lines, 1) == pytest.approx(0.8 / 1.33, rel=1e-9)
 
 
 def test_a_line_stretched_to_nothing_is_refused():

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 import seakeep
-from seakeep.tank.play import noisy_truth
-from seakeep.tank.realised import comparison, matrix_rows, realise_all
+from seakeep.tank.play import noisy_truth, play_run
+from seakeep.tank.realised import comparison, matrix_rows, realise
 
 pytest.importorskip("numba", reason="needs the extra tank")
 
@@ -16,7 +16,7 @@ STATES = [
 
 @pytest.fixture(scope="module")
 def realised(settings, rig):
-    return realise_all(settings, rig)
+    return [realise(play_run(settings, name, rig), name) for name in settings.runs]
 
 
 def test_default_seed_realises_the_papers_waves(settings, realised):

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from seakeep.campaign.checksums import sha256_of
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.files import make_folder, replacing
 
@@ -230,6 +231,4 @@ def _download(name: str, wanted: str, addresses: Sequence[str]) -> bytes:
 
 
 def _checksum(path: Path) -> str | None:
-    if not path.is_file():
-        return None
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return sha256_of(path) if path.is_file() else None

@@ -14,6 +14,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.campaign.binary import read_matlab, read_netcdf
+from seakeep.campaign.checksums import sha256_of
 from seakeep.campaign.columns import Columns, is_unit, meant_column, named_unit
 from seakeep.campaign.kinds import refuse_foreign
 from seakeep.campaign.rosbag import is_recording, read_recording
@@ -71,10 +72,10 @@ def checksum(path: Path) -> str:
     """SHA-256 of a file, or of the names and contents of the files in a bag's folder."""
     _check_there(path)
     if not path.is_dir():
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        return sha256_of(path)
     digest = hashlib.sha256()
     for part in sorted(each for each in path.iterdir() if each.is_file()):
-        digest.update(part.name.encode() + b"\0" + hashlib.sha256(part.read_bytes()).digest())
+        digest.update(part.name.encode() + b"\0" + bytes.fromhex(sha256_of(part)))
     return digest.hexdigest()
 
 

@@ -14,7 +14,7 @@ from seakeep.campaign.labels import version
 from seakeep.campaign.prepare import Campaign, Progress
 from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepWarning
-from seakeep.files import make_folder, replacing
+from seakeep.files import make_folder, replacing, write_netcdf
 
 __all__ = ["load_prepared", "prepared_folder", "write_prepared"]
 
@@ -83,7 +83,7 @@ def write_prepared(
 
 def _write(run: xr.Dataset, path: Path) -> None:
     with replacing(path) as temporary:
-        run.to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(temporary, run)
 
 
 def _fresh_step(campaign: Campaign, name: str, file: Path) -> float | None:
@@ -111,8 +111,9 @@ def load_prepared(
     Returns
     -------
     dict of str to xarray.Dataset
-        As :meth:`Campaign.prepare` gives them. A file is fresh if the campaign's digest, the
-        checksum of the raw file and the version of seakeep are those it was written with.
+        As :meth:`Campaign.prepare` gives them. A file is fresh if the campaign's name and digest,
+        the checksums of the raw files on which the run depends (through period and clocks too) and
+        the version of seakeep are those it was written with.
 
     Raises
     ------

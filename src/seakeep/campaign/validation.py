@@ -84,14 +84,43 @@ def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
         line = path.read_bytes()[: error.start].count(b"\n") + 1
         raise RequestError(
             f"{path}, line {line}: not UTF-8, which TOML asks for. Save the file as UTF-8."
+            + _if_no_toml(path, what)
         ) from None
     try:
-        return tomllib.loads(text.replace("\r\n", "\n"))
+        found = tomllib.loads(text.replace("\r\n", "\n"))
     except tomllib.TOMLDecodeError as error:
         raise RequestError(
             f"{path} is not valid TOML: {error}. Write texts in quotes, lists in [ ], "
-            "one 'key = value' a line, and each table and key once."
+            "one 'key = value' a line, and each table and key once." + _if_no_toml(path, what)
         ) from None
+    _check_kind(found, path, what)
+    return found
+
+
+_TABLES = {"campaign": ("channels", "runs", "rig"), "study": ("study", "tests", "training")}
+"""What the two kinds of files are known by."""
+
+
+def _if_no_toml(path: Path, what: str) -> str:
+    if path.suffix.lower() == ".toml":
+        return ""
+    return (
+        f" If it holds measurements: a {what} file is expected here, whose name ends in .toml. "
+        f"Draft a campaign with 'seakeep init {path.name}'."
+    )
+
+
+def _check_kind(found: Mapping[str, Any], path: Path, what: str) -> None:
+    other = "study" if what == "campaign" else "campaign"
+    tables = [f"[{key}]" for key in _TABLES[other] if key in found]
+    if tables and not any(key in found for key in _TABLES[what]):
+        mend = (
+            "Name the campaign that it names." if other == "study" else "A study names a campaign."
+        )
+        raise RequestError(
+            f"{path} is a {other} file (it has {', '.join(tables)}), and a {what} file is expected "
+            f"here. {mend}"
+        )
 
 
 def validate(received: Mapping[str, Any], name: str) -> CampaignSettings:

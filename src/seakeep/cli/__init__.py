@@ -72,7 +72,7 @@ def _kept(leaving: BaseException) -> str:
         if isinstance(error, KeyboardInterrupt) and (notes := getattr(error, "__notes__", [])):
             return " ".join(notes)
         error = error.__context__
-    return "Files that were finished are kept: repeat the command to go on."
+    return "Files that were finished are kept: the command takes them over when it is repeated."
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +12,7 @@ import xarray as xr
 from rich import box
 from rich.table import Table
 
-from seakeep.campaign import load_prepared, read_campaign
+from seakeep.campaign import Campaign, load_prepared, read_campaign
 from seakeep.cli.console import messages, progress_bar, quietly, results
 from seakeep.cli.options import DEFAULT_LEVEL, CampaignFile, Level, Scheduler, Workers, crew
 from seakeep.conventions import conversion, instant
@@ -42,6 +43,14 @@ def calibrate(
     run: Annotated[
         list[str] | None,
         typer.Option("--run", help="Name of a run (repeatable); by default those that train."),
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            "--start",
+            help="First instant used of each run, s or encounter periods such as '20 T'; by "
+            "default the begin of its training span, or of the run.",
+        ),
     ] = None,
     stop: Annotated[
         str | None,
@@ -81,15 +90,14 @@ def calibrate(
     with progress_bar("Preparing") as progress:
         prepared = load_prepared(read, names=wanted, progress=progress)
     every = list(prepared.values())
-    last = None if stop is None else instant_of(stop, read, every, "--stop")
-    if last is not None and not any(last <= float(each["time"][-1]) for each in every):
-        end = max(float(each["time"][-1]) for each in every)
+    first = _instant(start, "--start", read, prepared)
+    last = _instant(stop, "--stop", read, prepared)
+    if first is not None and last is not None and first >= last:
         raise RequestError(
-            f"--stop {stop} ({last:g} s) lies after the end of {', '.join(prepared)} ({end:g} s). "
-            "Name an instant inside, or leave --stop out to use all."
+            f"--start {start} ({first:.10g} s) lies at or after --stop {stop} ({last:.10g} s)."
         )
     count = samples_of(steps, read, every, fitted.dt, "--steps")
-    parts = {name: _part(each, last) for name, each in prepared.items()}
+    parts = {name: _part(each, first, last) for name, each in prepared.items()}
     with progress_bar("Calibrating") as progress:
         calibrated = fitted.calibrate(
             parts,
@@ -105,16 +113,45 @@ def calibrate(
     ]
     results().print(f"Calibrated on {', '.join(used)}: judge it on other instants.", soft_wrap=True)
     calibrated.save(out)
+    whole = sum(calibrated.calibration.windows.values())
+    if whole / (whole + 1) < calibrated.calibration.found.level:
+        messages().print(
+            "Note: errors that last for a whole window are seen only once in each. Counted as "
+            f"such, {counted(whole, 'window')} would warrant {100 * whole / (whole + 1):.0f} %; "
+            "more windows make the margin surer.",
+            soft_wrap=True,
+        )
     messages().print(
         f"Wrote {out}. Judge it elsewhere with: seakeep compare {out} {campaign} --band calibrated"
     )
 
 
-def _part(run: xr.Dataset, stop: float | None) -> xr.Dataset:
-    """The training span of a run, or all of it, up to an instant."""
+def _instant(
+    stated: str | None, name: str, campaign: Campaign, runs: Mapping[str, xr.Dataset]
+) -> float | None:
+    """An instant that lies inside one of the runs at least; a stop of 'inf' is the end of all."""
+    if stated is None:
+        return None
+    found = instant_of(stated, campaign, runs.values(), name)
+    if name == "--stop" and found == math.inf:
+        return found
+    spans = {key: (float(each["time"][0]), float(each["time"][-1])) for key, each in runs.items()}
+    if not any(begin <= found <= end for begin, end in spans.values()):
+        known = ", ".join(
+            f"{key}: {begin:.10g} to {end:.10g} s" for key, (begin, end) in spans.items()
+        )
+        raise RequestError(
+            f"{name} {stated} ({found:.10g} s) lies in none of the runs ({known}). Name an instant "
+            f"inside, or leave {name} out."
+        )
+    return found
+
+
+def _part(run: xr.Dataset, start: float | None, stop: float | None) -> xr.Dataset:
+    """Part of a run between two instants, by default those of its training span, or its ends."""
     time = run["time"].values
     begin, end = run.attrs.get("train_span", (time[0], time[-1]))
-    return between(run, (begin, end if stop is None else min(end, stop)))
+    return between(run, (begin if start is None else start, end if stop is None else stop))
 
 
 def _table(ensemble: HankelEnsemble) -> Table:

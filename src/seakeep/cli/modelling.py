@@ -43,6 +43,7 @@ from seakeep.study import (
     fit_campaign,
     forecast_at_full_scale,
     in_degrees,
+    with_degrees,
 )
 from seakeep.study import compare as compare_runs
 from seakeep.study.lengths import instant_of, samples_of
@@ -102,6 +103,9 @@ def forecast(
     workers: Workers = None,
     scheduler: Scheduler = None,
     full_scale: FullScale = False,
+    degrees: Annotated[
+        bool, typer.Option("--degrees", help="Write angles in degrees instead of radians.")
+    ] = False,
 ) -> None:
     """Forecast a run: the model runs freely after START, driven by the measured waves.
 
@@ -148,6 +152,8 @@ def forecast(
         scale = _scale(read)
         result = forecast_at_full_scale(result, scale)
         scaled = f" Times are at full scale (1:{scale:g}); --start and --steps at model scale."
+    if degrees:
+        result = with_degrees(result)
     write_forecast(result, out)
     status = result.attrs["status"]
     messages().print(

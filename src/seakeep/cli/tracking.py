@@ -12,7 +12,7 @@ import xarray as xr
 from seakeep.campaign import read_table
 from seakeep.cli.console import messages, progress_bar
 from seakeep.errors import RequestError
-from seakeep.files import replacing
+from seakeep.files import replacing, write_netcdf
 from seakeep.signals.agreement import Agreement, compare_motion
 from seakeep.signals.sightings import FLAGS
 from seakeep.signals.tracking import TrackingSettings, track_video
@@ -157,7 +157,7 @@ def _write(tracked: xr.Dataset, out: Path | None) -> None:
         return
     with replacing(out) as temporary:
         if out.suffix == ".nc":
-            tracked.to_netcdf(temporary, engine="h5netcdf")
+            write_netcdf(temporary, tracked)
         else:
             temporary.write_text(_as_csv(tracked), encoding="utf-8", newline="\n")
 

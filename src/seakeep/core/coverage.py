@@ -43,7 +43,8 @@ def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
     Parameters
     ----------
     lower, upper : array_like, shape (…, time, channel) or (time,)
-        Bounds; a channel with a NaN in either (too few members left) gives NaN.
+        Bounds, infinite where a margin is; a channel with a NaN in either (too few members left)
+        gives NaN.
     measured : array_like, shape (…, time, channel) or (time,)
         Measurement, or on the tank the truth, in the same units.
 
@@ -74,6 +75,13 @@ def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
             f"lower has shape {low.shape}, upper {high.shape} and measured {m.shape}; all must "
             "end in (time, channel) of the same size, or be series of the same length."
         )
+    try:
+        np.broadcast_shapes(low.shape, m.shape)
+    except ValueError:
+        raise RequestError(
+            f"lower and upper have shape {low.shape} and measured {m.shape}; the axes before "
+            "(time, channel) must agree, or be missing in measured."
+        ) from None
     if not np.all(np.isfinite(m)):
         raise DataError(
             f"measured holds {int(np.count_nonzero(~np.isfinite(m)))} value(s) that are NaN or "
@@ -88,7 +96,7 @@ def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
             f"lower exceeds upper at {int(np.count_nonzero(low > high))} instant(s); they are "
             "given in the wrong order."
         )
-    lost = np.isnan(low + high).any(axis=-2)
+    lost = (np.isnan(low) | np.isnan(high)).any(axis=-2)
     below, above = (m < low).mean(axis=-2), (m > high).mean(axis=-2)
     width = (high - low).mean(axis=-2)
     spread = np.where(np.ptp(m, axis=-2) > 0, m.std(axis=-2, ddof=1), np.nan)

@@ -49,6 +49,13 @@ def paired(
             f"predicted has shape {p.shape} and measured {m.shape}; both must end in "
             f"(time, channel) of the same size.{hint}"
         )
+    try:
+        np.broadcast_shapes(p.shape, m.shape)
+    except ValueError:
+        raise RequestError(
+            f"predicted has shape {p.shape} and measured {m.shape}; the axes before "
+            "(time, channel) must agree, or be missing in one of them."
+        ) from None
     if m.shape[-2] < 2:
         raise RequestError(
             f"a window of {m.shape[-2]} sample(s) has no standard deviation; judge at least two."

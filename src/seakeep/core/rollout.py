@@ -98,7 +98,7 @@ def rollout(
         )
     count = _count_states(a, b, start, n_states)
     if start.ndim == 3:
-        start = start[:, ::-1].reshape(start.shape[0], -1)
+        start = start[:, ::-1].reshape(len(start), start.shape[1] * start.shape[2])
     if start.shape[1] != a.shape[1] or start.shape[0] != driving.shape[0]:
         raise RequestError(
             f"histories {np.shape(histories)} and inputs {driving.shape} do not fit A {a.shape}: "
@@ -107,6 +107,8 @@ def rollout(
     if a.shape[0] == a.shape[1] and _shifts_exactly(a, b, count):
         a, b = a[:count], b[:count]
     channels, steps = _input_steps(b, driving)
+    if not len(start):
+        return np.empty((0, steps, count))
     with np.errstate(over="ignore", invalid="ignore"):
         memory = scratch or Scratch()
         out = None
@@ -228,13 +230,27 @@ def _is_regressed(a: FloatArray, count: int) -> bool:
     """
     kept = len(a) - count
     block = a[count:, :kept]
-    if kept < 2 or not np.all(np.diagonal(block) > 0):
+    if kept < 2:
+        return False
+    diagonal = np.diagonal(block)
+    if not np.all(diagonal > 0) and not _stands_still(diagonal, count):
         return False
     tolerance = SYMMETRIC * np.abs(block).max()
     # The first row tells most other matrices apart.
     return bool(
         np.all(np.abs(block[0] - block[:, 0]) <= tolerance)
         and np.all(np.abs(block - block.T) <= tolerance)
+    )
+
+
+def _stands_still(diagonal: FloatArray, count: int) -> bool:
+    """Whether what is not positive are channels that were zero in training, in every delay."""
+    rounding = 100 * float(np.finfo(diagonal.dtype).eps) * np.abs(diagonal).max()
+    still = (np.abs(diagonal) <= rounding).reshape(-1, count)
+    return (
+        bool(np.all(diagonal >= -rounding))
+        and not np.all(still)
+        and np.array_equal(still.all(axis=0), still.any(axis=0))
     )
 
 
@@ -256,10 +272,15 @@ def _input_steps(b: FloatArray, inputs: FloatArray) -> tuple[int, int]:
     length, width = inputs.shape[1:]
     if width == b.shape[1]:
         return width, length
-    if width == 0 or b.shape[1] % width:
+    if width == 0 or b.shape[1] == 0 or b.shape[1] % width:
+        mend = (
+            "Check the number of inputs and their delays."
+            if b.shape[1]
+            else "A model without input takes inputs of shape (window, steps, 0)."
+        )
         raise RequestError(
             f"inputs with {width} channels do not fit B of shape {b.shape}: its columns must be "
-            "Q(z+1). Check the number of inputs and their delays."
+            f"Q(z+1). {mend}"
         )
     delays = b.shape[1] // width - 1
     if length - delays < 1:

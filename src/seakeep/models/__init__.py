@@ -11,6 +11,7 @@ from seakeep.models.choice import AlignmentChoice, choose_alignment
 from seakeep.models.ensemble import BayesianHankelDMDc
 from seakeep.models.fitted_ensemble import HankelEnsemble
 from seakeep.models.hankel import HankelDMDc
+from seakeep.models.held import BandForecast, HeldEnsemble
 from seakeep.models.model import HankelDMDcModel
 from seakeep.models.offsets import ProbeOffset, estimate_probe_offset
 from seakeep.models.priors import Fixed, LogUniform, Uniform
@@ -18,12 +19,14 @@ from seakeep.models.summaries import summarize
 
 __all__ = [
     "AlignmentChoice",
+    "BandForecast",
     "BayesianHankelDMDc",
     "FittedAlignment",
     "Fixed",
     "HankelDMDc",
     "HankelDMDcModel",
     "HankelEnsemble",
+    "HeldEnsemble",
     "LogUniform",
     "ProbeAlignment",
     "ProbeOffset",

@@ -23,6 +23,7 @@ import xarray as xr
 
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
+from seakeep.models.checks import check_choice
 from seakeep.signals import effective_celerity
 from seakeep.signals.alignment import (
     CarriedElevation,
@@ -84,8 +85,8 @@ class ProbeAlignment:
     highest_frequency: float | None = None
 
     def __post_init__(self) -> None:
-        _check_word("mode", self.mode, ("effective", "dispersion"))
-        _check_word("surge", self.surge, ("measured", "predicted", "none"))
+        check_choice("alignment: mode", self.mode, ("effective", "dispersion"))
+        check_choice("alignment: surge", self.surge, ("measured", "predicted", "none"))
         _check_number("celerity", self.celerity, "m/s", "a positive number or None")
         _check_number(
             "highest_frequency", self.highest_frequency, "Hz", "a positive number or None"
@@ -142,12 +143,6 @@ class ProbeAlignment:
                     f"{', '.join(known)}."
                 )
         return cls(**value)
-
-
-def _check_word(name: str, value: object, words: Sequence[str]) -> None:
-    if value not in words:
-        listed = ", ".join(f"'{word}'" for word in words[:-1]) + f" or '{words[-1]}'"
-        raise RequestError(f"alignment: {name} must be {listed}; received {value!r}.")
 
 
 def _is_number(value: object) -> bool:

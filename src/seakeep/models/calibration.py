@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
 from seakeep.core.calibration import ConformalMargin, band_scores, conformal_margin
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import labelled
+from seakeep.models.checks import check_choice
 from seakeep.models.ensemble_series import shelved
 from seakeep.models.progress import Progress
 from seakeep.models.summaries import STATISTICS, check_level, reduce_members
@@ -23,7 +25,15 @@ from seakeep.models.workers import Crew
 if TYPE_CHECKING:
     from seakeep.models.fitted_ensemble import HankelEnsemble
 
-__all__ = ["Band", "Calibration", "calibrate", "check_band", "held_out_scores", "widened"]
+__all__ = [
+    "Band",
+    "Calibration",
+    "calibrate",
+    "check_band",
+    "held_out_scores",
+    "warn_of_horizon",
+    "widened",
+]
 
 FloatArray = npt.NDArray[np.float64]
 Band = Literal["members", "calibrated"]
@@ -162,7 +172,7 @@ def _unread_starts(ensemble: HankelEnsemble, name: str, run: xr.Dataset, steps: 
         raise RequestError(f"steps must be a positive integer; received {steps!r}.")
     time = np.asarray(run["time"].values, dtype=float)
     slack = 1e-6 * ensemble.dt
-    read = ensemble.read_spans.get(name)
+    read = _read_span(ensemble, name, run)
     starts, at = [], ensemble.history_samples - 1
     while at + steps < time.size:
         # The instants at + 1 … at + steps are forecast.
@@ -173,6 +183,34 @@ def _unread_starts(ensemble: HankelEnsemble, name: str, run: xr.Dataset, steps: 
         starts.append(float(time[at]))
         at += steps
     return starts
+
+
+def _read_span(ensemble: HankelEnsemble, name: str, run: xr.Dataset) -> tuple[float, float] | None:
+    """What members have read of a run: of the one that holds their samples, else of its name.
+
+    A name that was made up for a run without one says nothing.
+    """
+    arrays, spans = ensemble.arrays, ensemble.read_spans
+    for key, begin, states in zip(arrays.names, arrays.begins, arrays.states, strict=True):
+        if key in spans and _holds(run, ensemble, name, begin, states):
+            return spans[key]
+    return None if labelled.is_made_up(name, run) else spans.get(name)
+
+
+def _holds(
+    run: xr.Dataset, ensemble: HankelEnsemble, name: str, begin: float, states: FloatArray
+) -> bool:
+    """Whether a run has the same states at the same instants, as far as both reach."""
+    time = np.asarray(run["time"].values, dtype=float)
+    if not time.size:
+        return False
+    ahead = round((begin - time[0]) / ensemble.dt)  # samples of the run before the states
+    first, skipped = max(ahead, 0), max(-ahead, 0)
+    count = min(time.size - first, len(states) - skipped)
+    if count < 1 or abs(time[first] - begin - skipped * ensemble.dt) > 0.5 * ensemble.dt:
+        return False
+    held = labelled.channel_matrix(run, ensemble.states, name, slice(first, first + count))
+    return bool(np.array_equal(held, states[skipped : skipped + count]))
 
 
 def _measured(
@@ -199,10 +237,9 @@ def check_band(ensemble: HankelEnsemble, level: float, band: Band) -> None:
     RequestError
         If the ensemble was not calibrated, or for another level, or there is no such band.
     """
+    check_choice("band", band, get_args(Band))
     if band == "members":
         return
-    if band != "calibrated":
-        raise RequestError(f"band must be 'members' or 'calibrated'; received {band!r}.")
     if ensemble.calibration is None:
         raise RequestError(
             "the ensemble is not calibrated. Call ensemble.calibrate(runs, steps), or seakeep "
@@ -213,6 +250,18 @@ def check_band(ensemble: HankelEnsemble, level: float, band: Band) -> None:
         raise RequestError(
             f"the band was calibrated for level = {known:g}, and {level:g} was asked for. "
             "Calibrate for that level."
+        )
+
+
+def warn_of_horizon(ensemble: HankelEnsemble, name: str, steps: int, stacklevel: int = 5) -> None:
+    """Warn where a forecast is longer than those that its calibrated band was made from."""
+    if ensemble.calibration is not None and steps > ensemble.calibration.steps:
+        warnings.warn(
+            f"the forecast of {name} is longer than the {ensemble.calibration.steps} instants that "
+            "the band was calibrated for: its coverage is not warranted there. Calibrate with "
+            "longer windows.",
+            SeakeepWarning,
+            stacklevel=stacklevel,
         )
 
 

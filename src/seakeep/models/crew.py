@@ -15,6 +15,7 @@ import threadpoolctl
 
 from seakeep.core.scratch import Scratch
 from seakeep.errors import RequestError, SeakeepError
+from seakeep.models.checks import check_choice
 
 __all__ = [
     "Backend",
@@ -67,10 +68,7 @@ class Crew:
         workers: object = self.workers
         if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
             raise RequestError(f"workers must be a positive integer; received {workers!r}.")
-        if self.backend not in get_args(Backend):
-            raise RequestError(
-                f"backend must be 'processes', 'threads' or 'auto'; received {self.backend!r}."
-            )
+        check_choice("backend", self.backend, get_args(Backend))
         if self.scheduler is not None and workers != 1:
             raise RequestError(
                 f"workers = {workers} counts workers on this machine, and scheduler = "
@@ -144,7 +142,12 @@ def do_all(
 
 
 class _OneBlasThread:
-    """One limit for all that work in this process; the last to leave lifts it."""
+    """One limit for all that work in this process; the last to leave lifts it.
+
+    OpenBLAS has one pool of threads a process. From threadpoolctl 3.8 on its limit belongs to the
+    Python thread that set it first, and others are ignored; here whoever comes first and whoever
+    leaves last may be different threads, so the limit is taken over from its owner.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -159,6 +162,7 @@ class _OneBlasThread:
                 if self._modules != len(sys.modules):  # a library may have come with a module
                     self._controller = threadpoolctl.ThreadpoolController()
                     self._modules = len(sys.modules)
+                self._take_over()
                 self._limits = self._controller.limit(limits=1, user_api="blas")
             self._inside += 1
 
@@ -171,7 +175,14 @@ class _OneBlasThread:
         with self._lock:
             self._inside -= 1
             if self._inside == 0:
+                self._take_over()
                 self._limits.restore_original_limits()
+                self._take_over()
+
+    def _take_over(self) -> None:
+        for library in self._controller.lib_controllers:
+            if hasattr(library, "clear_controlling_thread"):
+                library.clear_controlling_thread(force=True)
 
 
 _ONE_BLAS_THREAD = _OneBlasThread()

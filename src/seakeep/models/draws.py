@@ -1,19 +1,21 @@
 r"""Draws of the settings of an ensemble's members.
 
 Every member has a generator of its own, the k-th child of the seed, and reads its numbers from it
-alone: a member is the same whatever the number of members, of workers, or the order of work.
+alone, or from the k-th point of a Sobol net that the seed itself scrambles: a member is the same
+whatever the number of members, of workers, or the order of work.
 
 Lengths are drawn in encounter periods and become samples by rounding to the nearest integer, halves
 upwards (:func:`~seakeep.models.settings.periods_to_samples`). A draw is infeasible where a run that
 trains the member does not hold the window with its delay history before it (``history="before"``:
-m + max(s, z) samples; ``"inside"``: m samples, and max(s, z) + 2 of them), or an integer is out
-of range. All of it is then drawn again from the member's own generator, and counted.
+m + max(s, z) samples; ``"inside"``: m samples, and max(s, z) + 2 of them), an integer is out of
+range, or a quantile is not finite. All of it is then drawn again from the member's own generator,
+and counted.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -32,6 +34,8 @@ FloatArray = npt.NDArray[np.float64]
 Sampling = Literal["monte_carlo", "sobol"]
 TrainOn = Literal["all", "runs", "windows"]
 
+PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
+"""Settings that are drawn, in the order of a member's numbers."""
 MOST_REDRAWS = 1000
 """After so many infeasible draws of one member the priors are taken not to fit the data."""
 
@@ -109,7 +113,7 @@ def draw_members(spec: BayesianHankelDMDc, dt: float, samples: Sequence[int]) ->
     seed = spec.seed_sequence
     points = np.empty((spec.n_members, 0))
     if spec.sampling == "sobol":
-        scrambling = child(seed, spec.n_members)
+        scrambling = np.random.default_rng(seed)
         engine = scipy.stats.qmc.Sobol(4, scramble=True, rng=scrambling)
         # A power of two, the balance of which the net keeps; the first n_members are used.
         points = engine.random_base2(max(spec.n_members - 1, 1).bit_length())
@@ -127,54 +131,83 @@ def _draw_member(
     point: FloatArray,
 ) -> Draw:
     inside = spec.history == "inside"
+    refused = ""
     for redrawn in range(MOST_REDRAWS):
         quantiles = point if point.size and not redrawn else generator.random(4)
-        draw = _values(spec, dt, quantiles, redrawn)
-        if draw.state_delays < 0 or draw.input_delays < 0 or draw.ridge < 0:
+        drawn = _quantiles_of(spec, quantiles)
+        if refused := _not_finite(drawn):
             continue
-        if draw.window is not None and draw.window < 2:
+        draw = _rounded(spec, dt, drawn, redrawn)
+        if refused := _out_of_range(draw, inside):
             continue
         needed = draw.needed(inside)
-        if inside and draw.window is not None and draw.window < needed:
+        run = None if spec.train_on == "all" else int(generator.integers(len(samples)))
+        if (min(samples) if run is None else samples[run]) < needed:
+            refused = (
+                f"the shortest run has {min(samples)} samples up to stop, and the last draw asked "
+                f"for {needed} (window {draw.window}, delays {draw.state_delays} and "
+                f"{draw.input_delays}). Give longer runs or a later stop, or narrow the priors."
+            )
             continue
-        if spec.train_on == "all":
-            if min(samples) >= needed:
-                return draw
-            continue
-        run = int(generator.integers(len(samples)))
-        if samples[run] < needed:
-            continue
+        if run is None:
+            return draw
         last = samples[run] - 1
         if spec.train_on == "windows":
             last = int(generator.integers(needed - 1, samples[run]))
-        return Draw(**{**draw.__dict__, "run": run, "last": last})
-    raise DataError(
-        f"no feasible draw in {MOST_REDRAWS}: the shortest run has {min(samples)} samples up to "
-        f"stop, and the last draw asked for {needed} (window {draw.window}, delays "
-        f"{draw.state_delays} and {draw.input_delays}). Give longer runs or a later stop, or "
-        "narrow the priors."
-    )
+        return replace(draw, run=run, last=last)
+    raise DataError(f"no feasible draw in {MOST_REDRAWS}: {refused}")
 
 
-def _values(spec: BayesianHankelDMDc, dt: float, quantiles: FloatArray, redrawn: int) -> Draw:
-    length, state, control = (
-        float(prior.ppf(float(q))) if prior is not None else np.nan
-        for prior, q in zip(
-            (spec.train_length, spec.state_delay, spec.input_delay), quantiles[:3], strict=True
+def _quantiles_of(spec: BayesianHankelDMDc, quantiles: FloatArray) -> dict[str, float]:
+    return {
+        name: float(prior.ppf(float(q)))
+        for name, q in zip(PRIORS, quantiles, strict=True)
+        if (prior := getattr(spec, name)) is not None
+    }
+
+
+def _not_finite(drawn: dict[str, float]) -> str:
+    """What is wrong with quantiles that are no numbers to round; empty where nothing is."""
+    wrong = [f"{name} = {value}" for name, value in drawn.items() if not np.isfinite(value)]
+    if not wrong:
+        return ""
+    return f"the last one gave {wrong[0]}. Check the parameters of that prior, or give it bounds."
+
+
+def _out_of_range(draw: Draw, inside: bool) -> str:
+    """What is wrong with a draw whatever the runs; empty where nothing is."""
+    for name in ("state_delays", "input_delays", "ridge"):
+        if (value := getattr(draw, name)) < 0:
+            return (
+                f"the last one gave {name} = {value:.6g}, which is negative. Move the prior above "
+                "zero."
+            )
+    least = draw.needed(inside) if inside else 2
+    if draw.window is not None and draw.window < least:
+        within = (
+            f" with delays of {draw.state_delays} and {draw.input_delays} inside it"
+            if inside
+            else ""
         )
-    )
+        return (
+            f"the last one gave a window of {draw.window} samples{within}, and {least} are "
+            "needed. Raise train_length, or lower the delays."
+        )
+    return ""
 
+
+def _rounded(spec: BayesianHankelDMDc, dt: float, drawn: dict[str, float], redrawn: int) -> Draw:
     def to_samples(periods: float) -> int:
         return periods_to_samples(periods, spec.encounter_period, dt)
 
     return Draw(
-        train_length=length,
-        state_delay=state,
-        input_delay=control,
-        ridge=float(spec.ridge.ppf(float(quantiles[3]))),
-        window=None if spec.train_length is None else to_samples(length),
-        state_delays=to_samples(state),
-        input_delays=to_samples(control),
+        train_length=drawn.get("train_length", np.nan),
+        state_delay=drawn["state_delay"],
+        input_delay=drawn["input_delay"],
+        ridge=drawn["ridge"],
+        window=to_samples(drawn["train_length"]) if "train_length" in drawn else None,
+        state_delays=to_samples(drawn["state_delay"]),
+        input_delays=to_samples(drawn["input_delay"]),
         run=None,
         last=None,
         redrawn=redrawn,

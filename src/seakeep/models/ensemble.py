@@ -14,6 +14,7 @@ from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.aligned import align_training
 from seakeep.models.alignment import ProbeAlignment
+from seakeep.models.checks import check_choice
 from seakeep.models.draws import Sampling, TrainOn, draw_members
 from seakeep.models.fitted_ensemble import HankelEnsemble
 from seakeep.models.identification import Stop, check_names, last_sample, stop_instants, until
@@ -108,8 +109,8 @@ class BayesianHankelDMDc:
                 check_prior(name, getattr(self, name))
         check_integer("n_members", self.n_members, 1)
         periods_to_samples(1, self.encounter_period, self.dt if self.dt is not None else 1.0)
-        _check_word("sampling", self.sampling, ("monte_carlo", "sobol"))
-        _check_word("train_on", self.train_on, ("all", "runs", "windows"))
+        check_choice("sampling", self.sampling, ("monte_carlo", "sobol"))
+        check_choice("train_on", self.train_on, ("all", "runs", "windows"))
         object.__setattr__(self, "alignment", self.shared.alignment)
         object.__setattr__(self, "seed_sequence", _seed_sequence(self.seed))
 
@@ -258,13 +259,6 @@ class BayesianHankelDMDc:
             state_labels=labels[0],
             input_labels=labels[1],
             alignment=fitted,
-        )
-
-
-def _check_word(name: str, value: object, words: tuple[str, ...]) -> None:
-    if value not in words:
-        raise RequestError(
-            f"{name} must be one of {', '.join(repr(word) for word in words)}; received {value!r}."
         )
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.models import aligned
-from seakeep.models.calibration import Band, check_band, widened
+from seakeep.models.calibration import Band, check_band, warn_of_horizon, widened
 from seakeep.models.ensemble_labels import label_channels, statuses, verdict, window_coords
 from seakeep.models.ensemble_series import shelved
 from seakeep.models.forecasting import ForecastWindow
@@ -41,7 +41,7 @@ def all_members(
     with shelved(ensemble, run, windows, crew, progress, whole=True) as (shelf, lost):
         (values,) = shelf.all()
     variables = _labelled(ensemble, values, ("member", "time"))
-    status = statuses(lost[:, 0], windows[0].time.values)
+    status = statuses(lost[:, 0], windows[0].time.values, ensemble.dt)
     variables["status"] = xr.Variable(("member",), status)
     return xr.Dataset(
         variables,
@@ -64,7 +64,8 @@ def summary(
     windows, values, lost = _reduced(ensemble, run, [start], steps, level, band, crew, progress)
     window = windows[0]
     variables = _labelled(ensemble, values[0], ("statistic", "time"))
-    variables["status"] = xr.Variable(("member",), statuses(lost[:, 0], window.time.values))
+    status = statuses(lost[:, 0], window.time.values, ensemble.dt)
+    variables["status"] = xr.Variable(("member",), status)
     counts = {"start": window.start} | _counted(ensemble, level, band) | verdict(lost)
     return xr.Dataset(
         variables,
@@ -91,7 +92,8 @@ def all_members_of_windows(
         values = shelf.all()
     variables = _labelled(ensemble, values, ("window", "member", "lead"))
     status = [
-        statuses(row, window.time.values) for row, window in zip(lost.T, windows, strict=True)
+        statuses(row, window.time.values, ensemble.dt)
+        for row, window in zip(lost.T, windows, strict=True)
     ]
     variables["status"] = xr.Variable(("window", "member"), np.stack(status))
     coords = window_coords(windows, ensemble.dt) | {"member": np.arange(ensemble.n_members)}
@@ -132,6 +134,8 @@ def _reduced(
     level = check_level(level)
     check_band(ensemble, level, band)
     windows = read_windows(ensemble, run, starts, steps)
+    if band == "calibrated":
+        warn_of_horizon(ensemble, windows[0].name, windows[0].steps)
     with shelved(ensemble, run, windows, crew, progress) as (shelf, lost):
         values = widened(ensemble, reduce_members(shelf, lost, level, crew.workers), band)
     return windows, values, lost

@@ -45,9 +45,9 @@ def window_coords(windows: Sequence[ForecastWindow], dt: float) -> dict[str, xr.
     }
 
 
-def statuses(lost: npt.NDArray[np.int64], time: FloatArray) -> npt.NDArray[np.str_]:
+def statuses(lost: npt.NDArray[np.int64], time: FloatArray, dt: float) -> npt.NDArray[np.str_]:
     """Status of each member from its first lost instant, or −1."""
-    return np.array([status_text(int(at), time) for at in lost], dtype=str)
+    return np.array([status_text(int(at), time, dt) for at in lost], dtype=str)
 
 
 def verdict(lost: npt.NDArray[np.int64]) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from seakeep.models.draws import Draw
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.members import TrainingArrays
 from seakeep.models.settings import HankelSettings
+from seakeep.models.store import as_json
 
 __all__ = ["BAYESIAN_HANKEL_DMDC", "draws_dataset", "pack", "unpack"]
 
@@ -101,9 +102,9 @@ def pack(
     }
     return dataset.assign(variables).assign_attrs(
         dt=dt,
-        settings=json.dumps(asdict(settings)),
+        settings=as_json(settings),
         runs=json.dumps(place),
-        alignment=json.dumps(None if alignment is None else asdict(alignment)),
+        alignment="null" if alignment is None else as_json(alignment),
         labels=json.dumps({k: [asdict(label) for label in v] for k, v in labels.items()}),
     )
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from seakeep.errors import SeakeepWarning
 from seakeep.models.forecasting import alignment_line, counted, with_units
+from seakeep.signals.clocks import instant_text
 
 if TYPE_CHECKING:
     from seakeep.models.fitted_ensemble import HankelEnsemble
@@ -54,7 +55,7 @@ def summary(ensemble: HankelEnsemble) -> str:
         + (f", {TRAIN_ON[origin['train_on']]}" if len(ensemble.arrays.names) > 1 else ""),
     ]
     lines += [
-        f"    {name}: {first:.10g} to {stop:.10g} s"
+        f"    {name}: {instant_text(first, ensemble.dt)} to {instant_text(stop, ensemble.dt)} s"
         for name, (first, stop) in ensemble.training_spans.items()
     ]
     if (calibration := ensemble.calibration) is not None:

@@ -117,12 +117,20 @@ def to_mat(model: HankelDMDcModel, path: str | Path) -> Path:
         "OutputName": _cell([label.name for label in model.state_labels]),
         "InputUnit": _cell([label.units for label in model.input_labels]),
         "OutputUnit": _cell([label.units for label in model.state_labels]),
+        "StateName": _cell(_state_names(model)),
         "Notes": "seakeep: x(k+1) = A x(k) + B (u(k) - InputOffset), "
         "y(k) = C x(k) + D (u(k) - InputOffset) + OutputOffset",
     }
     with replacing(Path(path)) as temporary, temporary.open("wb") as stream:
         io.savemat(stream, content, do_compression=True, oned_as="column")
     return Path(path)
+
+
+def _state_names(model: HankelDMDcModel) -> list[str]:
+    """Names of the entries of the state, in the order of :func:`matrices`."""
+    delayed = [(name, back) for back in range(model.state_delays + 1) for name in model.states]
+    delayed += [(name, back) for back in range(1, model.input_delays + 1) for name in model.inputs]
+    return [f"{name}(k-{back})" if back else f"{name}(k)" for name, back in delayed]
 
 
 def _cell(texts: list[str]) -> npt.NDArray[np.object_]:

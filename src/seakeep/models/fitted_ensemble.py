@@ -17,6 +17,7 @@ from seakeep.models.alignment import FittedAlignment
 from seakeep.models.calibration import Band, Calibration, calibrate
 from seakeep.models.draws import Draw
 from seakeep.models.ensemble_summary import warn_of_unstable
+from seakeep.models.held import HeldEnsemble, hold
 from seakeep.models.labelled import ChannelLabel, Runs
 from seakeep.models.members import TrainingArrays, member_model, member_radius, window_ends
 from seakeep.models.model import HankelDMDcModel
@@ -297,6 +298,35 @@ class HankelEnsemble:
         """
         crew = Crew(workers, backend, scheduler)
         return ensemble_forecasts.summary(self, run, start, steps, level, band, crew, progress)
+
+    def hold(
+        self,
+        *,
+        workers: int = 1,
+        backend: Backend = "processes",
+        scheduler: str | None = None,
+        progress: Progress | None = None,
+    ) -> HeldEnsemble:
+        """Identify all members once and keep them, for forecasts in a loop or on board.
+
+        Parameters
+        ----------
+        workers, backend, scheduler, progress
+            As in :meth:`forecast`.
+
+        Returns
+        -------
+        HeldEnsemble
+            Its ``forecast_arrays`` gives mean and band from plain arrays. It takes N(N(s+1) +
+            Q(z+1)) numbers a member with exact delay rows, and s + 1 times as many with
+            regressed ones.
+
+        Raises
+        ------
+        RequestError
+            If the members carry the waves to the surge that they predict.
+        """
+        return hold(self, Crew(workers, backend, scheduler), progress)
 
     def calibrate(
         self,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +13,11 @@ import xarray as xr
 from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.identification import Scale
+from seakeep.signals.clocks import fixed, instant_text
 
 if TYPE_CHECKING:
     from seakeep.models.alignment import FittedAlignment
+    from seakeep.models.fitted_ensemble import HankelEnsemble
     from seakeep.models.model import HankelDMDcModel
 
 __all__ = ["ForecastWindow", "label_forecast", "modes", "read_window", "summary"]
@@ -90,13 +93,17 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
     time = np.asarray(run.variables["time"].values, dtype=float)
     at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
     needed = model.history_samples
+
+    def told(instant: float) -> str:
+        return instant_text(instant, model.dt)
+
     if at + 1 < needed:
         near = abs(float(start) - time[at]) <= 1e-6 * model.dt
-        snapped = "" if near else f" (nearest sample {time[at]:.10g} s)"
+        snapped = "" if near else f" (nearest sample {told(time[at])} s)"
         raise RequestError(
-            f"start = {float(start):.10g} s{snapped} leaves {at + 1} samples of history in "
+            f"start = {told(float(start))} s{snapped} leaves {at + 1} samples of history in "
             f"{name} and the model needs {needed} (the start included): {needed - at - 1} are "
-            f"missing. Start at {time[0] + (needed - 1) * model.dt:.10g} s or later."
+            f"missing. Start at {told(time[0] + (needed - 1) * model.dt)} s or later."
         )
     available = time.size - 1 - at
     count = available if steps is None else steps
@@ -111,8 +118,8 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
     most = available + 1 if model.inputs else count
     if count > most:
         raise RequestError(
-            f"{count} steps from {time[at]:.10g} s need the input up to "
-            f"{time[at] + (count - 1) * model.dt:.10g} s and {name} ends at {time[-1]:.10g} s. "
+            f"{count} steps from {told(time[at])} s need the input up to "
+            f"{told(time[at] + (count - 1) * model.dt)} s and {name} ends at {told(time[-1])} s. "
             f"At most {most} steps can be forecast from there."
         )
     first = at + 1 - needed
@@ -141,30 +148,42 @@ def read_window(model: Reader, run: xr.Dataset, start: float, steps: int | None)
 
 
 def check_arrays(
-    model: HankelDMDcModel,
+    model: HankelDMDcModel | HankelEnsemble,
     x_history: npt.ArrayLike,
     u_history: npt.ArrayLike,
     u_future: npt.ArrayLike,
     steps: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the histories cut to (s+1, N) and (z + steps, Q); arguments as ``forecast_arrays``."""
+    """Return the histories cut to (s+1, N) and (z + steps, Q); arguments as ``forecast_arrays``.
+
+    Columns that have names (a pandas DataFrame, a DataArray) are taken by name.
+    """
     if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
         raise RequestError(f"steps must be a positive integer; received {steps!r}.")
-    states, inputs = len(model.states), len(model.inputs)
+    states, inputs = model.states, model.inputs
     s, z = model.state_delays, model.input_delays
     x = _finite("x_history", _rows("x_history", x_history, s + 1, states, "s + 1")[-s - 1 :])
     if not inputs:
         return x, np.zeros((int(steps), 0))
     u = _finite("u_history", _rows("u_history", u_history, z + 1, inputs, "z + 1")[-z - 1 :])
-    future = np.asarray(u_future, dtype=float)
-    if future.size == 0:
-        future = np.zeros((0, inputs))
-    future = _rows("u_future", future, int(steps) - 1, inputs, "steps − 1")
-    return x, np.concatenate([u, _finite("u_future", future[: int(steps) - 1])])
+    future = np.zeros((0, len(inputs))) if np.size(u_future) == 0 else u_future
+    after = _rows("u_future", future, int(steps) - 1, inputs, "steps − 1")
+    return x, np.concatenate([u, _finite("u_future", after[: int(steps) - 1])])
 
 
-def _rows(name: str, value: npt.ArrayLike, least: int, channels: int, meaning: str) -> FloatArray:
-    array = np.asarray(value, dtype=float)
+def _rows(
+    name: str, value: npt.ArrayLike, least: int, names: Sequence[str], meaning: str
+) -> FloatArray:
+    plain = _by_name(name, value, names)
+    if np.iscomplexobj(plain):
+        raise RequestError(f"{name} holds complex numbers; channels are real.")
+    if np.ma.isMaskedArray(plain):
+        plain = np.ma.filled(np.ma.asarray(plain, dtype=float), np.nan)
+    try:
+        array = np.asarray(plain, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise RequestError(f"{name} is no array of numbers: {error}.") from None
+    channels = len(names)
     if array.ndim != 2 or array.shape[1] != channels or array.shape[0] < least:
         turned = array.ndim == 2 and array.shape[0] == channels and array.shape[1] >= least
         raise RequestError(
@@ -172,6 +191,24 @@ def _rows(name: str, value: npt.ArrayLike, least: int, channels: int, meaning: s
             f"({meaning}) and {channels} columns.{' It looks transposed.' if turned else ''}"
         )
     return array
+
+
+def _by_name(name: str, value: npt.ArrayLike, names: Sequence[str]) -> Any:
+    """Columns in the order of the model, where they have names."""
+    table: Any = value
+    columns = getattr(table, "columns", None)
+    if isinstance(table, xr.DataArray) and table.ndim == 2 and table.dims[1] in table.coords:
+        columns = table.indexes[table.dims[1]]
+    if columns is None or not all(isinstance(each, str) for each in columns):
+        return value
+    missing = [each for each in names if each not in list(columns)]
+    if missing:
+        raise RequestError(
+            f"{name} has no column '{missing[0]}'; its columns: {', '.join(columns)}."
+        )
+    if isinstance(table, xr.DataArray):
+        return table.sel({table.dims[1]: list(names)}).values
+    return table[list(names)].to_numpy()
 
 
 def _finite(name: str, needed: FloatArray) -> FloatArray:
@@ -215,17 +252,18 @@ def cut_divergence(values: FloatArray, scale: Scale, begun: FloatArray) -> Float
     return values
 
 
-def status_text(lost: int, time: FloatArray) -> str:
+def status_text(lost: int, time: FloatArray, dt: float) -> str:
     """What ``status`` says of a free run whose first lost instant is `lost`, or −1 for none."""
-    return "ok" if lost < 0 else f"{DIVERGED_AT}{time[lost]:.10g} s"
+    return "ok" if lost < 0 else f"{DIVERGED_AT}{instant_text(time[lost], dt)} s"
 
 
 def status_at_clock(status: str, clock: float) -> str:
     """The same status where time runs by a factor `clock`, as at full scale."""
     if not status.startswith(DIVERGED_AT):
         return status
-    instant = float(status.removeprefix(DIVERGED_AT).removesuffix(" s"))
-    return f"{DIVERGED_AT}{clock * instant:.10g} s"
+    instant = status.removeprefix(DIVERGED_AT).removesuffix(" s")
+    decimals = max(3, len(instant.partition(".")[2]))
+    return f"{DIVERGED_AT}{fixed(clock * float(instant), decimals)} s"
 
 
 def label_forecast(
@@ -233,7 +271,7 @@ def label_forecast(
 ) -> xr.Dataset:
     """Dataset of a forecast of shape (steps, N), with units, spread in training, and status."""
     lost = np.flatnonzero(np.isnan(values).any(axis=1))
-    status = status_text(int(lost[0]) if lost.size else -1, window.time.values)
+    status = status_text(int(lost[0]) if lost.size else -1, window.time.values, model.dt)
     variables = {
         label.name: xr.Variable(
             ("time",),
@@ -306,7 +344,8 @@ def summary(model: HankelDMDcModel) -> str:
         f"{counted(len(training.runs), 'run')}",
     ]
     lines += [
-        f"    {name}: {columns} pairs, {first:.10g} to {stop:.10g} s"
+        f"    {name}: {columns} pairs, {instant_text(first, model.dt)} to "
+        f"{instant_text(stop, model.dt)} s"
         for name, columns, first, stop in zip(
             training.runs, training.columns, training.first, training.stop, strict=True
         )

@@ -169,7 +169,7 @@ class HankelDMDc(HankelSettings):
         if self.alignment is not None:
             check_names(states, inputs)
             named, stop = until(named, stop), None
-            reach = self.history_samples - 1
+            reach = 0 if self.history == "inside" else self.history_samples - 1
             fitted, named = align_training(
                 self.alignment, named, states, inputs, self.window, reach
             )

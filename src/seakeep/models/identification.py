@@ -256,9 +256,9 @@ def stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
                 f"stop names the run '{unknown[0]}', which is not among the runs "
                 f"({', '.join(names)}).{did_you_mean(unknown[0], names)}"
             )
-        return {name: stop.get(name) for name in names}
+        return {name: _one_stop(stop.get(name), f"stop of '{name}'") for name in names}
     if np.ndim(stop) > 0:  # a scalar array, such as an instant of a run, is one for all
-        values = [None if value is None else float(value) for value in cast("list[Any]", stop)]
+        values = [_one_stop(value, "each stop") for value in cast("list[Any]", stop)]
         if len(values) != len(names):
             raise RequestError(
                 f"stop has {len(values)} instants for {len(names)} runs; give one for all, or "
@@ -266,6 +266,10 @@ def stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
             )
         return dict(zip(names, values, strict=True))
     return dict.fromkeys(names, labelled.as_instant(stop, "stop"))
+
+
+def _one_stop(value: object, what: str) -> float | None:
+    return None if value is None else labelled.as_instant(value, what)
 
 
 def last_sample(time: FloatArray, stop: float | None, name: str) -> int:

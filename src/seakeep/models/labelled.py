@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
@@ -12,6 +13,7 @@ import xarray as xr
 
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.signals import uniform_step
+from seakeep.signals.clocks import instant_text
 
 __all__ = ["ChannelLabel", "as_runs", "channel_labels", "channel_matrix", "nearest_sample"]
 
@@ -61,13 +63,21 @@ def as_runs(runs: Runs) -> dict[str, xr.Dataset]:
         check_run(runs, "runs")
     else:
         for number, run in enumerate(runs, start=1):
-            name = run_name(run, f"run {number}")
-            named[name if name not in named else f"{name} ({number})"] = run
+            given = name = run_name(run, f"run {number}")
+            while name in named:
+                name = f"{given} ({number})"
+                number += 1
+            named[name] = run
     if not named:
         raise RequestError("no run was given. Pass one Dataset, a sequence or a mapping of them.")
     for name, run in named.items():
         check_run(run, name)
     return named
+
+
+def is_made_up(name: str, run: xr.Dataset) -> bool:
+    """Whether a name was given by :func:`as_runs` to a run that has none."""
+    return "run" not in run.attrs and re.fullmatch(r"run( \d+)?( \(\d+\))*", name) is not None
 
 
 def run_name(run: object, fallback: str) -> str:
@@ -95,15 +105,9 @@ def run_step(run: xr.Dataset, name: str) -> float:
     Raises
     ------
     DataError
-        If the times are unsorted, repeated or not uniform.
+        If the times are no numbers, unsorted, repeated or not uniform.
     """
-    time = run.variables["time"].values
-    if time.dtype.kind not in "iuf":
-        raise DataError(
-            f"the times of {name} are of type {time.dtype}; seconds as numbers are expected. "
-            "Subtract the first instant and divide by one second."
-        )
-    return uniform_step(time, name)
+    return uniform_step(run.variables["time"].values, name)
 
 
 def check_step(run: xr.Dataset, name: str, expected: float) -> None:
@@ -181,13 +185,19 @@ def check_finite(
         return
     bad = ~np.isfinite(values)
     row, column = (int(index) for index in np.argwhere(bad)[0])
+    instant = instant_text(time[first + row], _spacing(time))
     raise DataError(
         f"channel '{names[column]}' of {name} has {int(bad[:, column].sum())} missing or infinite "
-        f"value(s) in the samples needed, the first at t = {time[first + row]:.10g} s. "
+        f"value(s) in the samples needed, the first at t = {instant} s. "
         "Nothing is filled in silence: have short gaps bridged (gaps = 'bridge' and longest_gap in "
         "[preparation]), or cut the run so that the gap lies outside (record, span, train or test "
         "in [runs.NAME])."
     )
+
+
+def _spacing(time: FloatArray) -> float:
+    """Step of uniform instants, s, as near as they state it."""
+    return float(time[-1] - time[0]) / (time.size - 1)
 
 
 def channel_labels(run: xr.Dataset, names: Sequence[str]) -> tuple[ChannelLabel, ...]:
@@ -245,11 +255,12 @@ def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "sta
     RequestError
         If the instant is outside the run by more than rounding, or not a number.
     """
-    step = (time[-1] - time[0]) / (time.size - 1)
+    step = _spacing(time)
     rounding = 1e-3 * step
     if not time[0] - rounding <= instant <= time[-1] + rounding:
         raise RequestError(
-            f"{what} = {instant:.10g} s is outside {name}, which runs from {time[0]:.10g} to "
-            f"{time[-1]:.10g} s. Choose an instant inside it."
+            f"{what} = {instant_text(instant, step)} s is outside {name}, which runs from "
+            f"{instant_text(time[0], step)} to {instant_text(time[-1], step)} s. Choose an instant "
+            "inside it."
         )
     return int(np.clip(np.rint((instant - time[0]) / step), 0, time.size - 1))

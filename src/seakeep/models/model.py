@@ -297,10 +297,11 @@ class HankelDMDcModel:
         Parameters
         ----------
         x_history : array_like, shape (at least s + 1, N)
-            States up to and including instant k, oldest first, physical units.
+            States up to and including instant k, oldest first, physical units, in the order of
+            ``model.states``; columns with names (a DataFrame) are taken by name.
         u_history : array_like, shape (at least z + 1, Q)
-            Inputs up to and including instant k, aligned already if the model aligns them
-            (:meth:`aligned_inputs`).
+            Inputs up to and including instant k, in the order of ``model.inputs``, aligned already
+            if the model aligns them (:meth:`aligned_inputs`).
         u_future : array_like, shape (at least steps − 1, Q)
             Inputs at k + 1, k + 2, …; shape (0, 0) for a model without input.
         steps : int
@@ -314,7 +315,8 @@ class HankelDMDcModel:
         Raises
         ------
         RequestError
-            If a shape does not fit; a transposed array is refused, not turned.
+            If a shape does not fit (a transposed array is refused, not turned), a column is
+            missing, or a value that is needed is not finite or masked.
         """
         x, u = forecasting.check_arrays(self, x_history, u_history, u_future, steps)
         values: FloatArray = free_runs(self, x[None], u[None], int(steps))[0]
@@ -352,7 +354,7 @@ class HankelDMDcModel:
         return export.to_control(self)
 
     def to_mat(self, path: str | Path) -> Path:
-        """Write A, B, C, D, Ts, offsets, names and units for MATLAB.
+        """Write A, B, C, D, Ts, offsets, names (of the state's entries too) and units for MATLAB.
 
         Parameters
         ----------
@@ -394,6 +396,29 @@ class HankelDMDcModel:
         if self.alignment is not None:
             history = aligned.align_history(self, run, window)
         return export.initial_state(self, window.state_history, history)
+
+    def initial_state_arrays(
+        self, x_history: npt.ArrayLike, u_history: npt.ArrayLike
+    ) -> FloatArray:
+        """State of the exported system from arrays, for use in a loop or on board.
+
+        Parameters
+        ----------
+        x_history, u_history : array_like, shapes (at least s + 1, N) and (at least z + 1, Q)
+            As for :meth:`forecast_arrays`.
+
+        Returns
+        -------
+        ndarray, shape (N(s+1) + Qz,)
+            :math:`[x_k; x_{k-1}; …; x_{k-s}; u_{k-1}; …; u_{k-z}]`, less their means.
+
+        Raises
+        ------
+        RequestError
+            As :meth:`forecast_arrays`.
+        """
+        x, u = forecasting.check_arrays(self, x_history, u_history, [], 1)
+        return export.initial_state(self, x, u)
 
     def summary(self) -> str:
         """Text that says what the model is and how it was identified.

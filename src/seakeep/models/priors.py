@@ -15,7 +15,7 @@ import numpy as np
 
 from seakeep.errors import RequestError
 
-__all__ = ["Fixed", "LogUniform", "Prior", "Uniform", "check_prior", "describe", "rebuild"]
+__all__ = ["Fixed", "LogUniform", "Prior", "Uniform", "check_prior", "describe"]
 
 
 @runtime_checkable
@@ -171,38 +171,3 @@ def describe(prior: Prior | None) -> dict[str, Any] | None:
     args = [float(value) for value in getattr(prior, "args", ())]
     kwds = {key: float(value) for key, value in getattr(prior, "kwds", {}).items()}
     return {"prior": f"scipy.stats.{distribution}", "args": args, "kwds": kwds}
-
-
-def rebuild(description: dict[str, Any] | None) -> Prior | None:
-    """The prior of a description; the inverse of :func:`describe`.
-
-    Parameters
-    ----------
-    description : dict or None
-        From :func:`describe`.
-
-    Returns
-    -------
-    Prior or None
-        Equal in all its quantiles.
-
-    Raises
-    ------
-    ValueError
-        If the description names no prior.
-    """
-    if description is None:
-        return None
-    known = {"Uniform": Uniform, "LogUniform": LogUniform, "Fixed": Fixed}
-    parameters = dict(description)
-    name = str(parameters.pop("prior"))
-    if name in known:
-        own: Prior = known[name](**parameters)
-        return own
-    from scipy import stats
-
-    kind = getattr(stats, name.removeprefix("scipy.stats."), None)
-    if not isinstance(kind, stats.rv_continuous | stats.rv_discrete):
-        raise ValueError(f"unknown prior '{name}'")
-    frozen: Prior = kind(*parameters["args"], **parameters["kwds"])
-    return frozen

@@ -14,6 +14,7 @@ from seakeep.core.embedding import History
 from seakeep.core.regression import Precision
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models.alignment import ProbeAlignment
+from seakeep.models.checks import check_choice
 
 __all__ = [
     "DelayRows",
@@ -21,7 +22,6 @@ __all__ = [
     "History",
     "Precision",
     "RidgeScale",
-    "check_choice",
     "check_integer",
     "check_ridge",
     "periods_to_samples",
@@ -51,11 +51,16 @@ def periods_to_samples(periods: float, encounter_period: float, dt: float) -> in
     Raises
     ------
     RequestError
-        If period or step are not positive.
+        If period or step are not positive, or the step is as long as the period.
     """
     for name, value in (("encounter_period", encounter_period), ("dt", dt)):
         if not (math.isfinite(value) and value > 0):
             raise RequestError(f"{name} must be a positive number of seconds; received {value!r}.")
+    if dt >= encounter_period:
+        raise RequestError(
+            f"the time step dt = {dt:g} s is no shorter than the encounter period of "
+            f"{encounter_period:g} s. Are the two swapped?"
+        )
     return math.floor(periods * encounter_period / dt + 0.5)
 
 
@@ -79,12 +84,6 @@ def check_ridge(value: object) -> None:
             f"ridge must be a number, zero or positive; received {value!r}. "
             "The paper uses 100; 0 asks for the solution of least norm."
         )
-
-
-def check_choice(name: str, value: object, choices: tuple[str, str]) -> None:
-    """Refuse a setting that is none of two words."""
-    if value not in choices:
-        raise RequestError(f"{name} must be '{choices[0]}' or '{choices[1]}'; received {value!r}.")
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, is_dataclass
@@ -14,17 +15,27 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.errors import DataError, RequestError
-from seakeep.files import replacing
+from seakeep.files import replacing, write_netcdf
 from seakeep.models.identification import Scale
 from seakeep.models.labelled import ChannelLabel
 
-__all__ = ["FORMAT_VERSION", "HANKEL_DMDC", "pack", "read", "unpack", "write"]
+__all__ = [
+    "FORMAT_VERSION",
+    "HANKEL_DMDC",
+    "as_json",
+    "checksum",
+    "pack",
+    "read",
+    "unpack",
+    "write",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
 HANKEL_DMDC = "hankel_dmdc"
-FORMAT_VERSION = 1
-"""Version of the layout; raised when an older seakeep could not read a new file rightly."""
+FORMAT_VERSION = 2
+"""Version of the layout; raised when an older seakeep could not read a new file rightly. From 2 on
+files carry a checksum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,12 +74,12 @@ def pack(
             variables[f"{group}_{name}"] = (group, getattr(scale, name))
     attrs = {
         "dt": dt,
-        "settings": _json(settings),
-        "training": _json(training),
+        "settings": as_json(settings),
+        "training": as_json(training),
         "labels": json.dumps({k: [asdict(label) for label in v] for k, v in labels.items()}),
     }
     if alignment is not None:
-        attrs["alignment"] = _json(alignment)
+        attrs["alignment"] = as_json(alignment)
     return xr.Dataset(variables, attrs=attrs)
 
 
@@ -102,7 +113,8 @@ def _values(dataset: xr.Dataset, name: str, precision: str = "double") -> FloatA
     return np.ascontiguousarray(dataset[name].values, dtype=precision)
 
 
-def _json(value: object) -> str:
+def as_json(value: object) -> str:
+    """Write a dataclass as JSON; numbers of numpy become plain ones."""
     assert is_dataclass(value)
     assert not isinstance(value, type)
     return json.dumps(asdict(value), default=_plain)
@@ -142,11 +154,9 @@ def write(dataset: xr.Dataset, path: str | Path, kind: str) -> Path:
         seakeep_format=FORMAT_VERSION,
         seakeep_version=metadata.version("seakeep"),
     )
+    labelled.attrs["checksum"] = checksum(labelled)
     with replacing(target) as temporary:
-        try:
-            labelled.to_netcdf(temporary, engine="h5netcdf")
-        except RuntimeError as error:  # what HDF5 makes of a full disk when it closes the file
-            raise OSError("the file could not be written to its end") from error
+        write_netcdf(temporary, labelled)
     return target
 
 
@@ -209,4 +219,33 @@ def read(path: str | Path) -> xr.Dataset:
             f"({metadata.version('seakeep')}) reads up to {FORMAT_VERSION}. Update seakeep, or "
             "save the model again with this version."
         )
+    if version < 1 or (version > 1 and dataset.attrs.get("checksum") != checksum(dataset)):
+        raise DataError(
+            f"{source} does not hold what was written into it (its checksum differs): it was "
+            "damaged or altered. Copy it again, or save the model again."
+        )
     return dataset
+
+
+def checksum(dataset: xr.Dataset) -> str:
+    """SHA-256 over all that a model file holds, the checksum itself aside.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        What is written, or was read.
+
+    Returns
+    -------
+    str
+        Hexadecimal digits.
+    """
+    found = hashlib.sha256()
+    told = {key: value for key, value in dataset.attrs.items() if key != "checksum"}
+    found.update(json.dumps(told, default=_plain, sort_keys=True).encode())
+    for name in sorted(map(str, dataset.variables)):
+        variable = dataset.variables[name]
+        kind = [name, variable.dims, variable.shape, variable.dtype.str, variable.attrs]
+        found.update(json.dumps(kind, default=_plain, sort_keys=True).encode())
+        found.update(np.ascontiguousarray(variable.values).tobytes())
+    return found.hexdigest()

@@ -177,7 +177,7 @@ def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
     channels = [
         name
         for name, variable in forecast.data_vars.items()
-        if "member" in variable.dims and variable.dtype.kind == "f"
+        if "member" in variable.dims and variable.dtype.kind in "iuf"
     ]
     lost = xr.zeros_like(forecast["member"], dtype=bool)
     for name in channels:

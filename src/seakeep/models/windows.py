@@ -128,9 +128,14 @@ def read_windows(
         raise RequestError(
             f"starts must be a list of instants; received {starts!r}. Write [{starts}]."
         )
-    windows = [read_window(model, run, float(start), steps) for start in starts]
-    if not windows:
+    if len(starts) == 0:
         raise RequestError("starts is empty: name at least one instant to forecast from.")
+    if steps is None and len(starts) > 1:
+        raise RequestError(
+            f"steps is None, which is the end of the run, at another distance from each of the "
+            f"{len(starts)} starts. Give the number of instants to forecast from all of them."
+        )
+    windows = [read_window(model, run, start, steps) for start in starts]
     if model.alignment is None:
         return windows
     check_offset(run)
@@ -162,7 +167,7 @@ def forecast_windows(
     labels, spread = model.state_labels, model.state_scale.spread
     variables = label_channels(labels, spread, values, ("window", "lead"))
     lost = first_lost(values).tolist()
-    status = [status_text(at, w.time.values) for at, w in zip(lost, windows, strict=True)]
+    status = [status_text(at, w.time.values, model.dt) for at, w in zip(lost, windows, strict=True)]
     variables["status"] = xr.Variable(("window",), status)
     attrs = {"run": windows[0].name, **notes}
     return xr.Dataset(variables, coords=window_coords(windows, model.dt), attrs=attrs)

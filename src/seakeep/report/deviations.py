@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -14,7 +15,16 @@ from seakeep.report.study_tables import ReportTable
 from seakeep.study import StudyResult
 from seakeep.study.windows import windows_overlap
 
-__all__ = ["alignment_words", "deviations", "prior_words", "test_overlap", "training_overlap"]
+__all__ = [
+    "alignment_words",
+    "deviations",
+    "prior_words",
+    "test_overlap",
+    "training_overlap",
+    "training_windows_overlap",
+    "unequal_training",
+    "whole_readers",
+]
 
 APART = 0.005
 """Windows that share less than this part of their length are apart."""
@@ -43,15 +53,107 @@ def training_overlap(result: StudyResult) -> str:
     )
     if count == 1:
         return f"{room}; there is one."
+    nested = _nested(result)
+    whole = (
+        f" From the begins of their spans, where {_listed(whole_readers(result))} reads them, they "
+        f"share {100 * nested:.0f} %."
+        if nested >= APART
+        else ""
+    )
     if share < APART:
         runs = len(set(result.groups["training"]["run"].values.tolist()))
         where = f", which lie in {runs} runs," if runs > 1 else ""
-        return f"{room}; the {count} windows{where} do not overlap."
+        return f"{room}; the {count} windows{where} do not overlap.{whole}"
     return (
         f"{room}: so the {count} windows share {100 * share:.0f} % of their length with one "
-        "another. They are not independent, and the boxes show the spread over test windows more "
-        "than that over training data."
+        f"another.{whole} They are not independent, and the boxes show the spread over test "
+        "windows more than that over training data."
     )
+
+
+def whole_readers(result: StudyResult) -> list[str]:
+    """Models that read all of a training set, whatever its length.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    list of str
+        Their names.
+    """
+    return [model for model, length in _stated_lengths(result).items() if length == "None"]
+
+
+def unequal_training(result: StudyResult) -> str:
+    """Sentence on models that learn from different lengths of data.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    str
+        Empty where all of them read all, or none does.
+    """
+    stated, whole = _stated_lengths(result), whole_readers(result)
+    others = [model for model in stated if model not in whole]
+    if not (whole and others):
+        return ""
+    period = float(result.attrs["encounter_period"])
+    sets = [sum(end - begin for begin, end in each) / period for each in _spans(result)]
+    low, high = f"{min(sets):.0f}", f"{max(sets):.0f}"
+    told = []
+    for model in others:
+        if result.is_ensemble(model):
+            length = prior_words(stated[model])
+        else:
+            length = f"{int(stated[model]) * float(result.attrs['dt']) / period:.3g}"
+        told.append(f"{model_words(model)} from a part ({length} T̂)")
+    return (
+        f"Models learn from different amounts of data: {_listed(whole)} from all of a training set "
+        f"({low if low == high else f'{low} to {high}'} T̂), {', '.join(told)}. A difference "
+        "between them is one of training data too."
+    )
+
+
+def _listed(models: list[str]) -> str:
+    return ", ".join(map(model_words, models))
+
+
+def _stated_lengths(result: StudyResult) -> dict[str, str]:
+    """Training length of each model as it was stated; "None" where it reads all."""
+    specs: dict[str, dict[str, str]] = json.loads(result.attrs["specs"])
+    return {
+        m: spec["train_length" if "train_length" in spec else "window"] for m, spec in specs.items()
+    }
+
+
+def _spans(result: StudyResult) -> list[list[tuple[float, float]]]:
+    """Begin and end of each span of each training set, s."""
+    return [
+        [(float(a), float(b)) for a, b in re.findall(r"(-?[\d.]+) to (-?[\d.]+) s", str(text))]
+        for text in result.groups["training"]["spans"].values
+    ]
+
+
+def _nested(result: StudyResult) -> float:
+    """Part of a training set that others hold too, as models without a window read them."""
+    training = result.groups["training"]
+    if not whole_readers(result):
+        return 0.0
+    runs = [str(run) for run in training["run"].values]
+    return windows_overlap([(r, *span) for r, (span,) in zip(runs, _spans(result), strict=True)])
+
+
+def training_windows_overlap(result: StudyResult) -> bool:
+    """Whether training windows share a part of their length that counts."""
+    found = _overlap(result)
+    return found is not None and found[0] > 1 and max(found[3], _nested(result)) >= APART
 
 
 def test_overlap(result: StudyResult) -> str:
@@ -112,6 +214,7 @@ def deviations(result: StudyResult) -> ReportTable:
     Returns
     -------
     ReportTable
+        The paper has a column where the study asks for it.
     """
     preset = str(result.attrs["preset"])
     rows = [
@@ -120,12 +223,18 @@ def deviations(result: StudyResult) -> ReportTable:
         *_model_rows(result),
         *_study_rows(result),
     ]
+    note = str(result.attrs.get("preparation_note", ""))
+    if not result.shows_paper:
+        chosen = tuple((subject, here) for subject, _, here in rows)
+        return ReportTable(
+            "method", f"Method in effect (preset {preset})", ("subject", "in effect"), chosen, note
+        )
     return ReportTable(
         "deviations",
         f"What the paper leaves open, and what is in effect here (preset {preset})",
         ("subject", "the paper", "in effect here"),
         tuple(rows),
-        str(result.attrs.get("preparation_note", "")),
+        note,
     )
 
 
@@ -159,7 +268,7 @@ def _data_rows(result: StudyResult) -> Rows:
          " and ".join(filtered) or "none"),
         *([("places of the probes", "48.24 m and 48.42 m for the same pole", ", ".join(places))]
           if places else []),
-        ("wave spectra", "Welch segments of 8.2 s", "both: those, and segments of 60 s"),
+        ("wave spectra", "Welch segments of 8.2 s", "Welch segments of 8.2 s and of 60 s"),
     ]  # fmt: skip
 
 
@@ -179,8 +288,8 @@ def _model_rows(result: StudyResult) -> Rows:
         ("measured outputs read after the start", "surge, through the alignment",
          f"{conditional}: every error, band and density here is conditional on measured "
          f"{conditional}" if conditional else "none: forecasts in the strict sense"),
-        ("standardisation", "z-score on the training window", {
-            "True": "the same", "False": "none"}.get(each("standardize"), each("standardize"))),
+        ("standardisation", "z-score on the training window",
+         each("standardize", _standardisation)),
         ("history of the training window", "its sizes hold only before it",
          each("history", _history)),
         ("rows of Â that shift the delays", "ridge on all rows", each("delay_rows", _delay_rows)),
@@ -189,7 +298,8 @@ def _model_rows(result: StudyResult) -> Rows:
         ("delays to samples", "nearest integer in the text, floor in the box", "nearest"),
         ("end of a training window", "where it lies is unstated", "its stop, for all draws"),
         ("band", "'95 % confidence interval'", "quantiles of the members, point by point"),
-        ("'Bayesian'", "the prior pushed forward", "the same: there is no likelihood"),
+        ("'Bayesian'", "the prior pushed forward",
+         "the prior pushed forward: there is no likelihood"),
     ]  # fmt: skip
 
 
@@ -204,13 +314,16 @@ def _study_rows(result: StudyResult) -> Rows:
     overlap: Rows = []
     if found is not None:
         count, length, span, share = found
-        shared = f"they share {100 * share:.0f} % of their length" if share >= APART else "apart"
-        if count == 1:
-            shared = "one"
+        shared = ""
+        if count > 1:
+            shared = "; they do not overlap"
+        if training_windows_overlap(result):
+            shared = f"; they share {100 * share:.0f} % of their length"
+        windows = "1 window" if count == 1 else f"{count} windows"
         overlap = [
             ("training windows", "ten, drawn at random, which cannot but overlap",
-             f"{count}, placed {_placed(training['placement'])}; the largest draw reads "
-             f"{length:.1f} T̂ of a span of {span:.0f} T̂; {shared}"),
+             f"{windows}, placed {_placed(training['placement'])}; the largest draw reads "
+             f"{length:.1f} T̂ of a span of {span:.0f} T̂{shared}"),
         ]  # fmt: skip
     placements = {each["placement"] for each in result.settings["tests"].values()}
     return [
@@ -232,6 +345,10 @@ def _study_rows(result: StudyResult) -> Rows:
 
 def _placed(placement: str) -> str:
     return {"random": "at random", "apart": "without overlap"}[placement]
+
+
+def _standardisation(word: str) -> str:
+    return {"True": "z-score on the training window", "False": "none"}.get(word, word)
 
 
 def _history(word: str) -> str:

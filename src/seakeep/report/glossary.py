@@ -6,7 +6,6 @@ import re
 
 from seakeep.conventions import canonical_channel
 from seakeep.report.figures.boxes import FEWEST
-from seakeep.report.study_tables import channel_words
 from seakeep.study import StudyResult
 
 __all__ = ["few_cells", "glossary", "plain_symbol"]
@@ -30,6 +29,12 @@ def plain_symbol(channel: str) -> str:
     for tex, letter in _LETTERS.items():
         text = text.replace(tex, letter)
     return re.sub(r"\\(d?dot)\{(\w)\}", lambda m: m[2] + _ACCENTS[m[1]], text)
+
+
+def _explained(result: StudyResult, channel: str) -> str:
+    """Symbol and words of a channel; once where they are the same."""
+    symbol, words = plain_symbol(channel), result.words_of(channel)
+    return words if symbol == words else f"{symbol} {words}"
 
 
 def few_cells(result: StudyResult) -> str:
@@ -67,7 +72,7 @@ def glossary(result: StudyResult) -> list[tuple[str, str]]:
     list of (str, str)
     """
     period = float(result.attrs["encounter_period"])
-    symbols = "; ".join(f"{plain_symbol(name)} {channel_words(name)}" for name in result.channels)
+    symbols = "; ".join(_explained(result, name) for name in result.channels)
     loads = any(name.startswith("mooring_") for name in result.channels)
     regular = any(f"statistics/response/{test}" in result.groups for test in result.tests)
     same = (

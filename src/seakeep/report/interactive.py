@@ -9,21 +9,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.conventions import canonical_channel, conversion
+from seakeep.conventions import conversion
 from seakeep.report.figures.common import line_of, model_colour, model_words
 from seakeep.report.figures.histories import shown_cells
 from seakeep.report.style import shown_unit
 from seakeep.study import StudyResult
 
-__all__ = ["DASH_DOT", "dashes", "history_data", "pack"]
+__all__ = ["dashes", "history_data", "pack"]
 
 FloatArray = npt.NDArray[np.float64]
 
 MOST_MEMBERS = 40
 """Members of a cell that are embedded; more cannot be told apart on a screen."""
 MISSING = 65535
-DASH_DOT = (6.4, 1.6, 1.0, 1.6)
-"""Matplotlib's pattern of ``-.``, in line widths."""
 
 
 def pack(values: npt.ArrayLike) -> dict[str, Any]:
@@ -55,16 +53,14 @@ def pack(values: npt.ArrayLike) -> dict[str, Any]:
 
 
 def dashes(style: str | tuple[int, tuple[float, ...]]) -> list[float]:
-    """Dashes and gaps of a line style of matplotlib, in line widths.
+    """Dashes and gaps of a line of :data:`seakeep.report.style.LINES`, in line widths.
 
     Examples
     --------
     >>> dashes("-"), dashes((0, (4, 1.5)))
     ([], [4, 1.5])
     """
-    if isinstance(style, str):
-        return {"-": [], "-.": list(DASH_DOT)}[style]
-    return list(style[1])
+    return [] if isinstance(style, str) else list(style[1])
 
 
 def history_data(result: StudyResult) -> str:
@@ -112,7 +108,6 @@ def _channel(
     if units.split("/")[0] == "rad":
         target = units.replace("rad", "deg")
         factor = conversion(units, target)
-    known = canonical_channel(name)
     models = []
     for model in result.models:
         ensemble = result.is_ensemble(model)
@@ -132,7 +127,7 @@ def _channel(
         models.append(entry)
     return {
         "name": name,
-        "label": known.long_name if known else name.replace("_", " "),
+        "label": result.words_of(name),
         "unit": shown_unit(target),
         "measured": pack(factor * cell["measured"].values[:, column]),
         "models": models,

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
+from seakeep.campaign.settings import long_name_of
 from seakeep.errors import DataError
 from seakeep.report.style import (
     COLOURS,
     LINES,
+    THIN,
     axis_label,
     figure_style,
     new_figure,
+    plain_text,
+    prefixed,
     shown_unit,
 )
 from seakeep.signals import encounter_period
@@ -33,8 +39,19 @@ MOST_STEPS = 150
 LABEL = 8
 """Points of a label: the longest line of one fits beside its panel."""
 
-SHADES = ("#56606B", "#56B4E9", "#CC79A7", "#E69F00")
-"""Of several inputs."""
+SHADES: tuple[tuple[str, Any], ...] = (
+    ("#56606B", "-"),
+    ("#56B4E9", (0, (3, 1))),
+    ("#CC79A7", (0, (5, 1.5, 1, 1.5))),
+    ("#E69F00", (0, (1, 1))),
+    ("#000000", (0, (8, 1.5))),
+    ("#009E73", (0, (5, 1.5, 1, 1.5, 1, 1.5))),
+    ("#D55E00", (0, (1, 2.5))),
+    ("#0072B2", (0, (2, 2, 6, 2))),
+)
+"""Colour and dash of each of several inputs: dashes tell them apart in grey print."""
+ACROSS = 84
+"""Letters of a legend that stand beside each other over a panel."""
 BAND: dict[str, Any] = {"color": COLOURS["ensemble"], "alpha": 0.35, "linewidth": 0.6}
 
 
@@ -58,38 +75,31 @@ def overlay_figure(comparison: Comparison) -> Figure:
 
 
 def _draw(comparison: Comparison) -> Figure:
+    table = comparison_table([comparison]).isel(run=0)
+    comparison = _with_prefixes(comparison)
     states = [str(name) for name in comparison.measured.data_vars]
-    inputs = [str(name) for name in comparison.inputs.data_vars]
-    units_of = {name: str(comparison.inputs[name].attrs.get("units", "")) for name in inputs}
-    alike = [
-        [n for n in inputs if units_of[n] == unit] for unit in dict.fromkeys(units_of.values())
-    ]
+    alike = _of_one_unit(comparison.inputs)
     rows = len(states) + len(alike)
     period = _period_if_long(_counted(comparison))
     columns = 1 if period is None else 2
     figure = new_figure(7.5 if columns == 1 else 11.0, 1.0 + 1.45 * rows)
     axes = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
-    table = comparison_table([comparison]).isel(run=0)
+    for each in axes.flat:
+        each.use_sticky_edges = False  # an envelope would lie on the frame
+        each.margins(x=0.01)
     for row, name in enumerate(states):
         if period is not None:
             _draw_envelopes(axes[row, 0], comparison, name, period)
         _draw_state(axes[row, -1], comparison, name)
-        units = str(comparison.measured[name].attrs.get("units", ""))
-        axes[row, 0].set_ylabel(axis_label(name, units), fontsize=LABEL)
+        axes[row, 0].set_ylabel(_label(comparison.measured[name]), fontsize=LABEL)
         axes[row, 0].set_title(_judgement(table.sel(channel=name)), loc="right", fontsize=8, pad=2)
     for names, (first, last) in zip(alike, axes[len(states) :, [0, -1]], strict=True):
         if period is not None:
             _draw_input_envelopes(first, comparison.inputs, names, period)
         _draw_inputs(last, comparison.inputs, names)
-        first.set_ylabel(_input_label(names, units_of[names[0]]), fontsize=LABEL)
-        first.legend(
-            *last.get_legend_handles_labels(),
-            loc="lower left",
-            bbox_to_anchor=(0.0, 0.98),
-            borderaxespad=0.0,
-            ncols=min(len(names), 4),
-            fontsize=LABEL,
-        )
+        first.set_ylabel(_input_label(comparison.inputs[names]), fontsize=LABEL)
+        _legend_over(first, *last.get_legend_handles_labels())
+    figure.align_ylabels(axes[:, 0])
     for column in range(columns):
         axes[-1, column].set_xlabel("time [s]")
     if period is not None:
@@ -108,11 +118,70 @@ def _draw(comparison: Comparison) -> Figure:
     return figure
 
 
-def _input_label(names: list[str], units: str) -> str:
+def _units(channel: xr.DataArray) -> str:
+    return str(channel.attrs.get("units", ""))
+
+
+def _label(channel: xr.DataArray) -> str:
+    return axis_label(str(channel.name), _units(channel), channel.attrs.get("long_name"))
+
+
+def _input_label(inputs: xr.Dataset) -> str:
+    names = [str(name) for name in inputs.data_vars]
     if len(names) == 1:
-        return axis_label(names[0], units)
+        return _label(inputs[names[0]])
     waves = all(name.startswith("eta") for name in names)
-    return f"{'wave elevations' if waves else 'inputs'}\n[{shown_unit(units) or '?'}]"
+    units = shown_unit(_units(inputs[names[0]])) or "?"
+    return f"{'wave elevations' if waves else 'inputs'}\n[{units}]"
+
+
+def _of_one_unit(inputs: xr.Dataset) -> list[list[str]]:
+    """Names of the inputs, those of one unit together."""
+    groups: dict[str, list[str]] = {}
+    for name, each in inputs.data_vars.items():
+        groups.setdefault(_units(each), []).append(str(name))
+    return list(groups.values())
+
+
+def _with_prefixes(comparison: Comparison) -> Comparison:
+    """Loads in kN or MN where they are large: one factor a state, and one for alike inputs."""
+    forecast, measured, inputs = (
+        each.copy() for each in (comparison.forecast, comparison.measured, comparison.inputs)
+    )
+    band = None if comparison.band is None else comparison.band.copy()
+    for name in map(str, measured.data_vars):
+        among = [each for each in (measured, forecast, band) if each is not None]
+        _apply_prefix([(each, name) for each in among])
+    for names in _of_one_unit(inputs):
+        _apply_prefix([(inputs, name) for name in names])
+    return replace(comparison, forecast=forecast, measured=measured, inputs=inputs, band=band)
+
+
+def _apply_prefix(channels: Iterable[tuple[xr.Dataset, str]]) -> None:
+    chosen = [(each, name, each[name]) for each, name in channels]
+    largest = max(float(np.abs(each).max()) for _, _, each in chosen)
+    factor, units = prefixed(_units(chosen[0][2]), largest)
+    for data, name, each in chosen:
+        data[name] = factor * each
+        data[name].attrs = {**each.attrs, "units": units}
+
+
+def _legend_over(axes: Any, handles: list[Any], labels: list[str]) -> None:
+    """Legend above the left end of a panel, in rows of about equal lengths."""
+    across = max(1, min(4, len(labels), ACROSS // (6 + max(map(len, labels)))))
+    columns = -(-len(labels) // -(-len(labels) // across))
+    # matplotlib fills columns; a reader goes along rows.
+    order = [k for column in range(columns) for k in range(column, len(labels), columns)]
+    axes.legend(
+        [handles[k] for k in order],
+        [labels[k] for k in order],
+        loc="lower left",
+        bbox_to_anchor=(0.0, 0.98),
+        borderaxespad=0.0,
+        ncols=columns,
+        fontsize=LABEL,
+        handlelength=3.5,
+    )
 
 
 def _judgement(rows: xr.Dataset) -> str:
@@ -125,9 +194,12 @@ def _judgement(rows: xr.Dataset) -> str:
 
 def _title(comparison: Comparison) -> str:
     parts = [comparison.run, comparison.sea_state, f"ANRMSE {comparison.anrmse:.3f}"]
+    if (scale := comparison.full_scale) is not None:
+        told = f"sea state as stated: {comparison.sea_state}" if comparison.sea_state else ""
+        parts[1:2] = [f"full scale, λ = {scale:g}", told]
     if comparison.status != "ok":
         parts.append(comparison.status)
-    return " · ".join(part for part in parts if part)
+    return plain_text(" · ".join(part for part in parts if part))
 
 
 def _counted(comparison: Comparison) -> xr.DataArray:
@@ -170,12 +242,10 @@ def _draw_state(axes: Any, comparison: Comparison, name: str) -> None:
     label, style = _forecast_style(comparison)
     solid = dict(LINES["measured"])
     if (band := _band_of(comparison, name)) is not None:
-        # A band is often little wider than a line; thinner ones leave it to be seen.
-        solid["linewidth"], style = 1.0, {**style, "linewidth": 0.8}
+        solid = THIN
         axes.fill_between(forecast["time"], band[0], band[1], label=band[2], **BAND)
     axes.plot(measured["time"], measured, label="measured", **solid)
     axes.plot(forecast["time"], forecast, label=label, **style)
-    axes.margins(x=0.01)
 
 
 def _envelope(series: xr.DataArray, period: float) -> tuple[Any, Any, Any]:
@@ -200,20 +270,43 @@ def _draw_envelopes(axes: Any, comparison: Comparison, name: str, period: float)
     _, low, high = _envelope(comparison.forecast[name], period)
     for reached in (low, high):
         axes.stairs(reached, edges, baseline=None, color=style["color"], linewidth=0.8)
-    axes.margins(x=0.01)
 
 
 def _draw_input_envelopes(axes: Any, inputs: xr.Dataset, names: list[str], period: float) -> None:
-    for number, name in enumerate(names):
+    for name, style in zip(names, input_styles(len(names)), strict=True):
         edges, low, high = _envelope(inputs[name], period)
         for reached in (low, high):
-            axes.stairs(reached, edges, baseline=None, color=SHADES[number % 4], linewidth=0.8)
+            axes.stairs(reached, edges, baseline=None, **{**style, "linewidth": 0.8})
     axes.axhline(0.0, color=COLOURS["input"], linewidth=0.4)
 
 
 def _draw_inputs(axes: Any, inputs: xr.Dataset, names: list[str]) -> None:
-    dashes = ("-", (0, (3, 1)), "-.", ":")
-    for number, name in enumerate(names):
-        style = {**LINES["input"], "color": SHADES[number % 4], "linestyle": dashes[number % 4]}
-        axes.plot(inputs["time"], inputs[name], label=name, **style)
+    for name, style in zip(names, input_styles(len(names)), strict=True):
+        stated = inputs[name].attrs.get("long_name")
+        label = name if stated in (None, long_name_of(name, None)) else plain_text(str(stated))
+        axes.plot(inputs["time"], inputs[name], label=label, **style)
     axes.axhline(0.0, color=COLOURS["input"], linewidth=0.4)
+
+
+def input_styles(count: int) -> list[dict[str, Any]]:
+    """Styles of inputs in one panel; beyond the eighth, colours meet other dashes.
+
+    Parameters
+    ----------
+    count : int
+        Inputs, 64 at most that differ.
+
+    Returns
+    -------
+    list of dict
+        Keywords of ``plot``.
+    """
+    size = len(SHADES)
+    return [
+        {
+            **LINES["input"],
+            "color": SHADES[number % size][0],
+            "linestyle": SHADES[(number + number // size) % size][1],
+        }
+        for number in range(count)
+    ]

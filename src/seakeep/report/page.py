@@ -13,7 +13,12 @@ from typing import TYPE_CHECKING
 
 from seakeep.campaign.prepare import Progress
 from seakeep.files import replacing
-from seakeep.report.deviations import deviations, test_overlap, training_overlap
+from seakeep.report.deviations import (
+    deviations,
+    test_overlap,
+    training_overlap,
+    training_windows_overlap,
+)
 from seakeep.report.figures import ReportFigure, report_figures
 from seakeep.report.glossary import few_cells, glossary
 from seakeep.report.interactive import history_data
@@ -31,6 +36,7 @@ from seakeep.report.study_tables import (
 from seakeep.report.study_words import (
     clock_table,
     findings,
+    finished,
     quality_table,
     run_table,
     settings_table,
@@ -70,6 +76,27 @@ SECTIONS = {
     "settings": "Settings and windows",
     "versions": "Versions and digest",
 }
+
+
+def headings(result: StudyResult) -> dict[str, str]:
+    """Headings of the sections, in their order.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    dict of str to str
+        Where the paper is not asked for, what it leaves open is a matter of settings.
+    """
+    if result.shows_paper:
+        return SECTIONS
+    others = {
+        key: words for key, words in SECTIONS.items() if key not in ("deviations", "versions")
+    }
+    return {**others, "deviations": "Method in effect", "versions": SECTIONS["versions"]}
 
 
 def report_tables(result: StudyResult) -> dict[str, list[ReportTable]]:
@@ -238,13 +265,12 @@ def _page(
     tables: dict[str, list[ReportTable]],
     drawn: dict[str, list[tuple[ReportFigure, str]]],
 ) -> str:
-    bodies = {key: _section(result, key, tables, drawn) for key in SECTIONS}
+    titles = headings(result)
+    bodies = {key: _section(result, key, tables, drawn) for key in titles}
     shown = {key: body for key, body in bodies.items() if body}
-    contents = "".join(
-        f'<li><a href="#{key}">{html.escape(SECTIONS[key])}</a></li>' for key in shown
-    )
+    contents = "".join(f'<li><a href="#{key}">{html.escape(titles[key])}</a></li>' for key in shown)
     sections = "\n".join(
-        f'<section id="{key}"><h2>{html.escape(SECTIONS[key])}</h2>\n{body}</section>'
+        f'<section id="{key}"><h2>{html.escape(titles[key])}</h2>\n{body}</section>'
         for key, body in shown.items()
     )
     title = html.escape(f"{result.attrs['study']}: study report")
@@ -270,7 +296,7 @@ def _page(
 <p class="lead">{lead}</p>
 <p class="lead">Preset <strong>{html.escape(str(result.attrs["preset"]))}</strong>, seed
 {int(result.attrs["seed"])}, digest <code>{digest}</code>, finished
-{html.escape(str(result.attrs["created"]))}.</p>
+<span class="whole">{html.escape(finished(result))}</span>.</p>
 {sections}
 </main>
 </div>
@@ -313,7 +339,7 @@ def _summary(result: StudyResult) -> str:
     notices = [
         str(result.attrs.get("preparation_note", "")),
         few_cells(result),
-        training_overlap(result),
+        training_overlap(result) if training_windows_overlap(result) else "",
         test_overlap(result),
     ]
     conditional = str(result.attrs.get("conditional_on", ""))
@@ -403,7 +429,8 @@ def _table(table: ReportTable) -> str:
     note = f'<p class="note">{html.escape(table.note)}</p>' if table.note else ""
     text = (
         f'<div class="table" id="table-{table.name}"><button class="copy">Copy table</button>'
-        f'<div class="scroll"><table><caption>{html.escape(table.title)}</caption>'
+        f'<p class="caption" id="caption-{table.name}">{html.escape(table.title)}</p>'
+        f'<div class="scroll"><table aria-labelledby="caption-{table.name}">'
         f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>{note}"
         f"<p class='note only-screen'>Files: tables/{table.name}.csv, .tex.</p></div>"
     )

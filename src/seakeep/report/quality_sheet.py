@@ -13,10 +13,10 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.checks import Finding, check_pairs, findings_of
-from seakeep.campaign.settings import CampaignSettings
+from seakeep.campaign.settings import CampaignSettings, long_name_of
 from seakeep.conventions import displayed
 from seakeep.files import replacing
-from seakeep.report.style import COLOURS, axis_label, figure_style, new_figure
+from seakeep.report.style import COLOURS, axis_label, figure_style, new_figure, shown_unit
 from seakeep.signals.quality import FLAGS, LATE, Agreement
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["channel_rows", "quality_figure", "steps_of", "write_quality_sheet"]
 
 _MARKS = {
-    "missing": ("black", "x"),
+    "missing": ("#D55E00", "x"),
     "bridged": ("#E69F00", "+"),
     "outlier": ("#CC79A7", "o"),
     "saturated": ("#0072B2", "^"),
@@ -33,6 +33,8 @@ _MARKS = {
     "replaced": ("#56B4E9", "d"),
 }
 """Colour and shape of each flag: shapes tell them apart in grey print."""
+FOUND = "#FDEEE4"
+"""Ground of a panel, and of a row, in which something was found."""
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #1b2430; max-width: 1080px;
        margin: 2em auto; padding: 0 1em; }
@@ -40,10 +42,11 @@ h1 { font-size: 1.5em; } h2 { margin-top: 2em; border-top: 1px solid #ccd; paddi
 table { border-collapse: collapse; font-size: 13px; width: 100%; }
 th, td { text-align: left; padding: 3px 8px; border-bottom: 1px solid #e4e7ec;
          vertical-align: top; }
-td.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-.bad { background: #fdeee4; } .ok { color: #5b6770; } img { width: 100%; height: auto; }
+td.n, th.n { text-align: right; white-space: nowrap; }
+td.n { font-variant-numeric: tabular-nums; } table.short { width: auto; }
+.bad { background: FOUND; } .ok { color: #5b6770; } img { width: 100%; height: auto; }
 .scroll { overflow-x: auto; } li { margin: 2px 0; }
-"""
+""".replace("FOUND", FOUND)
 
 
 def _flags(run: xr.Dataset, name: str) -> Any:
@@ -84,6 +87,7 @@ def channel_rows(run: xr.Dataset) -> list[dict[str, Any]]:
         rows.append(
             {
                 "channel": name,
+                "words": long_name_of(name, run[name].attrs.get("long_name")),
                 "units": units,
                 "numbers": [float(each) for each in numbers] or [float("nan")] * 4,
                 "flagged": ", ".join(shares),
@@ -114,17 +118,17 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
     rows = len(names) + len(lagging)
     found = {each.channel for each in findings_of(run)}
     with figure_style():
-        figure = new_figure(9.5, 0.5 + 1.3 * rows)
+        figure = new_figure(9.5, 0.5 + 1.45 * rows)
         axes = figure.subplots(rows, 1, squeeze=False, sharex=True)[:, 0]
         time = run["time"].to_numpy()
         for at, name in zip(axes, names, strict=False):
             factor, units = displayed(str(run[name].attrs.get("units", "")))
             x, flags = factor * run[name].to_numpy(), _flags(run, name)
-            colour = COLOURS["forecast"] if name in found else COLOURS["measured"]
-            at.plot(time, x, color=colour, linewidth=0.6)
+            if name in found:
+                at.set_facecolor(FOUND)
+            at.plot(time, x, color=COLOURS["measured"], linewidth=0.6)
             _mark(at, time, x, flags)
-            at.set_ylabel(axis_label(name, units), fontsize=8)
-            at.margins(x=0.005)
+            at.set_ylabel(axis_label(name, units, run[name].attrs.get("long_name")), fontsize=8)
         for at, name in zip(axes[len(names) :], lagging, strict=True):
             each = agreements[name]
             limit = LATE * each.period
@@ -134,6 +138,10 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
             reach = max(1.5 * limit, 1.1 * float(np.nanmax(np.abs(each.lags), initial=0.0)))
             at.set_ylim(-reach, reach)
             at.set_ylabel(f"lag of\n{name.replace('_', ' ')} [s]", fontsize=8)
+        for at in axes:
+            at.margins(x=0.005)
+            at.tick_params(axis="x", labelbottom=True, labelsize=7)
+        figure.align_ylabels(axes)
         axes[-1].set_xlabel("time [s]")
     return figure
 
@@ -246,7 +254,8 @@ def _page(
         "of its group; inside the green band it does no harm. Findings count over the whole "
         "record that was read; the shares flagged, the statistics and the pictures show "
         "the span used.</p>"
-        '<div class="scroll"><table><tr><th>run</th><th>span used</th><th>findings</th>'
+        '<div class="scroll"><table class="short"><tr><th>run</th><th class="n">span used</th>'
+        '<th class="n">findings</th>'
         f"<th>channels</th></tr>{''.join(lines)}</table></div>{''.join(parts)}</body></html>"
     )
 
@@ -266,8 +275,9 @@ def _section(name: str, run: xr.Dataset, picture: bytes) -> str:
     return (
         f'<h2 id="{html.escape(name)}">{html.escape(name)}</h2><p>{html.escape(steps_of(run))}</p>'
         + (f"<ul>{items}</ul>" if items else "")
-        + '<div class="scroll"><table><tr><th>channel</th><th>unit</th><th>min</th><th>max</th>'
-        "<th>mean</th><th>SD</th><th>flagged in the span</th>"
+        + '<div class="scroll"><table><tr><th>channel</th><th>unit</th><th class="n">min</th>'
+        '<th class="n">max</th><th class="n">mean</th><th class="n">SD</th>'
+        "<th>flagged in the span</th>"
         "<th>found in the record, and done about it</th></tr>"
         f'{body}</table></div><img alt="channels of {html.escape(name)}" '
         f'src="data:image/png;base64,{encoded}">'
@@ -294,6 +304,6 @@ def _row(row: Mapping[str, Any]) -> str:
         words.append(f"repaired: {html.escape(row['repaired'])}")
     mark = ' class="bad"' if row["findings"] else ""
     return (
-        f"<tr{mark}><td>{html.escape(row['channel'])}</td><td>{html.escape(row['units'])}</td>"
+        f"<tr{mark}><td>{html.escape(row['channel'])}</td><td>{html.escape(shown_unit(row['units']))}</td>"
         f"{numbers}<td>{html.escape(row['flagged'])}</td><td>{'<br>'.join(words)}</td></tr>"
     )

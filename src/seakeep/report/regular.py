@@ -9,7 +9,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.report.figures.common import model_words
-from seakeep.report.study_tables import MISSING, ReportTable, channel_words, conditional, number
+from seakeep.report.study_tables import MISSING, ReportTable, conditional, number
 from seakeep.study import StudyResult
 
 __all__ = ["response_table", "response_words"]
@@ -67,7 +67,7 @@ def response_table(result: StudyResult, test: str) -> ReportTable | None:
             lead = float(at["phase_lead"])
             rows.append(
                 (
-                    channel_words(name),
+                    result.words_of(name),
                     model_words(model),
                     number(float(at["sd_ratio"]), 2),
                     signed(float(at["mean_shift"]), 2),
@@ -130,7 +130,8 @@ def _words(result: StudyResult, test: str, data: xr.Dataset) -> str:
         words.append(_wave_words(at, moving, model_words(model)))
     words += _celerity_words(at, facts)
     if bool(drifting.any()):
-        words.append(_drift_words(at, [str(n) for n in data["channel"].values[drifting.values]]))
+        names = [str(n) for n in data["channel"].values[drifting.values]]
+        words.append(_drift_words(result, at, names))
     return " ".join(words + _slack_words(result, test))
 
 
@@ -139,7 +140,7 @@ def _slack_words(result: StudyResult, test: str) -> list[str]:
     tested = sorted({str(run) for run in result.tests[test]["run"].values})
     slack = result.groups["runs"]["slack"].sel(run=tested, name=result.channels).max("run")
     listed = [
-        f"{channel_words(str(name))} in {100 * float(part):.0f} %"
+        f"{result.words_of(str(name))} in {100 * float(part):.0f} %"
         for name, part in zip(slack["name"].values, slack.values, strict=True)
         if part >= SELDOM
     ]
@@ -186,10 +187,10 @@ def _celerity_words(at: xr.Dataset, facts: dict[str, float]) -> list[str]:
     return [said]
 
 
-def _drift_words(at: xr.Dataset, names: list[str]) -> str:
+def _drift_words(result: StudyResult, at: xr.Dataset, names: list[str]) -> str:
     part = at.sel(channel=names)
     listed = ", ".join(
-        f"{channel_words(name)} ({float(each['error_offset']):.1f} measured SDs; mean "
+        f"{result.words_of(name)} ({float(each['error_offset']):.1f} measured SDs; mean "
         f"{signed(float(each['mean_shift']), 1)} training SDs off, measured SD "
         f"{float(each['sd_ratio']):.2f} of the training SD)"
         for name in names
@@ -200,14 +201,14 @@ def _drift_words(at: xr.Dataset, names: list[str]) -> str:
     off = abs(np.log(expected / part["error_offset"])) > np.log(FITS)
     away = [str(name) for name in part["channel"].values[off.values]]
     if len(away) < len(names):
-        which = "" if not away else f" in {_listed([n for n in names if n not in away])}"
+        which = "" if not away else f" in {_listed(result, [n for n in names if n not in away])}"
         said.append(
             "A linear model falls back to its training mean, and steady drift grows with the "
             f"square of the waves: that accounts for the offset{which} within a factor of {FITS:g}."
         )
     if away:
         numbers = ", ".join(
-            f"{float(expected.sel(channel=name)):.1f} in {channel_words(name)}" for name in away
+            f"{float(expected.sel(channel=name)):.1f} in {result.words_of(name)}" for name in away
         )
         said.append(
             "Falling back to the training mean would make an offset, in measured SDs, of "
@@ -216,5 +217,5 @@ def _drift_words(at: xr.Dataset, names: list[str]) -> str:
     return " ".join(said)
 
 
-def _listed(names: list[str]) -> str:
-    return ", ".join(channel_words(name) for name in names)
+def _listed(result: StudyResult, names: list[str]) -> str:
+    return ", ".join(map(result.words_of, names))

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.conventions import canonical_channel
 from seakeep.files import replacing
 from seakeep.report.figures.common import HEADING, model_words
 from seakeep.report.figures.errors import BAND_WORDS
@@ -76,10 +75,23 @@ def number(value: float, digits: int = 3) -> str:
     return text.removeprefix("-") if float(text) == 0 else text
 
 
-def channel_words(name: str) -> str:
-    """Name of a channel for a table."""
-    known = canonical_channel(name)
-    return known.long_name if known else name.replace("_", " ")
+def small_number(value: float) -> str:
+    """Text of a number of four decimals, or as many more as two digits of it need.
+
+    Examples
+    --------
+    >>> small_number(0.0186), small_number(0.00023), small_number(-1.4e-5), small_number(3e-9)
+    ('0.0186', '0.00023', '-0.000014', '3.0e-09')
+    """
+    if not np.isfinite(value) or value == 0:
+        return number(value, 0)
+    decimals = max(4, 1 - int(np.floor(np.log10(abs(value)))))
+    return f"{value:.{decimals}f}" if decimals <= 7 else f"{value:.1e}"
+
+
+def probability(value: float) -> str:
+    """Text of a p-value."""
+    return "< 0.001" if value < 0.001 else number(value)
 
 
 def error_table(result: StudyResult, test: str) -> ReportTable:
@@ -104,7 +116,7 @@ def error_table(result: StudyResult, test: str) -> ReportTable:
     rows, left_out = [], 0
     names = [str(name) for name in boxes["channel"].values]
     for name in [*names[1:], names[0]]:
-        row = ["average" if name == "average" else channel_words(name)]
+        row = ["average" if name == "average" else result.words_of(name)]
         for measure in HEADING:
             for model in result.models:
                 at = boxes.sel(model=model, measure=measure, channel=name)
@@ -177,7 +189,7 @@ def conditional(result: StudyResult) -> str:
 
 
 def divergence_table(result: StudyResult, model: str, variant: str) -> ReportTable:
-    """Jensen–Shannon divergence of all channels beside its noise floor and the paper's.
+    """Jensen–Shannon divergence of all channels beside its noise floor and, if asked, the paper's.
 
     Parameters
     ----------
@@ -195,14 +207,14 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> ReportTab
     data = result.groups["statistics/divergence"]
     at = data.sel(model=model, variant=variant)
     numbers = ("mean", "lower", "upper", "uncertainty", "noise_floor")
-    comparable = result.is_ensemble(model)
+    comparable = result.is_ensemble(model) and result.shows_paper
     rows = []
     for name in result.channels:
         one = at.sel(channel=name)
-        row = [channel_words(name), *(number(float(one[key]), 4) for key in numbers)]
+        row = [result.words_of(name), *(small_number(float(one[key])) for key in numbers)]
         row.append(str(int(one["block_length"])) if np.isfinite(one["block_length"]) else MISSING)
         rows.append((*row, PUBLISHED.get(name, MISSING)) if comparable else tuple(row))
-    means = [number(float(at[key].mean()), 4) for key in numbers]
+    means = [small_number(float(at[key].mean())) for key in numbers]
     rows.append(("average", *means, "", *((JSD_MEAN,) if comparable else ())))
     columns = ("channel", "EV", "q0.025", "q0.975", "U", "noise floor", "block (samples)")
     test = result.label_of(str(data.attrs["test"]))
@@ -250,7 +262,7 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
     names = [*result.channels, "average"]
     rows = []
     for name in names:
-        row = ["average" if name == "average" else channel_words(name)]
+        row = ["average" if name == "average" else result.words_of(name)]
         for data in tables.values():
             at = data.sel(channel=name)
             first, *others = (number(float(v), 2) for v in at[f"{prefix}inside"].values)
@@ -340,7 +352,7 @@ def trend_table(result: StudyResult) -> ReportTable:
         for band, words in BAND_WORDS.items():
             for model in result.models:
                 at = data.sel(model=model, band=band)
-                interval = ", ".join(number(float(at[key]), 4) for key in ("lower", "upper"))
+                interval = ", ".join(small_number(float(at[key])) for key in ("lower", "upper"))
                 rows.append(
                     (
                         result.label_of(test),
@@ -348,9 +360,9 @@ def trend_table(result: StudyResult) -> ReportTable:
                         model_words(model),
                         number(float(at["error_mean"].mean())),
                         number(float(at["change"])),
-                        f"{number(float(at['slope']), 4)} [{interval}]",
+                        f"{small_number(float(at['slope']))} [{interval}]",
                         number(float(at["kendall_tau"]), 2),
-                        number(float(at["p_value"])),
+                        probability(float(at["p_value"])),
                     )
                 )
     period = float(result.settings["statistics"]["split_period"])

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import json
 import re
+from datetime import datetime
 from typing import Any
 
 import numpy as np
 
 from seakeep.campaign.checks import findings_of
+from seakeep.report.deviations import unequal_training, whole_readers
 from seakeep.report.figures.common import HEADING, model_words
 from seakeep.report.quality_sheet import channel_rows
-from seakeep.report.study_tables import ReportTable, channel_words
+from seakeep.report.study_tables import ReportTable
 from seakeep.report.style import shown_unit
 from seakeep.study import StudyResult
 
 __all__ = [
     "findings",
+    "finished",
     "quality_table",
     "run_table",
     "settings_table",
@@ -53,6 +56,8 @@ def findings(result: StudyResult) -> list[str]:
             if singles and ensembles:
                 parts[-1] += _verdict(medians[singles[0]], medians[ensembles[0]])
         said.append(f"{_capital(result.label_of(test))}: " + "; ".join(parts) + ".")
+    if unequal := unequal_training(result):
+        said.append(unequal)
     for model in ensembles:
         said += _coverage_findings(result, model)
     return said + _windows_found(result)
@@ -190,7 +195,7 @@ def sign_table(result: StudyResult) -> ReportTable:
     channels = result.groups["channels"]
     rows = [
         (
-            channel_words(str(name)),
+            result.words_of(str(name)),
             str(at["use"].values),
             shown_unit(str(at["units"].values)),
             str(at["positive"].values),
@@ -295,7 +300,7 @@ def quality_table(result: StudyResult, name: str) -> ReportTable:
         low, high, mean, spread = (f"{value:.4g}" for value in each["numbers"])
         rows.append(
             (
-                channel_words(channel),
+                each["words"],
                 "yes" if channel in used else "",
                 shown_unit(each["units"]),
                 mean,
@@ -326,6 +331,8 @@ def training_table(result: StudyResult) -> ReportTable:
     """Training sets and test windows."""
     training = result.groups["training"]
     reads = float(result.attrs["longest_training"])
+    every = ", ".join(map(model_words, whole_readers(result)))
+    whole = f" (all of it: {every})" if every else ""
     rows = [
         ("training", str(n), str(s), str(left) or "")
         for n, s, left in zip(
@@ -347,9 +354,14 @@ def training_table(result: StudyResult) -> ReportTable:
         ("use", "set", "instants", "left out"),
         tuple(rows),
         "Of a training set: from the begin of its span to its stop, of which a draw reads the last "
-        f"part, {reads:.2f} s at most, delay history included. The delay history of a forecast is "
-        "measured data just before the start; it may reach into a training span.",
+        f"part, {reads:.2f} s at most, delay history included{whole}. The delay history of a "
+        "forecast is measured data just before the start; it may reach into a training span.",
     )
+
+
+def finished(result: StudyResult) -> str:
+    """Day and time at which the study was finished, as people read them."""
+    return f"{datetime.fromisoformat(str(result.attrs['created'])):%Y-%m-%d %H:%M:%S %Z}"
 
 
 def versions_table(result: StudyResult) -> ReportTable:
@@ -362,7 +374,7 @@ def versions_table(result: StudyResult) -> ReportTable:
         ("campaign digest", str(result.attrs["campaign_digest"])),
         ("preset", str(result.attrs["preset"])),
         ("seed", str(result.attrs["seed"])),
-        ("finished", str(result.attrs["created"])),
+        ("finished", finished(result)),
         *((name, str(version)) for name, version in versions.items()),
     ]
     return ReportTable("versions", "Versions and digest", ("what", "value"), tuple(rows))

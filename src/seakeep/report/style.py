@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from seakeep.campaign.settings import long_name_of
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
 from seakeep.files import replacing
@@ -20,9 +21,12 @@ if TYPE_CHECKING:
 __all__ = [
     "COLOURS",
     "LINES",
+    "THIN",
     "axis_label",
     "figure_style",
     "new_figure",
+    "plain_text",
+    "prefixed",
     "save_figure",
     "shown_unit",
 ]
@@ -39,13 +43,23 @@ COLOURS = {
 LINES: dict[str, dict[str, Any]] = {
     "measured": {"color": COLOURS["measured"], "linewidth": 1.6, "linestyle": "-"},
     "forecast": {"color": COLOURS["forecast"], "linewidth": 1.2, "linestyle": (0, (4, 1.5))},
-    "ensemble": {"color": COLOURS["ensemble"], "linewidth": 1.2, "linestyle": "-."},
+    "ensemble": {
+        "color": COLOURS["ensemble"],
+        "linewidth": 1.3,
+        "linestyle": (0, (4, 2.5, 1, 2.5)),
+    },
     "input": {"color": COLOURS["input"], "linewidth": 0.9, "linestyle": "-"},
 }
 """Lines differ in dash and width as well as in colour."""
 
+THIN: dict[str, Any] = {**LINES["measured"], "linewidth": 0.8}
+"""Measured, between a band and its mean: a band is often little wider than a line."""
+
 WIDEST = 18
 """Letters of a label on one line: what the height of a panel holds."""
+
+_WITH_PREFIX = ("N", "N m", "Pa", "W")
+"""Units whose values run into millions at full scale."""
 
 _RC: Any = {
     "font.size": 9,
@@ -128,23 +142,74 @@ def save_figure(figure: Figure, path: Path, dpi: float | None = None) -> Path:
     return path
 
 
-def axis_label(name: str, units: str) -> str:
+def axis_label(name: str, units: str, long_name: str | None = None) -> str:
     r"""Label of a channel for an axis: words, symbol where it has one, and unit.
+
+    Parameters
+    ----------
+    name, units : str
+        Of the channel.
+    long_name : str, optional
+        What the campaign calls it; by default its canonical name in full, else `name`.
+
+    Returns
+    -------
+    str
+        Lines that fit the height of a panel, the last one with symbol and unit.
 
     Examples
     --------
     >>> axis_label("pitch_rate", "rad/s")
     'pitch rate\n$\\dot{\\theta}$ [rad/s]'
+    >>> axis_label("pitch", "deg", "Trim angle (MRU-5)")
+    'Trim angle (MRU-5)\n$\\theta$ [deg]'
     >>> axis_label("propeller_torque", "N m")
     'propeller torque\n[N m]'
     >>> axis_label("eta_us_fwd", "m").partition("\n$")[0]
     'wave elevation\nus fwd'
     """
     channel = canonical_channel(name)
-    words = channel.long_name if channel else name.replace("_", " ")
     symbol = f"${channel.symbol}$ " if channel else ""
-    lines = "\n".join(_balanced(words))
+    lines = "\n".join(_balanced(plain_text(long_name_of(name, long_name))))
     return f"{lines}\n{symbol}[{shown_unit(units) or '?'}]"
+
+
+def plain_text(words: str) -> str:
+    r"""Words of a user for a figure: a dollar is a dollar, and begins no formula.
+
+    Examples
+    --------
+    >>> plain_text("price [$/kWh]")
+    'price [\\$/kWh]'
+    """
+    return words.replace("$", r"\$")
+
+
+def prefixed(units: str, largest: float) -> tuple[float, str]:
+    """Factor and unit in which a large force, moment, pressure or power is shown.
+
+    Parameters
+    ----------
+    units : str
+        Its SI unit.
+    largest : float
+        Largest modulus, in that unit.
+
+    Returns
+    -------
+    (float, str)
+        For other units, and below a thousand: 1 and the same unit.
+
+    Examples
+    --------
+    >>> prefixed("N", 3.2e6), prefixed("N m", 4500.0), prefixed("m", 4500.0)
+    ((1e-06, 'MN'), (0.001, 'kN m'), (1.0, 'm'))
+    """
+    if units in _WITH_PREFIX:
+        for prefix, size in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
+            if largest >= size:
+                return 1.0 / size, prefix + units
+    return 1.0, units
 
 
 def shown_unit(unit: str) -> str:
@@ -160,9 +225,9 @@ def shown_unit(unit: str) -> str:
 
 def _balanced(words: str) -> list[str]:
     """Wrap into as few lines as fit, of lengths as equal as they can be."""
-    lines = textwrap.wrap(words, WIDEST)
+    lines = textwrap.wrap(words, WIDEST, break_on_hyphens=False)
     for width in range(1, WIDEST):
-        narrower = textwrap.wrap(words, width, break_long_words=False)
+        narrower = textwrap.wrap(words, width, break_long_words=False, break_on_hyphens=False)
         if len(narrower) == len(lines) and max(map(len, narrower)) <= WIDEST:
             return narrower
     return lines

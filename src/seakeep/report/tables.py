@@ -11,7 +11,7 @@ import xarray as xr
 from rich import box
 from rich.table import Table
 
-from seakeep.files import replacing
+from seakeep.files import replacing, write_netcdf
 
 __all__ = [
     "band_findings",
@@ -39,6 +39,7 @@ _BAND_HEADINGS = {
 }
 _OF_RUNS = ("start", "status", "anrmse", "conditional_on", "probe_offset", "probe_offset_spread")
 _OF_BANDS = ("band", "level", "members", "diverged")
+_OF_SCALE = ("scale", "scale_factor")
 
 
 def rich_comparison(table: xr.Dataset) -> Table:
@@ -54,7 +55,10 @@ def rich_comparison(table: xr.Dataset) -> Table:
     rich.table.Table
         A row a run and channel, and the averages below each run.
     """
-    out = Table(box=box.SIMPLE_HEAD, title="Forecast against measurement", title_justify="left")
+    title = "Forecast against measurement"
+    if "scale" in table:
+        title += f", full scale (1:{float(table['scale_factor'][0]):g})"
+    out = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
     out.add_column("run", no_wrap=True)
     out.add_column("channel", no_wrap=True)
     out.add_column("unit", no_wrap=True)
@@ -207,7 +211,7 @@ def write_csv(table: xr.Dataset, path: Path) -> Path:
     """
     columns = [name for name in (*_HEADINGS, *_BAND_HEADINGS) if name in table]
     frame = table[columns].to_dataframe().reset_index()
-    for name in (*_OF_RUNS, *(each for each in _OF_BANDS if each in table)):
+    for name in (*_OF_RUNS, *(each for each in (*_OF_BANDS, *_OF_SCALE) if each in table)):
         frame[name] = frame["run"].map(table[name].to_series())
     front = ["run", "channel", "channel_units"]
     frame = frame[front + [name for name in frame.columns if name not in front]]
@@ -224,7 +228,8 @@ def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
     forecast : Dataset
         Of a model, or of an ensemble: statistics, whose columns are ``heave [m]`` (the mean),
         ``heave std [m]``, ``heave lower [m]`` and ``heave upper [m]``, or members, whose columns
-        are ``heave member 0 [m]`` and so on.
+        are ``heave member 0 [m]`` and so on. At full scale a last column, ``scale_factor``, says
+        so.
     path : Path
         The file; its suffix, ``.nc`` or ``.csv``, decides the format.
 
@@ -240,7 +245,7 @@ def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
     """
     with replacing(path) as temporary:
         if path.suffix == ".nc":
-            forecast.to_netcdf(temporary, engine="h5netcdf")
+            write_netcdf(temporary, forecast)
         else:
             # Instants are multiples of a step; nine decimals hide the rounding of the product.
             time = pd.Index(forecast["time"].values.round(9), name="time [s]")
@@ -262,6 +267,9 @@ def _columns(forecast: xr.Dataset) -> dict[str, npt.NDArray[np.float64]]:
                 break
         else:
             columns[f"{name} [{units}]"] = variable.values
+    if forecast.attrs.get("scale") == "full":
+        scale = float(forecast.attrs["scale_factor"])
+        columns["scale_factor"] = np.full(forecast.sizes["time"], scale)
     return columns
 
 

@@ -179,7 +179,8 @@ def effective_celerity(
     RequestError
         If the records differ in length or a number is out of range.
     DataError
-        If a record is constant, or no peak lies within the bounds.
+        If a record is constant, no peak lies within the bounds, or the downstream record is not
+        the later one.
 
     Notes
     -----
@@ -192,6 +193,12 @@ def effective_celerity(
     centre = apart / float(phase_speed(2 * np.pi / cycle, depth))
     bounds = (max(centre - 0.5 * cycle, 0.0), centre + 0.5 * cycle)
     lag, height = correlation_peak(first, second, step, bounds)
+    if lag <= 0:
+        raise DataError(
+            f"the downstream record is not later than the upstream one (lag {lag:.3g} s, "
+            f"correlation {height:.3f}), so there is no celerity between them. Check that the two "
+            "are not the same record, which probe stands upstream, and their positions."
+        )
     return EffectiveCelerity(apart / lag, lag, height, bounds)
 
 

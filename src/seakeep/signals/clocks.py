@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 from scipy import special
@@ -18,6 +20,66 @@ STEP_TOLERANCE = 0.01
 
 PASSBAND = 0.8
 """Part of the lower Nyquist frequency up to which resampling keeps what there is."""
+
+
+def as_seconds(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
+    """Return times as floats; refuse dates, words and what else is not a number of seconds.
+
+    Parameters
+    ----------
+    time : array_like
+        Instants, s.
+    name : str, optional
+        What the message calls the owner of the times.
+
+    Returns
+    -------
+    ndarray
+        The times, of the same shape.
+
+    Raises
+    ------
+    DataError
+        If they are not numbers.
+    """
+    t = np.asarray(time)
+    if t.dtype.kind not in "iuf":
+        raise DataError(
+            f"the times of {name} are of type {t.dtype}; seconds as numbers are expected. "
+            "Subtract the first instant and divide by one second."
+        )
+    return t.astype(float, copy=False)
+
+
+def instant_text(instant: float, dt: float) -> str:
+    """Write an instant to a thousandth of a time step, whatever it is counted from.
+
+    Parameters
+    ----------
+    instant : float
+        s.
+    dt : float
+        Time step, s; 0 asks for all digits of the instant.
+
+    Returns
+    -------
+    str
+        Without the unit, and without zeros at its end.
+
+    Examples
+    --------
+    >>> instant_text(1700000034.35, 0.05), instant_text(2.0, 0.05)
+    ('1700000034.35', '2')
+    """
+    known = 15 - len(f"{abs(instant):.0f}")  # digits of a double
+    wanted = 3 - math.floor(math.log10(dt)) if dt > 0 else known
+    return fixed(instant, max(0, min(wanted, known)))
+
+
+def fixed(value: float, decimals: int) -> str:
+    """Write a number to so many decimals, without zeros at its end."""
+    text = f"{value:.{decimals}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
@@ -38,9 +100,9 @@ def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
     Raises
     ------
     DataError
-        If a time is not finite, repeated, or smaller than the one before.
+        If a time is no number, not finite, repeated, or smaller than the one before.
     """
-    t = np.asarray(time, dtype=float)
+    t = as_seconds(time, name)
     if t.ndim != 1 or t.size < 2:
         raise DataError(f"{name} has {t.size} instant(s); a time axis needs at least two.")
     if not np.all(np.isfinite(t)):
@@ -50,17 +112,21 @@ def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
             f"({int(np.sum(~np.isfinite(t)))} in all). Remove these rows, or repair the times."
         )
     steps = np.diff(t)
+
+    def told(sample: int) -> str:
+        return f"{instant_text(t[sample], float(np.median(np.abs(steps))))} s"
+
     if np.any(steps == 0):
         at = int(np.flatnonzero(steps == 0)[0])
         raise DataError(
-            f"the times of {name} repeat: {t[at]:g} s stands at samples {at} and {at + 1} "
+            f"the times of {name} repeat: {told(at)} stands at samples {at} and {at + 1} "
             f"({int(np.sum(steps == 0))} repetitions in all). Remove the double rows, or raise the "
             "number of decimals the logger writes."
         )
     if np.any(steps < 0):
         at = int(np.flatnonzero(steps < 0)[0])
         raise DataError(
-            f"the times of {name} are not sorted: {t[at + 1]:g} s follows {t[at]:g} s at sample "
+            f"the times of {name} are not sorted: {told(at + 1)} follows {told(at)} at sample "
             f"{at + 1}. Sort the rows by time, or split the file where the clock was restarted."
         )
     return t
@@ -84,15 +150,15 @@ def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
     Raises
     ------
     DataError
-        If the times are unsorted, repeated, or further from a uniform grid than a hundredth of a
-        step and than the decimals explain with which they were written.
+        If the times are no numbers, unsorted, repeated, or further from a uniform grid than a
+        hundredth of a step and than the decimals explain with which they were written.
 
     Examples
     --------
     >>> uniform_step([0.0, 0.1, 0.2, 0.3])
     0.1
     """
-    t = np.asarray(time, dtype=float)
+    t = as_seconds(time, name)
     if t.ndim != 1 or t.size < 2:
         check_order(t, name)
     step = float((t[-1] - t[0]) / (t.size - 1))
@@ -122,20 +188,24 @@ def printed_tolerance(t: FloatArray, step: float) -> float:
 def _irregularity(t: FloatArray, name: str) -> str:
     steps = np.diff(t)
     usual = float(np.median(steps))
+
+    def told(sample: int) -> str:
+        return f"{instant_text(t[sample], usual)} s"
+
     counts = steps / usual
     gaps = np.flatnonzero(counts > 1.5)
     if gaps.size and np.max(np.abs(counts - np.rint(counts))) < 0.1:
         longest = gaps[np.argmax(steps[gaps])]
         return (
-            f"the times of {name} have {gaps.size} gap(s): after t = {t[gaps[0]]:g} s, "
+            f"the times of {name} have {gaps.size} gap(s): after t = {told(int(gaps[0]))}, "
             f"{int(np.rint(counts[gaps[0]])) - 1} sample(s) of {usual:g} s are missing; the "
-            f"longest gap, after t = {t[longest]:g} s, lasts {steps[longest]:g} s. Fill the gap, "
-            "or use the record before or after it."
+            f"longest gap, after t = {told(int(longest))}, lasts {steps[longest]:g} s. Fill the "
+            "gap, or use the record before or after it."
         )
     at = int(np.argmax(np.abs(steps - usual)))
     return (
         f"the times of {name} are not uniform: steps run from {steps.min():g} to {steps.max():g} s "
-        f"(median {usual:g} s), the oddest after t = {t[at]:g} s. Interpolate the series onto a "
+        f"(median {usual:g} s), the oddest after t = {told(at)}. Interpolate the series onto a "
         "uniform step before reading it, or split it where the clock changed."
     )
 
@@ -192,7 +262,7 @@ def resample(
     True
     """
     array = as_series(series)
-    t, wanted = np.asarray(time, dtype=float), np.asarray(new_time, dtype=float)
+    t, wanted = as_seconds(time, "the series"), as_seconds(new_time, "the new time axis")
     dt, new_dt = uniform_step(t, "the series"), uniform_step(wanted, "the new time axis")
     if array.shape[0] != t.size:
         raise DataError(
@@ -202,8 +272,9 @@ def resample(
     slack = 1e-6 * dt
     if wanted[0] < t[0] - slack or wanted[-1] > t[-1] + slack:
         raise DataError(
-            f"new instants from {wanted[0]:g} to {wanted[-1]:g} s lie outside the series, which "
-            f"runs from {t[0]:g} to {t[-1]:g} s. Shorten the new time axis."
+            f"new instants from {instant_text(wanted[0], dt)} to {instant_text(wanted[-1], dt)} s "
+            f"lie outside the series, which runs from {instant_text(t[0], dt)} to "
+            f"{instant_text(t[-1], dt)} s. Shorten the new time axis."
         )
     position = (wanted - t[0]) / dt
     nearest = np.rint(position)

@@ -12,7 +12,7 @@ from scipy import fft
 
 from seakeep.errors import RequestError
 from seakeep.signals.filters import as_series, positive
-from seakeep.signals.spectra import encounter_period
+from seakeep.signals.spectra import encounter_period, waves_part
 
 __all__ = ["Repeat", "find_repeat", "is_regular"]
 
@@ -31,7 +31,8 @@ class Repeat:
     Parameters
     ----------
     share : float
-        Part of the test record that repeats, 0 to 1.
+        Part of the test record that repeats, 0 to 1; still water before and after the waves does
+        not count.
     correlation : float
         Highest modulus of the correlation of the analytic signals.
     training : int
@@ -61,8 +62,9 @@ def find_repeat(
 
     A sea of equally spaced components comes back after one over their spacing, turned by a
     constant phase; the record itself then correlates poorly, its analytic signal fully. Each
-    stretch of the test record is compared with all places in each training record by the modulus
-    of the normalised correlation of the analytic signals.
+    stretch of the test record, without still water before and after the waves, is compared with all
+    places in each training record by the modulus of the normalised correlation of the analytic
+    signals.
 
     Parameters
     ----------
@@ -111,6 +113,8 @@ def find_repeat(
     record = as_series(test, minimum=8)
     if np.ptp(record) == 0 or np.sum(np.diff(np.sign(record - record.mean())) > 0) < 2:
         return None
+    part = waves_part(record, step)
+    record = record[part]
     waves = _analytic(record)
     length = round(positive("periods", periods, "1") * encounter_period(record, step) / step)
     length = min(length, record.size)
@@ -131,7 +135,8 @@ def find_repeat(
             repeated[start : start + length] = True
             if best is None or height > best.correlation:
                 phase = float(np.angle(match[at]))
-                best = Repeat(0.0, height, index, at * step, start * step, phase)
+                begin = (part.start + start) * step
+                best = Repeat(0.0, height, index, at * step, begin, phase)
     if best is None:
         return None
     share = float(repeated.mean())

@@ -245,13 +245,15 @@ def clock_from_correlation(
     Raises
     ------
     DataError
-        If fewer than two windows correlate.
+        If a signal has gaps, or fewer than two windows correlate.
     RequestError
-        If a record is shorter than the window.
+        If a record is shorter than the window, or a signal and its times differ in length.
     """
     a, c = np.asarray(series, float), np.asarray(time, float)
     b, t = np.asarray(reference, float), np.asarray(reference_time, float)
     step = min(uniform_step(c, "the logger"), uniform_step(t, "the reference"))
+    _check_signal(a, c, "the logger")
+    _check_signal(b, t, "the reference")
     begin, end = max(c[0], t[0]), min(c[-1], t[-1])
     if end - begin < window + 2 * largest_lag:
         raise RequestError(
@@ -277,6 +279,22 @@ def clock_from_correlation(
     instants = begin + lags.centre[good]
     clock = _line(instants + lags.lag[good], instants, None)
     return replace(clock, method="correlation of windows")
+
+
+def _check_signal(series: FloatArray, time: FloatArray, owner: str) -> None:
+    """Refuse a signal that has gaps, or another length than its times."""
+    if series.shape != time.shape:
+        raise RequestError(
+            f"the signal of {owner} has shape {series.shape} and its times {time.shape}; one value "
+            "an instant is needed."
+        )
+    lost = np.flatnonzero(~np.isfinite(series))
+    if lost.size:
+        raise DataError(
+            f"the signal of {owner} has {lost.size} missing or infinite value(s), the first at "
+            f"sample {lost[0]}. Bridge the gap (seakeep.signals.bridge), or use the record before "
+            "or after it."
+        )
 
 
 def clock_from_shared(

@@ -7,6 +7,7 @@ from seakeep.study.comparison import (
     comparison_table,
     forecast_at_full_scale,
     in_degrees,
+    with_degrees,
 )
 from seakeep.study.run import run_study
 from seakeep.study.settings import Study, StudySettings, read_study
@@ -31,4 +32,5 @@ __all__ = [
     "read_study",
     "run_study",
     "training_runs",
+    "with_degrees",
 ]

@@ -7,7 +7,8 @@ of workers.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -20,7 +21,7 @@ from seakeep.errors import DataError, SeakeepError
 from seakeep.models import HankelDMDc, HankelDMDcModel
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.fitted_ensemble import HankelEnsemble
-from seakeep.models.shelf import Layout, open_shelf
+from seakeep.models.shelf import Layout, Shelf, open_shelf
 from seakeep.models.summaries import STATISTICS, first_lost, reduce_members
 from seakeep.models.windows import free_runs
 from seakeep.study.calibration import calibration_arrays, calibration_name
@@ -318,38 +319,79 @@ def _ensemble_cells(
     write: Write,
 ) -> None:
     """Each member is identified once and forecasts all windows; then each cell is reduced."""
-    batches = _batches(groups)
-    series: dict[str, list[FloatArray]] = {test: [] for test in groups}
-    for number in range(ensemble.n_members):
-        member = ensemble.member(number)
-        for tests, windows in batches:
-            values = _forecast(member, runs, windows)
-            edges = np.cumsum([len(groups[test].numbers) for test in tests])[:-1]
-            for test, part in zip(tests, np.split(values, edges), strict=True):
-                series[test].append(part)
-    for test, windows in groups.items():
-        found = series.pop(test)
-        lost = np.stack([first_lost(values) for values in found])
-        layout = Layout.in_pieces(len(windows.numbers), len(found), *found[0].shape[1:])
-        with open_shelf(layout) as shelf:
-            for number, values in enumerate(found):
-                shelf.put(number, values)
-            reduced = reduce_members(shelf, lost, plan.level)
-        pair = {"measured": windows.measured, "training_std": spread}
-        errors = {
-            "member_nrmse": [metrics.nrmse(predicted=v, **pair) for v in found],
-            "member_nammae": [
-                metrics.normalised_extremes_error(predicted=v, **pair) for v in found
-            ],
+    count, batches = ensemble.n_members, _batches(groups)
+    with ExitStack() as stack:
+        tables = {
+            test: stack.enter_context(_table(plan, unit, test, windows, spread, count))
+            for test, windows in groups.items()
         }
-        judged = {key: np.stack(each).astype(np.float32) for key, each in errors.items()}
-        for row, window in enumerate(windows.numbers):
+        for number in range(count):
+            member = ensemble.member(number)
+            for tests, windows in batches:
+                values = _forecast(member, runs, windows)
+                edges = np.cumsum([len(groups[test].numbers) for test in tests])[:-1]
+                for test, part in zip(tests, np.split(values, edges), strict=True):
+                    tables[test].put(number, part)
+        for test, table in tables.items():
+            for window, arrays in table.cells(plan.level):
+                write(cell_name(unit.model, unit.training, test, window), arrays)
+
+
+@dataclass(frozen=True)
+class _Table:
+    """What becomes of the members of a test set, one after the other; their series on a shelf."""
+
+    windows: Windows
+    spread: FloatArray
+    shown: Mapping[int, int]
+    shelf: Shelf
+    lost: npt.NDArray[np.int64]
+    judged: Mapping[str, npt.NDArray[np.float32]]
+    members: npt.NDArray[np.float32]
+
+    def put(self, number: int, values: FloatArray) -> None:
+        """Judge a member's free runs, shape (window, steps, N), and put them away."""
+        pair = {"measured": self.windows.measured, "training_std": self.spread}
+        self.lost[number] = first_lost(values)
+        self.judged["member_nrmse"][number] = metrics.nrmse(predicted=values, **pair)
+        self.judged["member_nammae"][number] = metrics.normalised_extremes_error(
+            predicted=values, **pair
+        )
+        for place, row in enumerate(self.shown):
+            self.members[place, number] = values[row]
+        self.shelf.put(number, values)
+
+    def cells(self, level: float) -> Iterator[tuple[int, dict[str, Any]]]:
+        """Number and arrays of each window."""
+        reduced = reduce_members(self.shelf, self.lost, level)
+        for row, window in enumerate(self.windows.numbers):
             arrays: dict[str, Any] = dict(zip(STATISTICS, reduced[row], strict=True))
-            arrays["lost"] = lost[:, row]
-            arrays |= {key: each[:, row] for key, each in judged.items()}
-            if plan.is_shown(unit.training, test, window):
-                arrays["members"] = np.stack([v[row] for v in found]).astype(np.float32)
-            write(cell_name(unit.model, unit.training, test, window), arrays)
+            arrays["lost"] = self.lost[:, row]
+            arrays |= {key: each[:, row] for key, each in self.judged.items()}
+            if row in self.shown:
+                arrays["members"] = self.members[self.shown[row]]
+            yield window, arrays
+
+
+@contextmanager
+def _table(
+    plan: Plan, unit: Unit, test: str, windows: Windows, spread: FloatArray, members: int
+) -> Iterator[_Table]:
+    count, *size = windows.measured.shape
+    rows = [k for k, n in enumerate(windows.numbers) if plan.is_shown(unit.training, test, n)]
+    with open_shelf(Layout.in_pieces(count, members, *size)) as shelf:
+        yield _Table(
+            windows=windows,
+            spread=spread,
+            shown={row: place for place, row in enumerate(rows)},
+            shelf=shelf,
+            lost=np.empty((members, count), dtype=np.int64),
+            judged={
+                key: np.empty((members, count, size[1]), dtype=np.float32)
+                for key in ("member_nrmse", "member_nammae")
+            },
+            members=np.empty((len(rows), members, *size), dtype=np.float32),
+        )
 
 
 def _eigenvalues(

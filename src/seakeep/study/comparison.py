@@ -77,6 +77,12 @@ class Comparison:
         return not any(bool(each.isnull().any()) for each in self.forecast.data_vars.values())
 
     @property
+    def full_scale(self) -> float | None:
+        """Scale factor, where times and values are at full scale; None at model scale."""
+        attrs = self.forecast.attrs
+        return float(attrs["scale_factor"]) if attrs.get("scale") == "full" else None
+
+    @property
     def anrmse(self) -> float:
         """Average of the channels' NRMSE."""
         return float(metrics.anrmse(predicted=self.forecast, measured=self.measured))
@@ -97,10 +103,10 @@ def in_degrees(comparison: Comparison) -> Comparison:
     """
     return replace(
         comparison,
-        forecast=_degrees(comparison.forecast),
-        measured=_degrees(comparison.measured),
-        inputs=_degrees(comparison.inputs),
-        band=None if comparison.band is None else _degrees(comparison.band),
+        forecast=with_degrees(comparison.forecast),
+        measured=with_degrees(comparison.measured),
+        inputs=with_degrees(comparison.inputs),
+        band=None if comparison.band is None else with_degrees(comparison.band),
     )
 
 
@@ -163,7 +169,18 @@ def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
     return out
 
 
-def _degrees(run: xr.Dataset) -> xr.Dataset:
+def with_degrees(run: xr.Dataset) -> xr.Dataset:
+    """Turn the angles of a run or a forecast, and their rates, into degrees.
+
+    Parameters
+    ----------
+    run : Dataset
+        In SI units.
+
+    Returns
+    -------
+    Dataset
+    """
     out = run.copy()
     for name, variable in run.data_vars.items():
         units = str(variable.attrs.get("units", ""))
@@ -296,15 +313,9 @@ def _warn_of_known(model: HankelDMDcModel | HankelEnsemble, compared: Comparison
     if part := part_in(model.training_spans):
         told.append(f"the forecast of {name} lies in what trained the model {part}: {memory}")
     calibration = model.calibration if isinstance(model, HankelEnsemble) else None
-    if calibration is not None and compared.forecast.attrs.get("band") == "calibrated":
-        if part := part_in(calibration.spans):
-            told.append(f"the band was calibrated on a part of this forecast {part}: {memory}")
-        if compared.measured.sizes["time"] > calibration.steps:
-            told.append(
-                f"the forecast of {name} is longer than the {calibration.steps} instants that the "
-                "band was calibrated for: its coverage is not warranted there. Calibrate with "
-                "longer windows."
-            )
+    known = {} if calibration is None else calibration.spans
+    if compared.forecast.attrs.get("band") == "calibrated" and (part := part_in(known)):
+        told.append(f"the band was calibrated on a part of this forecast {part}: {memory}")
     for text in told:
         warnings.warn(text, SeakeepWarning, stacklevel=3)
 
@@ -383,7 +394,8 @@ def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
         in the band (%), ``band_width``, its mean width (in ``channel_units``), and
         ``relative_band_width`` (in measured standard deviations); over ``run``:
         ``mean_coverage`` over the channels that can be judged, ``members``, ``diverged``,
-        ``level`` and ``band`` ("members" or "calibrated").
+        ``level`` and ``band`` ("members" or "calibrated"). At full scale ``scale`` ("full") and
+        ``scale_factor`` over ``run``.
     """
     rows = [_row(comparison) for comparison in comparisons]
     table = xr.concat(rows, dim="run")
@@ -432,6 +444,7 @@ def _row(comparison: Comparison) -> xr.Dataset:
             for name, values in each.items()
         }
         | _band_entries(comparison, slack)
+        | _scale_entries(comparison)
         | {
             "anrmse": comparison.anrmse,
             "mean_nammae": float(metrics.nammae(predicted=p, measured=m)),
@@ -448,6 +461,12 @@ def _row(comparison: Comparison) -> xr.Dataset:
             "channel_units": ("channel", [str(p[name].attrs.get("units", "")) for name in names]),
         },
     )
+
+
+def _scale_entries(comparison: Comparison) -> dict[str, Any]:
+    if (scale := comparison.full_scale) is None:
+        return {}
+    return {"scale": "full", "scale_factor": scale}
 
 
 def _band_entries(comparison: Comparison, slack: xr.Dataset) -> dict[str, Any]:

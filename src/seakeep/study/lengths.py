@@ -86,8 +86,10 @@ def _count(stated: str, name: str, otherwise: str) -> float:
     except RequestError:
         length = None
     if length is None or length.power != 1:
+        comma = " Write a decimal point, no comma." if "," in stated else ""
         raise RequestError(
-            f"{name}: received '{stated}'. Give {otherwise}, or encounter periods such as '15 T'."
+            f"{name}: received '{stated}'. Give {otherwise}, or encounter periods such as "
+            f"'15 T'.{comma}"
         )
     return length.count
 

@@ -234,5 +234,5 @@ def study_text(preset: Preset, size: Size, seed: int) -> str:
             f'placement = "{placement}"',
             "",
         ]
-    lines += ["[statistics]", f"n_series = {size.series}", ""]
+    lines += ["[statistics]", f"n_series = {size.series}", "", "[output]", "paper = true", ""]
     return "\n".join(lines)

@@ -16,13 +16,22 @@ from seakeep.models.priors import Prior, describe
 from seakeep.models.workers import Crew, WorkerLostError, as_finished, check_crew
 from seakeep.study.cells import Unit, cells_of, compute, units_of
 from seakeep.study.description import describe_study
+from seakeep.study.lock import alone_in
 from seakeep.study.merge import merge_cells
 from seakeep.study.plan import Plan, make_plan
 from seakeep.study.settings import Study
 from seakeep.study.slow import warn_of_slow_study
 from seakeep.study.specs import Spec
 from seakeep.study.statistics import judge
-from seakeep.study.store import RESULT, CellFolder, StudyResult, read_result, versions, write_result
+from seakeep.study.store import (
+    RESULT,
+    CellFolder,
+    StudyResult,
+    read_result,
+    retell,
+    versions,
+    write_result,
+)
 
 __all__ = ["run_study"]
 
@@ -68,7 +77,7 @@ def run_study(
     ------
     RequestError
         If settings leave no feasible window, a channel is missing, the folder holds another
-        study or cannot be written, or the cluster cannot be used.
+        study or cannot be written, another process works there, or the cluster cannot be used.
     DataError
         If a run cannot be read or used.
     StorageError
@@ -86,25 +95,46 @@ def run_study(
     tell = progress or (lambda done, total, what: None)
     cells = CellFolder(out, study.digest)
     cells.check()
-    if (out / RESULT).exists():
-        found = read_result(out)
-        if found.attrs.get("digest") == study.digest:
-            tell(1, 1, "finished before")
-            return found
+    if (found := _finished(study, out, tell)) is not None:
+        return retell(found, _words_of_study(study))
     check_crew(crew)
     plan, runs = make_plan(study, lambda done, total, name: tell(done, total, f"preparing {name}"))
     warn_of_slow_study(plan, runs)
     cells.open(study.name)
-    units = units_of(plan, study.settings.output.eigenvalues)
-    left = [unit for unit in units if not all(cells.has(name) for name in cells_of(plan, unit))]
-    _compute_all(plan, runs, cells, units, left, crew, tell)
-    tell(len(units), len(units), "statistics and densities")
-    groups = {**describe_study(study, plan, runs), **merge_cells(study, plan, runs, cells)}
-    groups.update(judge(groups, study.settings, list(plan.states)))
-    groups.update(extra or {})
-    result = write_result(out, {**_attributes(study, plan, groups), **(notes or {})}, groups)
-    cells.clear()
-    return result
+    with alone_in(out):
+        if (found := _finished(study, out, tell)) is None:  # by another process, meanwhile
+            units = units_of(plan, study.settings.output.eigenvalues)
+            left = [u for u in units if not all(cells.has(name) for name in cells_of(plan, u))]
+            _compute_all(plan, runs, cells, units, left, crew, tell)
+            tell(len(units), len(units), "statistics and densities")
+            groups = {**describe_study(study, plan, runs), **merge_cells(study, plan, runs, cells)}
+            groups.update(judge(groups, study.settings, list(plan.states)))
+            groups.update(extra or {})
+            attributes = {**_attributes(study, plan, groups), **(notes or {})}
+            found = write_result(out, attributes, groups)
+        cells.clear()
+    return found
+
+
+def _finished(study: Study, out: Path, tell: Progress) -> StudyResult | None:
+    """The result of an earlier run, if there is one of the same study."""
+    if not (out / RESULT).exists():
+        return None
+    found = read_result(out)
+    if found.attrs.get("digest") != study.digest:
+        return None
+    tell(1, 1, "finished before")
+    return found
+
+
+def _words_of_study(study: Study) -> dict[str, str]:
+    """Attributes in which a study may change without becoming another one: names and labels."""
+    general, campaign = study.settings.study, study.campaign.settings.campaign
+    return {
+        "study": study.name,
+        "description": general.description or campaign.description,
+        "settings": study.settings.model_dump_json(),
+    }
 
 
 def _attributes(
@@ -112,8 +142,7 @@ def _attributes(
 ) -> dict[str, str | float | int]:
     general = study.settings.study
     return {
-        "study": study.name,
-        "description": general.description or study.campaign.settings.campaign.description,
+        **_words_of_study(study),
         "campaign": study.campaign.name,
         "preset": general.preset,
         "seed": general.seed,
@@ -123,7 +152,6 @@ def _attributes(
         "dt": plan.dt,
         "longest_training": plan.needs.training * plan.dt,
         "preparation": study.campaign.settings.preparation.model_dump_json(),
-        "settings": study.settings.model_dump_json(),
         "specs": json.dumps({name: _fields(spec) for name, spec in plan.specs.items()}),
         "conditional_on": _conditional(plan),
         "versions": json.dumps(versions()),
@@ -149,8 +177,9 @@ def _words_of(value: object) -> str:
 
 def _conditional(plan: Plan) -> str:
     """Measured output that a forecast reads after its start, through the alignment."""
-    alignments = [getattr(spec, "alignment", None) for spec in plan.specs.values()]
-    return "surge" if any(getattr(a, "surge", "") == "measured" for a in alignments) else ""
+    alignments = [spec.alignment for spec in plan.specs.values() if spec.alignment is not None]
+    read = [each.surge_channel for each in alignments if each.surge == "measured"]
+    return ", ".join(dict.fromkeys(read))
 
 
 def _compute_all(

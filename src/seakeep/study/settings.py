@@ -150,12 +150,17 @@ class StatisticsSettings(Table):
 
 
 class OutputSettings(Table):
-    """``[output]``: what is kept beside the arrays that are judged."""
+    """``[output]``: what is kept beside the arrays that are judged, and what a report shows."""
 
     shown_windows: Annotated[int, Field(ge=0)] = Field(
         default=2, description="windows of the first test set whose members are kept for figures"
     )
     eigenvalues: bool = Field(default=True, description="true or false")
+    paper: bool = Field(
+        default=False,
+        description="whether the report puts the paper's choices and published numbers beside "
+        "those of the study",
+    )
 
 
 def _default_models() -> dict[str, StudyModelSettings]:
@@ -246,20 +251,33 @@ class Study:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of all on which the results depend: settings, campaign, and the raw files."""
+        """SHA-256 of all on which the results depend: settings, campaign, raw files, the truth."""
         content = self.settings.model_dump(mode="json")
         for key in ("name", "description", "campaign", "truth", "model"):
             del content["study"][key]
         for each in content["tests"].values():
             del each["label"]
+        del content["output"]["paper"]
         content["channels"] = [list(self.states), list(self.inputs)]
         content["campaign"] = self.campaign.digest
         content["files"] = {n: self.campaign.checksum_of(n) for n in self.campaign.runs}
+        if self.truth_folder is not None:
+            content["truth"] = _checksums(self.truth_folder)
         content["format"] = FORMAT
         kinds = {run.waves for run in self.campaign.settings.runs.values()}
         if None in kinds and any(t.waves == "irregular" for t in self.settings.tests.values()):
             content["waves_not_stated"] = "irregular"
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _checksums(folder: Path) -> dict[str, str]:
+    """SHA-256 of each file of a folder."""
+    found = {}
+    for path in sorted(each for each in folder.rglob("*") if each.is_file()):
+        with path.open("rb") as file:
+            name = path.relative_to(folder).as_posix()
+            found[name] = hashlib.file_digest(file, "sha256").hexdigest()
+    return found
 
 
 def read_study(path: Path | str) -> Study:

@@ -7,8 +7,8 @@ import json
 import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -19,7 +19,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.errors import DataError, RequestError, SeakeepError
-from seakeep.files import replacing
+from seakeep.files import replacing, write_netcdf
 from seakeep.interruption import uninterrupted
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "StorageError",
     "StudyResult",
     "read_result",
+    "retell",
     "versions",
     "write_result",
 ]
@@ -203,7 +204,7 @@ class CellFolder:
                 np.load(opened, allow_pickle=False) as file,
             ):
                 arrays = {key: file[key] for key in file.files}
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile):
             return None
         return arrays if str(arrays.pop("digest", "")) == self.digest else None
 
@@ -213,9 +214,10 @@ class CellFolder:
 
     def clear(self) -> None:
         """Remove the cells; for when all of them are in the result."""
-        for path in (self.folder / CELLS).glob("*"):
+        for path in (self.folder / CELLS).glob("*.npz*"):
             path.unlink(missing_ok=True)
-        (self.folder / CELLS).rmdir()
+        with suppress(OSError):  # somebody else's files stay
+            (self.folder / CELLS).rmdir()
 
 
 def _read_header(path: Path) -> dict[str, Any]:
@@ -294,6 +296,11 @@ class StudyResult:
         names = [str(name) for name in self.groups["runs"]["run"].values]
         return {name: self.groups[f"prepared/{name}"] for name in names}
 
+    @property
+    def shows_paper(self) -> bool:
+        """Whether a report puts the paper's choices and numbers beside those of the study."""
+        return bool(self.settings["output"].get("paper", False))
+
     def is_ensemble(self, model: str) -> bool:
         """Whether a model is an ensemble."""
         return str(self.settings["models"][model]["kind"]).startswith("bayesian")
@@ -301,6 +308,10 @@ class StudyResult:
     def label_of(self, test: str) -> str:
         """Words for a test set."""
         return str(self.settings["tests"][test]["label"] or test.replace("_", " "))
+
+    def words_of(self, channel: str) -> str:
+        """Words for a channel of the study: what the campaign calls it."""
+        return str(self.groups["channels"]["long_name"].sel(name=channel).values)
 
 
 def write_result(
@@ -329,15 +340,45 @@ def write_result(
     """
     kept = {**attrs, "format": FORMAT, "created": datetime.now(UTC).isoformat(timespec="seconds")}
     with uninterrupted(), storing(folder), replacing(folder / RESULT) as temporary:
-        xr.Dataset(attrs=kept).to_netcdf(temporary, engine="h5netcdf", mode="w")
-        for name, group in groups.items():
-            packed = {
-                key: {"zlib": True, "complevel": 1, "shuffle": True}
-                for key, variable in group.data_vars.items()
-                if variable.size > 4096 and variable.dtype.kind == "f"
-            }
-            group.to_netcdf(temporary, engine="h5netcdf", mode="a", group=name, encoding=packed)
+        write_netcdf(temporary, xr.Dataset(attrs=kept), groups, _packing)
     return StudyResult(folder, kept, dict(groups))
+
+
+def _packing(group: xr.Dataset) -> dict[str, dict[str, object]]:
+    return {
+        str(key): {"zlib": True, "complevel": 1, "shuffle": True}
+        for key, variable in group.data_vars.items()
+        if variable.size > 4096 and variable.dtype.kind == "f"
+    }
+
+
+def retell(result: StudyResult, words: Mapping[str, str]) -> StudyResult:
+    """Write other words into a finished result: attributes on which no array depends.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The result.
+    words : mapping of str to str
+        Attributes.
+
+    Returns
+    -------
+    StudyResult
+        With these words.
+
+    Raises
+    ------
+    StorageError
+        If the file cannot be written.
+    """
+    changed = {key: value for key, value in words.items() if result.attrs.get(key) != value}
+    if not changed:
+        return result
+    path = result.folder / RESULT
+    with uninterrupted(), storing(result.folder), replacing(path) as temporary:
+        write_netcdf(temporary, xr.Dataset(attrs=changed), onto=path)
+    return replace(result, attrs={**result.attrs, **changed})
 
 
 def read_result(folder: Path | str) -> StudyResult:
@@ -380,7 +421,7 @@ def read_result(folder: Path | str) -> StudyResult:
         for name in names:
             with xr.open_dataset(path, engine="h5netcdf", group=name, decode_times=False) as opened:
                 groups[name] = opened.load()
-    except (OSError, KeyError, ValueError, TypeError) as error:
+    except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
         raise DataError(
             f"{path} is damaged or no NetCDF file: {type(error).__name__} while reading it. Remove "
             "it and run the study again."

@@ -18,7 +18,7 @@ import scipy
 import xarray as xr
 
 from seakeep.errors import RequestError
-from seakeep.files import replacing
+from seakeep.files import replacing, write_netcdf
 
 __all__ = [
     "CONVENTIONS",
@@ -140,7 +140,7 @@ def save_hydrodynamics(data: xr.Dataset, path: Path | str) -> None:
         Where to.
     """
     with replacing(Path(path)) as temporary:
-        data.to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(temporary, data)
 
 
 def shipped_hydrodynamics(name: str = "ck14e.nc") -> Path:

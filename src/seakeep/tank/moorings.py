@@ -10,7 +10,7 @@ import numpy.typing as npt
 from seakeep.errors import RequestError
 from seakeep.tank.settings import LineSettings
 
-__all__ = ["line_table", "mooring_stiffness", "slack_offset", "unstretched_length"]
+__all__ = ["line_table", "mooring_stiffness", "unstretched_length"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -113,23 +113,3 @@ def mooring_stiffness(table: FloatArray) -> FloatArray:
         # A turned eye keeps its tension: its second derivative with pitch is minus the arm.
         total[2, 2] += tension * float(unit @ np.array([eye_x, eye_z]))
     return total
-
-
-def slack_offset(table: FloatArray, line: int) -> float:
-    """Surge offset at which a level line goes slack, m.
-
-    Parameters
-    ----------
-    table : ndarray, shape (line, 7)
-        From :func:`line_table`.
-    line : int
-        Its row.
-
-    Returns
-    -------
-    float
-        Negative for a line that slackens when the vessel moves against the waves.
-    """
-    eye_x, _, pole_x, _, _, unstretched, _ = table[line]
-    reach = pole_x - eye_x
-    return float(reach - np.sign(reach) * unstretched)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from seakeep.files import replacing
+from seakeep.files import replacing, write_netcdf
 from seakeep.tank.instruments import Record
 
 __all__ = ["header", "time_decimals", "write_dataset", "write_record", "write_text"]
@@ -89,6 +89,9 @@ def write_record(record: Record, folder: Path, kind: str) -> Path:
 
 def write_dataset(data: xr.Dataset, path: Path) -> None:
     """Write a Dataset to NetCDF, compressed, under a temporary name, then rename it."""
-    packed = {str(name): {"zlib": True, "complevel": 4} for name in data.data_vars}
     with replacing(path) as temporary:
-        data.to_netcdf(temporary, engine="h5netcdf", encoding=packed)
+        write_netcdf(temporary, data, packing=_packing)
+
+
+def _packing(data: xr.Dataset) -> dict[str, dict[str, object]]:
+    return {str(name): {"zlib": True, "complevel": 4} for name in data.data_vars}

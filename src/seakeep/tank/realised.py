@@ -15,9 +15,8 @@ from seakeep.signals import (
     wave_heights,
     wave_spectrum,
 )
-from seakeep.tank.dynamics import Rig, assemble_rig
 from seakeep.tank.instruments import Played, record_run
-from seakeep.tank.play import generator, play_run
+from seakeep.tank.play import generator
 from seakeep.tank.settings import TankSettings
 from seakeep.waves import group_speed, phase_speed, wavelength_to_frequency
 
@@ -175,24 +174,6 @@ def realise(played: Played, name: str) -> Realised:
     )
 
 
-def realise_all(settings: TankSettings, rig: Rig | None = None) -> list[Realised]:
-    """Play and measure all runs.
-
-    Parameters
-    ----------
-    settings : TankSettings
-        The settings.
-    rig : Rig, optional
-        Vessel and moorings.
-
-    Returns
-    -------
-    list of Realised
-    """
-    made = assemble_rig(settings) if rig is None else rig
-    return [realise(play_run(settings, name, made), name) for name in settings.runs]
-
-
 def comparison(settings: TankSettings, realised: list[Realised]) -> list[Row]:
     """Numbers that the paper states, ours beside them.
 
@@ -201,7 +182,7 @@ def comparison(settings: TankSettings, realised: list[Realised]) -> list[Row]:
     settings : TankSettings
         The settings.
     realised : list of Realised
-        From :func:`realise_all`.
+        From :func:`realise`, one a run.
 
     Returns
     -------
@@ -235,7 +216,7 @@ def matrix_rows(settings: TankSettings, realised: list[Realised]) -> list[dict[s
     settings : TankSettings
         The settings.
     realised : list of Realised
-        From :func:`realise_all`.
+        From :func:`realise`, one a run.
 
     Returns
     -------

@@ -228,12 +228,11 @@ def _solve_shape(hull: HullSettings, density: float) -> tuple[float, float, floa
     )
     target = hull.mass / density
 
-    def layer(midship: float) -> float:
-        # The thin layer between the pool's lid and its free surface is water, not hull.
-        return 0.0 if hull.pool is None else hull.pool.length * hull.pool.beam * -hull.pool.lid
+    # The thin layer between the pool's lid and its free surface is water, not hull.
+    layer = 0.0 if hull.pool is None else hull.pool.length * hull.pool.beam * -hull.pool.lid
 
     def volume(draft: float) -> float:
-        return _volume(_patches(hull, draft, 0.0, exponent)[0])[0] - layer(0.0)
+        return _volume(_patches(hull, draft, 0.0, exponent)[0])[0] - layer
 
     lowest = 0.02 if hull.pool is None else 0.005 - hull.pool.shelf
     if volume(lowest) > target or volume(1.0) < target:
@@ -245,7 +244,7 @@ def _solve_shape(hull: HullSettings, density: float) -> tuple[float, float, floa
 
     def lever(midship: float) -> float:
         moment = _volume(_patches(hull, draft, midship, exponent)[0])[1]
-        return moment - (0.0 if hull.pool is None else layer(midship) * hull.pool.centre)
+        return moment - (0.0 if hull.pool is None else layer * hull.pool.centre)
 
     quarter = 0.25 * hull.length_waterline
     midship = float(scipy.optimize.brentq(lever, -quarter, quarter, xtol=1e-12))

@@ -89,7 +89,7 @@ def _data(result: StudyResult) -> list[ReportFigure]:
             f"quality_{name}",
             "data",
             f"All channels of {name} after preparation, flagged samples marked; "
-            "orange: a channel in which something was found.",
+            "tinted: a channel in which something was found.",
             partial(quality_figure, run, {}),
             raster=True,
         )

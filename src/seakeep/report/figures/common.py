@@ -60,8 +60,8 @@ def short_label(channel: str) -> str:
     return f"${known.symbol}$" if known else channel.replace("_", " ")
 
 
-def grid_of_axes(figure: Any, count: int, columns: int) -> list[Any]:
-    """Axes in rows of `columns`, the empty places at the end taken away.
+def grid_of_axes(figure: Any, count: int, most: int) -> list[Any]:
+    """Axes in rows of `most`, or of fewer that fill as few rows; empty places are taken away.
 
     Parameters
     ----------
@@ -69,15 +69,16 @@ def grid_of_axes(figure: Any, count: int, columns: int) -> list[Any]:
         The figure.
     count : int
         Axes wanted.
-    columns : int
-        Axes a row.
+    most : int
+        Axes a row, at most.
 
     Returns
     -------
     list of matplotlib.axes.Axes
         `count` of them.
     """
-    rows = -(-count // columns)
+    rows = -(-count // most)
+    columns = -(-count // rows)
     axes: Sequence[Any] = list(figure.subplots(rows, columns, squeeze=False).ravel())
     for spare in axes[count:]:
         spare.remove()

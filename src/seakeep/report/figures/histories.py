@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from seakeep.report.figures.common import line_of, model_words, short_label
-from seakeep.report.style import LINES, figure_style, new_figure
+from seakeep.report.style import LINES, THIN, figure_style, new_figure
 from seakeep.study import StudyResult
 
 if TYPE_CHECKING:
@@ -76,6 +76,7 @@ def history_figure(result: StudyResult, test: str, training: int, window: int) -
         for each, name in zip(axes, names, strict=True):
             wider = {model: float(margin.sel(channel=name)) for model, margin in margins.items()}
             _draw_channel(each, result, cell.sel(channel=name), name, wider)
+        figure.supylabel("deviation from the training mean, in training SD", fontsize=8)
         axes[-1].set_xlabel(r"time after the last measured state, in encounter periods")
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper right", ncols=len(handles))
@@ -99,7 +100,9 @@ def _draw_channel(
 
     time = cell["time"].values / float(result.attrs["encounter_period"])
     level = 100 * float(result.settings["statistics"]["level"])
-    axes.plot(time, standard("measured"), label="measured", **LINES["measured"])
+    banded = any(result.is_ensemble(model) for model in result.models)
+    solid = THIN if banded else LINES["measured"]
+    axes.plot(time, standard("measured"), label="measured", **solid)
     for model in result.models:
         style = line_of(result, model)
         if result.is_ensemble(model):

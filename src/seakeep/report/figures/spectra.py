@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.conventions import canonical_channel
-from seakeep.report.style import figure_style, new_figure
+from seakeep.report.style import figure_style, new_figure, plain_text
 from seakeep.study import StudyResult
 
 if TYPE_CHECKING:
@@ -57,8 +56,7 @@ def spectrum_figure(result: StudyResult) -> Figure:
         peak = max((_peak(spectra, n) for n in waves), default=1.0)
         axes.set_xlim(0, 2.2 * peak)
         axes.set_ylim(bottom=0)
-        known = canonical_channel(str(spectra.attrs["channel"]))
-        words = known.long_name if known else str(spectra.attrs["channel"])
+        words = plain_text(result.words_of(str(spectra.attrs["channel"])))
         axes.set(xlabel="frequency [Hz]", ylabel=f"spectral density of {words} [m²/Hz]")
         if axes.get_legend_handles_labels()[0]:
             axes.legend(fontsize=8)

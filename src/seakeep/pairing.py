@@ -1,0 +1,200 @@
+"""Datasets side by side: the channels of the first, each against that of its name in the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.signals.clocks import check_order, instant_text
+
+__all__ = ["Paired", "channel_names", "pair"]
+
+FloatArray = npt.NDArray[np.float64]
+
+INSTANT_TOLERANCE = 0.01
+"""Part of a step by which an instant of one Dataset may differ from that of another."""
+
+
+@dataclass(frozen=True, eq=False)
+class Paired:
+    """Arrays of Datasets that fit together.
+
+    Parameters
+    ----------
+    names : list of str
+        Channels.
+    lead : tuple of str
+        Dimensions of the first Dataset before ``time``.
+    arrays : dict of str to ndarray
+        One a Dataset, at the instants of the first: (…, time, channel) of the first; the others
+        the same shape, or (time, channel) where they have no further dimension.
+    """
+
+    names: list[str]
+    lead: tuple[str, ...]
+    arrays: dict[str, FloatArray]
+
+
+def channel_names(data: xr.Dataset, name: str) -> list[str]:
+    """Variables that hold numbers; words, such as the status of a forecast, are no channels.
+
+    Parameters
+    ----------
+    data : Dataset
+        Channels over ``time``.
+    name : str
+        What messages call it.
+
+    Returns
+    -------
+    list of str
+        At least one.
+
+    Raises
+    ------
+    RequestError
+        If there is none.
+    DataError
+        If one has no dimension ``time``.
+    """
+    names = [str(key) for key, each in data.data_vars.items() if each.dtype.kind in "iufb"]
+    if not names:
+        raise RequestError(f"{name} holds no channel; there is nothing to judge.")
+    for channel in names:
+        if "time" not in data[channel].dims:
+            raise DataError(
+                f"{name} has no coordinate 'time' in channel '{channel}' (dimensions: "
+                f"{', '.join(map(str, data[channel].dims)) or 'none'}). Give every channel the "
+                "dimension 'time' and the instants in seconds, or select the channels to judge."
+            )
+    return names
+
+
+def pair(**sides: xr.Dataset) -> Paired:
+    """Take the channels of the first Dataset, at its instants, out of all.
+
+    Instants are matched within a hundredth of a step; samples are matched one by one where a
+    Dataset states no instants.
+
+    Parameters
+    ----------
+    **sides : Dataset
+        Two or more, under the names that messages use.
+
+    Returns
+    -------
+    Paired
+        Names and arrays.
+
+    Raises
+    ------
+    RequestError
+        If a channel is missing, or dimensions or lengths do not fit.
+    DataError
+        If units or instants differ, or times are not seconds in rising order.
+    """
+    (first, reference), *others = sides.items()
+    names = channel_names(reference, first)
+    reference = reference[names]
+    lead = tuple(str(dim) for dim in reference[names[0]].dims if dim != "time")
+    for name in names:
+        if set(reference[name].dims) != {*lead, "time"}:
+            raise RequestError(
+                f"channel '{name}' of {first} has the dimensions {reference[name].dims} and "
+                f"'{names[0]}' has {reference[names[0]].dims}. Judge channels of the same "
+                "dimensions together."
+            )
+    arrays = {first: _stacked(reference, names, (*lead, "time"))}
+    for side, data in others:
+        _check_channels(names, reference, data, first, side)
+        found = _at_instants(data[names], reference, side, first)
+        further = _check_lead(found, reference, side, first)
+        values = _stacked(found, names, (*(dim for dim in lead if dim in further), "time"))
+        if further:
+            missing = [axis for axis, dim in enumerate(lead) if dim not in further]
+            shape = arrays[first].shape
+            values = np.broadcast_to(np.expand_dims(values, missing), shape)
+        arrays[side] = values
+    return Paired(names, lead, arrays)
+
+
+def _stacked(data: xr.Dataset, names: list[str], order: tuple[str, ...]) -> FloatArray:
+    columns = [data[name].transpose(*order).values.astype(float, copy=False) for name in names]
+    return np.stack(columns, axis=-1)
+
+
+def _check_channels(
+    names: list[str], reference: xr.Dataset, data: xr.Dataset, first: str, side: str
+) -> None:
+    known = [str(key) for key in data.data_vars]
+    for name in names:
+        if name not in known:
+            raise RequestError(
+                f"{side} has no channel '{name}'.{did_you_mean(name, known)} It has: "
+                f"{', '.join(known)}. Select the channels to judge: {first}[['heave']]."
+            )
+        if data[name].dtype.kind not in "iufb":
+            raise DataError(
+                f"channel '{name}' of {side} is of type {data[name].dtype}, not a real number. "
+                "Convert it."
+            )
+        units = [each[name].attrs.get("units") for each in (reference, data)]
+        if all(units) and units[0] != units[1]:
+            raise DataError(
+                f"channel '{name}' is in '{units[0]}' in {first} and in '{units[1]}' in {side}. "
+                "Convert one of them and its units attribute."
+            )
+    channel_names(data[names], side)
+
+
+def _at_instants(data: xr.Dataset, reference: xr.Dataset, side: str, first: str) -> xr.Dataset:
+    if "time" not in data.coords or "time" not in reference.coords:
+        if data.sizes["time"] != reference.sizes["time"]:
+            raise RequestError(
+                f"{side} has {data.sizes['time']} samples along time and {first} "
+                f"{reference.sizes['time']}; judge where both exist."
+            )
+        return data
+    wanted = check_order(reference["time"].values, first)
+    given = check_order(data["time"].values, side)
+    if np.array_equal(wanted, given):
+        return data
+    step = float(np.median(np.diff(wanted)))
+    try:
+        return data.sel(time=wanted, method="nearest", tolerance=INSTANT_TOLERANCE * step)
+    except KeyError as error:
+        raise DataError(
+            f"{first} runs from {instant_text(wanted[0], step)} to "
+            f"{instant_text(wanted[-1], step)} s and {side} from {instant_text(given[0], step)} to "
+            f"{instant_text(given[-1], step)} s, and not every instant of the first is one of the "
+            "second. Judge where both exist, on one time axis."
+        ) from error
+
+
+def _check_lead(data: xr.Dataset, reference: xr.Dataset, side: str, first: str) -> set[str]:
+    """Dimensions of `data` beside time, which `reference` must have too, with the same labels."""
+    further = {str(dim) for dim in data.dims} - {"time"}
+    for dim in sorted(further):
+        if dim not in reference.dims:
+            raise RequestError(
+                f"{side} has the dimension '{dim}' and {first} has not. Select one of it: "
+                f"{side}.isel({dim}=0)."
+            )
+        labels = [each[dim].values for each in (reference, data) if dim in each.coords]
+        same = reference.sizes[dim] == data.sizes[dim] and np.array_equal(labels[:1], labels[-1:])
+        if not same:
+            raise RequestError(
+                f"{side} and {first} differ along the dimension '{dim}' ({data.sizes[dim]} and "
+                f"{reference.sizes[dim]} entries, or others). Select the same ones of both."
+            )
+    for name in data.data_vars:
+        if set(data[name].dims) != {*further, "time"}:
+            raise RequestError(
+                f"channel '{name}' of {side} has the dimensions {data[name].dims}, and others "
+                "have more. Judge channels of the same dimensions together."
+            )
+    return further

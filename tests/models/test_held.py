@@ -1,0 +1,162 @@
+"""Members that are held give the ensemble's own numbers, from plain arrays that are checked."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import seakeep
+from seakeep import RequestError, SeakeepWarning
+from seakeep.models import FittedAlignment
+
+STATES, INPUTS, DT = ["heave", "pitch"], ["eta"], 0.1
+START, STEPS = 500, 60
+
+
+def sea(seed=0, samples=900):
+    rng = np.random.default_rng(seed)
+    time = DT * np.arange(samples)
+    angles = np.outer(time, 2 * np.pi * rng.uniform(0.3, 1.0, 30)) + rng.uniform(0, 6.28, 30)
+    waves = {"heave": np.cos(angles - 0.4), "pitch": np.sin(angles), "eta": np.cos(angles)}
+    return xr.Dataset(
+        {
+            key: ("time", each.sum(axis=1) + 0.2 * rng.standard_normal(samples), {"units": "m"})
+            for key, each in waves.items()
+        },
+        coords={"time": ("time", time, {"units": "s"})},
+        attrs={"run": f"sea {seed}"},
+    )
+
+
+def fitted(delay_rows="exact", ridge=(2, 20), **settings):
+    spec = seakeep.BayesianHankelDMDc(
+        encounter_period=1.6,
+        train_length=seakeep.Uniform(10, 16),
+        state_delay=seakeep.Uniform(0.2, 0.6),
+        input_delay=seakeep.Uniform(0.5, 1.5),
+        ridge=seakeep.Uniform(*ridge),
+        n_members=7,
+        delay_rows=delay_rows,
+        **settings,
+    )
+    return spec.fit(sea(), STATES, INPUTS)
+
+
+@pytest.fixture(scope="module")
+def ensemble():
+    return fitted().calibrate(sea(3), steps=STEPS)
+
+
+@pytest.fixture(scope="module")
+def held(ensemble):
+    return ensemble.hold()
+
+
+@pytest.fixture
+def arrays():
+    run = sea(1)
+    x = np.stack([run[name].values for name in STATES], axis=1)
+    u = run["eta"].values[:, None]
+    return {
+        "x_history": x[: START + 1],
+        "u_history": u[: START + 1],
+        "u_future": u[START + 1 : START + STEPS],
+    }
+
+
+@pytest.mark.parametrize("delay_rows", ["exact", "ridge"])
+@pytest.mark.parametrize("band", ["members", "calibrated"])
+def test_the_numbers_are_those_of_the_ensemble(delay_rows, band, arrays):
+    ensemble = fitted(delay_rows).calibrate(sea(3), steps=STEPS)
+    found = ensemble.hold().forecast_arrays(**arrays, steps=STEPS, band=band)
+    expected = ensemble.forecast_summary(sea(1), DT * START, STEPS, band=band)
+    for key in ("mean", "std", "lower", "upper"):
+        values = np.stack([expected[name].sel(statistic=key).values for name in STATES], axis=1)
+        # The same operations on the same numbers, in another order of windows at most.
+        np.testing.assert_allclose(getattr(found, key), values, rtol=1e-12, atol=1e-12)
+    assert found.diverged == 0
+
+
+def test_who_identifies_them_makes_no_difference(ensemble, held, arrays):
+    told = []
+    threads = ensemble.hold(workers=2, backend="threads", progress=lambda *each: told.append(each))
+    for one, other in zip(
+        held.forecast_arrays(**arrays, steps=STEPS),
+        threads.forecast_arrays(**arrays, steps=STEPS),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(one, other)
+    assert told[-1] == (7, 7, "member 7")
+
+
+def test_it_says_what_it_is_and_takes(held):
+    numbers = sum(member.coefficients.size for member in held.members)
+    assert held.nbytes == 8 * numbers
+    assert "n_members=7, states=['heave', 'pitch'], inputs=['eta'], dt=0.1" in repr(held)
+
+
+def test_members_that_diverge_are_counted_and_left_out(ensemble, arrays):
+    held = ensemble.hold()
+    third = held.members[2]
+    third.coefficients[:, :2] = 9.0 * np.eye(2)  # grows by a factor of about nine a step
+    found = held.forecast_arrays(**arrays, steps=STEPS)
+    assert found.diverged == 1
+    others = replace(ensemble, members=tuple(np.delete(ensemble.members, 2)))
+    expected = others.hold().forecast_arrays(**arrays, steps=STEPS)
+    np.testing.assert_array_equal(found.upper, expected.upper)
+
+
+def test_columns_with_names_are_taken_by_name(held, arrays):
+    pandas = pytest.importorskip("pandas")
+    plain = held.forecast_arrays(**arrays, steps=STEPS)
+    turned = arrays["x_history"][:, ::-1]
+    frame = pandas.DataFrame(turned, columns=["pitch", "heave"])
+    frame["clock"] = 0.0
+    array = xr.DataArray(turned, dims=("time", "channel"), coords={"channel": ["pitch", "heave"]})
+    for named in (frame, array):
+        found = held.forecast_arrays(named, arrays["u_history"], arrays["u_future"], STEPS)
+        np.testing.assert_array_equal(found.mean, plain.mean)
+    with pytest.raises(RequestError, match=r"x_history has no column 'pitch'; its columns: heave"):
+        held.forecast_arrays(frame[["heave"]], arrays["u_history"], arrays["u_future"], steps=STEPS)
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil", "message"),
+    [
+        ("x_history", lambda a: a.T, r"x_history has shape \(2, 501\).*It looks transposed"),
+        ("x_history", lambda a: a + 0j, "x_history holds complex numbers"),
+        (
+            "x_history",
+            lambda a: np.ma.masked_array(a, mask=np.arange(len(a))[:, None] * [1, 1] > 498),
+            "x_history holds 4 values that are not finite",
+        ),
+        ("u_history", lambda a: [["a"]] * len(a), "u_history is no array of numbers"),
+        ("u_future", lambda a: a[:-1], r"u_future has shape \(58, 1\); expected .* 59 rows"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_refused(held, arrays, name, spoil, message):
+    arrays[name] = spoil(arrays[name])
+    with pytest.raises(RequestError, match=message):
+        held.forecast_arrays(**arrays, steps=STEPS)
+
+
+def test_a_band_is_checked_as_in_the_ensemble(held, arrays):
+    with pytest.raises(RequestError, match=r"calibrated for level = 0\.95, and 0\.9 was asked"):
+        held.forecast_arrays(**arrays, steps=STEPS, level=0.9, band="calibrated")
+    run = sea(1)
+    arrays["u_future"] = run["eta"].values[START + 1 :, None]
+    with pytest.warns(SeakeepWarning, match="is longer than the 60 instants") as told:
+        held.forecast_arrays(**arrays, steps=STEPS + 1, band="calibrated")
+    assert told[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        held.forecast_arrays(**arrays, steps=STEPS, band="calibrated")
+
+
+def test_members_that_steer_their_own_waves_are_not_held(ensemble):
+    settings = seakeep.ProbeAlignment(mode="effective", surge="predicted", celerity=2.0)
+    steered = replace(ensemble, alignment=FittedAlignment(settings, (True,), (0.0,), 2.0))
+    with pytest.raises(RequestError, match="carries the waves to the surge that its members predi"):
+        steered.hold()
