@@ -470,10 +470,11 @@ def test_one_logger_a_run_keeps_the_names_of_runs_and_logger(tmp_path):
     assert text.count("# guessed: irregular runs but the last train, the rest tests\n") == 4
 
 
-def test_what_has_gaps_is_left_out_with_a_word(tmp_path):
+@pytest.mark.parametrize("lost", [10, 200])  # of 1001 samples: a channel with gaps, and none
+def test_what_has_gaps_is_left_out_with_a_word(tmp_path, lost):
     columns = tank_columns() | {"WP aft [mm]": tank_columns()["WP fwd [mm]"]}
     for name in ("Heave [mm]", "WP aft [mm]"):
-        columns[name] = np.where(np.arange(1001) // 10 == 30, np.nan, columns[name])
+        columns[name] = np.where(np.arange(1001) // lost == 3, np.nan, columns[name])
     text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
     assert (campaign.model().states, campaign.model().inputs) == (("pitch",), ("eta_fwd",))
     for name, key in (("heave", "states"), ("eta_aft", "inputs")):

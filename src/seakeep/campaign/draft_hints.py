@@ -141,7 +141,7 @@ def driving_wave(guesses: Sequence[Guess]) -> Guess | None:
     return next((guess for guess in guesses if name and guess.channel == name), None)
 
 
-def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
+def model_table(guesses: Sequence[Guess], steps: float | None, holed: Sequence[str] = ()) -> Table:
     """Draft of ``[model]``: motions as states, waves as inputs, delays in encounter periods.
 
     Parameters
@@ -150,6 +150,8 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
         The channels.
     steps : float or None
         Samples a period of the waves that the preparation makes.
+    holed : sequence of str, optional
+        What columns would be that miss too much to be channels.
 
     Returns
     -------
@@ -178,6 +180,7 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
     if left := [name for name in noise if any(name in kind for kind in kinds)]:
         model.add(tomlkit.comment(f"{', '.join(left)}: noise alone was found; left out."))
     gapped = [str(guess.channel) for guess in guesses if guess.channel and guess.gaps]
+    gapped += holed
     if left := [name for name in gapped if any(name in kind for kind in kinds)]:
         _add_gapped(model, left, "states")
     if loads:
@@ -189,7 +192,8 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
             model.add(tomlkit.comment(line))
     model.add("inputs", [wave for wave in waves if wave not in states])
     model["inputs"].comment("guessed: the wave probes that drive it; those behind it do not")
-    if left := [wave for wave in _waves(guesses) if wave not in waves]:
+    holes = [name for name in holed if name.startswith("eta_")]
+    if left := [*(wave for wave in _waves(guesses) if wave not in waves), *holes]:
         _add_gapped(model, left, "inputs")
     model.add(tomlkit.comment("in place of the preset's, in encounter periods T or in samples:"))
     for key, count in (("state_delays", 1), ("input_delays", 5)):

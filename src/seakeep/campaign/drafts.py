@@ -27,6 +27,7 @@ from seakeep.campaign.guesses import (
     is_trigger,
     noise_of,
     rising_column,
+    suggest_channel,
     waves_of,
 )
 from seakeep.campaign.readers import read_columns, time_column, time_step_of, time_unit_of
@@ -113,7 +114,9 @@ def draft_campaign(
     kept = [guess for guess in guesses if guess.channel]
     preparation = preparation_table(kept, rates, period, shortest)
     document.add("preparation", preparation)
-    document.add("model", model_table(kept, _steps(preparation, rates, period)))
+    holed = [_meant(guess) for guess in guesses if guess.channel is None and guess.gaps]
+    holed = [name for name in holed if name not in names]
+    document.add("model", model_table(kept, _steps(preparation, rates, period), holed))
     return tomlkit.dumps(document)
 
 
@@ -279,6 +282,12 @@ def _channels(document: tomlkit.TOMLDocument, guesses: Sequence[Guess]) -> None:
         document.add(tomlkit.nl())
     for guess in skipped:
         document.add(tomlkit.comment(f"column '{guess.header}' left out: {guess.why}"))
+
+
+def _meant(guess: Guess) -> str:
+    """Channel that a column would be, were it whole."""
+    name, unit = named_unit(guess.column) if guess.named_unit else (guess.column, guess.unit)
+    return suggest_channel(name, None if guess.assumed_unit else unit, guess.logger)
 
 
 def _label(guess: Guess) -> str:
