@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seakeep.conventions import canonical_channel, canonical_names, conversion, instant, si_unit
+from seakeep.conventions import canonical_channel, canonical_names, conversion, si_unit
 from seakeep.errors import RequestError
 
 
@@ -106,12 +106,3 @@ def test_a_unit_that_would_keep_the_parser_busy_is_refused_at_once(unit):
 def test_units_of_shafts_and_cranes_are_known():
     assert conversion("rpm", "rad/s") == pytest.approx(0.10471975511965977, rel=1e-14)
     assert conversion("tonf", "N") == pytest.approx(9806.65, rel=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(63.58506359, "63.585"), (0.9450000524520874, "0.945"), (20.0, "20"), (-0.0001, "0"),
-     (100.0, "100"), (float("inf"), "inf"), (float("-inf"), "-inf")],
-)  # fmt: skip
-def test_instants_are_written_to_the_millisecond(seconds, text):
-    assert instant(seconds) == text

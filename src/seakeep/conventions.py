@@ -25,7 +25,6 @@ __all__ = [
     "canonical_names",
     "conversion",
     "displayed",
-    "instant",
     "si_unit",
 ]
 
@@ -153,28 +152,6 @@ def displayed(units: str) -> tuple[float, str]:
     if units == "rad" or units.startswith("rad/"):
         return math.degrees(1.0), units.replace("rad", "deg", 1)
     return 1.0, units
-
-
-def instant(seconds: float) -> str:
-    """Write an instant as people read it: to the millisecond.
-
-    Parameters
-    ----------
-    seconds : float
-        The instant.
-
-    Returns
-    -------
-    str
-        Without zeros at its end, and without a unit.
-
-    Examples
-    --------
-    >>> instant(63.58506359), instant(0.9450000524520874), instant(20.0), instant(float("inf"))
-    ('63.585', '0.945', '20', 'inf')
-    """
-    text = f"{seconds:z.3f}"
-    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 # The angle is a dimension of its own, so that degrees cannot pass for metres per metre.

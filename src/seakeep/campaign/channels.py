@@ -22,9 +22,10 @@ from seakeep.campaign.settings import (
     long_name_of,
 )
 from seakeep.campaign.validation import derivation_order, needed_channels, sources_of
-from seakeep.conventions import canonical_channel, conversion, instant, si_unit
+from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import Clock, bridge, inspect_times, onto_uniform, uniform_step
+from seakeep.signals.clocks import instant_text
 from seakeep.signals.quality import BRIDGED, MISSING, flag_attributes
 
 __all__ = ["Group", "read_groups"]
@@ -208,10 +209,11 @@ def _cut(table: xr.Dataset, settings: RunSettings, run: str) -> xr.Dataset:
     time = table["time"].to_numpy()
     kept = (time >= begin) & (time <= end)
     if kept.sum() < 2:
+        step = float(np.median(np.diff(time)))
+        first, last = instant_text(time[0], step), instant_text(time[-1], step)
         raise RequestError(
-            f"runs.{run}.record: received [{instant(begin)}, {instant(end)}] s, and the file runs "
-            f"from {instant(time[0])} to {instant(time[-1])} s: nothing is left. Correct the two "
-            "times."
+            f"runs.{run}.record: received [{begin:g}, {end:g}] s, and the file runs from "
+            f"{first} to {last} s: nothing is left. Correct the two times."
         )
     return table.isel(time=kept)
 
@@ -272,12 +274,12 @@ def _refuse_gaps(dataset: xr.Dataset, run: str, path: Path) -> None:
     step = float(np.median(np.diff(time)))
     lengths = ends - begins
     longest = int(np.argmax(lengths))
+    first, worst = (instant_text(time[begins[at]], step) for at in (0, longest))
     others = f" (also in {', '.join(gapped[1:])})" if gapped[1:] else ""
     raise DataError(
         f"run '{run}' ({path}): channel '{gapped[0]}' has {int(missing.sum())} missing values of "
-        f"{missing.size} in {begins.size} gap(s), the first at t = "
-        f"{instant(time[begins[0]])} s ({lengths[0]} samples, {lengths[0] * step:.4g} s), the "
-        f"longest at t = {instant(time[begins[longest]])} s ({lengths[longest]} samples, "
+        f"{missing.size} in {begins.size} gap(s), the first at t = {first} s ({lengths[0]} samples, "
+        f"{lengths[0] * step:.4g} s), the longest at t = {worst} s ({lengths[longest]} samples, "
         f"{lengths[longest] * step:.4g} s)"
         f"{others}. Repair the file, leave the channel out, or cut the gap off with record = "
         f"[begin, end] in [runs.{run}]; or state gaps = 'mask' or 'bridge' in [preparation]."

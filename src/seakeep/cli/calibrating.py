@@ -15,11 +15,12 @@ from rich.table import Table
 from seakeep.campaign import Campaign, load_prepared, read_campaign
 from seakeep.cli.console import messages, progress_bar, quietly, results
 from seakeep.cli.options import DEFAULT_LEVEL, CampaignFile, Level, Scheduler, Workers, crew
-from seakeep.conventions import conversion, instant
+from seakeep.conventions import conversion
 from seakeep.errors import RequestError
 from seakeep.files import check_place
 from seakeep.models import HankelEnsemble, load_model
 from seakeep.models.forecasting import counted
+from seakeep.signals.clocks import instant_text
 from seakeep.study.lengths import instant_of, samples_of
 from seakeep.study.workflow import between
 
@@ -108,9 +109,11 @@ def calibrate(
         )
     results().print(_table(calibrated))
     assert calibrated.calibration is not None
-    used = [
-        f"{n} {instant(a)} to {instant(b)} s" for n, (a, b) in calibrated.calibration.spans.items()
-    ]
+    spans = {
+        name: " to ".join(instant_text(edge, calibrated.dt) for edge in span)
+        for name, span in calibrated.calibration.spans.items()
+    }
+    used = [f"{name} {span} s" for name, span in spans.items()]
     results().print(f"Calibrated on {', '.join(used)}: judge it on other instants.", soft_wrap=True)
     calibrated.save(out)
     whole = sum(calibrated.calibration.windows.values())

@@ -23,7 +23,6 @@ from seakeep.cli.options import (
     Workers,
     crew,
 )
-from seakeep.conventions import instant
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import check_place, make_folder
 from seakeep.models import HankelDMDcModel, HankelEnsemble, load_model
@@ -37,6 +36,7 @@ from seakeep.report.tables import (
     write_csv,
     write_forecast,
 )
+from seakeep.signals.clocks import instant_text
 from seakeep.study import (
     at_full_scale,
     comparison_table,
@@ -156,9 +156,10 @@ def forecast(
         result = with_degrees(result)
     write_forecast(result, out)
     status = result.attrs["status"]
+    begin = instant_text(float(result.attrs["start"]), identified.dt)
     messages().print(
         f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
-        f"t = {instant(result.attrs['start'])} s, status {status}.{scaled}"
+        f"t = {begin} s, status {status}.{scaled}"
     )
     if not _usable(result):
         raise typer.Exit(1)
