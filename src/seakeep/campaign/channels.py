@@ -278,9 +278,9 @@ def _refuse_gaps(dataset: xr.Dataset, run: str, path: Path) -> None:
     others = f" (also in {', '.join(gapped[1:])})" if gapped[1:] else ""
     raise DataError(
         f"run '{run}' ({path}): channel '{gapped[0]}' has {int(missing.sum())} missing values of "
-        f"{missing.size} in {begins.size} gap(s), the first at t = {first} s ({lengths[0]} samples, "
-        f"{lengths[0] * step:.4g} s), the longest at t = {worst} s ({lengths[longest]} samples, "
-        f"{lengths[longest] * step:.4g} s)"
+        f"{missing.size} in {begins.size} gap(s), the first at t = {first} s ({lengths[0]} "
+        f"samples, {lengths[0] * step:.4g} s), the longest at t = {worst} s "
+        f"({lengths[longest]} samples, {lengths[longest] * step:.4g} s)"
         f"{others}. Repair the file, leave the channel out, or cut the gap off with record = "
         f"[begin, end] in [runs.{run}]; or state gaps = 'mask' or 'bridge' in [preparation]."
     )
