@@ -7,6 +7,7 @@ Frame: x along the direction in which the waves run, z up, angles right-handed a
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from functools import lru_cache
@@ -23,6 +24,7 @@ __all__ = [
     "canonical_channel",
     "canonical_names",
     "conversion",
+    "displayed",
     "si_unit",
 ]
 
@@ -127,6 +129,29 @@ def canonical_channel(name: str) -> Channel | None:
         place = match[1].replace("_", " ")
         return Channel(name, "N", f"mooring load {place}", rf"M_\mathrm{{{place}}}")
     return None
+
+
+def displayed(units: str) -> tuple[float, str]:
+    """Factor and unit in which people are shown a channel: angles in degrees.
+
+    Parameters
+    ----------
+    units : str
+        SI unit of the channel.
+
+    Returns
+    -------
+    (float, str)
+        What its values are multiplied by, and the unit then.
+
+    Examples
+    --------
+    >>> displayed("rad/s"), displayed("m")
+    ((57.29577951308232, 'deg/s'), (1.0, 'm'))
+    """
+    if units == "rad" or units.startswith("rad/"):
+        return math.degrees(1.0), units.replace("rad", "deg", 1)
+    return 1.0, units
 
 
 # The angle is a dimension of its own, so that degrees cannot pass for metres per metre.

@@ -10,6 +10,7 @@ from small_tank import tank_columns, write_csv
 
 from seakeep import cli
 from seakeep.campaign import read_campaign
+from seakeep.campaign.checks import findings_of
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
 from seakeep.errors import DataError, RequestError, SeakeepWarning
@@ -110,6 +111,33 @@ def test_fast_files_get_a_coarser_step(tmp_path):
     assert "# Hz; guessed: about 32 samples a wave of" in text
 
 
+def waves_of_period(folder, name, period, rate):
+    t = np.arange(0, max(40, 20 * period), 1 / rate)
+    x = np.sin(2 * np.pi * t / period)
+    return write_csv(folder / f"{name}.csv", {"Time [s]": t, "WP [mm]": 9 * x, "Heave [mm]": 5 * x})
+
+
+def test_the_step_suits_the_shortest_waves_of_all_runs(tmp_path):
+    files = [waves_of_period(tmp_path, f"run{i}", T, 200.0) for i, T in enumerate((1.5, 0.6, 1.0))]
+    still = {"Time [s]": np.arange(0, 40, 0.005)}
+    random = np.random.default_rng(0)
+    still |= {name: random.normal(size=8000) for name in ("WP [mm]", "Heave [mm]")}
+    files.append(write_csv(tmp_path / "still.csv", still))  # noise has no waves
+    text, campaign = drafted(tmp_path, files)
+    rate = campaign.settings.preparation.sampling_rate
+    assert rate == pytest.approx(200 / 3, rel=1e-5)  # 40 samples in 0.6 s; each fourth made 30
+    assert "# Hz; guessed: about 32 samples a wave of 0.6 s, the shortest" in text
+
+
+def test_no_step_is_finer_than_the_files(tmp_path):
+    """Of 13 samples a wave, as full-scale records have them, no 32 are made."""
+    text, campaign = drafted(tmp_path, [waves_of_period(tmp_path, "slow", 10.0, 1.25)])
+    settings = campaign.settings.preparation
+    assert (settings.sampling_rate, settings.steps_per_period) == (None, None)
+    assert "# sampling_rate = 1.25  # Hz; left out, the files' own" in text
+    assert "steps_per_period" not in text
+
+
 def test_one_file_trains(tmp_path):
     text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", tank_columns())])
     assert campaign.training_runs == ["run"]
@@ -153,8 +181,14 @@ def test_files_without_time_or_with_odd_names(tmp_path):
     text, campaign = drafted(tmp_path, sorted(tmp_path.glob("*.csv")))
     assert "sampling_rate = 100.0 # ASSUMED: the files have no time column. Correct it" in text
     assert campaign.runs == ["1", "1_2"]
-    with pytest.warns(SeakeepWarning, match=ASSUMED.format("surge")):
-        assert len(campaign.prepare()) == 2
+    rated = pytest.warns(SeakeepWarning, match="1: sampled at 100 Hz, which is assumed: no file")
+    with rated, pytest.warns(SeakeepWarning, match=ASSUMED.format("heave_2, surge")):
+        runs = campaign.prepare()
+    assert len(runs) == 2
+    assert ("time", "rate") in {(each.channel, each.kind) for each in findings_of(runs["1"])}
+    confirmed = re.sub("(unit|sampling_rate)_assumed = true", "", text)
+    (tmp_path / "campaign.toml").write_text(confirmed)
+    assert read_campaign(tmp_path / "campaign.toml").prepare()
 
 
 def test_matlab(tmp_path):
@@ -165,6 +199,60 @@ def test_matlab(tmp_path):
     assert list(campaign.settings.channels) == ["heave", "eta_1"]
     with pytest.warns(SeakeepWarning, match=ASSUMED.format("eta_1")):
         assert campaign.prepare()
+
+
+def named(t):
+    """A run as loggers save it that have no place for units: in the names."""
+    waves = np.cos(2 * np.pi * t / 1.2)
+    return {"BolgeHoyde_1_mm": 10 * waves, "Stamp_deg": 2 * waves, "Heave_MM": 5 * waves,
+            "Kraft_kN": 0.3 + waves, "gyro_x_deg_s": waves, "Trim_s": waves}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("time", "unit"), [("Tid_s", 1.0), ("time_ms", 1e3), ("Klokke_ms", 1e3), ("Klokke", 1.0)]
+)
+def test_units_that_names_end_on(tmp_path, time, unit):
+    """Times are found by their name, or because they rise evenly; 50 Hz they are in any unit."""
+    t = 0.02 * np.arange(1000)
+    for i in (1, 2):
+        io.savemat(tmp_path / f"Run_00{i}.mat", {**named(t), time: unit * t})
+    text, campaign = drafted(tmp_path, sorted(tmp_path.glob("*.mat")))
+    why = "it rises evenly, as times do, in " if "Klokke" in time else "from its name"
+    assert f'time = "{time}" # guessed' in text
+    assert why in text
+    assert "# the files have 50 samples a second" in text
+    with pytest.warns(SeakeepWarning, match=ASSUMED.format("trim_s")):
+        run = campaign.prepare()["Run_001"]
+    assert run.attrs["dt"] == pytest.approx(0.02, rel=1e-12)
+    for name, units, size in (
+        ("eta_1", "m", 0.01), ("pitch", "rad", np.radians(2)), ("heave", "m", 0.005),
+        ("kraft", "N", 1000.0), ("roll_rate", "rad/s", np.radians(1)), ("trim_s", "1", 1.0),
+    ):  # fmt: skip
+        assert run[name].attrs["units"] == units
+        assert float(np.ptp(run[name].to_numpy())) == pytest.approx(2 * size, rel=1e-12)
+    assert run["kraft"].attrs["long_name"] == "Kraft"  # kN it is no more
+
+
+@pytest.mark.parametrize("count", ["Sample", "WP [mm]"])
+def test_what_rises_evenly_and_is_no_time(tmp_path, count):
+    """Numbers of samples, and what a unit says to be something else."""
+    t = 0.02 * np.arange(100)
+    rising = np.arange(100.0) if count == "Sample" else 3 * t
+    write_csv(tmp_path / "run.csv", {count: rising, "Heave [mm]": np.sin(9 * t)})
+    text, campaign = drafted(tmp_path, [tmp_path / "run.csv"])
+    assert campaign.settings.files.sampling_rate == 100.0
+    assert campaign.settings.files.sampling_rate_assumed
+    left = "# column 'Sample' left out: it counts; if it counts seconds, state time = …"
+    assert (left in text) is (count == "Sample")
+
+
+def test_numbers_without_a_header(tmp_path):
+    t = 0.02 * np.arange(100)
+    np.savetxt(tmp_path / "run.txt", np.column_stack([t, np.sin(9 * t), np.cos(9 * t)]))
+    text, campaign = drafted(tmp_path, [tmp_path / "run.txt"])
+    assert 'time = "1" # guessed: it rises evenly, as times do, in s: 50 samples a second' in text
+    assert "# CORRECT IT: the files have no header; give [channels.…] their names, such" in text
+    assert list(campaign.settings.channels) == ["column_2", "column_3"]
 
 
 def test_files_in_the_data_folder_are_named_by_it(tmp_path, monkeypatch):
@@ -380,6 +468,18 @@ def test_one_logger_a_run_keeps_the_names_of_runs_and_logger(tmp_path):
     assert 'states = ["eta_us_fwd"] # CORRECT IT: no motion was found; name the files of' in text
     assert campaign.training_runs == ["irregular_1"]
     assert text.count("# guessed: irregular runs but the last train, the rest tests\n") == 4
+
+
+@pytest.mark.parametrize("lost", [10, 200])  # of 1001 samples: a channel with gaps, and none
+def test_what_has_gaps_is_left_out_with_a_word(tmp_path, lost):
+    columns = tank_columns() | {"WP aft [mm]": tank_columns()["WP fwd [mm]"]}
+    for name in ("Heave [mm]", "WP aft [mm]"):
+        columns[name] = np.where(np.arange(1001) // lost == 3, np.nan, columns[name])
+    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
+    assert (campaign.model().states, campaign.model().inputs) == (("pitch",), ("eta_fwd",))
+    for name, key in (("heave", "states"), ("eta_aft", "inputs")):
+        said = f"# {name} left out: it has gaps, and a model takes none. To be among the {key}, "
+        assert said in text
 
 
 def test_motions_that_are_noise_alone_are_no_states(tmp_path):

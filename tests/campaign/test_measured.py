@@ -1,5 +1,6 @@
 """The measured data sets, where they are."""
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 
 from seakeep.campaign import read_campaign, read_table
 from seakeep.campaign.drafts import draft_campaign
+from seakeep.errors import SeakeepWarning
 
 pytestmark = [
     pytest.mark.data,
@@ -33,7 +35,12 @@ def test_draft(tmp_path, name):
     path = tmp_path / "campaign.toml"
     path.write_text(draft_campaign(files, tmp_path), encoding="utf-8")
     campaign = read_campaign(path)
-    runs = campaign.prepare()
+    # The position of the flume's wavemaker is the one column whose header says no unit.
+    bare = [n for n, each in campaign.settings.channels.items() if each.unit_assumed]
+    assert bare == (["wm_position"] if name == FLUME else [])
+    told = pytest.warns(SeakeepWarning, match="the unit of wm_position, and")
+    with told if bare else contextlib.nullcontext():
+        runs = campaign.prepare()
     assert len(runs) == len(files)
     assert len({run.attrs["dt"] for run in runs.values()}) == 1
     assert "heave" in campaign.model().states

@@ -1,5 +1,6 @@
 """Whole records, and values that a vessel can reach: what prepare warns of and the sheet tells."""
 
+import re
 import warnings
 
 import numpy as np
@@ -59,6 +60,69 @@ def loggers(tmp_path):
         return read_campaign(path)
 
     return write
+
+
+class TestClocksAndRates:
+    """What is assumed or contradicted about instants is a finding."""
+
+    def test_clocks_of_which_nothing_is_said_are_assumed_the_same(self, loggers, tmp_path):
+        found = clocks(loggers().prepare()["first"])
+        assert [channel for channel, _ in found] == ["mru"]
+        assert found[0][1].startswith("assumed the same as the reference's: state trigger, shared")
+        path = tmp_path / "campaign.toml"
+        one = path.read_text().replace("[instruments.mru]", "[instruments.mru]\noffset = 0")
+        path.write_text(one, encoding="utf-8")
+        assert not clocks(read_campaign(path).prepare()["first"])
+
+    @pytest.mark.parametrize(
+        ("files", "text"),
+        [('time = "Time"\nsampling_rate = 100', "samples at 50 Hz, as its times tell; 100 Hz are"),
+         ("sampling_rate = 25", "counted at the 25 Hz stated; the file's own times, which are "),
+         ('time = "Time"\nsampling_rate = 50', None), ("sampling_rate = 50", None)],
+    )  # fmt: skip
+    def test_a_rate_against_the_times(self, edited, files, text):
+        path = edited(("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"))
+        found = clocks(read_campaign(path).prepare(["first"])["first"])
+        assert [each[0] for each in found] == ([] if text is None else ["time"])
+        assert text is None or found[0][1].startswith(text)
+
+
+class TestSteps:
+    """A step that loses the waves, and one that is finer than what was recorded."""
+
+    # Five waves of 0.5 to 0.9 Hz, all of one height, two of them above 0.72 Hz, where a filter for
+    # 1.6 Hz has its middle: 40 %, give or take how they beat under the spectrum's window.
+    @pytest.mark.parametrize(
+        ("chain", "fate"),
+        [("sampling_rate = 1.6", "[345]. % of the energy of its waves .* is damped or lost at 1.6"),
+         ("sampling_rate = 1.5\nanti_alias = false", "0.75 Hz and is folded into slower waves"),
+         ("sampling_rate = 10", None), ("sampling_rate = 3", None), ("sampling_rate = 100", None)],
+    )  # fmt: skip
+    def test_what_a_coarse_step_loses_is_told(self, edited, chain, fate):
+        path = edited(("sampling_rate = 10", chain))
+        found = step_findings(read_campaign(path).prepare(["first"])["first"])
+        assert set(found) == ({"eta_fwd", "heave", "pitch"} if fate else set())
+        assert fate is None or re.search(fate, found["eta_fwd"])
+
+    def test_noise_has_nothing_to_lose(self, edited, tank):
+        noise = np.random.default_rng(0).normal(0.0, 1.0, 1001)
+        write_csv(tank / "first.csv", tank_columns() | {"Pitch (deg)": noise})
+        found = step_findings(read_campaign(edited()).prepare(["first"])["first"])
+        assert not found
+
+    def test_a_step_finer_than_the_files(self, edited):
+        path = edited(("sampling_rate = 10", "sampling_rate = 200"))
+        found = step_findings(read_campaign(path).prepare(["first"])["first"])
+        assert list(found) == ["time"]
+        assert found["time"].startswith("put on 200 Hz, and no logger records more than 50 Hz")
+
+
+def step_findings(run):
+    return {each.channel: each.text for each in findings_of(run) if each.kind == "step"}
+
+
+def clocks(run):
+    return [(each.channel, each.text) for each in findings_of(run) if each.kind == "clock"]
 
 
 def records(run):
@@ -212,6 +276,24 @@ class TestValues:
         assert "scale" in kinds(run)
 
 
+@pytest.mark.parametrize(
+    ("begin", "why"),
+    [(300, "a gap of 2 s is longer than longest_gap = 0.25 s in [preparation]"),
+     (901, "it stands at an end of the record")],
+)  # fmt: skip
+def test_why_a_gap_is_not_bridged(edited, tank, begin, why):
+    columns = tank_columns(0)
+    columns["Heave [mm]"][begin : begin + 100] = np.nan
+    columns["Heave [mm]"][100:105] = np.nan  # short
+    write_csv(tank / "first.csv", columns)
+    path = edited(("[preparation]", '[preparation]\ngaps = "bridge"'))
+    said = findings_of(read_campaign(path).prepare(["first"])["first"])
+    missing, bridged = (each.text for each in said if each.kind == "missing")
+    assert missing.startswith("missing: 100 samples in 1 place(s)")
+    assert missing.endswith(f"; not bridged: {why}")
+    assert bridged.startswith("bridged: 5 samples in 1 place(s)")
+
+
 def kinds(run):
     return {each.kind for each in findings_of(run)}
 
@@ -225,3 +307,15 @@ def test_the_commands_show_step_and_period(edited, tank, capsys):
     assert words in " ".join(capsys.readouterr().err.split())
     page = (tank / "prepared" / "quality.html").read_text(encoding="utf-8")
     assert page.count(words) == 2
+
+
+def test_the_command_tells_what_was_found(loggers, tmp_path, capsys):
+    pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
+    loggers()
+    path = tmp_path / "mru.csv"
+    columns = {**tank_columns(), "Pitch (deg)": np.full(1001, 3.2)}
+    write_csv(path, {name: x for name, x in columns.items() if name != "WP fwd [mm]"})
+    assert cli.main(["prepare", str(tmp_path / "campaign.toml")]) == 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert "Found in first: pitch: constant at 3.2 deg Found" in said
+    assert "Found in first: clock of mru: assumed the same as the reference's: state" in said

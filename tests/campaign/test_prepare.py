@@ -359,6 +359,14 @@ class TestBadRuns:
         ):
             read_campaign(path).prepare()
 
+    def test_times_of_single_precision_are_told_as_they_were_meant(self, edited, tank):
+        columns = tank_columns(1)
+        columns["Time [s]"] = (0.945 + columns["Time [s]"]).astype(np.float32)
+        write_csv(tank / "second.csv", columns)
+        path = edited(("span = [2, 18]", "span = [2, 30]"))
+        with pytest.raises(RequestError, match=r"the record runs from 0\.945 to 20\.945 s\. Cor"):
+            read_campaign(path).prepare()
+
     def test_span_that_holds_nothing(self, edited):
         path = edited(("span = [2, 18]", "span = [2.01, 2.05]"))
         with pytest.raises(

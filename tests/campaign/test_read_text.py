@@ -105,6 +105,30 @@ def test_time_in_the_unit_of_its_header(tmp_path):
     np.testing.assert_allclose(run["time"], [0, 0.02], rtol=1e-15)
 
 
+@pytest.mark.parametrize("name", ["time_ms", "Tid_ms", "t ms"])
+@pytest.mark.parametrize("stated", [None, "stated"])
+def test_time_in_the_unit_that_its_name_ends_on(tmp_path, name, stated):
+    path = write(tmp_path, f"{name};heave\n0;1\n20;2\n")
+    run = read_table(path, FileSettings(time=stated and name))
+    np.testing.assert_allclose(run["time"], [0, 0.02], rtol=1e-15)
+    slow = read_table(path, FileSettings(time=name, time_unit="s"))  # a name is no header
+    np.testing.assert_array_equal(slow["time"], [0, 20])
+
+
+def test_a_unit_of_time_stated_against_the_header(tmp_path):
+    path = write(tmp_path, "Zeit [s],heave\n0,1\n0.02,2\n")
+    for unit in ("s", "sec"):
+        assert read_table(path, FileSettings(time_unit=unit))["time"][1] == 0.02
+    with pytest.raises(
+        RequestError,
+        match=r"time_unit: 'ms' is stated, and .*run\.csv says 's' of its time column 'Zeit'\. "
+        "Leave time_unit out where the files say it; or, if the file is wrong, correct its header",
+    ):
+        read_table(path, FileSettings(time="Zeit", time_unit="ms"))
+    rated = read_table(path, FileSettings(sampling_rate=10))  # what the message proposes
+    np.testing.assert_array_equal(rated["time"], [0, 0.1])
+
+
 def test_no_time_column_but_a_rate(tmp_path):
     run = read_table(write(tmp_path, "heave,pitch\n1,1\n2,2\n"), FileSettings(sampling_rate=50))
     np.testing.assert_array_equal(run["time"], [0, 0.02])
@@ -259,6 +283,11 @@ def test_round_trip(tmp_path, values, delimiter, comma, units, compressed, newli
             " expected a header, then one row an instant and one column a channel",
         ),
         (
+            "0,0.1,0.2\n1,2,3\n",
+            DataError,
+            r"run\.csv: no header and more columns than rows, which looks transposed \(2 rows, 3",
+        ),
+        (
             "time,heave\n2024-05-01 12:00:00.1,1\n2024-05-01 12:00:00.2,2\n",
             DataError,
             "line 2, column 'time': '2024-05-01 12:00:00.1' is not a number. Write dates and clock",
@@ -282,7 +311,13 @@ def test_round_trip(tmp_path, values, delimiter, comma, units, compressed, newli
         (
             "t,heave\n0,1\n0,2\n",
             DataError,
-            "the times of .*run.csv repeat: 0 s stands at samples 0",
+            r"the times of .*run.csv repeat: 0 s stands at samples 0 and 1 \(1 repetitions .* and "
+            r"the readings .* leave time out of \[files\] and state sampling_rate \(Hz\) there",
+        ),
+        (
+            "t,heave,pitch\n0,1,\n0,1,\n1,2,3\n",
+            DataError,
+            "the times of .*run.csv repeat: 0 s .* Remove the double rows, or raise the",
         ),
         ("t,heave\n1,1\n0,2\n", DataError, "are not sorted: 0 s follows 1 s at sample 1"),
         ("t,heave\n0,1\n,2\n", DataError, "hold a value that is not finite at sample 1"),

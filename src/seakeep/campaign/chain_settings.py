@@ -31,6 +31,10 @@ class InstrumentSettings(Table):
     sampling_rate: Positive | None = Field(
         default=None, description="samples a second; times are counted where the file has none"
     )
+    sampling_rate_assumed: bool = Field(
+        default=False,
+        description="true while sampling_rate is a guess: prepare warns until it is removed",
+    )
     time: str | None = Field(default=None, description="the name of its time column")
     time_unit: str | None = Field(default=None, description="unit of its time column, such as 'ms'")
     trigger: str | None = Field(default=None, description="the column that holds the trigger")

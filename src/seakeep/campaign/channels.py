@@ -13,7 +13,7 @@ from seakeep.campaign.checks import check_samples
 from seakeep.campaign.columns import is_unit
 from seakeep.campaign.derivation import derive
 from seakeep.campaign.instruments import Logger, channels_of, homes
-from seakeep.campaign.readers import labelled_table
+from seakeep.campaign.readers import labelled_table, time_column, time_step_of
 from seakeep.campaign.settings import (
     CampaignSettings,
     ChannelSettings,
@@ -25,6 +25,7 @@ from seakeep.campaign.validation import derivation_order, needed_channels, sourc
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import Clock, bridge, inspect_times, onto_uniform, uniform_step
+from seakeep.signals.clocks import instant_text
 from seakeep.signals.quality import BRIDGED, MISSING, flag_attributes
 
 __all__ = ["Group", "read_groups"]
@@ -133,10 +134,20 @@ def _channels(
         _refuse_gaps(dataset, run, path)
     dataset = _bridged(_regular(dataset, preparation, f"run '{run}' ({path})"), preparation)
     dataset = check_samples(dataset, preparation.outliers == "replace")
+    if (aside := _time_aside(logger)) is not None:
+        dataset.attrs["time_column_step"] = aside
     for name, position in settings.rig.positions.items():
         if name in dataset:
             dataset[name].attrs["x_position"] = float(position)
     return dataset
+
+
+def _time_aside(logger: Logger) -> float | None:
+    """Step that the file's times tell, s, where a stated rate counts in their place."""
+    if logger.options.sampling_rate is None or logger.options.time is not None:
+        return None
+    name = time_column(logger.columns)
+    return None if name is None else time_step_of(logger.columns, name)
 
 
 def _regular(dataset: xr.Dataset, preparation: PreparationSettings, name: str) -> xr.Dataset:
@@ -198,9 +209,11 @@ def _cut(table: xr.Dataset, settings: RunSettings, run: str) -> xr.Dataset:
     time = table["time"].to_numpy()
     kept = (time >= begin) & (time <= end)
     if kept.sum() < 2:
+        step = float(np.median(np.diff(time)))
+        first, last = instant_text(time[0], step), instant_text(time[-1], step)
         raise RequestError(
             f"runs.{run}.record: received [{begin:g}, {end:g}] s, and the file runs from "
-            f"{time[0]:g} to {time[-1]:g} s: nothing is left. Correct the two times."
+            f"{first} to {last} s: nothing is left. Correct the two times."
         )
     return table.isel(time=kept)
 
@@ -261,12 +274,13 @@ def _refuse_gaps(dataset: xr.Dataset, run: str, path: Path) -> None:
     step = float(np.median(np.diff(time)))
     lengths = ends - begins
     longest = int(np.argmax(lengths))
+    first, worst = (instant_text(time[begins[at]], step) for at in (0, longest))
     others = f" (also in {', '.join(gapped[1:])})" if gapped[1:] else ""
     raise DataError(
         f"run '{run}' ({path}): channel '{gapped[0]}' has {int(missing.sum())} missing values of "
-        f"{missing.size} in {begins.size} gap(s), the first at t = {time[begins[0]]:g} s "
-        f"({lengths[0]} samples, {lengths[0] * step:g} s), the longest at t = "
-        f"{time[begins[longest]]:g} s ({lengths[longest]} samples, {lengths[longest] * step:g} s)"
+        f"{missing.size} in {begins.size} gap(s), the first at t = {first} s ({lengths[0]} "
+        f"samples, {lengths[0] * step:.4g} s), the longest at t = {worst} s "
+        f"({lengths[longest]} samples, {lengths[longest] * step:.4g} s)"
         f"{others}. Repair the file, leave the channel out, or cut the gap off with record = "
         f"[begin, end] in [runs.{run}]; or state gaps = 'mask' or 'bridge' in [preparation]."
     )

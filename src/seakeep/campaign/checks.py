@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.campaign.settings import CampaignSettings
+from seakeep.campaign.settings import CampaignSettings, PreparationSettings
+from seakeep.conventions import displayed
 from seakeep.errors import SeakeepWarning
 from seakeep.signals import Clock, bridge, misplaced_probes
 from seakeep.signals.gaps import stretches
@@ -33,6 +34,7 @@ from seakeep.signals.quality import (
     level_drift,
 )
 from seakeep.signals.resolution import reading_step
+from seakeep.signals.synchronise import ASSUMED
 
 __all__ = [
     "Finding",
@@ -49,6 +51,10 @@ __all__ = [
 
 FloatArray = npt.NDArray[np.float64]
 
+RATE_TOLERANCE = 0.01
+"""Part by which a stated rate may differ from the times: rates are written with two digits or more,
+and quartzes keep theirs a thousand times better."""
+
 NO_SLOW_MOTION = ("heave", "roll", "pitch")
 """Besides wave elevations, channels whose level has no reason to change within a run."""
 
@@ -64,7 +70,7 @@ class Finding:
     kind : str
         ``constant``, ``missing``, ``outliers``, ``saturated``, ``stuck``, ``drift``, ``lag``,
         ``resolution``, ``agreement``, ``scale``, ``position``, ``clock``, ``record``, ``period``,
-        ``impossible``, ``unit`` or ``left out``.
+        ``rate``, ``step``, ``impossible``, ``unit`` or ``left out``.
     text : str
         What, how much, and what was done about it.
     """
@@ -145,7 +151,7 @@ def checked(
 ) -> list[Finding]:
     """All findings of a run."""
     pairs, _ = check_pairs(whole, settings)
-    every = told_samples(groups) + check_levels(whole) + pairs
+    every = told_samples(groups, settings.preparation) + check_levels(whole) + pairs
     every += check_positions(whole, settings.rig.water_depth, settings.runs[run].waves)
     others = [Finding("other runs", "left out", words) for words in left_out.values()]
     return every + check_clocks(clocks, groups, settings) + others
@@ -155,7 +161,9 @@ _KINDS = {MISSING: "missing", OUTLIER: "outliers", SATURATED: "saturated", STUCK
           BRIDGED: "missing"}  # fmt: skip
 
 
-def told_samples(groups: Mapping[str, xr.Dataset]) -> list[Finding]:
+def told_samples(
+    groups: Mapping[str, xr.Dataset], preparation: PreparationSettings | None = None
+) -> list[Finding]:
     """Put flagged samples, and channels that are constant, into words."""
     out = []
     for group in groups.values():
@@ -165,8 +173,8 @@ def told_samples(groups: Mapping[str, xr.Dataset]) -> list[Finding]:
             if "derived_from" in group[name].attrs:
                 continue
             if not np.ptp(group[name].to_numpy()):
-                value = float(group[name][0])
-                out.append(Finding(str(name), "constant", f"constant at {value:g}"))
+                value = _in_words(group[name], float(group[name][0]), ".6g")
+                out.append(Finding(str(name), "constant", f"constant at {value}"))
             if f"{name}_flags" not in group.coords:
                 continue
             flags = group[f"{name}_flags"].to_numpy()
@@ -183,8 +191,26 @@ def told_samples(groups: Mapping[str, xr.Dataset]) -> list[Finding]:
                 )
                 if bit == OUTLIER and (flags & REPLACED).any():
                     text += "; replaced by interpolation"
+                if bit == MISSING and preparation is not None and preparation.gaps == "bridge":
+                    text += f"; not bridged: {_why_open(parts, hit.size, dt, preparation)}"
                 out.append(Finding(str(name), _KINDS[bit], text))
     return out
+
+
+def _in_words(channel: xr.DataArray, value: float, form: str) -> str:
+    """Write a value of a channel with its unit, angles in degrees."""
+    factor, unit = displayed(str(channel.attrs["units"]))
+    return f"{factor * value:{form}}" + (f" {unit}" if unit not in ("1", "-") else "")
+
+
+def _why_open(
+    parts: Sequence[tuple[int, int]], size: int, dt: float, preparation: PreparationSettings
+) -> str:
+    inner = [(end - begin) * dt for begin, end in parts if begin > 0 and end < size]
+    if not inner:
+        return "it stands at an end of the record"
+    limit = f"longest_gap = {float(preparation.longest_gap):g} s in [preparation]"
+    return f"a gap of {max(inner):.3g} s is longer than {limit}"
 
 
 def check_levels(run: xr.Dataset) -> list[Finding]:
@@ -200,8 +226,7 @@ def check_levels(run: xr.Dataset) -> list[Finding]:
         change, sure = level_drift(x, dt, dominant_period(x, dt))
         # A level that moves by half the waves' spread shifts means and standardisation visibly.
         if abs(change) > 0.5 * x.std() and sure > 5:
-            units = run[name].attrs["units"]
-            text = f"level drifts by {change:+.3g} {units} over the record"
+            text = f"level drifts by {_in_words(run[name], change, '+.3g')} over the record"
             out.append(Finding(name, "drift", text))
     return out
 
@@ -248,7 +273,7 @@ def check_pairs(
             for fault in agreement.faults():
                 text = f"against {pair.channels[0]}: {fault}"
                 if (kind := _kind(fault)) == "resolution":
-                    text += f" ({step:.2g} {run[name].attrs['units']})"
+                    text += f" ({_in_words(run[name], step, '.2g')})"
                 out.append(Finding(name, kind, text))
             if not np.isfinite(agreement.period):
                 continue
@@ -345,12 +370,32 @@ def check_clocks(
         if (jitter := float(group.attrs.get("time_jitter_rms", 0.0))) > 0:
             text = f"jitter of {1e3 * jitter:.3g} ms RMS; interpolated onto a uniform step"
             out.append(Finding(label, "clock", text))
-        nominal = settings.instruments[name].sampling_rate if name else None
-        if nominal is not None and abs(step * nominal - 1) > 0.01:
-            text = f"samples at {1 / step:.5g} Hz; {nominal:g} Hz are stated"
+        out += [Finding(label, "clock", text) for text in _other_rate(name, group, settings)]
+        if clock.method == ASSUMED:
+            text = (
+                f"{ASSUMED}: state trigger, shared, correlated or offset (0 where the two run on "
+                f"one clock) in [instruments.{name}]"
+            )
             out.append(Finding(label, "clock", text))
         if clock.offset_error > 0.25 * step or clock.residual > 0.5 * step:
             out.append(Finding(label, "clock", f"poorly known: {clock.describe()}"))
         if abs(clock.drift) > 2e-4:
             out.append(Finding(label, "clock", f"drifts by {1e6 * clock.drift:+.0f} ppm"))
     return out
+
+
+def _other_rate(name: str, group: xr.Dataset, settings: CampaignSettings) -> list[str]:
+    """Say that a rate is stated and the times tell another one."""
+    step = float(group["time"][1] - group["time"][0])
+    stated = settings.instruments[name].sampling_rate if name else settings.files.sampling_rate
+    aside = group.attrs.get("time_column_step")
+    if stated is None:
+        return []
+    if aside is not None and abs(aside * stated - 1) > RATE_TOLERANCE:
+        return [
+            f"counted at the {stated:g} Hz stated; the file's own times, which are left aside, "
+            f"tell {1 / aside:.5g} Hz. Leave sampling_rate out, or correct it"
+        ]
+    if abs(step * stated - 1) > RATE_TOLERANCE:
+        return [f"samples at {1 / step:.5g} Hz, as its times tell; {stated:g} Hz are stated"]
+    return []

@@ -12,12 +12,22 @@ import numpy.typing as npt
 from seakeep.conventions import si_unit
 from seakeep.errors import RequestError, did_you_mean
 
-__all__ = ["Columns", "is_unit", "meant_column", "split_unit", "unique_names"]
+__all__ = ["Columns", "is_unit", "meant_column", "named_unit", "split_unit", "unique_names"]
 
 FloatArray = npt.NDArray[np.float64]
 
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*\Z")
 _PARENTHESES = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\s*\Z")
+
+_ENDINGS = {
+    **{unit: unit for unit in ("mm", "cm", "m", "deg", "rad", "N", "kN", "MN", "kgf", "Nm", "kNm",
+                               "g", "V", "mV", "Pa", "kPa", "bar", "Hz", "rpm", "s", "ms", "us",
+                               "sec")},
+    **{f"{each}_{per}": f"{each}/{unit}" for each in ("mm", "cm", "m", "deg", "rad")
+       for per, unit in (("s", "s"), ("s2", "s^2"), ("per_s", "s"), ("per_s2", "s^2"))},
+    "MM": "mm", "CM": "cm", "DEG": "deg", "RAD": "rad", "KN": "kN",
+}  # fmt: skip
+"""Endings of names that say a unit. Not all units: "min", "in" and "t" mean other things there."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +131,32 @@ def split_unit(header: str) -> tuple[str, str | None]:
     if match and match["unit"].strip() and is_unit(match["unit"]):
         return match["name"].strip(), match["unit"].strip()
     return header, None
+
+
+def named_unit(name: str) -> tuple[str, str | None]:
+    """Split the unit off that a name ends on, as where a format has no other place for it.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``"Heave_mm"``.
+
+    Returns
+    -------
+    (str, str or None)
+        Name and unit.
+
+    Examples
+    --------
+    >>> named_unit("Heave_mm"), named_unit("pitch_deg_s"), named_unit("WP_1")
+    (('Heave', 'mm'), ('pitch', 'deg/s'), ('WP_1', None))
+    """
+    words = re.split(r"[_ ]+", name.strip())
+    for count in (3, 2, 1):
+        unit = _ENDINGS.get("_".join(words[-count:]))
+        if unit is not None and any(words[:-count]):
+            return "_".join(words[:-count]), unit
+    return name, None
 
 
 def unique_names(headers: Iterable[str]) -> tuple[list[str], list[str | None]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 import tomlkit
 from tomlkit.items import Table
 
@@ -69,7 +70,10 @@ def _band(period: float | None, rate: float) -> str:
 
 
 def preparation_table(
-    guesses: Sequence[Guess], rates: Mapping[str, float | None], period: float | None
+    guesses: Sequence[Guess],
+    rates: Mapping[str, float | None],
+    period: float | None,
+    shortest: float | None,
 ) -> Table:
     """Draft of ``[preparation]``: one step for all, and what to do about gaps.
 
@@ -79,39 +83,43 @@ def preparation_table(
         The channels.
     rates : mapping of str to float or None
         Samples a second by logger.
-    period : float or None
-        Period of the waves, s.
+    period, shortest : float or None
+        Period of the first run's waves, and the shortest of all runs', s.
 
     Returns
     -------
     Table
-        The table.
+        The table; no step is finer than that of the fastest logger.
     """
     table = tomlkit.table()
     known = [rate for rate in rates.values() if rate]
     for logger, rate in rates.items():
         if rate and not logger:
             table.add(tomlkit.comment(f"the files have {rate:.6g} samples a second"))
-    if len(rates) > 1 and period is not None:
+    fine = period is not None and STEPS / period > max(known, default=np.inf)
+    usual = f"sampling_rate = {float(f'{min([25.0, *known]):.6g}')}  # Hz"
+    if len(rates) > 1 and period is not None and not fine:
         table.add("steps_per_period", STEPS)
         table["steps_per_period"].comment(
             f"guessed: samples a mean period, here about {STEPS / period:.3g} Hz"
         )
-        table.add(tomlkit.comment("sampling_rate = 25.0  # Hz; instead of it"))
+        table.add(tomlkit.comment(f"{usual}; instead of it"))
     elif len(rates) > 1:
         table.add("sampling_rate", float(f"{min(known, default=25.0):.6g}"))
         table["sampling_rate"].comment("Hz; guessed: that of the slowest logger")
     else:
         rate = known[0] if known else None
-        every = 1 if rate is None or period is None else int(period * rate / STEPS)
-        if rate is not None and period is not None and every > 1:
+        every = 1 if rate is None or shortest is None else int(shortest * rate / STEPS)
+        if rate is not None and shortest is not None and every > 1:
             table.add("sampling_rate", float(f"{rate / every:.6g}"))
             table["sampling_rate"].comment(
-                f"Hz; guessed: about {STEPS} samples a wave of {period:.3g} s"
+                f"Hz; guessed: about {STEPS} samples a wave of {shortest:.3g} s, the shortest"
             )
         else:
-            table.add(tomlkit.comment("sampling_rate = 25.0  # Hz; left out, the files' own"))
-        table.add(tomlkit.comment(f"steps_per_period = {STEPS}  # instead: samples a mean period"))
+            table.add(tomlkit.comment(f"{usual}; left out, the files' own"))
+        if not fine:
+            said = f"steps_per_period = {STEPS}  # instead: samples a mean period"
+            table.add(tomlkit.comment(said))
     gapped = [str(guess.channel) for guess in guesses if guess.gaps]
     if gapped:
         bridged = bool(_waves(guesses)) and not _waves(guesses, whole=True)
@@ -133,7 +141,7 @@ def driving_wave(guesses: Sequence[Guess]) -> Guess | None:
     return next((guess for guess in guesses if name and guess.channel == name), None)
 
 
-def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
+def model_table(guesses: Sequence[Guess], steps: float | None, holed: Sequence[str] = ()) -> Table:
     """Draft of ``[model]``: motions as states, waves as inputs, delays in encounter periods.
 
     Parameters
@@ -142,6 +150,8 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
         The channels.
     steps : float or None
         Samples a period of the waves that the preparation makes.
+    holed : sequence of str, optional
+        What columns would be that miss too much to be channels.
 
     Returns
     -------
@@ -164,14 +174,15 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
     model = tomlkit.table()
     model.add("preset", "recommended")
     model.add("states", list(states))
-    motions = any(moved)
     model["states"].comment(
-        "guessed: the motions that the model forecasts"
-        if motions
-        else "CORRECT IT: no motion was found; name the files of all loggers to init"
+        "guessed: the motions that the model forecasts" if any(moved) else _no_motion(guesses)
     )
     if left := [name for name in noise if any(name in kind for kind in kinds)]:
         model.add(tomlkit.comment(f"{', '.join(left)}: noise alone was found; left out."))
+    gapped = [str(guess.channel) for guess in guesses if guess.channel and guess.gaps]
+    gapped += holed
+    if left := [name for name in gapped if any(name in kind for kind in kinds)]:
+        _add_gapped(model, left, "states")
     if loads:
         for line in (
             f"Loads ({', '.join(loads)}) may be added to the states to have them forecast too.",
@@ -181,6 +192,9 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
             model.add(tomlkit.comment(line))
     model.add("inputs", [wave for wave in waves if wave not in states])
     model["inputs"].comment("guessed: the wave probes that drive it; those behind it do not")
+    holes = [name for name in holed if name.startswith("eta_")]
+    if left := [*(wave for wave in _waves(guesses) if wave not in waves), *holes]:
+        _add_gapped(model, left, "inputs")
     model.add(tomlkit.comment("in place of the preset's, in encounter periods T or in samples:"))
     for key, count in (("state_delays", 1), ("input_delays", 5)):
         about = f"  # about {round(count * steps)} samples" if steps is not None else ""
@@ -189,3 +203,23 @@ def model_table(guesses: Sequence[Guess], steps: float | None) -> Table:
     model.add(tomlkit.comment('ridge_scale = "per_snapshot"'))
     model.add(tomlkit.comment('delay_rows = "exact"'))
     return model
+
+
+def _add_gapped(model: Table, left: Sequence[str], key: str) -> None:
+    has = "it has" if len(left) == 1 else "they have"
+    model.add(
+        tomlkit.comment(
+            f"{', '.join(left)} left out: {has} gaps, and a model takes none. To be among the "
+            f"{key}, mend them in the files, or bridge them (gaps, longest_gap in [preparation])."
+        )
+    )
+
+
+def _no_motion(guesses: Sequence[Guess]) -> str:
+    """What to do where no column is called as a motion is."""
+    if all(guess.column.isdigit() for guess in guesses):
+        return (
+            "CORRECT IT: the files have no header; give [channels.…] their names, such as heave "
+            "or eta_1, and state units"
+        )
+    return "CORRECT IT: no motion was found; name the files of all loggers to init"

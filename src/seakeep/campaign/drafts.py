@@ -10,7 +10,7 @@ import numpy as np
 import tomlkit
 from tomlkit.items import Table
 
-from seakeep.campaign.columns import Columns, is_unit
+from seakeep.campaign.columns import Columns, named_unit
 from seakeep.campaign.draft_hints import (
     derived_examples,
     driving_wave,
@@ -23,13 +23,16 @@ from seakeep.campaign.guesses import (
     Guess,
     arranged,
     guess_channels,
+    is_noise,
     is_trigger,
     noise_of,
+    rising_column,
+    suggest_channel,
     waves_of,
 )
-from seakeep.campaign.readers import read_columns, time_column
+from seakeep.campaign.readers import read_columns, time_column, time_step_of, time_unit_of
 from seakeep.campaign.settings import FileSettings
-from seakeep.conventions import canonical_channel, conversion
+from seakeep.conventions import canonical_channel
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import encounter_period
 
@@ -38,6 +41,8 @@ __all__ = ["draft_campaign"]
 NOISE = 4.0
 """Standard deviations of a probe's noise that a wave must pass either way to count: one sample in
 16 000 of normal noise lies beyond."""
+
+REMOVE = "prepare warns of it: remove it"
 
 LED = 0.9
 """Where noise shortens the counted period to less than this part, the draft states a hysteresis."""
@@ -81,13 +86,18 @@ def draft_campaign(
     paths = [Path(file) for file in files]
     known = {key: value for key, value in (options or {}).items() if value is not None}
     tables = [read_columns(path, FileSettings.model_validate(known)) for path in paths]
-    read = arranged(paths, tables, [time_column(table) for table in tables])
+    read = arranged(paths, tables, _times(tables))
     guesses = guess_channels(read)
     if not any(guess.channel for guess in guesses):
         _refuse(read)
     loggers = list({file.logger: file for file in reversed(read)}.values())[::-1]
     rates = {file.logger: _rate(file.table, file.time) for file in loggers}
-    period, hysteresis = _wave_period(loggers, guesses, rates)
+    wave = driving_wave(guesses)
+    counted = (
+        [] if wave is None else [_wave_period(f, wave) for f in read if f.logger == wave.logger]
+    )
+    period, hysteresis = counted[0] if counted else (None, 0.0)
+    shortest = min((each for each, _ in counted if each is not None), default=None)
     document = tomlkit.document()
     document.add(tomlkit.comment("Draft of a campaign. Read every line that says 'guessed', then"))
     document.add(tomlkit.comment("run: seakeep prepare THIS-FILE, and look at the sheet it makes"))
@@ -102,9 +112,11 @@ def draft_campaign(
         _instruments(document, loggers, guesses, rates)
     _runs(document, read, folder)
     kept = [guess for guess in guesses if guess.channel]
-    preparation = preparation_table(kept, rates, period)
+    preparation = preparation_table(kept, rates, period, shortest)
     document.add("preparation", preparation)
-    document.add("model", model_table(kept, _steps(preparation, rates, period)))
+    holed = [_meant(guess) for guess in guesses if guess.channel is None and guess.gaps]
+    holed = [name for name in holed if name not in names]
+    document.add("model", model_table(kept, _steps(preparation, rates, period), holed))
     return tomlkit.dumps(document)
 
 
@@ -133,29 +145,26 @@ def _refuse(files: Sequence[File]) -> None:
     )
 
 
+def _times(tables: Sequence[Columns]) -> list[str | None]:
+    """Time column of each file, by its name; else by its values, where no file tells its rate."""
+    named = [time_column(table) for table in tables]
+    return [
+        rising_column(table) if time is None and table.sampling_rate is None else time
+        for table, time in zip(tables, named, strict=True)
+    ]
+
+
 def _rate(table: Columns, time: str | None) -> float | None:
-    if time is None or time not in table.values or table.values[time].size < 3:
-        return table.sampling_rate
-    unit = table.units.get(time, "s").split(" since ")[0]
-    times = table.values[time]
-    step = float(times[-1] - times[0]) / (times.size - 1)
-    usual = float(np.median(np.diff(times)))
-    step = step if abs(step - usual) < 0.01 * abs(usual) else usual  # gaps do not count
-    step *= conversion(unit, "s", f"the time column '{time}'") if is_unit(unit) else 1.0
-    return 1.0 / step if step > 0 else None
+    step = None if time is None else time_step_of(table, time)
+    return table.sampling_rate if step is None else 1.0 / step
 
 
-def _wave_period(
-    loggers: Sequence[File], guesses: Sequence[Guess], rates: dict[str, float | None]
-) -> tuple[float | None, float]:
-    """Period of the first file's waves, s, and the hysteresis that keeps noise from counting."""
-    wave = driving_wave(guesses)
-    if wave is None or (rate := rates[wave.logger]) is None:
-        return None, 0.0
-    table = next(file.table for file in loggers if file.logger == wave.logger)
-    series = table.values[wave.column]
+def _wave_period(file: File, wave: Guess) -> tuple[float | None, float]:
+    """Period of a file's waves, s, and the hysteresis that keeps noise from counting."""
+    rate = _rate(file.table, file.time)
+    series = file.table.values.get(wave.column, np.zeros(0))
     there = np.isfinite(series)
-    if there.sum() < LONG or not np.ptp(series[there]):
+    if rate is None or there.sum() < LONG or not np.ptp(series[there]) or is_noise(series):
         return None, 0.0
     at = np.arange(series.size)
     series = np.interp(at, at[there], series[there])
@@ -224,11 +233,20 @@ def _files_table(
     times = {file.time for file in files}
     if len(times) == 1 and (time := files[0].time) is not None:
         table.add("time", time)
-        table["time"].comment("guessed from its name")
-    elif not files[0].logger and files[0].table.sampling_rate is None:
+        table["time"].comment(_why_time(files[0].table, time))
+    elif not files[0].logger and None in times and files[0].table.sampling_rate is None:
         table.add("sampling_rate", 100.0)
         table["sampling_rate"].comment("ASSUMED: the files have no time column. Correct it")
+        table.add("sampling_rate_assumed", tomlkit.item(True).comment(REMOVE))
     document.add("files", table)
+
+
+def _why_time(table: Columns, time: str) -> str:
+    if time_column(table) is not None:
+        return "guessed from its name"
+    unit, step = time_unit_of(table, time), time_step_of(table, time)
+    rate = "" if step is None else f": {1 / step:.6g} samples a second"
+    return f"guessed: it rises evenly, as times do, in {unit}{rate}. Check it"
 
 
 def _channels(document: tomlkit.TOMLDocument, guesses: Sequence[Guess]) -> None:
@@ -244,16 +262,16 @@ def _channels(document: tomlkit.TOMLDocument, guesses: Sequence[Guess]) -> None:
         table.add("column", guess.column)
         if guess.logger:
             table.add("instrument", guess.logger)
-        if guess.assumed_unit:
+        if guess.named_unit:
+            table.add("unit", guess.unit)
+            table["unit"].comment("guessed: its name ends on it. Check it")
+        elif guess.assumed_unit:
             table.add("unit", guess.unit)
             table["unit"].comment("ASSUMED: the file states none. Correct it")
-            if guess.unit != "-":
-                table.add(
-                    "unit_assumed", tomlkit.item(True).comment("prepare warns of it: remove it")
-                )
+            table.add("unit_assumed", tomlkit.item(True).comment(REMOVE))
         canonical = canonical_channel(guess.channel)
         if canonical is None:
-            table.add("long_name", guess.column)
+            table.add("long_name", _label(guess))
         else:
             table["column"].comment(f"guessed: {canonical.long_name}; header '{guess.header}'")
         if guess.gaps:
@@ -264,6 +282,17 @@ def _channels(document: tomlkit.TOMLDocument, guesses: Sequence[Guess]) -> None:
         document.add(tomlkit.nl())
     for guess in skipped:
         document.add(tomlkit.comment(f"column '{guess.header}' left out: {guess.why}"))
+
+
+def _meant(guess: Guess) -> str:
+    """Channel that a column would be, were it whole."""
+    name, unit = named_unit(guess.column) if guess.named_unit else (guess.column, guess.unit)
+    return suggest_channel(name, None if guess.assumed_unit else unit, guess.logger)
+
+
+def _label(guess: Guess) -> str:
+    """Name of a column for labels, without a unit that the campaign converts."""
+    return named_unit(guess.column)[0] if guess.named_unit else guess.column
 
 
 def _instruments(
@@ -294,6 +323,7 @@ def _instruments(
         if file.time is None and file.table.sampling_rate is None:
             table.add("sampling_rate", 100.0)
             table["sampling_rate"].comment("ASSUMED: the file has no time column. Correct it")
+            table.add("sampling_rate_assumed", tomlkit.item(True).comment(REMOVE))
         elif rate := rates[file.logger]:
             table.add(tomlkit.comment(f"{rate:.6g} samples a second"))
         if all(triggers.values()):

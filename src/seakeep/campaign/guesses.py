@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.campaign.columns import Columns, is_unit
+from seakeep.campaign.columns import Columns, is_unit, named_unit
 from seakeep.conventions import canonical_channel, si_unit
+from seakeep.errors import DataError
+from seakeep.signals import uniform_step
 
 __all__ = [
     "MOTIONS",
@@ -20,8 +22,10 @@ __all__ = [
     "arranged",
     "guess_channels",
     "is_acceleration",
+    "is_noise",
     "is_trigger",
     "noise_of",
+    "rising_column",
     "suggest_channel",
     "waves_of",
     "words_of",
@@ -74,7 +78,10 @@ class File:
 
 @dataclass(frozen=True)
 class Guess:
-    """What a column may be; `channel` is None where nothing fits, `noise` where nothing moves."""
+    """What a column may be; `channel` is None where nothing fits, `noise` where nothing moves.
+
+    `named_unit` says that the unit is what the column's name ends on.
+    """
 
     column: str
     header: str
@@ -83,6 +90,7 @@ class Guess:
     logger: str = ""
     why: str = ""
     assumed_unit: bool = False
+    named_unit: bool = False
     gaps: bool = False
     noise: bool = False
 
@@ -207,11 +215,15 @@ def guess_channels(files: Sequence[File]) -> list[Guess]:
 def _guess(column: str, files: Sequence[File], taken: set[str]) -> Guess:
     table, logger = files[0].table, files[0].logger
     header, unit = table.headers.get(column, column), table.units.get(column)
+    name, named = (column, None) if unit is not None else named_unit(column)
+    if named is not None and si_unit(named) == "s":  # no channel is a time: "Tension_s" is a side
+        name, named = column, None
+    unit = unit if unit is not None else named
     why, gaps = _fault(column, files)
     if unit is not None and not is_unit(unit):
         why = why or f"its unit '{unit}' is not known; state unit = '…'"
     # One file a run may be that of one logger, whose name tells what it measured.
-    channel = None if why else suggest_channel(column, unit, logger or _stem(files[0].path))
+    channel = None if why else suggest_channel(name, unit, logger or _stem(files[0].path))
     if channel is not None:
         stem, count = channel, 2
         while channel in taken:
@@ -220,11 +232,13 @@ def _guess(column: str, files: Sequence[File], taken: set[str]) -> Guess:
     assumed = unit is None
     canonical = canonical_channel(channel) if channel else None
     unit = unit if unit is not None else (canonical.units if canonical else "-")
-    noise = not why and all(_is_noise(file.table.values[column]) for file in files)
-    return Guess(column, header, unit, channel, logger, why, assumed, gaps, noise)
+    noise = not why and all(is_noise(file.table.values[column]) for file in files)
+    return Guess(
+        column, header, unit, channel, logger, why, assumed, named is not None, gaps, noise
+    )
 
 
-def _is_noise(series: FloatArray) -> bool:
+def is_noise(series: FloatArray) -> bool:
     """Whether most of a column's variance has no memory from one sample to the next."""
     series = series[np.isfinite(series)]
     if series.size < LONG:
@@ -250,7 +264,33 @@ def _fault(column: str, files: Sequence[File]) -> tuple[str, bool]:
     there = {id(f): float(np.mean(np.isfinite(f.table.values[column]))) for f in files}
     if gapped := [f for f in files if there[id(f)] < USABLE]:
         return f"has gaps in {_listed(gapped)}", True
+    if all(_step_of(f.table.values[column]) == 1.0 for f in files):
+        return "it counts; if it counts seconds, state time = …", False
     return "", min(there.values()) < 1
+
+
+def rising_column(table: Columns) -> str | None:
+    """Name of the first column that rises evenly, as times do; None if there is none.
+
+    One that a unit says to be something else is none, nor is one that counts 1, 2, 3.
+    """
+    for column, series in table.values.items():
+        unit = table.units.get(column) or named_unit(column)[1]
+        if unit is not None and not (is_unit(unit) and si_unit(unit) == "s"):
+            continue
+        if _step_of(series) not in (None, 1.0):
+            return column
+    return None
+
+
+def _step_of(series: FloatArray) -> float | None:
+    """Step of a column that rises evenly; None for any other."""
+    if series.size < LONG or not np.all(np.diff(series) > 0):
+        return None
+    try:
+        return uniform_step(series)
+    except DataError:
+        return None
 
 
 def _listed(files: Sequence[File]) -> str:

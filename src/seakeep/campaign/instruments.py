@@ -29,6 +29,7 @@ from seakeep.signals import (
     clock_from_shared,
     onto_uniform,
 )
+from seakeep.signals.synchronise import ASSUMED
 
 __all__ = ["Logger", "channels_of", "clocks_of", "homes", "open_loggers", "reference_of"]
 
@@ -240,7 +241,7 @@ def _clock(
     if pair is None:
         stated = own.offset is not None or own.drift is not None
         clock = Clock(own.offset or 0.0, 1e-6 * (own.drift or 0.0))
-        return replace(clock, method="as stated") if stated else clock
+        return replace(clock, method="as stated" if stated else ASSUMED)
     time, series = logger.uniform(pair[0])
     instants, other = reference.uniform(pair[1])
     if not np.ptp(series) or not np.ptp(other):

@@ -14,6 +14,7 @@ from seakeep.campaign.resampling import inside
 from seakeep.campaign.settings import CampaignSettings, RunSettings
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import Clock
+from seakeep.signals.clocks import instant_text
 
 __all__ = ["attributes_of", "cropped", "role_of", "version"]
 
@@ -119,10 +120,10 @@ def cropped(
             continue
         finite = [edge for edge in span if np.isfinite(edge)]
         if any(not record[0] - dt < edge < record[1] + dt for edge in finite):
+            begin, end = _texts(record, dt)
             raise RequestError(
-                f"runs.{name}.{key}: received [{span[0]:g}, {span[1]:g}] s, and the record "
-                f"runs from {record[0]:g} to {record[1]:g} s. Correct the span; 'inf' stands "
-                "for the end."
+                f"runs.{name}.{key}: received [{', '.join(_texts(span, dt))}] s, and the record "
+                f"runs from {begin} to {end} s. Correct the span; 'inf' stands for the end."
             )
         _refuse_empty(f"runs.{name}.{key}", span, time, dt, record)
     if settings.span is None:
@@ -146,17 +147,23 @@ def _refuse_empty(
     """Refuse a span that holds too few of a run's instants, whose record is the reference's."""
     if (count := int(inside(time, span, dt).sum())) > 1:
         return
-    stated = f"{key}: [{span[0]:g}, {span[1]:g}] s holds {count} sample(s) at a step of {dt:g} s"
-    begin, end = float(time[0]), float(time[-1])
-    if begin > record[0] + 2 * dt or end < record[1] - 2 * dt:
+    stretch = ", ".join(_texts(span, dt))
+    stated = f"{key}: [{stretch}] s holds {count} sample(s) at a step of {dt:.4g} s"
+    begin, end = _texts((float(time[0]), float(time[-1])), dt)
+    if time[0] > record[0] + 2 * dt or time[-1] < record[1] - 2 * dt:
+        first, last = _texts(record, dt)
         raise DataError(
-            f"{stated}, since all loggers recorded together only from {begin:g} to {end:g} s; the "
-            f"reference runs from {record[0]:g} to {record[1]:g} s. Check whether the files of the "
-            "other loggers are whole, or correct the span."
+            f"{stated}, since all loggers recorded together only from {begin} to {end} s; the "
+            f"reference runs from {first} to {last} s. Check whether the files of the other "
+            "loggers are whole, or correct the span."
         )
     raise RequestError(
-        f"{stated}. Lengthen the span, or move it into the run's {begin:g} to {end:g} s."
+        f"{stated}. Lengthen the span, or move it into the run's {begin} to {end} s."
     )
+
+
+def _texts(span: tuple[float, float], dt: float) -> tuple[str, str]:
+    return instant_text(span[0], dt), instant_text(span[1], dt)
 
 
 def role_of(settings: RunSettings) -> str:

@@ -11,16 +11,35 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.campaign.checks import Finding
+from seakeep.campaign.guesses import MOTIONS, is_noise
 from seakeep.campaign.instruments import channels_of
-from seakeep.campaign.settings import CampaignSettings, RunSettings
+from seakeep.campaign.settings import CampaignSettings, PreparationSettings, RunSettings
 from seakeep.campaign.survey import used_span
 from seakeep.errors import SeakeepWarning
+from seakeep.signals.clocks import PASSBAND
+from seakeep.signals.sampling import energy_above
 
-__all__ = ["check_records", "check_values", "implausible", "warn_of"]
+__all__ = [
+    "WARNED",
+    "check_rates",
+    "check_records",
+    "check_step",
+    "check_values",
+    "implausible",
+    "warn_of",
+]
 
 LOST = 0.05
 """Part of a run's used span that a logger may miss: they are started and stopped by hand, seconds
 apart, and runs last minutes."""
+
+LOST_ENERGY = 0.05
+"""Part of the waves' energy that a step may cost: 2.5 % of their standard deviation, more than a
+calibrated probe leaves open (1 to 2 %)."""
+
+FINER = 2.0
+"""Times finer than the fastest logger that a step may be: one of 32 to a period is so where the
+loggers take 16, the fewest that show a wave's shape."""
 
 
 def check_records(groups: Mapping[str, xr.Dataset], settings: RunSettings) -> list[Finding]:
@@ -94,6 +113,68 @@ def check_values(run: xr.Dataset, depth: float | None) -> list[Finding]:
     return out
 
 
+def check_step(
+    groups: Mapping[str, xr.Dataset], dt: float, preparation: PreparationSettings
+) -> list[Finding]:
+    """Steps that are too coarse for the waves, or finer than any logger's.
+
+    Parameters
+    ----------
+    groups : mapping of str to Dataset
+        Channels by logger, each at its own rate.
+    dt : float
+        The common step, s.
+    preparation : PreparationSettings
+        How it is reached.
+
+    Returns
+    -------
+    list of Finding
+        Of kind ``step``: of the run's time, and of each wave elevation and motion.
+    """
+    out = []
+    steps = {name: float(g["time"][1] - g["time"][0]) for name, g in groups.items()}
+    if round(min(steps.values()) / dt, 3) > FINER:
+        text = (
+            f"put on {1 / dt:.4g} Hz, and no logger records more than "
+            f"{1 / min(steps.values()):.4g} Hz: nothing is gained, and models take longer"
+        )
+        out.append(Finding("time", "step", text))
+    # A filter halves amplitudes in the middle between its pass band and the Nyquist frequency.
+    edge = (0.5 * (PASSBAND + 1.0) if preparation.anti_alias else 1.0) * 0.5 / dt
+    fate = "is damped or lost" if preparation.anti_alias else "is folded into slower waves"
+    for logger, group in groups.items():
+        for name in map(str, group.data_vars):
+            wanted = name.startswith("eta_") or name in MOTIONS
+            if not wanted or "derived_from" in group[name].attrs or steps[logger] >= dt:
+                continue
+            x = group[name].to_numpy()
+            share, period = energy_above(x, steps[logger], edge)
+            if share > LOST_ENERGY and not is_noise(x):
+                text = (
+                    f"{100 * share:.2g} % of the energy of its waves (peak at {period:.3g} s) lies "
+                    f"above {edge:.3g} Hz and {fate} at {1 / dt:.4g} Hz; take a finer step"
+                )
+                out.append(Finding(name, "step", text))
+    return out
+
+
+def _in(unit: str | None) -> str:
+    return "without a unit" if unit == "-" else f"in {unit}"
+
+
+def check_rates(groups: Mapping[str, xr.Dataset], settings: CampaignSettings) -> list[Finding]:
+    """Loggers whose rate is a guess, of kind ``rate``; the reference of one file is "time"."""
+    out = []
+    for name in groups:
+        own = settings.instruments[name] if name else settings.files
+        counted = own.sampling_rate is not None and own.time is None
+        if counted and own.sampling_rate_assumed:
+            text = f"at {own.sampling_rate:g} Hz, which is assumed: no file tells its rate"
+            out.append(Finding(name or "time", "rate", text))
+    return out
+
+
 def _reached(x: npt.NDArray[np.float64]) -> float:
     return float(np.percentile(np.abs(x), 99))
 
@@ -123,15 +204,18 @@ def implausible(
     Returns
     -------
     list of Finding
-        Records, values, assumed units and the period.
+        Records, values, assumed units and rates, the step, and the period.
     """
     run = settings.runs[name]
     found = check_records(groups, run) + check_values(whole, settings.rig.water_depth)
     found += [
-        Finding(channel, "unit", f"in {each.unit}, which is assumed: no file states its unit")
+        Finding(channel, "unit", f"{_in(each.unit)}, which is assumed: no file states its unit")
         for channel, each in channels_of(settings, run).items()
         if each.unit_assumed and channel in whole
     ]
+    found += check_rates(groups, settings)
+    step = float(whole["time"][1] - whole["time"][0])
+    found += check_step(groups, step, settings.preparation)
     if name in doubts and settings.wave_channel is not None:
         found.append(Finding(settings.wave_channel, "period", doubts[name]))
     return found
@@ -145,6 +229,8 @@ _MENDS = {
     "impossible": _UNIT,
 }
 """What to do about each kind of finding of which a warning is given."""
+WARNED = frozenset({"unit", "rate", "position", "period", "left out", *_MENDS})
+"""Kinds of findings that warnings tell while a campaign is prepared."""
 
 
 def warn_of(findings: Iterable[Finding], run: str, told: set[tuple[str, str]]) -> None:
@@ -175,6 +261,15 @@ def warn_of(findings: Iterable[Finding], run: str, told: set[tuple[str, str]]) -
             stacklevel=3,
         )
     for each in every:
+        if each.kind == "rate" and (each.channel, "rate") not in told:
+            table = "files" if each.channel == "time" else f"instruments.{each.channel}"
+            told.add((each.channel, "rate"))
+            warnings.warn(
+                f"{run}: sampled {each.text}. All periods and rates follow from it. Correct "
+                f"sampling_rate in [{table}], and remove sampling_rate_assumed there.",
+                SeakeepWarning,
+                stacklevel=3,
+            )
         if each.kind not in _MENDS or (each.channel, each.kind) in told:
             continue
         if each.kind != "record":

@@ -33,7 +33,7 @@ Progress = Callable[[int, int, str], None]
 SHOWN_RUNS = 6
 """Runs that a campaign's representation names."""
 
-FORMAT = 5
+FORMAT = 6
 """Goes into the digest: raise it when the same settings begin to give other arrays or findings."""
 
 

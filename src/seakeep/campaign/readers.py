@@ -6,7 +6,7 @@ import difflib
 import hashlib
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +15,13 @@ import xarray as xr
 
 from seakeep.campaign.binary import read_matlab, read_netcdf
 from seakeep.campaign.checksums import sha256_of
-from seakeep.campaign.columns import Columns, meant_column
+from seakeep.campaign.columns import Columns, is_unit, meant_column, named_unit
 from seakeep.campaign.kinds import refuse_foreign
 from seakeep.campaign.rosbag import is_recording, read_recording
 from seakeep.campaign.settings import FileSettings
 from seakeep.campaign.tdms import read_tdms
 from seakeep.campaign.text import read_text
-from seakeep.conventions import conversion
+from seakeep.conventions import conversion, si_unit
 from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
 from seakeep.signals.clocks import check_order
 
@@ -29,8 +29,8 @@ __all__ = ["expand", "read_columns", "read_table"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_TIMES = {"time", "t", "times", "tid", "tempo", "zeit", "temps", "tiempo", "time_s", "t_s",
-          "sec", "seconds", "elapsed", "elapsed time", "time elapsed", "timestamp"}  # fmt: skip
+_TIMES = {"time", "t", "times", "tid", "tempo", "zeit", "temps", "tiempo", "sec", "seconds",
+          "elapsed", "elapsed time", "time elapsed", "timestamp"}  # fmt: skip
 SHOWN = 5
 """Names of a folder that a message lists at most."""
 _VARIABLE = re.compile(r"\$\{([^}]*)\}")
@@ -226,9 +226,31 @@ def time_column(table: Columns, stated: str | None = None) -> str | None:
     if stated is not None:
         return table.find(stated)
     for name in table.names:
-        if name.strip().lower() in _TIMES:
+        bare, unit = named_unit(name)
+        if unit is not None and si_unit(unit) != "s":
+            bare = name
+        if bare.strip().lower() in _TIMES:
             return name
     return None
+
+
+def time_unit_of(table: Columns, name: str, stated: str | None = None) -> str:
+    """Unit of a time column: as stated, as its header says, as its name ends, or seconds."""
+    said = table.units.get(name, "").split(" since ")[0].strip()
+    named = named_unit(name)[1]
+    return stated or said or (named if named is not None and si_unit(named) == "s" else "s")
+
+
+def time_step_of(table: Columns, name: str) -> float | None:
+    """Step of a time column, s, by which gaps do not count; None where it tells none."""
+    times, unit = table.values.get(name), time_unit_of(table, name)
+    if times is None or times.size < 3:
+        return None
+    step = float(times[-1] - times[0]) / (times.size - 1)
+    usual = float(np.median(np.diff(times)))
+    step = step if abs(step - usual) < 0.01 * abs(usual) else usual
+    step *= conversion(unit, "s", f"the time column '{name}'") if is_unit(unit) else 1.0
+    return step if step > 0 else None
 
 
 def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | None, FloatArray]:
@@ -250,6 +272,45 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
         return name, check_order(np.arange(count) / float(rate or 1.0), str(path))
     if name in table.faults:
         raise DataError(table.faults[name])
-    unit = (options.time_unit or table.units.get(name, "s")).split(" since ")[0]
+    unit = time_unit_of(table, name, options.time_unit)
     factor = conversion(unit, "s", f"the time column '{name}' of {path}")
-    return name, check_order(table.values[name] * factor, str(path))
+    _refuse_other_unit(path, table, name, options.time_unit)
+    times = table.values[name] * factor
+    _refuse_stuck_clock(path, times, [x for each, x in table.values.items() if each != name])
+    return name, check_order(times, str(path))
+
+
+def _refuse_other_unit(path: Path, table: Columns, name: str, stated: str | None) -> None:
+    """Refuse a unit of the times that is stated against the one in the file's header."""
+    said = table.units.get(name, "").split(" since ")[0].strip()
+    if stated is None or not is_unit(said) or si_unit(said) != "s":
+        return
+    if conversion(said, "s") == conversion(stated, "s"):
+        return
+    raise RequestError(
+        f"time_unit: '{stated}' is stated, and {path} says '{said}' of its time column '{name}'. "
+        "Leave time_unit out where the files say it; or, if the file is wrong, correct its header, "
+        "or leave time and time_unit out and state sampling_rate (Hz) in [files]."
+    )
+
+
+def _refuse_stuck_clock(path: Path, times: FloatArray, others: Sequence[FloatArray]) -> None:
+    """Refuse times that repeat while readings go on: no row is double, the clock is wrong.
+
+    Rows that are there twice are left to :func:`check_order`.
+    """
+    again = np.flatnonzero(np.diff(times) == 0)
+    if not again.size or not others:
+        return
+    pairs = [(x[again], x[again + 1]) for x in others]
+    same = [(a == b) | ~(np.isfinite(a) | np.isfinite(b)) for a, b in pairs]
+    if np.all(same, axis=0).mean() > 0.5:
+        return
+    raise DataError(
+        f"the times of {path} repeat: {times[again[0]]:.10g} s stands at samples {again[0]} and "
+        f"{again[0] + 1} ({again.size} repetitions in all), and the readings beside them differ, "
+        "so no row is double: the clock stood still, or is written with too few decimals. If the "
+        "readings went on evenly, leave time out of [files] and state sampling_rate (Hz) there; "
+        "of one logger of several, export the file without its times and state sampling_rate in "
+        "[instruments.NAME]. Else export it with more decimals."
+    )

@@ -13,6 +13,7 @@ from seakeep.campaign.derivation import derive
 from seakeep.campaign.settings import CampaignSettings, PreparationSettings
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import low_pass, resample, uniform_step
+from seakeep.signals.clocks import instant_text
 from seakeep.signals.quality import MISSING
 
 __all__ = ["common_axis", "inside", "on_one_axis", "strays"]
@@ -26,14 +27,18 @@ def overlap(groups: Mapping[str, xr.Dataset], run: str) -> tuple[float, float]:
     end = min(float(each["time"][-1]) for each in groups.values())
     if end <= begin:
         spans = ", ".join(
-            f"{name} {float(each['time'][0]):g} to {float(each['time'][-1]):g} s"
-            for name, each in groups.items()
+            f"{name} {_instant(each, 0)} to {_instant(each, -1)} s" for name, each in groups.items()
         )
         raise DataError(
             f"run '{run}': its instruments never recorded together ({spans}, on the reference's "
             "clock). Check the files of the run and the clocks."
         )
     return begin, end
+
+
+def _instant(group: xr.Dataset, at: int) -> str:
+    time = group["time"].to_numpy()
+    return instant_text(float(time[at]), float(np.median(np.diff(time))))
 
 
 def common_axis(groups: Mapping[str, xr.Dataset], dt: float, run: str) -> FloatArray:

@@ -95,6 +95,10 @@ class FileSettings(Table):
     sampling_rate: Positive | None = Field(
         default=None, description="samples a second, for files that have no time column"
     )
+    sampling_rate_assumed: bool = Field(
+        default=False,
+        description="true while sampling_rate is a guess: prepare warns until it is removed",
+    )
     delimiter: Literal[",", ";", "\t", " "] | None = Field(
         default=None, description="',' or ';' or '\\t', or ' ' for any number of blanks"
     )

@@ -178,6 +178,10 @@ def _layout(path: Path, lines: list[str], options: FileSettings) -> _Layout:
     if _numeric(head):
         named = [] if remark is None else _cells(remark[0], delimiter)
         headers = named if len(named) == len(head) and not _numeric(named) else []
+        if not headers and len(rows) < len(head):
+            raise _transposed(
+                path, "no header and more columns than rows, which looks", len(rows), len(head)
+            )
         headers = headers or [str(i + 1) for i in range(len(head))]
         body = rows
     else:
@@ -211,11 +215,15 @@ def _decimal(lines: list[str], delimiter: str) -> str:
 
 def _refuse_transposed(path: Path, head: list[str], rows: int) -> None:
     if len(head) > 2 and not _NUMBER.match(head[0]) and _numeric(head[1:]):
-        raise DataError(
-            f"{path}: the first line is '{head[0]}' and {len(head) - 1} numbers, which looks "
-            f"transposed ({rows} rows, {len(head)} columns); expected a header, then one row an "
-            "instant and one column a channel. Save it transposed: nothing is turned silently."
-        )
+        words = f"the first line is '{head[0]}' and {len(head) - 1} numbers, which looks"
+        raise _transposed(path, words, rows, len(head))
+
+
+def _transposed(path: Path, words: str, rows: int, columns: int) -> DataError:
+    return DataError(
+        f"{path}: {words} transposed ({rows} rows, {columns} columns); expected a header, then one "
+        "row an instant and one column a channel. Save it transposed: nothing is turned silently."
+    )
 
 
 def _delimiter(lines: list[str]) -> str:

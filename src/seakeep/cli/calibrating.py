@@ -20,6 +20,7 @@ from seakeep.errors import RequestError
 from seakeep.files import check_place
 from seakeep.models import HankelEnsemble, load_model
 from seakeep.models.forecasting import counted
+from seakeep.signals.clocks import instant_text
 from seakeep.study.lengths import instant_of, samples_of
 from seakeep.study.workflow import between
 
@@ -108,7 +109,11 @@ def calibrate(
         )
     results().print(_table(calibrated))
     assert calibrated.calibration is not None
-    used = [f"{n} {a:.10g} to {b:.10g} s" for n, (a, b) in calibrated.calibration.spans.items()]
+    spans = {
+        name: " to ".join(instant_text(edge, calibrated.dt) for edge in span)
+        for name, span in calibrated.calibration.spans.items()
+    }
+    used = [f"{name} {span} s" for name, span in spans.items()]
     results().print(f"Calibrated on {', '.join(used)}: judge it on other instants.", soft_wrap=True)
     calibrated.save(out)
     whole = sum(calibrated.calibration.windows.values())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich import box
@@ -17,7 +17,9 @@ from seakeep.campaign import (
     read_campaign,
     write_prepared,
 )
+from seakeep.campaign.checks import findings_of
 from seakeep.campaign.datasets import DATASETS, data_folder, fetch, find_dataset, state_of
+from seakeep.campaign.plausibility import WARNED
 from seakeep.campaign.store import prepared_folder
 from seakeep.campaign.survey import as_one
 from seakeep.cli.console import messages, progress_bar, results
@@ -25,7 +27,13 @@ from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import replacing
 from seakeep.report.quality_sheet import steps_of, write_quality_sheet
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 __all__ = ["datasets", "init", "prepare"]
+
+SHOWN = 12
+"""Findings that prepare prints at most: what fits a screen beside the files' names."""
 
 
 def init(
@@ -129,6 +137,7 @@ def _write_sheet(
     runs = load_prepared(read, folder, list(files))
     words = steps_of(next(iter(runs.values())))
     messages().print(f"{words[0].upper()}{words[1:]}.")
+    _tell_findings(runs)
     unread = {name: str(error) for name, error in failures.items()}
     try:
         pages = write_quality_sheet(runs, read.settings, read.name, folder, unread)
@@ -136,6 +145,23 @@ def _write_sheet(
         messages().print(f"Note: no data-quality sheet: {error}", style="yellow")
         return
     messages().print(f"Wrote {pages[0]}: look at it before you use the runs.")
+
+
+def _tell_findings(runs: Mapping[str, xr.Dataset]) -> None:
+    """Tell what the checks found and no warning said: a line a channel and kind of fault."""
+    found: dict[tuple[str, str, str], list[tuple[str, str]]] = {}
+    for name, run in runs.items():
+        for each in (each for each in findings_of(run) if each.kind not in WARNED):
+            found.setdefault((each.channel, each.kind, each.text.split()[0]), []).append(
+                (name, each.text)
+            )
+    for (channel, kind, _), said in list(found.items())[:SHOWN]:
+        whose = f"clock of {channel}" if kind == "clock" and channel != "time" else channel
+        others = len({run for run, _ in said}) - 1
+        alike = f" (and in {others} more run{'s' * (others > 1)})" if others else ""
+        messages().print(f"Found in {said[0][0]}: {whose}: {said[0][1]}{alike}")
+    if len(found) > SHOWN:
+        messages().print(f"Found {len(found) - SHOWN} things more: the sheet lists them.")
 
 
 datasets = typer.Typer(

@@ -36,6 +36,7 @@ from seakeep.report.tables import (
     write_csv,
     write_forecast,
 )
+from seakeep.signals.clocks import instant_text
 from seakeep.study import (
     at_full_scale,
     comparison_table,
@@ -155,9 +156,10 @@ def forecast(
         result = with_degrees(result)
     write_forecast(result, out)
     status = result.attrs["status"]
+    begin = instant_text(float(result.attrs["start"]), identified.dt)
     messages().print(
         f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
-        f"t = {result.attrs['start']:.10g} s, status {status}.{scaled}"
+        f"t = {begin} s, status {status}.{scaled}"
     )
     if not _usable(result):
         raise typer.Exit(1)

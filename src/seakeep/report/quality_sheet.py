@@ -14,6 +14,7 @@ import xarray as xr
 
 from seakeep.campaign.checks import Finding, check_pairs, findings_of
 from seakeep.campaign.settings import CampaignSettings, long_name_of
+from seakeep.conventions import displayed
 from seakeep.files import replacing
 from seakeep.report.style import COLOURS, axis_label, figure_style, new_figure, shown_unit
 from seakeep.signals.quality import FLAGS, LATE, Agreement
@@ -55,13 +56,6 @@ def _flags(run: xr.Dataset, name: str) -> Any:
     return np.zeros(run.sizes["time"], dtype=int)
 
 
-def _shown(units: str) -> tuple[float, str]:
-    """Factor and unit in which a channel is shown: angles in degrees."""
-    if units == "rad" or units.startswith("rad/"):
-        return float(np.rad2deg(1.0)), units.replace("rad", "deg", 1)
-    return 1.0, units
-
-
 def channel_rows(run: xr.Dataset) -> list[dict[str, Any]]:
     """Rows of a run's table: statistics, flagged shares and findings of each channel.
 
@@ -82,7 +76,7 @@ def channel_rows(run: xr.Dataset) -> list[dict[str, Any]]:
     for name in map(str, run.data_vars):
         x, flags = run[name].to_numpy(), _flags(run, name)
         some = bool(np.isfinite(x).any())
-        factor, units = _shown(str(run[name].attrs.get("units", "")))
+        factor, units = displayed(str(run[name].attrs.get("units", "")))
         x = factor * x
         numbers = [np.nanmin(x), np.nanmax(x), np.nanmean(x), np.nanstd(x, ddof=1)] if some else []
         shares = [
@@ -128,7 +122,7 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
         axes = figure.subplots(rows, 1, squeeze=False, sharex=True)[:, 0]
         time = run["time"].to_numpy()
         for at, name in zip(axes, names, strict=False):
-            factor, units = _shown(str(run[name].attrs.get("units", "")))
+            factor, units = displayed(str(run[name].attrs.get("units", "")))
             x, flags = factor * run[name].to_numpy(), _flags(run, name)
             if name in found:
                 at.set_facecolor(FOUND)

@@ -18,6 +18,9 @@ FloatArray = npt.NDArray[np.float64]
 STEP_TOLERANCE = 0.01
 """A time axis is uniform if no instant is further than this part of a step from its grid."""
 
+PASSBAND = 0.8
+"""Part of the lower Nyquist frequency up to which resampling keeps what there is."""
+
 
 def as_seconds(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
     """Return times as floats; refuse dates, words and what else is not a number of seconds.
@@ -212,7 +215,7 @@ def resample(
     time: npt.ArrayLike,
     new_time: npt.ArrayLike,
     attenuation: float = 60.0,
-    passband: float = 0.8,
+    passband: float = PASSBAND,
     anti_alias: bool = True,
 ) -> FloatArray:
     """Band-limited resampling of a uniform series onto another uniform time axis.

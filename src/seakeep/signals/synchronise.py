@@ -33,6 +33,9 @@ FloatArray = npt.NDArray[np.float64]
 LARGEST_DRIFT = 1e-3
 """Drift allowed for when pulses are matched and lags are searched: a thousand ppm."""
 
+ASSUMED = "assumed the same as the reference's"
+"""Method of a clock of which nothing is known."""
+
 
 @dataclass(frozen=True)
 class Clock:
@@ -85,9 +88,14 @@ class Clock:
         out: FloatArray = self.offset + (1.0 + self.drift) * np.asarray(time, dtype=float)
         return out
 
+    @property
+    def told(self) -> bool:
+        """Whether offset and drift were found or stated; else they are zero because none was."""
+        return self.method not in (Clock.method, ASSUMED)
+
     def describe(self) -> str:
         """One line for people: offset and drift with their errors, and where they come from."""
-        if self.method == Clock.method:
+        if not self.told:
             return self.method
         found = (
             f"{1e3 * self.offset:+z.2f}{_error(1e3 * self.offset_error, 2)} ms, "
@@ -422,7 +430,7 @@ def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
         return list(clocks)
     pooled = []
     for clock in clocks:
-        if clock.method == Clock.method:
+        if not clock.told:
             pooled.append(clock)
             continue
         own = clock.drift_error if np.isfinite(clock.drift_error) else 0.0
