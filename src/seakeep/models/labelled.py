@@ -189,9 +189,9 @@ def check_finite(
     raise DataError(
         f"channel '{names[column]}' of {name} has {int(bad[:, column].sum())} missing or infinite "
         f"value(s) in the samples needed, the first at t = {instant} s. "
-        "Nothing is filled in silence: have short gaps bridged (gaps = 'bridge' and longest_gap in "
-        "[preparation]), or cut the run so that the gap lies outside (record, span, train or test "
-        "in [runs.NAME])."
+        "Nothing is filled in silence: gaps up to longest_gap are bridged where [preparation] says "
+        "gaps = 'bridge' (of arrays by seakeep.signals.bridge); cut the run so that a longer one "
+        "lies outside (record, span, train or test in [runs.NAME])."
     )
 
 
