@@ -100,7 +100,7 @@ def write_netcdf(
         for name, each in parts:
             encoding = {} if packing is None else packing(each)
             each.dump_to_store(H5NetCDFStore(file, group=name, mode="a"), encoding=encoding)
-    path.write_bytes(made.getbuffer())
+    path.write_bytes(made.getvalue())  # shares the memory, and survives what was written into it
 
 
 def check_place(path: Path, suffix: str | None = None) -> None:

@@ -24,6 +24,9 @@ __all__ = [
 
 FloatArray = npt.NDArray[np.float64]
 
+EARLIEST = 1e-3
+"""Part of a step below which a lag is none: rounding leaves either sign of nought."""
+
 
 @dataclass(frozen=True, eq=False)
 class PhaseCelerity:
@@ -193,9 +196,9 @@ def effective_celerity(
     centre = apart / float(phase_speed(2 * np.pi / cycle, depth))
     bounds = (max(centre - 0.5 * cycle, 0.0), centre + 0.5 * cycle)
     lag, height = correlation_peak(first, second, step, bounds)
-    if lag <= 0:
+    if lag < EARLIEST * step:
         raise DataError(
-            f"the downstream record is not later than the upstream one (lag {lag:.3g} s, "
+            f"the downstream record is not later than the upstream one (lag {lag:.4f} s, "
             f"correlation {height:.3f}), so there is no celerity between them. Check that the two "
             "are not the same record, which probe stands upstream, and their positions."
         )
