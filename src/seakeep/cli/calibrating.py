@@ -15,7 +15,7 @@ from rich.table import Table
 from seakeep.campaign import Campaign, load_prepared, read_campaign
 from seakeep.cli.console import messages, progress_bar, quietly, results
 from seakeep.cli.options import DEFAULT_LEVEL, CampaignFile, Level, Scheduler, Workers, crew
-from seakeep.conventions import conversion
+from seakeep.conventions import displayed
 from seakeep.errors import RequestError
 from seakeep.files import check_place
 from seakeep.models import HankelEnsemble, load_model
@@ -172,9 +172,7 @@ def _table(ensemble: HankelEnsemble) -> Table:
     for heading in ("margin", "in SD", "blocks", "warranted %"):
         table.add_column(heading, justify="right", no_wrap=True)
     for k, label in enumerate(ensemble.state_labels):
-        unit = label.units
-        shown = unit.replace("rad", "deg") if unit.split("/")[0] == "rad" else unit
-        factor = conversion(unit, shown) if shown != unit else 1.0
+        factor, shown = displayed(label.units)
         table.add_row(
             label.name,
             shown,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.conventions import conversion
+from seakeep.conventions import displayed
 from seakeep.report.figures.common import line_of, model_colour, model_words
 from seakeep.report.figures.histories import shown_cells
 from seakeep.report.style import shown_unit
@@ -103,11 +103,7 @@ def _channel(
     result: StudyResult, cell: Any, data: Any, row: int | None, column: int, name: str
 ) -> dict[str, Any]:
     channels = result.groups["channels"].sel(name=name)
-    units = str(channels["units"].values)
-    factor, target = 1.0, units
-    if units.split("/")[0] == "rad":
-        target = units.replace("rad", "deg")
-        factor = conversion(units, target)
+    factor, target = displayed(str(channels["units"].values))
     models = []
     for model in result.models:
         ensemble = result.is_ensemble(model)

@@ -13,7 +13,7 @@ import xarray as xr
 from seakeep import metrics, statistics
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
-from seakeep.conventions import conversion
+from seakeep.conventions import displayed
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import HankelDMDcModel, HankelEnsemble
 from seakeep.models.calibration import Band
@@ -184,10 +184,9 @@ def with_degrees(run: xr.Dataset) -> xr.Dataset:
     out = run.copy()
     for name, variable in run.data_vars.items():
         units = str(variable.attrs.get("units", ""))
-        if units.split("/")[0] != "rad":
+        factor, target = displayed(units)
+        if target == units:
             continue
-        target = units.replace("rad", "deg")
-        factor = conversion(units, target)
         out[name] = variable * factor
         out[name].attrs = {**variable.attrs, "units": target}
         if "training_std" in variable.attrs:
