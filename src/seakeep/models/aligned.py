@@ -15,6 +15,7 @@ from seakeep.errors import RequestError
 from seakeep.models import forecasting, labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment, fit_alignment
 from seakeep.models.forecasting import ForecastWindow
+from seakeep.models.offsets import wants_offset
 from seakeep.signals.alignment import CarriedElevation
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def align_training(
     fitted = fit_alignment(settings, runs, states, inputs, window)
     out = {}
     for name, run in runs.items():
-        if "probe_offset_span" in run.attrs and "probe_offset" not in run.attrs:
+        if wants_offset(run):
             raise RequestError(
                 f"{name} asks for its probe offset to be estimated, which takes a model, so it "
                 "cannot train one. State probe_offset (m), or train on other runs."

@@ -18,7 +18,13 @@ from seakeep.waves import phase_speed
 if TYPE_CHECKING:
     from seakeep.models.model import HankelDMDcModel
 
-__all__ = ["ProbeOffset", "check_offset", "estimate_probe_offset", "settle_offset"]
+__all__ = [
+    "ProbeOffset",
+    "check_offset",
+    "estimate_probe_offset",
+    "settle_offset",
+    "wants_offset",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -166,9 +172,14 @@ def settle_offset(model: HankelDMDcModel, run: xr.Dataset) -> xr.Dataset:
     return run.assign_attrs(probe_offset=found.offset, probe_offset_spread=found.spread)
 
 
+def wants_offset(run: xr.Dataset) -> bool:
+    """Whether a run asks for its probe offset to be estimated."""
+    return "probe_offset_span" in run.attrs and "probe_offset" not in run.attrs
+
+
 def check_offset(run: xr.Dataset) -> None:
     """Refuse a run whose probe offset an ensemble would have to estimate."""
-    if "probe_offset_span" in run.attrs and "probe_offset" not in run.attrs:
+    if wants_offset(run):
         raise RequestError(
             f"{labelled.run_name(run, 'the run')} asks for its probe offset to be estimated, which "
             "an ensemble does not do. Estimate it with a model (seakeep.estimate_probe_offset) and "

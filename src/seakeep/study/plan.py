@@ -11,6 +11,7 @@ from seakeep.campaign import load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import DataError, RequestError
 from seakeep.models import HankelDMDc
+from seakeep.models.offsets import wants_offset
 from seakeep.models.settings import periods_to_samples
 from seakeep.study.needs import needs_of
 from seakeep.study.settings import Study
@@ -204,7 +205,7 @@ def _check_offsets(plan: Plan, runs: dict[str, xr.Dataset]) -> None:
     """Refuse a run whose probe offset each model would estimate in its own way."""
     tested = dict.fromkeys(window.run for windows in plan.tests.values() for window in windows)
     for name in tested:
-        if "probe_offset_span" in runs[name].attrs and "probe_offset" not in runs[name].attrs:
+        if wants_offset(runs[name]):
             raise RequestError(
                 f"the run '{name}' asks for its probe offset to be estimated, and a study judges "
                 "all models on the same waves. Estimate it once with a model "
