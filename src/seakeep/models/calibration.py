@@ -91,7 +91,9 @@ def calibrate(
 ) -> Calibration:
     """Find the margins of an ensemble; see :meth:`HankelEnsemble.calibrate`."""
     named = labelled.as_runs(runs)
-    scores = held_out_scores(ensemble, named, steps, level, crew, progress)
+    level = check_level(level)
+    free = _free_starts(ensemble, named, steps)
+    scores = _scores(ensemble, named, free, steps, level, crew, progress)
     if not scores:
         longest = max(run.sizes["time"] for run in named.values()) - ensemble.history_samples
         reason = "members have read what is left of them"
@@ -104,10 +106,7 @@ def calibrate(
         )
     margin = conformal_margin(np.concatenate(list(scores.values())), level)
     windows = {name: len(each) for name, each in scores.items()}
-    spans = {}
-    for name in scores:
-        starts = _unread_starts(ensemble, name, named[name], steps)
-        spans[name] = (starts[0], starts[-1] + steps * ensemble.dt)
+    spans = {n: (starts[0], starts[-1] + steps * ensemble.dt) for n, starts in free.items()}
     return Calibration(margin, windows, steps, spans)
 
 
@@ -117,7 +116,6 @@ def held_out_scores(
     steps: int,
     level: float,
     crew: Crew,
-    progress: Progress | None = None,
 ) -> dict[str, FloatArray]:
     """Scores of the band in windows end to end, none of which a member has read.
 
@@ -133,8 +131,6 @@ def held_out_scores(
         Probability between the bounds.
     crew : Crew
         Who does the work.
-    progress : callable, optional
-        Called as ``progress(done, total, what)`` after each member in each run.
 
     Returns
     -------
@@ -142,9 +138,28 @@ def held_out_scores(
         Runs in which there is such a window.
     """
     level = check_level(level)
-    found: dict[str, FloatArray] = {}
+    return _scores(ensemble, runs, _free_starts(ensemble, runs, steps), steps, level, crew)
+
+
+def _free_starts(
+    ensemble: HankelEnsemble, runs: Mapping[str, xr.Dataset], steps: int
+) -> dict[str, list[float]]:
+    """Starts of the windows of each run in which there are any."""
     free = {name: _unread_starts(ensemble, name, run, steps) for name, run in runs.items()}
-    free = {name: starts for name, starts in free.items() if starts}
+    return {name: starts for name, starts in free.items() if starts}
+
+
+def _scores(
+    ensemble: HankelEnsemble,
+    runs: Mapping[str, xr.Dataset],
+    free: Mapping[str, list[float]],
+    steps: int,
+    level: float,
+    crew: Crew,
+    progress: Progress | None = None,
+) -> dict[str, FloatArray]:
+    """Scores in windows from these starts; a step of progress is a member in one of the runs."""
+    found: dict[str, FloatArray] = {}
     for number, (name, starts) in enumerate(free.items()):
         run = runs[name]
         tell = None if progress is None else _counted(progress, number, len(free), name)
