@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from seakeep.campaign import Campaign, read_campaign
+from seakeep.campaign.checksums import sha256_of
 from seakeep.campaign.readers import expand
 from seakeep.campaign.settings import ModelSettings
 from seakeep.campaign.tables import Names, Positive, Table
@@ -272,12 +273,8 @@ class Study:
 
 def _checksums(folder: Path) -> dict[str, str]:
     """SHA-256 of each file of a folder."""
-    found = {}
-    for path in sorted(each for each in folder.rglob("*") if each.is_file()):
-        with path.open("rb") as file:
-            name = path.relative_to(folder).as_posix()
-            found[name] = hashlib.file_digest(file, "sha256").hexdigest()
-    return found
+    files = (each for each in folder.rglob("*") if each.is_file())
+    return {path.relative_to(folder).as_posix(): sha256_of(path) for path in files}
 
 
 def read_study(path: Path | str) -> Study:
