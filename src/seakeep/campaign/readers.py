@@ -236,9 +236,14 @@ def time_column(table: Columns, stated: str | None = None) -> str | None:
 
 def time_unit_of(table: Columns, name: str, stated: str | None = None) -> str:
     """Unit of a time column: as stated, as its header says, as its name ends, or seconds."""
-    said = table.units.get(name, "").split(" since ")[0].strip()
+    said = _said_unit(table, name)
     named = named_unit(name)[1]
     return stated or said or (named if named is not None and si_unit(named) == "s" else "s")
+
+
+def _said_unit(table: Columns, name: str) -> str:
+    """Unit that a file's header states for its times, without an epoch; empty if it states none."""
+    return table.units.get(name, "").split(" since ")[0].strip()
 
 
 def time_step_of(table: Columns, name: str) -> float | None:
@@ -282,7 +287,7 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
 
 def _refuse_other_unit(path: Path, table: Columns, name: str, stated: str | None) -> None:
     """Refuse a unit of the times that is stated against the one in the file's header."""
-    said = table.units.get(name, "").split(" since ")[0].strip()
+    said = _said_unit(table, name)
     if stated is None or not is_unit(said) or si_unit(said) != "s":
         return
     if conversion(said, "s") == conversion(stated, "s"):

@@ -47,7 +47,7 @@ class BandForecast(NamedTuple):
     diverged: int
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class HeldEnsemble:
     """Members with their matrices, for forecasts in a loop or on board.
 

@@ -135,10 +135,13 @@ def _stated_lengths(result: StudyResult) -> dict[str, str]:
 
 def _spans(result: StudyResult) -> list[list[tuple[float, float]]]:
     """Begin and end of each span of each training set, s."""
-    return [
-        [(float(a), float(b)) for a, b in re.findall(r"(-?[\d.]+) to (-?[\d.]+) s", str(text))]
-        for text in result.groups["training"]["spans"].values
-    ]
+    return [_edges(text) for text in result.groups["training"]["spans"].values]
+
+
+def _edges(text: object) -> list[tuple[float, float]]:
+    """Begin and end of each span that a text tells, s."""
+    found = re.findall(r"(-?[\d.e+]+) to (-?[\d.e+]+) s", str(text))
+    return [(float(begin), float(end)) for begin, end in found]
 
 
 def _nested(result: StudyResult) -> float:
@@ -194,13 +197,8 @@ def _overlap(result: StudyResult) -> tuple[int, float, float, float] | None:
     stops, runs = training["stop"].values, training["run"].values
     spans = [(str(r), float(s) - length, float(s)) for r, s in zip(runs, stops, strict=True)]
     halves = result.groups["runs"]["train_span"].values
-    longest = max((_seconds(str(span)) for span in halves if span), default=np.nan)
+    longest = max((end - begin for span in halves for begin, end in _edges(span)), default=np.nan)
     return len(spans), length / period, longest / period, windows_overlap(spans)
-
-
-def _seconds(span: str) -> float:
-    begin, _, end = span.removesuffix(" s").partition(" to ")
-    return float(end) - float(begin)
 
 
 def deviations(result: StudyResult) -> ReportTable:

@@ -138,8 +138,7 @@ def settings_table(result: StudyResult) -> ReportTable:
             rows.append((prefix, _setting_words(prefix, shown)))
 
     settings = {k: v for k, v in result.settings.items() if k != "models"}
-    calibrated = any(str(name).startswith("calibration/") for name in result.groups)
-    settings["statistics"] = {**settings["statistics"], "calibrate": calibrated}
+    settings["statistics"] = {**settings["statistics"], "calibrate": result.is_calibrated}
     walk("", settings)
     for model, spec in json.loads(result.attrs["specs"]).items():
         rows += [(f"models.{model}.{key}", _setting_words(key, v)) for key, v in spec.items()]

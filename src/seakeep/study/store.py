@@ -301,6 +301,11 @@ class StudyResult:
         """Whether a report puts the paper's choices and numbers beside those of the study."""
         return bool(self.settings["output"].get("paper", False))
 
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether bands of ensembles are calibrated."""
+        return any(name.startswith("calibration/") for name in self.groups)
+
     def is_ensemble(self, model: str) -> bool:
         """Whether a model is an ensemble."""
         return str(self.settings["models"][model]["kind"]).startswith("bayesian")

@@ -128,8 +128,7 @@ def _boxes(result: StudyResult) -> list[ReportFigure]:
 
 def _histories(result: StudyResult) -> list[ReportFigure]:
     level = 100 * float(result.settings["statistics"]["level"])
-    calibrated = any(name.startswith("calibration/") for name in result.groups)
-    edges = ", and that band calibrated (dotted)" if calibrated else ""
+    edges = ", and that band calibrated (dotted)" if result.is_calibrated else ""
     return [
         ReportFigure(
             f"history_{test}_{window:03d}",
