@@ -277,6 +277,7 @@ def _fill_snapshots(
     # As above, with blocks of one; each run has a first row, and a first column above it.
     runs = list(pairwise(ends.tolist()))
     for run, (first, last) in enumerate(runs):
+        others = runs[run + 1 :]
         for begin, stop in _panels(first, last, 1):
             np.matmul(steps[begin:stop], signed[:, begin:], out=gram[begin:stop, begin:])
             if begin == first:
@@ -286,7 +287,7 @@ def _fill_snapshots(
             for at in range(max(begin, first + 1), stop):
                 row = gram[at, at:last]
                 row += gram[at - 1, at - 1 : last - 1]
-                for other, end in runs[run + 1 :]:
+                for other, end in others:
                     row = gram[at, other + 1 : end]
                     row += gram[at - 1, other : end - 1]
 
