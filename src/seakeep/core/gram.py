@@ -284,9 +284,11 @@ def _fill_snapshots(
                 gram[first, first:] = heads[run, first:]
             for later in range(run + 1, len(runs)):
                 gram[begin:stop, runs[later][0]] = heads[later, begin:stop]
+            above = gram[max(begin - 1, first), max(begin - 1, first) : last]
             for at in range(max(begin, first + 1), stop):
                 row = gram[at, at:last]
-                row += gram[at - 1, at - 1 : last - 1]
+                np.add(row, above[:-1], out=row)
+                above = row
                 for other, end in others:
                     row = gram[at, other + 1 : end]
                     row += gram[at - 1, other : end - 1]

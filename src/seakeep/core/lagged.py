@@ -73,8 +73,8 @@ def lagged_sums(
     if out.size == 0 or count == 0:
         out[:] = 0.0
         return out
-    depth = min(lags, max(1, BLOCK_WIDTH // channels))
-    blocks = -(-lags // depth)
+    blocks = -(-lags // max(1, BLOCK_WIDTH // channels))
+    depth = -(-lags // blocks)
     rows = count + (blocks - 1) * depth
     newest_first = np.zeros((rows + depth - 1, channels))
     newest_first[: count + lags - 1] = series[first - lags + 1 : first + count][::-1]

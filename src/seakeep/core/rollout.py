@@ -372,7 +372,7 @@ def _run_shifting(
         line, output = samples[0], propagator.output_state
         for at in range((number - 1) * width, -1, -width):
             piece = line[at : at + width]
-            np.matmul(output, line[at + width : at + width + size], out=piece)
+            np.dot(output, line[at + width : at + width + size], out=piece)
             piece += forcing[at // width, 0]
     else:
         transposed = np.ascontiguousarray(propagator.output_state.T)

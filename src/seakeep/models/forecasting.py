@@ -273,8 +273,8 @@ def label_forecast(
     lost = np.flatnonzero(np.isnan(values).any(axis=1))
     status = status_text(int(lost[0]) if lost.size else -1, window.time.values, model.dt)
     variables = {
-        label.name: xr.Variable(
-            ("time",),
+        label.name: (
+            "time",
             values[:, column],
             {
                 "units": label.units,
@@ -284,9 +284,9 @@ def label_forecast(
         )
         for column, label in enumerate(model.state_labels)
     }
+    # The instants stand among the variables: given as coords, xarray would merge twice.
     return xr.Dataset(
-        variables,
-        coords={"time": window.time},
+        {"time": window.time, **variables},
         attrs={"run": window.name, "start": window.start, "status": status},
     )
 

@@ -346,7 +346,7 @@ def moments(
     pooled = np.concatenate(
         [values[window.samples] for values, window in zip(series, windows, strict=True)]
     )
-    mean = pooled.mean(axis=0)
+    mean = pooled.sum(axis=0) / len(pooled)
     centred = pooled - mean
     spread = np.sqrt(np.einsum("tc,tc->c", centred, centred) / (len(pooled) - 1))
     # A constant that is not a binary fraction has a spread of rounding, not of zero.

@@ -154,10 +154,10 @@ def channel_matrix(
     """
     size = len(range(*samples.indices(run.sizes["time"])))
     out = np.empty((size, len(names)))
-    variables, coordinates = run.variables, set(run.coords)
+    variables, channels = run.variables, run.data_vars
     for column, channel in enumerate(names):
-        if channel not in variables or channel in coordinates:
-            known = [str(variable) for variable in run.data_vars]
+        if channel not in channels:
+            known = [str(variable) for variable in channels]
             raise RequestError(
                 f"{name} has no channel '{channel}'.{did_you_mean(channel, known)} "
                 f"It has: {', '.join(known)}."
@@ -263,4 +263,4 @@ def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "sta
             f"{instant_text(time[0], step)} to {instant_text(time[-1], step)} s. Choose an instant "
             "inside it."
         )
-    return int(np.clip(np.rint((instant - time[0]) / step), 0, time.size - 1))
+    return min(max(round((instant - float(time[0])) / step), 0), time.size - 1)
