@@ -47,7 +47,9 @@ def one_model(history: str, with_peers: bool):
         )
         return reference.forecast(model, problem.states, problem.inputs, start, STEPS)
 
-    def package(delay_rows, precision="double"):
+    after = slice(start + 1, start + STEPS)
+
+    def package(delay_rows, precision="double", arrays=False):
         spec = seakeep.HankelDMDc(
             state_delays=STATE_DELAYS,
             input_delays=INPUT_DELAYS,
@@ -60,6 +62,9 @@ def one_model(history: str, with_peers: bool):
 
         def call():
             model = spec.fit(run, states, inputs, stop=problem.stop * DT)
+            if arrays:
+                x, u = problem.states[: start + 1], problem.inputs[: start + 1]
+                return model.forecast_arrays(x, u, problem.inputs[after], STEPS)
             return model.forecast(run, start=start * DT, steps=STEPS)
 
         return call
@@ -68,6 +73,8 @@ def one_model(history: str, with_peers: bool):
         "plain NumPy, the paper's formula": plain,
         "seakeep, delay_rows='ridge'": package("ridge"),
         "seakeep, delay_rows='exact'": package("exact"),
+        "seakeep, delay_rows='ridge', forecast_arrays": package("ridge", arrays=True),
+        "seakeep, delay_rows='exact', forecast_arrays": package("exact", arrays=True),
         "seakeep, delay_rows='ridge', single precision": package("ridge", "single"),
         "seakeep, delay_rows='exact', single precision": package("exact", "single"),
     }
