@@ -315,6 +315,11 @@ def test_round_trip(tmp_path, values, delimiter, comma, units, compressed, newli
             r"the readings .* leave time out of \[files\] and state sampling_rate \(Hz\) there",
         ),
         (
+            "t,heave\n1700000000.25,1\n1700000000.25,2\n",
+            DataError,
+            r"repeat: 1700000000\.25 s stands at samples 0 and 1 \(1 .* the clock stood",
+        ),
+        (
             "t,heave,pitch\n0,1,\n0,1,\n1,2,3\n",
             DataError,
             "the times of .*run.csv repeat: 0 s .* Remove the double rows, or raise the",

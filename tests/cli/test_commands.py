@@ -314,6 +314,25 @@ def test_compare_tells_where_a_forecast_shows_memory_or_a_band_does_not_hold(run
     assert "repeats training input" not in err
 
 
+def test_instants_are_told_to_the_step_where_times_count_from_1970(run, tmp_path):
+    campaign = shutil.copy(TUTORIAL / "campaign.toml", tmp_path)
+    for path in TUTORIAL.glob("run?.csv"):
+        head, *rows = path.read_text("utf-8").splitlines()
+        instants = [row.split(";", 1) for row in rows]
+        rows = [f"{1700000000.02 + float(time):.2f};{rest}" for time, rest in instants]
+        (tmp_path / path.name).write_text("\n".join([head, *rows]) + "\n", "utf-8")
+    assert run(f"fit {campaign} -o {tmp_path}/late.nc --model ensemble")[0] == 0
+    compare = f"compare {tmp_path}/late.nc {campaign} --run first --steps 100 -o {tmp_path}/c"
+    _, _, err = run(f"{compare} --start 1700000030")
+    assert re.search(r"lies in what trained the model \(17000000\d\d\.\d+ to 1700000\d+", err)
+    calibrate = f"calibrate {tmp_path}/late.nc {campaign} --run unseen --steps 9 -o {tmp_path}/w.nc"
+    _, _, err = run(f"{calibrate} --stop 1700000900.06")
+    assert "--stop 1700000900.06 (1700000900.06 s) lies in none of the runs" in err
+    assert "(unseen: 1700000000.02 to 17000001" in err
+    _, _, err = run(f"{calibrate} --start 1700000020.1 --stop 1700000020.06")
+    assert "--start 1700000020.1 (1700000020.1 s) lies at or after --stop 1700000020.06" in err
+
+
 def judged_rows(folder):
     """Rows of a comparison's CSV by their channel."""
     lines = (folder / "comparison.csv").read_text(encoding="utf-8").splitlines()

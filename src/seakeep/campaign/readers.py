@@ -23,7 +23,7 @@ from seakeep.campaign.tdms import read_tdms
 from seakeep.campaign.text import read_text
 from seakeep.conventions import conversion, si_unit
 from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
-from seakeep.signals.clocks import check_order
+from seakeep.signals.clocks import check_order, instant_text
 
 __all__ = ["expand", "read_columns", "read_table"]
 
@@ -311,9 +311,10 @@ def _refuse_stuck_clock(path: Path, times: FloatArray, others: Sequence[FloatArr
     same = [(a == b) | ~(np.isfinite(a) | np.isfinite(b)) for a, b in pairs]
     if np.all(same, axis=0).mean() > 0.5:
         return
+    first = int(again[0])
     raise DataError(
-        f"the times of {path} repeat: {times[again[0]]:.10g} s stands at samples {again[0]} and "
-        f"{again[0] + 1} ({again.size} repetitions in all), and the readings beside them differ, "
+        f"the times of {path} repeat: {instant_text(times[first], 0)} s stands at samples {first} "
+        f"and {first + 1} ({again.size} repetitions in all), and the readings beside them differ, "
         "so no row is double: the clock stood still, or is written with too few decimals. If the "
         "readings went on evenly, leave time out of [files] and state sampling_rate (Hz) there; "
         "of one logger of several, export the file without its times and state sampling_rate in "

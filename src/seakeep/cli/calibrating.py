@@ -91,12 +91,11 @@ def calibrate(
     with progress_bar("Preparing") as progress:
         prepared = load_prepared(read, names=wanted, progress=progress)
     every = list(prepared.values())
-    first = _instant(start, "--start", read, prepared)
-    last = _instant(stop, "--stop", read, prepared)
+    first = _instant(start, "--start", read, prepared, fitted.dt)
+    last = _instant(stop, "--stop", read, prepared, fitted.dt)
     if first is not None and last is not None and first >= last:
-        raise RequestError(
-            f"--start {start} ({first:.10g} s) lies at or after --stop {stop} ({last:.10g} s)."
-        )
+        begin, end = (instant_text(edge, fitted.dt) for edge in (first, last))
+        raise RequestError(f"--start {start} ({begin} s) lies at or after --stop {stop} ({end} s).")
     count = samples_of(steps, read, every, fitted.dt, "--steps")
     parts = {name: _part(each, first, last) for name, each in prepared.items()}
     with progress_bar("Calibrating") as progress:
@@ -130,7 +129,7 @@ def calibrate(
 
 
 def _instant(
-    stated: str | None, name: str, campaign: Campaign, runs: Mapping[str, xr.Dataset]
+    stated: str | None, name: str, campaign: Campaign, runs: Mapping[str, xr.Dataset], dt: float
 ) -> float | None:
     """An instant that lies inside one of the runs at least; a stop of 'inf' is the end of all."""
     if stated is None:
@@ -141,11 +140,12 @@ def _instant(
     spans = {key: (float(each["time"][0]), float(each["time"][-1])) for key, each in runs.items()}
     if not any(begin <= found <= end for begin, end in spans.values()):
         known = ", ".join(
-            f"{key}: {begin:.10g} to {end:.10g} s" for key, (begin, end) in spans.items()
+            f"{key}: {instant_text(begin, dt)} to {instant_text(end, dt)} s"
+            for key, (begin, end) in spans.items()
         )
         raise RequestError(
-            f"{name} {stated} ({found:.10g} s) lies in none of the runs ({known}). Name an instant "
-            f"inside, or leave {name} out."
+            f"{name} {stated} ({instant_text(found, dt)} s) lies in none of the runs ({known}). "
+            f"Name an instant inside, or leave {name} out."
         )
     return found
 

@@ -21,6 +21,7 @@ from seakeep.models.forecasting import status_at_clock
 from seakeep.models.identification import is_constant
 from seakeep.models.workers import Backend
 from seakeep.signals import froude_factor, to_full_scale
+from seakeep.signals.clocks import instant_text
 from seakeep.study.lengths import instant_of, samples_of
 from seakeep.study.repeats import warn_of_repeats
 
@@ -305,7 +306,9 @@ def _warn_of_known(model: HankelDMDcModel | HankelEnsemble, compared: Comparison
         """Span of the run that the forecast touches, in words; empty if it does not."""
         begin, end = spans.get(name, (np.inf, -np.inf))
         touches = first < end - 0.5 * model.dt and last > begin
-        return f"({begin:.10g} to {end:.10g} s)" if touches else ""
+        if not touches:
+            return ""
+        return f"({instant_text(begin, model.dt)} to {instant_text(end, model.dt)} s)"
 
     memory = "this shows memory, not skill. Test elsewhere (--run, --start, --steps)."
     told = []
