@@ -170,6 +170,23 @@ def accuracy(contenders, problem) -> dict[str, float]:
     return out
 
 
+def rounding() -> dict[str, float]:
+    """Largest difference of one model's forecasts in single precision from those in double."""
+    out = {}
+    for history in ("inside", "before"):
+        contenders, problem = one_model(history, with_peers=False)
+        spread = problem.states.std(axis=0, ddof=1)
+        for delay_rows in ("ridge", "exact"):
+            name = f"seakeep, delay_rows='{delay_rows}'"
+            double, single = (contenders[name + more]() for more in ("", ", single precision"))
+            errors = [
+                float(abs(single[state] - double[state]).max()) / deviation
+                for state, deviation in zip(names()[0], spread, strict=True)
+            ]
+            out[f"history {history}, delay_rows='{delay_rows}'"] = max(errors)
+    return out
+
+
 def precision(arguments: argparse.Namespace) -> dict[str, list[timing.Timing]]:
     """Single beside double precision, with draws of λ where both are allowed."""
     out = {}
@@ -206,7 +223,7 @@ def read_arguments() -> argparse.Namespace:
         "--figures", type=Path, help="copy the figures of the scaling here, such as docs/figures"
     )
     parser.add_argument("--no-peers", action="store_true", help="leave other packages out")
-    parts = ["one", "ensemble", "study", "single", "scaling"]
+    parts = ["one", "ensemble", "study", "single", "rounding", "scaling"]
     parser.add_argument("--only", choices=parts, help="one part alone; the others are kept")
     return parser.parse_args()
 
@@ -248,8 +265,9 @@ def main() -> None:
         sections[title] = timing.interleave(contenders, arguments.study_rounds, memory=False)
     if arguments.only in (None, "single"):
         sections |= precision(arguments)
+    differences = rounding() if arguments.only in (None, "rounding") else {}
     part = arguments.only is not None
-    print(timing.write(arguments.out, sections, notes, survey, part))
+    print(timing.write(arguments.out, sections, notes, survey, differences, part))
     if arguments.only is None:
         print(scaling.run(arguments.out, arguments.figures))
 

@@ -1,10 +1,13 @@
 """Each trick of the fast core equals the plain formula over random shapes."""
 
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from seakeep.core import gram as gram_module
 from seakeep.core import identify, rollout, snapshot_matrices
 from seakeep.core.embedding import TrainingWindow
 from seakeep.core.gram import Piece, gram_trace, primal_system, snapshot_gram
@@ -56,26 +59,32 @@ def pieces_of(problem):
     ]
 
 
+# Rows of a panel: these matrices are smaller than the usual height, and must have joints too.
+panels = st.sampled_from([1, 2, 5, gram_module.PANEL])
+
+
 @settings(deadline=None)
-@given(problems())
-def test_the_displaced_gram_is_the_gram(problem):
+@given(problems(), panels)
+def test_the_displaced_gram_is_the_gram(problem, panel):
     states, _, _, s, z = problem
     regressors, targets = built(problem)
     N, extended = states[0].shape[1], states[0].shape[1] * (s + 1)
     # Inputs stand first.
     turned = np.concatenate([regressors[extended:], regressors[:extended]])
-    system = primal_system(pieces_of(problem), s, z, Scratch())
+    with patch.object(gram_module, "PANEL", panel):
+        system = primal_system(pieces_of(problem), s, z, Scratch())
     gram, right = system.gram, system.right
     np.testing.assert_allclose(np.triu(gram), np.triu(turned @ turned.T), atol=TIGHT, rtol=TIGHT)
     np.testing.assert_allclose(right, targets[:N] @ turned.T, atol=TIGHT, rtol=TIGHT)
 
 
 @settings(deadline=None)
-@given(problems())
-def test_the_diagonal_sums_are_the_gram_of_the_snapshots(problem):
+@given(problems(), panels)
+def test_the_diagonal_sums_are_the_gram_of_the_snapshots(problem, panel):
     *_, s, z = problem
     regressors, _ = built(problem)
-    gram = snapshot_gram(pieces_of(problem), s, z, Scratch())
+    with patch.object(gram_module, "PANEL", panel):
+        gram = snapshot_gram(pieces_of(problem), s, z, Scratch())
     np.testing.assert_allclose(
         np.triu(gram), np.triu(regressors.T @ regressors), atol=TIGHT, rtol=TIGHT
     )
