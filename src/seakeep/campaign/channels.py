@@ -25,7 +25,7 @@ from seakeep.campaign.validation import derivation_order, needed_channels, sourc
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import Clock, bridge, inspect_times, onto_uniform, uniform_step
-from seakeep.signals.clocks import instant_text
+from seakeep.signals.clocks import instant_text, span_text
 from seakeep.signals.quality import BRIDGED, MISSING, flag_attributes
 
 __all__ = ["Group", "read_groups"]
@@ -210,10 +210,9 @@ def _cut(table: xr.Dataset, settings: RunSettings, run: str) -> xr.Dataset:
     kept = (time >= begin) & (time <= end)
     if kept.sum() < 2:
         step = float(np.median(np.diff(time)))
-        first, last = instant_text(time[0], step), instant_text(time[-1], step)
         raise RequestError(
             f"runs.{run}.record: received [{begin:g}, {end:g}] s, and the file runs from "
-            f"{first} to {last} s: nothing is left. Correct the two times."
+            f"{span_text(time[0], time[-1], step)}: nothing is left. Correct the two times."
         )
     return table.isel(time=kept)
 

@@ -20,7 +20,7 @@ from seakeep.errors import RequestError
 from seakeep.files import check_place
 from seakeep.models import HankelEnsemble, load_model
 from seakeep.models.forecasting import counted
-from seakeep.signals.clocks import instant_text
+from seakeep.signals.clocks import instant_text, span_text
 from seakeep.study.lengths import instant_of, samples_of
 from seakeep.study.workflow import between
 
@@ -108,11 +108,8 @@ def calibrate(
         )
     results().print(_table(calibrated))
     assert calibrated.calibration is not None
-    spans = {
-        name: " to ".join(instant_text(edge, calibrated.dt) for edge in span)
-        for name, span in calibrated.calibration.spans.items()
-    }
-    used = [f"{name} {span} s" for name, span in spans.items()]
+    spans = calibrated.calibration.spans.items()
+    used = [f"{name} {span_text(*span, calibrated.dt)}" for name, span in spans]
     results().print(f"Calibrated on {', '.join(used)}: judge it on other instants.", soft_wrap=True)
     calibrated.save(out)
     whole = sum(calibrated.calibration.windows.values())
@@ -140,8 +137,7 @@ def _instant(
     spans = {key: (float(each["time"][0]), float(each["time"][-1])) for key, each in runs.items()}
     if not any(begin <= found <= end for begin, end in spans.values()):
         known = ", ".join(
-            f"{key}: {instant_text(begin, dt)} to {instant_text(end, dt)} s"
-            for key, (begin, end) in spans.items()
+            f"{key}: {span_text(begin, end, dt)}" for key, (begin, end) in spans.items()
         )
         raise RequestError(
             f"{name} {stated} ({instant_text(found, dt)} s) lies in none of the runs ({known}). "

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from seakeep.errors import SeakeepWarning
 from seakeep.models.forecasting import alignment_line, counted, with_units
-from seakeep.signals.clocks import instant_text
+from seakeep.signals.clocks import span_text
 
 if TYPE_CHECKING:
     from seakeep.models.fitted_ensemble import HankelEnsemble
@@ -55,8 +55,8 @@ def summary(ensemble: HankelEnsemble) -> str:
         + (f", {TRAIN_ON[origin['train_on']]}" if len(ensemble.arrays.names) > 1 else ""),
     ]
     lines += [
-        f"    {name}: {instant_text(first, ensemble.dt)} to {instant_text(stop, ensemble.dt)} s"
-        for name, (first, stop) in ensemble.training_spans.items()
+        f"    {name}: {span_text(*span, ensemble.dt)}"
+        for name, span in ensemble.training_spans.items()
     ]
     if (calibration := ensemble.calibration) is not None:
         found, count_of = calibration.found, sum(calibration.windows.values())

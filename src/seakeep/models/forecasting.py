@@ -13,7 +13,7 @@ import xarray as xr
 from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.identification import Scale
-from seakeep.signals.clocks import fixed, instant_text
+from seakeep.signals.clocks import fixed, instant_text, span_text
 
 if TYPE_CHECKING:
     from seakeep.models.alignment import FittedAlignment
@@ -344,8 +344,7 @@ def summary(model: HankelDMDcModel) -> str:
         f"{counted(len(training.runs), 'run')}",
     ]
     lines += [
-        f"    {name}: {columns} pairs, {instant_text(first, model.dt)} to "
-        f"{instant_text(stop, model.dt)} s"
+        f"    {name}: {columns} pairs, {span_text(first, stop, model.dt)}"
         for name, columns, first, stop in zip(
             training.runs, training.columns, training.first, training.stop, strict=True
         )

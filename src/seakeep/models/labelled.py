@@ -13,7 +13,7 @@ import xarray as xr
 
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.signals import uniform_step
-from seakeep.signals.clocks import instant_text
+from seakeep.signals.clocks import instant_text, span_text
 
 __all__ = ["ChannelLabel", "as_runs", "channel_labels", "channel_matrix", "nearest_sample"]
 
@@ -260,7 +260,6 @@ def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "sta
     if not time[0] - rounding <= instant <= time[-1] + rounding:
         raise RequestError(
             f"{what} = {instant_text(instant, step)} s is outside {name}, which runs from "
-            f"{instant_text(time[0], step)} to {instant_text(time[-1], step)} s. Choose an instant "
-            "inside it."
+            f"{span_text(time[0], time[-1], step)}. Choose an instant inside it."
         )
     return min(max(round((instant - float(time[0])) / step), 0), time.size - 1)

@@ -76,6 +76,11 @@ def instant_text(instant: float, dt: float) -> str:
     return fixed(instant, max(0, min(wanted, known)))
 
 
+def span_text(begin: float, end: float, dt: float) -> str:
+    """Write a span of time, with its unit; instants as :func:`instant_text`."""
+    return f"{instant_text(begin, dt)} to {instant_text(end, dt)} s"
+
+
 def fixed(value: float, decimals: int) -> str:
     """Write a number to so many decimals, without zeros at its end."""
     text = f"{value:.{decimals}f}"
@@ -272,9 +277,8 @@ def resample(
     slack = 1e-6 * dt
     if wanted[0] < t[0] - slack or wanted[-1] > t[-1] + slack:
         raise DataError(
-            f"new instants from {instant_text(wanted[0], dt)} to {instant_text(wanted[-1], dt)} s "
-            f"lie outside the series, which runs from {instant_text(t[0], dt)} to "
-            f"{instant_text(t[-1], dt)} s. Shorten the new time axis."
+            f"new instants from {span_text(wanted[0], wanted[-1], dt)} lie outside the series, "
+            f"which runs from {span_text(t[0], t[-1], dt)}. Shorten the new time axis."
         )
     position = (wanted - t[0]) / dt
     nearest = np.rint(position)

@@ -21,7 +21,7 @@ from seakeep.models.forecasting import status_at_clock
 from seakeep.models.identification import is_constant
 from seakeep.models.workers import Backend
 from seakeep.signals import froude_factor, to_full_scale
-from seakeep.signals.clocks import instant_text
+from seakeep.signals.clocks import span_text
 from seakeep.study.lengths import instant_of, samples_of
 from seakeep.study.repeats import warn_of_repeats
 
@@ -306,9 +306,7 @@ def _warn_of_known(model: HankelDMDcModel | HankelEnsemble, compared: Comparison
         """Span of the run that the forecast touches, in words; empty if it does not."""
         begin, end = spans.get(name, (np.inf, -np.inf))
         touches = first < end - 0.5 * model.dt and last > begin
-        if not touches:
-            return ""
-        return f"({instant_text(begin, model.dt)} to {instant_text(end, model.dt)} s)"
+        return f"({span_text(begin, end, model.dt)})" if touches else ""
 
     memory = "this shows memory, not skill. Test elsewhere (--run, --start, --steps)."
     told = []
