@@ -162,12 +162,16 @@ def accuracy(contenders, problem) -> dict[str, float]:
     measured = problem.states[problem.stop + 1 : problem.stop + 1 + STEPS]
     out = {}
     for name, call in contenders.items():
-        result = call()
-        if not isinstance(result, np.ndarray):
-            result = np.stack([result[state].values for state in names()[0]], axis=1)
-        error = np.sqrt(np.mean((result - measured) ** 2, axis=0))
+        error = np.sqrt(np.mean((as_array(call()) - measured) ** 2, axis=0))
         out[name] = float(np.mean(error / measured.std(axis=0, ddof=1)))
     return out
+
+
+def as_array(result) -> np.ndarray:
+    """States of a forecast side by side, shape (steps, N)."""
+    if isinstance(result, np.ndarray):
+        return result
+    return np.stack([result[state].values for state in names()[0]], axis=1)
 
 
 def rounding() -> dict[str, float]:
@@ -178,12 +182,10 @@ def rounding() -> dict[str, float]:
         spread = problem.states.std(axis=0, ddof=1)
         for delay_rows in ("ridge", "exact"):
             name = f"seakeep, delay_rows='{delay_rows}'"
-            double, single = (contenders[name + more]() for more in ("", ", single precision"))
-            errors = [
-                float(abs(single[state] - double[state]).max()) / deviation
-                for state, deviation in zip(names()[0], spread, strict=True)
-            ]
-            out[f"history {history}, delay_rows='{delay_rows}'"] = max(errors)
+            double = as_array(contenders[name]())
+            single = as_array(contenders[f"{name}, single precision"]())
+            largest = np.max(np.abs(single - double) / spread)
+            out[f"history {history}, delay_rows='{delay_rows}'"] = float(largest)
     return out
 
 

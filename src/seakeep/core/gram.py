@@ -277,14 +277,13 @@ def _fill_snapshots(
     # As above, with blocks of one; each run has a first row, and a first column above it.
     runs = list(pairwise(ends.tolist()))
     for run, (first, last) in enumerate(runs):
-        others = runs[run + 1 :]
+        others, above = runs[run + 1 :], gram[first, first:last]
         for begin, stop in _panels(first, last, 1):
             np.matmul(steps[begin:stop], signed[:, begin:], out=gram[begin:stop, begin:])
             if begin == first:
                 gram[first, first:] = heads[run, first:]
             for later in range(run + 1, len(runs)):
                 gram[begin:stop, runs[later][0]] = heads[later, begin:stop]
-            above = gram[max(begin - 1, first), max(begin - 1, first) : last]
             for at in range(max(begin, first + 1), stop):
                 row = gram[at, at:last]
                 np.add(row, above[:-1], out=row)

@@ -118,7 +118,7 @@ def _solve_beside(padded: FloatArray, right: FloatArray, ridge: float) -> FloatA
     count, size = right.shape
     padded[:size, size:] = right.T
     padded[size:, size:] = 0.0
-    padded.reshape(-1)[size * (len(padded) + 1) :: len(padded) + 1] = np.finfo(padded.dtype).max / 4
+    np.fill_diagonal(padded[size:, size:], np.finfo(padded.dtype).max / 4)
     factor = _factor(padded, ridge, count)
     half = np.zeros((count, len(padded)), padded.dtype)
     half[:, :size] = padded[:size, size:].T
