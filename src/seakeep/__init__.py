@@ -1,48 +1,12 @@
-"""Data-driven models of vessels in waves: Hankel dynamic mode decomposition with control."""
+"""Data-driven models of vessels in waves: Hankel dynamic mode decomposition with control.
+
+The public names are listed in ``__init__.pyi``; each room is imported when a name of it is used.
+"""
 
 from importlib import metadata
 
-from seakeep import core, metrics, signals, statistics
-from seakeep.campaign import Campaign, read_campaign
-from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
-from seakeep.models import (
-    BayesianHankelDMDc,
-    Fixed,
-    HankelDMDc,
-    HankelDMDcModel,
-    HankelEnsemble,
-    LogUniform,
-    ProbeAlignment,
-    Uniform,
-    choose_alignment,
-    estimate_probe_offset,
-    load_model,
-    summarize,
-)
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 __version__ = metadata.version("seakeep")
-
-__all__ = [
-    "BayesianHankelDMDc",
-    "Campaign",
-    "DataError",
-    "Fixed",
-    "HankelDMDc",
-    "HankelDMDcModel",
-    "HankelEnsemble",
-    "LogUniform",
-    "ProbeAlignment",
-    "RequestError",
-    "SeakeepError",
-    "SeakeepWarning",
-    "Uniform",
-    "choose_alignment",
-    "core",
-    "estimate_probe_offset",
-    "load_model",
-    "metrics",
-    "read_campaign",
-    "signals",
-    "statistics",
-    "summarize",
-]

@@ -573,7 +573,7 @@ def test_ctrl_c_ends_with_130_and_says_what_is_kept(run, monkeypatch):
     def interrupt(*_args, **_keywords):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(modelling, "fit_campaign", interrupt)
+    monkeypatch.setattr("seakeep.study.fit_campaign", interrupt)
     status, _, err = run(f"fit {CAMPAIGN} -o m.nc")
     assert status == 130
     assert "Interrupted. Files that were finished are kept: the command takes them over" in err
@@ -583,7 +583,7 @@ def test_an_unforeseen_error_asks_for_a_report(run, monkeypatch):
     def fail(*_args, **_keywords):
         raise RuntimeError("the tank is empty")
 
-    monkeypatch.setattr(modelling, "fit_campaign", fail)
+    monkeypatch.setattr("seakeep.study.fit_campaign", fail)
     status, _, err = run(f"fit {CAMPAIGN} -o m.nc")
     assert status == 1
     assert "RuntimeError: the tank is empty. This is a fault of seakeep" in err

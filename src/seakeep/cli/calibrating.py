@@ -5,24 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-import xarray as xr
-from rich import box
-from rich.table import Table
 
-from seakeep.campaign import Campaign, load_prepared, read_campaign
 from seakeep.cli.console import messages, progress_bar, quietly, results
 from seakeep.cli.options import DEFAULT_LEVEL, CampaignFile, Level, Scheduler, Workers, crew
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError
 from seakeep.files import check_place
-from seakeep.models import HankelEnsemble, load_model
-from seakeep.models.forecasting import counted
-from seakeep.signals.clocks import instant_text, span_text
-from seakeep.study.lengths import instant_of, samples_of
-from seakeep.study.workflow import between
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from rich.table import Table
+
+    from seakeep.campaign import Campaign
+    from seakeep.models import HankelEnsemble
 
 __all__ = ["calibrate"]
 
@@ -65,8 +63,9 @@ def calibrate(
     workers: Workers = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """Widen the band of an ensemble so that it holds what it says in the sea it was calibrated in.
+    """Calibrate the band of an ensemble on measured windows.
 
+    The band is widened so that it holds what it says in the sea it was calibrated in.
     The ensemble forecasts windows end to end, none of which a member has read, and the bounds are
     moved outwards by a quantile of how far measurements lie outside (split-conformal). Leave out
     what the ensemble is to be judged on.
@@ -75,6 +74,12 @@ def calibrate(
     --steps 200 -o calibrated.nc
     """
     check_place(out, ".nc")
+    from seakeep.campaign import load_prepared, read_campaign
+    from seakeep.models import HankelEnsemble, load_model
+    from seakeep.models.forecasting import counted
+    from seakeep.signals.clocks import instant_text, span_text
+    from seakeep.study.lengths import samples_of
+
     fitted = load_model(ensemble)
     if not isinstance(fitted, HankelEnsemble):
         raise RequestError(
@@ -131,6 +136,9 @@ def _instant(
     """An instant that lies inside one of the runs at least; a stop of 'inf' is the end of all."""
     if stated is None:
         return None
+    from seakeep.signals.clocks import instant_text, span_text
+    from seakeep.study.lengths import instant_of
+
     found = instant_of(stated, campaign, runs.values(), name)
     if name == "--stop" and found == math.inf:
         return found
@@ -148,6 +156,8 @@ def _instant(
 
 def _part(run: xr.Dataset, start: float | None, stop: float | None) -> xr.Dataset:
     """Part of a run between two instants, by default those of its training span, or its ends."""
+    from seakeep.study.workflow import between
+
     time = run["time"].values
     begin, end = run.attrs.get("train_span", (time[0], time[-1]))
     return between(run, (begin if start is None else start, end if stop is None else stop))
@@ -155,6 +165,11 @@ def _part(run: xr.Dataset, start: float | None, stop: float | None) -> xr.Datase
 
 def _table(ensemble: HankelEnsemble) -> Table:
     """Margins of the channels, and what they were found on."""
+    from rich import box
+    from rich.table import Table
+
+    from seakeep.models.forecasting import counted
+
     assert ensemble.calibration is not None
     found, windows = ensemble.calibration.found, ensemble.calibration.windows
     title = (

@@ -7,28 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich import box
-from rich.table import Table
 
-from seakeep.campaign import (
-    Campaign,
-    draft_campaign,
-    load_prepared,
-    read_campaign,
-    write_prepared,
-)
-from seakeep.campaign.checks import findings_of
-from seakeep.campaign.datasets import DATASETS, data_folder, fetch, find_dataset, state_of
-from seakeep.campaign.plausibility import WARNED
-from seakeep.campaign.store import prepared_folder
-from seakeep.campaign.survey import as_one
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import replacing
-from seakeep.report.quality_sheet import steps_of, write_quality_sheet
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from seakeep.campaign import Campaign
 
 __all__ = ["datasets", "init", "prepare"]
 
@@ -53,12 +40,14 @@ def init(
         str | None, typer.Option("--decimal", help="Mark of decimals, '.' or ','.")
     ] = None,
 ) -> None:
-    """Draft a campaign file from the headers of measured files.
+    """Draft a campaign file from measured files' headers.
 
     Columns, units and canonical names are guessed: read the draft before you use it.
 
     Example: seakeep init docs/tutorial/run1.csv docs/tutorial/run2.csv -o campaign.toml
     """
+    from seakeep.campaign import draft_campaign
+
     folder = Path() if out is None else out.parent
     text = draft_campaign(files, folder, _file_options(skip_rows, delimiter, decimal))
     if out is None:
@@ -102,7 +91,9 @@ def prepare(
         bool, typer.Option("--sheet/--no-sheet", help="Write the data-quality sheet.")
     ] = True,
 ) -> None:
-    """Turn raw files into analysis-ready runs, one NetCDF file each, and a data-quality sheet.
+    """Prepare runs from raw files, with a data-quality sheet.
+
+    Raw files become analysis-ready runs, one NetCDF file each.
 
     Each run is written as soon as it is done: interrupted, a second call continues. A run that
     cannot be read does not keep the others from being prepared; at the end it is an error.
@@ -112,6 +103,10 @@ def prepare(
 
     Example: seakeep prepare docs/tutorial/campaign.toml
     """
+    from seakeep.campaign import read_campaign, write_prepared
+    from seakeep.campaign.store import prepared_folder
+    from seakeep.campaign.survey import as_one
+
     read = read_campaign(campaign)
     with progress_bar("Preparing") as progress:
         failures: dict[str, SeakeepError] = {}
@@ -133,6 +128,9 @@ def prepare(
 def _write_sheet(
     read: Campaign, files: Mapping[str, Path], failures: Mapping[str, SeakeepError]
 ) -> None:
+    from seakeep.campaign import load_prepared
+    from seakeep.report.quality_sheet import steps_of, write_quality_sheet
+
     folder = next(iter(files.values())).parent
     runs = load_prepared(read, folder, list(files))
     words = steps_of(next(iter(runs.values())))
@@ -149,6 +147,9 @@ def _write_sheet(
 
 def _tell_findings(runs: Mapping[str, xr.Dataset]) -> None:
     """Tell what the checks found and no warning said: a line a channel and kind of fault."""
+    from seakeep.campaign.checks import findings_of
+    from seakeep.campaign.plausibility import WARNED
+
     found: dict[tuple[str, str, str], list[tuple[str, str]]] = {}
     for name, run in runs.items():
         for each in (each for each in findings_of(run) if each.kind not in WARNED):
@@ -176,6 +177,11 @@ datasets = typer.Typer(
 def _list(context: typer.Context) -> None:
     if context.invoked_subcommand is not None:
         return
+    from rich import box
+    from rich.table import Table
+
+    from seakeep.campaign.datasets import DATASETS, data_folder, state_of
+
     folder = data_folder()
     table = Table(box=box.SIMPLE_HEAD, show_header=False)
     table.add_column("key", style="bold")
@@ -208,6 +214,8 @@ def _fetch(
 
     Example: seakeep datasets fetch ntnu_ship_section --to data
     """
+    from seakeep.campaign.datasets import data_folder, fetch, find_dataset
+
     dataset = find_dataset(name)
     folder = to or data_folder()
     if folder is None:

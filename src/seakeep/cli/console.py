@@ -6,17 +6,26 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from seakeep.campaign.prepare import Progress as Report
 from seakeep.errors import SeakeepWarning
 from seakeep.interruption import check_interrupted
 
-__all__ = ["messages", "progress_bar", "quietly", "results", "tell_warnings", "worker_count"]
+__all__ = [
+    "Report",
+    "messages",
+    "progress_bar",
+    "quietly",
+    "results",
+    "tell_warnings",
+    "worker_count",
+]
+
+Report = Callable[[int, int, str], None]
+"""Takes how many steps are done, how many there are, and the name of the next one."""
 
 SECONDS_BETWEEN_LINES = 5.0
 PIPE_WIDTH = 140
@@ -55,6 +64,14 @@ def progress_bar(what: str) -> Iterator[Report]:
 
         yield line
         return
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-import xarray as xr
 
-from seakeep.campaign import Campaign, load_prepared, read_campaign
 from seakeep.cli.console import messages, progress_bar, quietly, results
 from seakeep.cli.options import (
     DEFAULT_LEVEL,
@@ -25,28 +23,12 @@ from seakeep.cli.options import (
 )
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import check_place, make_folder
-from seakeep.models import HankelDMDcModel, HankelEnsemble, load_model
-from seakeep.report.overlay import overlay_figure
-from seakeep.report.style import save_figure
-from seakeep.report.tables import (
-    band_findings,
-    forecast_words,
-    rich_bands,
-    rich_comparison,
-    write_csv,
-    write_forecast,
-)
-from seakeep.signals.clocks import instant_text
-from seakeep.study import (
-    at_full_scale,
-    comparison_table,
-    fit_campaign,
-    forecast_at_full_scale,
-    in_degrees,
-    with_degrees,
-)
-from seakeep.study import compare as compare_runs
-from seakeep.study.lengths import instant_of, samples_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from seakeep.campaign import Campaign
+    from seakeep.models import HankelDMDcModel, HankelEnsemble
 
 __all__ = ["compare", "fit", "forecast"]
 
@@ -61,15 +43,20 @@ def fit(
     workers: Workers = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """Identify a model, or an ensemble of models, from the training runs of a campaign.
+    """Identify a model, or an ensemble, from a campaign.
 
-    The table [model] decides which: kind = 'bayesian_hankel_dmdc' is an ensemble.
+    The training runs are used. The table [model] decides which: kind =
+    'bayesian_hankel_dmdc' is an ensemble.
 
     Example: seakeep fit docs/tutorial/campaign.toml -o model.nc
 
     An ensemble: seakeep fit docs/tutorial/campaign.toml --model ensemble -o ensemble.nc
     """
     check_place(out, ".nc")
+    from seakeep.campaign import read_campaign
+    from seakeep.models import HankelEnsemble
+    from seakeep.study import fit_campaign
+
     with progress_bar("Preparing") as progress:
         identified = fit_campaign(read_campaign(campaign), model, progress)
     if isinstance(identified, HankelEnsemble):
@@ -107,8 +94,9 @@ def forecast(
         bool, typer.Option("--degrees", help="Write angles in degrees instead of radians.")
     ] = False,
 ) -> None:
-    """Forecast a run: the model runs freely after START, driven by the measured waves.
+    """Forecast a run from START, driven by measured waves.
 
+    The model runs freely after START; no measured state is read there.
     Of an ensemble, mean, standard deviation and band of its members are written.
 
     Example: seakeep forecast model.nc docs/tutorial/campaign.toml --run unseen --start 20
@@ -123,6 +111,13 @@ def forecast(
     if out.suffix not in (".nc", ".csv"):
         raise RequestError(f"{out} ends in '{out.suffix}'; a forecast is written as .nc or .csv.")
     check_place(out)
+    from seakeep.campaign import read_campaign
+    from seakeep.models import HankelDMDcModel, HankelEnsemble, load_model
+    from seakeep.report.tables import forecast_words, write_forecast
+    from seakeep.signals.clocks import instant_text
+    from seakeep.study import forecast_at_full_scale, with_degrees
+    from seakeep.study.lengths import instant_of, samples_of
+
     identified = load_model(model)
     read = read_campaign(campaign)
     if isinstance(identified, HankelDMDcModel):
@@ -196,7 +191,7 @@ def compare(
     scheduler: Scheduler = None,
     full_scale: FullScale = False,
 ) -> None:
-    """Forecast test runs and judge the forecasts against the measurement.
+    """Judge forecasts of test runs against the measurement.
 
     Prints a table a channel and writes it as CSV, with an overlay figure a run. Of an ensemble the
     members' mean is judged, and how much of the measurement their band holds.
@@ -207,6 +202,14 @@ def compare(
     """
     if format_ not in ("png", "svg", "pdf"):
         raise RequestError(f"--format must be png, svg or pdf; received '{format_}'.")
+    from seakeep.campaign import read_campaign
+    from seakeep.models import HankelDMDcModel, load_model
+    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.style import save_figure
+    from seakeep.report.tables import band_findings, rich_bands, rich_comparison, write_csv
+    from seakeep.study import at_full_scale, comparison_table, in_degrees
+    from seakeep.study import compare as compare_runs
+
     identified = load_model(model)
     if isinstance(identified, HankelDMDcModel):
         given = {"--level": level is not None, "--band": band is not None}
@@ -262,6 +265,8 @@ def _scale(campaign: Campaign) -> float:
 
 
 def _prepared(campaign: Campaign, run: str) -> xr.Dataset:
+    from seakeep.campaign import load_prepared
+
     known = list(campaign.settings.runs)
     if run not in known:
         raise RequestError(
@@ -286,6 +291,8 @@ def _band(
     """Level and kind of band that were asked for; a calibrated one knows its level."""
     if band not in (None, "members", "calibrated"):
         raise RequestError(f"--band must be members or calibrated; received '{band}'.")
+    from seakeep.models import HankelEnsemble
+
     kept = identified.calibration if isinstance(identified, HankelEnsemble) else None
     if kept is not None and band is None:
         messages().print(

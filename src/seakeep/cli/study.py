@@ -6,23 +6,19 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
-from rich import box
-from rich.table import Table
 
-from seakeep.campaign.prepare import Progress
-from seakeep.cli.console import progress_bar, results
+from seakeep.cli.console import Report, progress_bar, results
 from seakeep.cli.options import Scheduler, checked_count
 from seakeep.errors import RequestError
-from seakeep.report.page import write_report
-from seakeep.report.study_tables import ReportTable, overview_table
-from seakeep.report.study_words import findings
-from seakeep.study import StudyResult, read_result, read_study, run_study
-from seakeep.study.reproduce import Size
-from seakeep.study.reproduce import reproduce as reproduce_study
-from seakeep.study.settings import Preset
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from seakeep.report.study_tables import ReportTable
+    from seakeep.study import StudyResult
 
 __all__ = ["report", "reproduce", "study"]
 
@@ -46,12 +42,16 @@ def study(
     workers: Workers = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """Run a study: every training set, test window and model; then write its report.
+    """Run a study and write its report.
+
+    Each model is fitted on each training set and judged in each test window.
 
     A study that was stopped goes on where it stopped: run the same command again.
 
     Example: seakeep study examples/ntnu_ship_section/study.toml -o ship-study
     """
+    from seakeep.study import read_study, run_study
+
     asked = read_study(study_file)
     folder = out or study_file.parent / f"{study_file.stem}-results"
     count = checked_count(workers, scheduler)
@@ -77,16 +77,19 @@ def reproduce(
     workers: Workers = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """Play the paper's whole study on the virtual tank; needs no data.
+    """Reproduce the paper's study on the virtual tank.
 
-    Virtual campaign, preparation, deterministic and Bayesian identification, validation in
-    irregular and regular waves, statistics, figures, tables and a report.
+    Needs no data. Virtual campaign, preparation, deterministic and Bayesian identification,
+    validation in irregular and regular waves, statistics, figures, tables and a report.
 
     Example: seakeep reproduce --quick --out quick
     """
     if preset not in ("paper", "recommended"):
         raise RequestError(f"--preset must be paper or recommended; received '{preset}'.")
-    chosen: Preset = "paper" if preset == "paper" else "recommended"
+    from seakeep.study.reproduce import Size
+    from seakeep.study.reproduce import reproduce as reproduce_study
+
+    chosen: Literal["paper", "recommended"] = "paper" if preset == "paper" else "recommended"
     size = Size.quick() if quick else Size()
     # The few cells of the quick study are done before another process has started.
     count = 1 if quick and workers is None else checked_count(workers, scheduler)
@@ -107,10 +110,15 @@ def reproduce(
 def report(
     folder: Annotated[Path, typer.Argument(help="Folder of a study's results.", metavar="DIR")],
 ) -> None:
-    """Write the report of a finished study: one HTML file, figures, and tables.
+    """Write the report of a finished study.
+
+    One HTML file, figures, and tables.
 
     Example: seakeep report reproduction
     """
+    from seakeep.report.page import write_report
+    from seakeep.study import read_result
+
     found = read_result(folder)
     with _Progress("Report") as tell:
         page = write_report(found, tell)
@@ -124,7 +132,7 @@ class _Progress:
         self._bar = progress_bar(what)
         self._begin: tuple[float, int] | None = None
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> Report:
         report = self._bar.__enter__()
         if sys.stderr.isatty():
             return report
@@ -148,7 +156,11 @@ class _Progress:
         )
 
 
-def _run(folder: Path, work: Callable[[Progress], StudyResult]) -> None:
+def _run(folder: Path, work: Callable[[Report], StudyResult]) -> None:
+    from seakeep.report.page import write_report
+    from seakeep.report.study_tables import overview_table
+    from seakeep.report.study_words import findings
+
     try:
         with _Progress("Study") as tell:
             found = work(tell)
@@ -167,6 +179,9 @@ def _run(folder: Path, work: Callable[[Progress], StudyResult]) -> None:
 
 
 def _rich(table: ReportTable) -> Table:
+    from rich import box
+    from rich.table import Table
+
     out = Table(box=box.SIMPLE_HEAD, title=table.title, title_justify="left")
     for number, heading in enumerate(table.columns):
         out.add_column(heading, justify="right" if number in table.numeric else "left")

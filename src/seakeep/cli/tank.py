@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
-from rich import box
-from rich.table import Table
 
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.errors import RequestError
 from seakeep.files import make_folder
-from seakeep.tank.dynamics import Rig
-from seakeep.tank.play import check_settings, play, play_run, truth
-from seakeep.tank.realised import Realised, comparison, matrix_rows, realise
-from seakeep.tank.settings import TankSettings, default_settings, read_settings
+
+if TYPE_CHECKING:
+    from seakeep.tank.dynamics import Rig
+    from seakeep.tank.realised import Realised
+    from seakeep.tank.settings import TankSettings
 
 __all__ = ["tank"]
 
@@ -56,8 +55,9 @@ def tank(
         typer.Option("--statistics", help="Print realised waves beside the paper's numbers."),
     ] = False,
 ) -> None:
-    """Play the virtual campaign: raw files as a tank delivers them, plus campaign.toml.
+    """Play a virtual campaign: raw files and campaign.toml.
 
+    The raw files are such as a towing tank delivers.
     The truth lies in the folder truth, which no identification command reads.
 
     Example: seakeep tank --out virtual --seed 0
@@ -67,6 +67,8 @@ def tank(
             "nothing to do: give --out DIR for the files of a campaign, or --statistics for the "
             "realised waves."
         )
+    from seakeep.tank.play import check_settings, play
+
     wanted = _settings(settings, seed, spacing)
     names = run or list(wanted.runs)
     rig = check_settings(wanted, names)
@@ -87,6 +89,8 @@ def tank(
 
 
 def _settings(path: Path | None, seed: int | None, spacing: str | None) -> TankSettings:
+    from seakeep.tank.settings import default_settings, read_settings
+
     made = default_settings() if path is None else read_settings(path)
     if seed is not None:
         made = made.model_copy(update={"seed": seed})
@@ -104,6 +108,9 @@ def _settings(path: Path | None, seed: int | None, spacing: str | None) -> TankS
 
 
 def _measured(settings: TankSettings, names: list[str], rig: Rig) -> list[Realised]:
+    from seakeep.tank.play import play_run
+    from seakeep.tank.realised import realise
+
     measured = []
     with progress_bar("Measuring") as progress:
         for done, name in enumerate(names):
@@ -114,6 +121,11 @@ def _measured(settings: TankSettings, names: list[str], rig: Rig) -> list[Realis
 
 
 def _print(settings: TankSettings, measured: list[Realised]) -> None:
+    from rich import box
+    from rich.table import Table
+
+    from seakeep.tank.realised import comparison, matrix_rows
+
     matrix = matrix_rows(settings, measured)
     table = Table(box=box.SIMPLE_HEAD, title="Test matrix", title_justify="left")
     for heading in matrix[0]:
@@ -146,6 +158,7 @@ def _print(settings: TankSettings, measured: list[Realised]) -> None:
 def _draw(settings: TankSettings, rig: Rig, measured: list[Realised], folder: Path) -> None:
     from seakeep.report.style import save_figure
     from seakeep.report.tank_figures import hydrodynamics_figure, run_figure, spectrum_figure
+    from seakeep.tank.play import play_run, truth
 
     make_folder(folder)
     written = [save_figure(hydrodynamics_figure(rig, settings), folder / "hydrodynamics.png")]

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import numpy as np
 import typer
-import xarray as xr
 
-from seakeep.campaign import read_table
 from seakeep.cli.console import messages, progress_bar
 from seakeep.errors import RequestError
 from seakeep.files import replacing, write_netcdf
-from seakeep.signals.agreement import Agreement, compare_motion
-from seakeep.signals.sightings import FLAGS
-from seakeep.signals.tracking import TrackingSettings, track_video
-from seakeep.signals.tracking_pictures import contact_sheet, overlay_video, write_picture
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from seakeep.signals.agreement import Agreement
 
 __all__ = ["track"]
 
 DECIMALS = {"s": 6, "m": 6, "deg": 5, "pixel": 3, "pixel^2": 1, "1": 4}
-DEFAULT = TrackingSettings()
 
 
 def track(
@@ -47,7 +45,7 @@ def track(
             metavar="LENGTH HEIGHT",
             help="Length and height of the panel, m: two numbers divided by a blank.",
         ),
-    ] = DEFAULT.panel,
+    ] = (0.30, 0.10),
     panel_place: Annotated[
         tuple[float, float],
         typer.Option(
@@ -55,10 +53,10 @@ def track(
             help="Panel's centre from the centre of gravity, downstream and up, m: two numbers "
             "divided by a blank.",
         ),
-    ] = DEFAULT.panel_place,
+    ] = (0.0, 0.25),
     downstream: Annotated[
         Literal["right", "left"], typer.Option(help="Side of the picture to which waves run.")
-    ] = DEFAULT.downstream,
+    ] = "right",
     level: Annotated[
         float, typer.Option(help="Pitch that the picture shows of a level vessel, deg.")
     ] = 0.0,
@@ -77,7 +75,7 @@ def track(
             help="Least red, green and blue of the panel, each 0 to 255: three numbers divided by "
             "blanks.",
         ),
-    ] = DEFAULT.lower,
+    ] = (150, 150, 150),
     region: Annotated[
         tuple[int, int, int, int] | None,
         typer.Option(
@@ -95,7 +93,7 @@ def track(
     ] = None,
     tolerance: Annotated[
         float, typer.Option(help="Part of its length by which the panel seen may differ.")
-    ] = DEFAULT.tolerance,
+    ] = 0.02,
     bridge: Annotated[
         float, typer.Option(help="Bridge gaps up to this long, s; by default none.")
     ] = 0.0,
@@ -115,8 +113,9 @@ def track(
         ),
     ] = None,
 ) -> None:
-    """Track a white panel on the vessel: surge, heave and pitch, with a quality a frame.
+    """Track surge, heave and pitch of a vessel in a video.
 
+    A white panel on the vessel is found in each frame, with a quality per frame.
     x points downstream, z up, pitch is positive bow up. Flagged frames (occluded, overexposed,
     lost …) give no motion unless --bridge is asked for. Needs the extra 'video'.
 
@@ -124,12 +123,16 @@ def track(
     """
     if out is not None and out.suffix not in (".nc", ".csv"):
         raise RequestError(f"{out} ends in '{out.suffix}'; a track is written as .csv or .nc.")
+    from seakeep.campaign import read_table
+    from seakeep.signals.tracking import TrackingSettings, track_video
+    from seakeep.signals.tracking_pictures import contact_sheet, overlay_video, write_picture
+
     settings = TrackingSettings(
         metres_per_pixel=metres_per_pixel,
         panel=panel,
         panel_place=panel_place,
         downstream=downstream,
-        level=float(np.deg2rad(level)),
+        level=math.radians(level),
         origin=origin,
         lower=threshold,
         region=region,
@@ -164,6 +167,9 @@ def _write(tracked: xr.Dataset, out: Path | None) -> None:
 
 def _as_csv(tracked: xr.Dataset) -> str:
     """Columns with units in brackets; angles in degrees, as loggers write them; NaN is empty."""
+    import numpy as np
+    import xarray as xr
+
     columns = {}
     for name, values in {"time": tracked["time"], **tracked.data_vars}.items():
         unit, numbers = str(values.attrs["units"]), values.to_numpy()
@@ -177,11 +183,13 @@ def _as_csv(tracked: xr.Dataset) -> str:
 
 
 def _summary(tracked: xr.Dataset, written: list[Path]) -> None:
+    from seakeep.signals.sightings import FLAGS
+
     flag, total = tracked["flag"].to_numpy(), tracked.sizes["time"]
     flagged = [
         f"{count} {name}"
         for name, code in FLAGS.items()
-        if name != "good" and (count := int(np.sum(flag == code)))
+        if name != "good" and (count := int((flag == code).sum()))
     ]
     scale, how = 1e3 * tracked.attrs["metres_per_pixel"], tracked.attrs["calibration"]
     bridged = int(tracked["bridged"].sum())
@@ -195,8 +203,10 @@ def _summary(tracked: xr.Dataset, written: list[Path]) -> None:
 
 
 def _agreement(tracked: xr.Dataset, reference: xr.Dataset, max_lag: float | None) -> None:
+    from seakeep.signals.agreement import compare_motion
+
     for name, found in compare_motion(tracked, reference, max_lag=max_lag).items():
-        factor, unit = (np.rad2deg(1.0), "deg") if found.units == "rad" else (1e3, "mm")
+        factor, unit = (math.degrees(1.0), "deg") if found.units == "rad" else (1e3, "mm")
         messages().print(
             f"{name} against the MRU: correlation {found.correlation:.4f}, video late by "
             f"{found.lag:+.3f} s, RMS difference {factor * found.rms:.3g} {unit}, "

@@ -1,0 +1,68 @@
+"""The package as a whole: its public names, and what starting it imports."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+import seakeep
+
+HEAVY = ("scipy", "pandas", "xarray", "matplotlib", "numba")
+REQUESTS = (
+    ["--help"],
+    ["--version"],
+    ["fti", "campaign.toml"],
+    ["fit"],
+    ["fit", "campaign.toml", "--modle", "ensemble"],
+    ["study", "study.toml", "--workers", "none"],
+    ["info"],
+)
+VERBS = (
+    *("tank", "init", "prepare", "fit", "calibrate", "forecast", "compare", "study", "report"),
+    *("reproduce", "datasets", "track", "info"),
+)
+
+
+def imported_by(code):
+    """Which of the heavy packages a fresh interpreter holds after running the code."""
+    asked = f"{code}\nimport sys\nprint([m for m in {HEAVY!r} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    return done.stdout.splitlines()[-1]
+
+
+def test_help_version_and_wrong_requests_start_without_heavy_packages():
+    requests = [*REQUESTS, *([verb, "--help"] for verb in VERBS)]
+    code = f"from seakeep.cli import main\nfor request in {requests!r}:\n    main(list(request))"
+    assert imported_by(code) == "[]"
+
+
+def test_a_room_is_imported_when_it_is_used():
+    assert imported_by("import seakeep; dir(seakeep)") == "[]"
+    code = "import seakeep; seakeep.study.run_study, seakeep.HankelDMDc"
+    assert "xarray" in imported_by(code)
+
+
+def test_the_public_names_are_there_and_no_others_are_shown():
+    assert dir(seakeep) == sorted(seakeep.__all__)
+    for name in dir(seakeep):
+        assert getattr(seakeep, name) is not None
+    assert not [name for name in dir(seakeep) if name.startswith("_")]
+
+
+def test_an_unknown_name_is_refused():
+    with pytest.raises(AttributeError, match="HankelDMD"):
+        _ = seakeep.HankelDMD
+
+
+def test_no_summary_in_the_help_is_cut_at_eighty_columns():
+    done = subprocess.run(
+        [sys.executable, "-m", "seakeep", "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "COLUMNS": "80"},
+    )
+    listed = done.stdout.partition("Commands:")[2].split("\n")
+    assert {line.split()[0] for line in listed if line.strip()} == set(VERBS)
+    assert not [line for line in listed if "..." in line or "…" in line or len(line) > 80]
