@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from seakeep.errors import RequestError
-from seakeep.files import replacing, write_netcdf
+from seakeep.files import MARK, check_output, replacing, write_netcdf
 
 
 def test_a_file_appears_when_it_is_whole(tmp_path):
@@ -173,3 +173,43 @@ def test_whatever_is_written_as_netcdf_survives_a_disk_that_is_full(tmp_path):
         assert "file.nc: File too large" in words
         assert "Free space on the disk" in words
     assert [path.name for path in folder.rglob("*")] == ["old", "study.nc"]
+
+
+class TestOutputs:
+    """No output replaces an input, or a file that seakeep did not write."""
+
+    def test_a_place_without_a_file_is_free(self, tmp_path):
+        check_output(tmp_path / "model.nc", "model", [tmp_path / "model.nc"])
+
+    def test_an_input_is_kept_under_any_name(self, tmp_path):
+        raw = tmp_path / "raw.csv"
+        raw.write_text("time [s],heave [m]\n")
+        (tmp_path / "same.csv").symlink_to(raw)
+        with pytest.raises(RequestError, match=r"same\.csv is read by this command and would be"):
+            check_output(tmp_path / "same.csv", "forecast", [raw], "time.*")
+
+    def test_a_netcdf_file_is_replaced_by_one_of_its_kind(self, tmp_path):
+        path = tmp_path / "a.nc"
+        write_netcdf(path, xr.Dataset(attrs={MARK: "model"}))
+        check_output(path, "model")
+        with pytest.raises(RequestError, match="exists and is no forecast that seakeep wrote"):
+            check_output(path, "forecast")
+        write_netcdf(path, xr.Dataset({"heave": ("time", [1.0])}))
+        with pytest.raises(RequestError, match=r"may be a measurement\. Choose another name"):
+            check_output(path, "model")
+        path.write_bytes(b"CDF\x01")
+        with pytest.raises(RequestError, match="exists and is no model"):
+            check_output(path, "model")
+
+    def test_text_states_what_it_is_and_csv_by_its_header(self, tmp_path):
+        path = tmp_path / "a.toml"
+        path.write_text("# seakeep_file: campaign\n")
+        check_output(path, "campaign")
+        path.write_text("[campaign]\n")
+        with pytest.raises(RequestError, match="exists and is no campaign"):
+            check_output(path, "campaign")
+        table = tmp_path / "a.csv"
+        table.write_text("run,channel\n1,2\n")
+        check_output(table, "table", header="run,channel")
+        with pytest.raises(RequestError, match="exists and is no table"):
+            check_output(table, "table", header="time,.*")

@@ -5,8 +5,9 @@ from __future__ import annotations
 import errno
 import io
 import os
+import re
 import secrets
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,10 @@ from seakeep.errors import RequestError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["check_place", "make_folder", "replacing", "write_netcdf"]
+__all__ = ["MARK", "check_output", "check_place", "make_folder", "replacing", "write_netcdf"]
+
+MARK = "seakeep_file"
+"""Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""
 
 
 @contextmanager
@@ -135,6 +139,69 @@ def check_place(path: Path, suffix: str | None = None) -> None:
             f"{path} ends in '{path.suffix}', and a file of the kind {suffix} is written. Name it "
             f"{path.with_suffix(suffix)}."
         )
+
+
+def check_output(
+    path: Path, kind: str, inputs: Iterable[Path] = (), header: str | None = None
+) -> None:
+    """Refuse, before any work, to replace an input or a file that seakeep did not write.
+
+    Parameters
+    ----------
+    path : Path
+        The file wanted.
+    kind : str
+        What is written there, such as ``"model"``: a file at `path` must be of the same kind.
+        NetCDF files state it in the attribute :data:`MARK`; others as ``seakeep_file: KIND`` in
+        their first or last kilobytes.
+    inputs : iterable of Path
+        Files that the command reads.
+    header : str, optional
+        Pattern of the first line of a CSV file, which has no place for a mark.
+
+    Raises
+    ------
+    RequestError
+        If nothing can be written there, or something would be lost.
+    """
+    check_place(path)
+    if not path.exists():
+        return
+    if any(each.exists() and path.samefile(each) for each in inputs):
+        raise RequestError(
+            f"{path} is read by this command and would be overwritten by the {kind}. "
+            "Choose another name."
+        )
+    if path.suffix == ".nc":
+        ours = _mark_of_netcdf(path) == kind
+    else:
+        with path.open("rb") as file:
+            start = file.read(HEAD).decode("utf-8", "replace")
+            file.seek(-min(HEAD, path.stat().st_size), os.SEEK_END)
+            end = file.read().decode("utf-8", "replace")  # where PDF keeps it
+        if path.suffix == ".csv":
+            ours = header is not None and re.fullmatch(header, start.partition("\n")[0]) is not None
+        else:
+            ours = f"{MARK}: {kind}" in start + end
+    if not ours:
+        raise RequestError(
+            f"{path} exists and is no {kind} that seakeep wrote; it may be a measurement. Choose "
+            "another name, or remove it first."
+        )
+
+
+HEAD = 8192
+"""Bytes of a file in which its mark is looked for."""
+
+
+def _mark_of_netcdf(path: Path) -> str | None:
+    import h5netcdf
+
+    try:
+        with h5netcdf.File(path, "r") as file:
+            return str(file.attrs.get(MARK))
+    except OSError:  # a NetCDF 3 file, or none: not ours
+        return None
 
 
 def make_folder(path: Path) -> Path:

@@ -561,6 +561,51 @@ def test_debug_shows_the_traceback(run):
     assert "Traceback" in err
 
 
+@pytest.mark.parametrize(
+    ("command", "kept"),
+    [
+        (f"fit {CAMPAIGN} -o docs/tutorial/raw.nc", "docs/tutorial/raw.nc"),
+        (
+            f"calibrate ensemble.nc {CAMPAIGN} --run unseen --steps 200 -o ensemble.nc",
+            "ensemble.nc",
+        ),
+        (f"forecast model.nc {CAMPAIGN} --run unseen --start 20 --steps 5 -o model.nc", "model.nc"),
+        (
+            f"forecast model.nc {CAMPAIGN} --run unseen --start 20 -o docs/tutorial/run3.csv",
+            "docs/tutorial/run3.csv",
+        ),
+        (f"forecast model.nc {CAMPAIGN} --run unseen --start 20 -o other.csv", "other.csv"),
+        (f"compare model.nc {CAMPAIGN} -o mine", "mine/comparison.csv"),
+        (f"compare model.nc {CAMPAIGN} -o drawn", "drawn/unseen.png"),
+    ],
+)
+def test_no_output_replaces_an_input_or_a_file_of_others(command, kept, run, place, monkeypatch):
+    for name, text in {
+        "docs/tutorial/raw.nc": "CDF\x01",
+        "other.csv": "time [s],heave [m],WP_01 [m]\n",
+        "mine/comparison.csv": "run,rating\n",
+        "drawn/unseen.png": "a photograph",
+    }.items():
+        (place / name).parent.mkdir(exist_ok=True)
+        (place / name).write_text(text)
+    monkeypatch.setattr("seakeep.campaign.prepare.Campaign.prepare", None)  # no work is done
+    before = (place / kept).read_bytes()
+    status, _, err = run(command)
+    assert status == 2
+    assert "Choose another name" in err
+    assert (place / kept).read_bytes() == before
+
+
+def test_a_command_that_is_repeated_replaces_what_it_wrote(run, place):
+    for _ in range(2):
+        command = f"forecast ensemble.nc {CAMPAIGN} --run unseen --start 20 --steps 5 -o again.csv"
+        assert run(command)[0] == 0
+        assert run(f"{command.replace('again', 'full')} --members --degrees")[0] == 0
+        assert run(f"compare model.nc {CAMPAIGN} -o twice --format pdf")[0] == 0
+        assert run(f"compare model.nc {CAMPAIGN} -o twice --format svg")[0] == 0
+        assert run(f"compare model.nc {CAMPAIGN} -o twice")[0] == 0
+
+
 def test_a_draft_is_not_overwritten(run, place):
     (place / "mine.toml").write_text("precious")
     status, _, err = run("init docs/tutorial/run1.csv -o mine.toml")

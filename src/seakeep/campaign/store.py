@@ -14,7 +14,7 @@ from seakeep.campaign.labels import version
 from seakeep.campaign.prepare import Campaign, Progress
 from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepWarning
-from seakeep.files import make_folder, replacing, write_netcdf
+from seakeep.files import MARK, make_folder, replacing, write_netcdf
 
 __all__ = ["load_prepared", "prepared_folder", "write_prepared"]
 
@@ -83,7 +83,7 @@ def write_prepared(
 
 def _write(run: xr.Dataset, path: Path) -> None:
     with replacing(path) as temporary:
-        write_netcdf(temporary, run)
+        write_netcdf(temporary, run.assign_attrs({MARK: "prepared run"}))
 
 
 def _fresh_step(campaign: Campaign, name: str, file: Path) -> float | None:
@@ -159,7 +159,7 @@ def _fresh(campaign: Campaign, name: str, file: Path) -> xr.Dataset | None:
     }
     if any(run.attrs.get(key) != value for key, value in expected.items()):
         return None
-    run.attrs = {key: _plain(value) for key, value in run.attrs.items()}
+    run.attrs = {key: _plain(value) for key, value in run.attrs.items() if key != MARK}
     for each in run.variables.values():
         each.attrs = {k: _plain(v) for k, v in each.attrs.items() if k != "_FillValue"}
         each.encoding = {}

@@ -10,10 +10,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from seakeep.cli.console import messages, progress_bar, quietly, results
-from seakeep.cli.options import DEFAULT_LEVEL, CampaignFile, Level, Scheduler, Workers, crew
+from seakeep.cli.options import (
+    DEFAULT_LEVEL,
+    CampaignFile,
+    Level,
+    Scheduler,
+    Workers,
+    crew,
+    read_files,
+)
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError
-from seakeep.files import check_place
+from seakeep.files import check_output, check_place
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,6 +95,7 @@ def calibrate(
             "'bayesian_hankel_dmdc' in [model])."
         )
     read = read_campaign(campaign)
+    check_output(out, "model", read_files(read, ensemble))
     wanted = run or [name for name in read.training_runs if name in fitted.training_spans]
     if not wanted:
         raise RequestError(

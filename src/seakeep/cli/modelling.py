@@ -20,9 +20,10 @@ from seakeep.cli.options import (
     Steps,
     Workers,
     crew,
+    read_files,
 )
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.files import check_place, make_folder
+from seakeep.files import check_output, check_place, make_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from seakeep.models import HankelDMDcModel, HankelEnsemble
 
 __all__ = ["compare", "fit", "forecast"]
+
+TABLE = "comparison.csv"
 
 
 def fit(
@@ -57,8 +60,10 @@ def fit(
     from seakeep.models import HankelEnsemble
     from seakeep.study import fit_campaign
 
+    read = read_campaign(campaign)
+    check_output(out, "model", read_files(read))
     with progress_bar("Preparing") as progress:
-        identified = fit_campaign(read_campaign(campaign), model, progress)
+        identified = fit_campaign(read, model, progress)
     if isinstance(identified, HankelEnsemble):
         with progress_bar("Stability") as progress:
             tell = quietly(progress)
@@ -113,13 +118,14 @@ def forecast(
     check_place(out)
     from seakeep.campaign import read_campaign
     from seakeep.models import HankelDMDcModel, HankelEnsemble, load_model
-    from seakeep.report.tables import forecast_words, write_forecast
+    from seakeep.report.tables import forecast_header, forecast_words, write_forecast
     from seakeep.signals.clocks import instant_text
     from seakeep.study import forecast_at_full_scale, with_degrees
     from seakeep.study.lengths import instant_of, samples_of
 
     identified = load_model(model)
     read = read_campaign(campaign)
+    check_output(out, "forecast", read_files(read, model), forecast_header(identified.states))
     if isinstance(identified, HankelDMDcModel):
         given = {"--level": level is not None, "--band": band is not None, "--members": members}
         _refuse_for_one(model, given | {"--scheduler": scheduler is not None})
@@ -210,12 +216,14 @@ def compare(
     from seakeep.study import at_full_scale, comparison_table, in_degrees
     from seakeep.study import compare as compare_runs
 
+    make_folder(out)
     identified = load_model(model)
     if isinstance(identified, HankelDMDcModel):
         given = {"--level": level is not None, "--band": band is not None}
         _refuse_for_one(model, given | {"--scheduler": scheduler is not None})
+    read = read_campaign(campaign)
+    _check_outputs(out, run or read.test_runs, format_, read_files(read, model))
     with progress_bar("Comparing") as progress:
-        read = read_campaign(campaign)
         comparisons = compare_runs(
             identified,
             read,
@@ -238,8 +246,7 @@ def compare(
         results().print(rich_bands(table))
     for text in band_findings(table):
         results().print(text, soft_wrap=True)
-    make_folder(out)
-    written = [write_csv(table, out / "comparison.csv")]
+    written = [write_csv(table, out / TABLE)]
     if find_spec("matplotlib") is None:
         messages().print(
             "Note: no figures, because matplotlib is not installed. "
@@ -252,6 +259,12 @@ def compare(
     messages().print("Wrote " + ", ".join(map(str, written)))
     if not all(comparison.complete for comparison in comparisons):
         raise typer.Exit(1)
+
+
+def _check_outputs(out: Path, runs: list[str], suffix: str, used: list[Path]) -> None:
+    check_output(out / TABLE, "table", used, "run,channel,channel_units,.*")
+    for name in runs:
+        check_output(out / f"{name}.{suffix}", "figure", used)
 
 
 def _scale(campaign: Campaign) -> float:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from seakeep.cli.console import worker_count
 from seakeep.errors import RequestError
+
+if TYPE_CHECKING:
+    from seakeep.campaign import Campaign
 
 __all__ = [
     "DEFAULT_LEVEL",
@@ -22,6 +26,7 @@ __all__ = [
     "Workers",
     "checked_count",
     "crew",
+    "read_files",
 ]
 
 DEFAULT_LEVEL = 0.95
@@ -77,6 +82,18 @@ BandKind = Annotated[
         "seakeep calibrate made; by default members.",
     ),
 ]
+
+
+def read_files(campaign: Campaign, *others: Path) -> list[Path]:
+    """Files that a command on a campaign reads: its own, the raw ones, and the prepared ones."""
+    from seakeep.campaign.store import prepared_folder
+
+    files = [campaign.path, *others]
+    for name in campaign.settings.runs:
+        with suppress(RequestError):  # what cannot be found is not read
+            files += campaign.files_of(name).values()
+        files.append(prepared_folder(campaign) / f"{name}.nc")
+    return files
 
 
 def crew(workers: int | None, scheduler: str | None) -> dict[str, Any]:

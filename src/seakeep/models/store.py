@@ -15,7 +15,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.errors import DataError, RequestError
-from seakeep.files import replacing, write_netcdf
+from seakeep.files import MARK, replacing, write_netcdf
 from seakeep.models.identification import Scale
 from seakeep.models.labelled import ChannelLabel
 
@@ -150,6 +150,7 @@ def write(dataset: xr.Dataset, path: str | Path, kind: str) -> Path:
     """
     target = Path(path)
     labelled = dataset.assign_attrs(
+        **{MARK: "model"},
         seakeep_kind=kind,
         seakeep_format=FORMAT_VERSION,
         seakeep_version=metadata.version("seakeep"),

@@ -13,7 +13,7 @@ import numpy as np
 from seakeep.campaign.settings import long_name_of
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
-from seakeep.files import replacing
+from seakeep.files import MARK, replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -128,17 +128,19 @@ def save_figure(figure: Figure, path: Path, dpi: float | None = None) -> Path:
     with figure_style(), replacing(path) as temporary:
         kind = path.suffix.removeprefix(".")
         if kind != "png":
-            figure.savefig(temporary, format=kind)
+            figure.savefig(temporary, format=kind, metadata={"Creator": f"{MARK}: figure"})
             return path
         from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from PIL import Image  # comes with matplotlib
+        from PIL import Image, PngImagePlugin  # comes with matplotlib
 
         figure.set_dpi(_RC["figure.dpi"] if dpi is None else dpi)
         canvas: Any = FigureCanvasAgg(figure)
         canvas.draw()
         full = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
         # Line drawings lose nothing to a palette and shrink to a third.
-        full.quantize(128).save(temporary, format=kind)
+        mark = PngImagePlugin.PngInfo()
+        mark.add_text("Software", f"{MARK}: figure")
+        full.quantize(128).save(temporary, format=kind, pnginfo=mark)
     return path
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +13,11 @@ import xarray as xr
 from rich import box
 from rich.table import Table
 
-from seakeep.files import replacing, write_netcdf
+from seakeep.files import MARK, replacing, write_netcdf
 
 __all__ = [
     "band_findings",
+    "forecast_header",
     "forecast_words",
     "rich_bands",
     "rich_comparison",
@@ -220,6 +223,12 @@ def write_csv(table: xr.Dataset, path: Path) -> Path:
     return path
 
 
+def forecast_header(states: Sequence[str]) -> str:
+    """Pattern of the first line of a CSV file that :func:`write_forecast` writes."""
+    one = rf"({'|'.join(map(re.escape, states))})( (std|lower|upper|member \d+))? \[[^]]*\]"
+    return rf'time \[s\](,"?{one}"?)+(,scale_factor)?\r?'
+
+
 def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
     """Write a forecast as NetCDF, or as CSV with a column a channel, full precision.
 
@@ -245,7 +254,7 @@ def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
     """
     with replacing(path) as temporary:
         if path.suffix == ".nc":
-            write_netcdf(temporary, forecast)
+            write_netcdf(temporary, forecast.assign_attrs({MARK: "forecast"}))
         else:
             # Instants are multiples of a step; nine decimals hide the rounding of the product.
             time = pd.Index(forecast["time"].values.round(9), name="time [s]")
