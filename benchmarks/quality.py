@@ -19,10 +19,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from seakeep.campaign.chain_settings import RedundantSettings
 from seakeep.campaign.channels import Group
 from seakeep.campaign.checks import check_levels, check_pairs, check_samples, told_samples
-from seakeep.campaign.settings import CampaignSettings
+from seakeep.campaign.settings import CampaignSettings, RedundantSettings
 from seakeep.signals import bridge, integrate
 from seakeep.signals.quality import (
     FEWEST_STEPS,

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from pydantic_core import PydanticUndefined
 
-from seakeep.campaign.settings import CampaignSettings, InstrumentSettings, InstrumentsSettings
-from seakeep.campaign.tables import Table
+from seakeep.campaign.settings import CampaignSettings
 from seakeep.study.settings import StudySettings
+from seakeep.toml import Table
 
 DOCS = Path(__file__).parent
 BEGIN, END = "<!-- keys: written by make_reference.py -->\n", "<!-- end of the keys -->\n"
@@ -38,9 +38,9 @@ file's own rate, before the runs are resampled to the common step.
 (encounter-periods)=
 ## Lengths in encounter periods
 
-A number is in seconds, samples or hertz, as the tables below say. A text counts in encounter periods T̂
-instead: `"1.5 T"` is a length or an instant, `"16 /T"` a frequency. So this campaign trains on sixty periods
-after the tenth, filters at sixteen times the encounter frequency and delays the input by five periods:
+A number is in seconds, samples or hertz, as the tables below say. Delays, windows and instants may be stated
+as a text that counts in encounter periods T̂ instead: `"1.5 T"`. So this campaign trains on sixty periods after
+the tenth and delays the input by five periods:
 
 ```toml
 [campaign]
@@ -48,7 +48,6 @@ encounter_period = 1.64
 
 [preparation]
 steps_per_period = 32
-low_pass = ["16 /T", "18 /T"]
 
 [runs.slow]
 file = "slow.csv"
@@ -62,7 +61,7 @@ input_delays = "5 T"
 
 T̂ is `encounter_period` of `[campaign]`, or measured: the mean zero-up-crossing period of the wave channel over
 the irregular runs, in the part of each run that is used. What that measurement rests on (spans of those runs,
-clocks, bridged gaps) can count in periods only where `encounter_period` is stated; a message says so. Lengths of
+windows of clocks) can count in periods only where `encounter_period` is stated; a message says so. Lengths of
 models become samples by rounding to the nearest integer. Priors of ensembles count in periods anyway.
 
 ## Tables and keys
@@ -116,8 +115,8 @@ def keys_of(settings):
         done.append(table)
         lines += [f"### {table.__name__.removesuffix('Settings')}", "", text_of(table), ""]
         lines += ["| key | default | meaning |", "|---|---|---|", *rows(table), ""]
-        if table is InstrumentsSettings:
-            queue.insert(0, InstrumentSettings)
+        if table.others is not None:
+            queue.insert(0, table.others)
         for field in table.model_fields.values():
             queue += tables_of(field.annotation)
     return lines

@@ -6,6 +6,7 @@ from seakeep.campaign import read_campaign
 from seakeep.campaign.settings import ModelSettings, PriorSettings
 from seakeep.errors import RequestError
 from seakeep.study import read_study
+from seakeep.toml import Length
 
 
 def refusal(path) -> str:
@@ -100,7 +101,7 @@ MISTAKES = [
     (
         "[runs.second]",
         '[runs."second/run"]',
-        "runs.second/run: received the run name 'second/run'; a name is made of letters",
+        "line 35, runs.second/run: the name of a run is made of at most 100 letters, digits",
     ),
     (
         'column = "Heave"',
@@ -306,7 +307,7 @@ def test_another_kind_of_file_is_told_by_what_it_holds(tank):
     path.write_text('[study]\ncampaign = "campaign.toml"\n[tests.all]\n')
     assert refusal(path) == (
         f"{path} is a study file (it has [study], [tests]), and a campaign file is expected here. "
-        "Name the campaign that it names."
+        "Name the right file."
     )
     campaign = tank / "campaign.toml"
     with pytest.raises(
@@ -329,7 +330,32 @@ def test_file_that_is_not_there(tank):
     assert "does not exist" in refusal(tank / "no" / "campaign.toml")
 
 
+def test_names_that_no_file_or_variable_can_hold(edited):
+    """Names with '/', control characters, or of 300 characters failed after all the work."""
+    for name in ("a/b", "a\\u0000b", "x" * 300):
+        message = refusal(edited(("[channels.acc]", f'[channels."{name}"]')))
+        assert "a name has 1 to 100 characters and holds no '/' and no control" in message
+        message = refusal(edited(("[runs.second]", f'[runs."{name}"]')))
+        assert "because files are named after it" in message
+    for name in ("time", "heave_flags"):
+        message = refusal(edited(("[channels.acc]", f"[channels.{name}]")))
+        assert "a channel is not called 'time', nor does its name end in '_flags'" in message
+
+
 class TestModels:
+    def test_any_kind_with_keys_of_its_constructor(self, edited):
+        path = edited(("[model]", '[model]\nkind = "fir"\nmemory = "2 T"\nlead = "0.75 T"\n'))
+        model = read_campaign(path).model()
+        assert model.kind == "fir"
+        assert model.arguments() == {"state_delays": 4, "input_delays": 8, "ridge": 1.0,
+                                     "lead": Length(0.75), "memory": Length(2.0)}  # fmt: skip
+        message = refusal(edited(("ridge = 1", "rigde = 1")))
+        assert "model.rigde: unknown key, received 1. Did you mean 'ridge'? Keys here" in message
+
+    def test_only_stated_keys_of_an_alignment_are_handed_on(self, edited):
+        path = edited(("ridge = 1", 'alignment = { mode = "dispersion" }'))
+        assert read_campaign(path).model().arguments()["alignment"] == {"mode": "dispersion"}
+
     def test_named_models(self, edited):
         path = edited(
             ("[model]", "[models.small]"),

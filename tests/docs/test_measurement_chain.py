@@ -8,8 +8,14 @@ import pytest
 from pages import play
 
 from seakeep import signals
-from seakeep.campaign.chain_settings import DerivedSettings, InstrumentSettings, PreparationSettings
-from seakeep.campaign.settings import GeneralSettings, RigSettings, RunSettings
+from seakeep.campaign.settings import (
+    DerivedSettings,
+    GeneralSettings,
+    InstrumentSettings,
+    PreparationSettings,
+    RigSettings,
+    RunSettings,
+)
 
 PAGE = (Path(__file__).parents[2] / "docs/measurement_chain.md").read_text(encoding="utf-8")
 

@@ -4,18 +4,22 @@ import pytest
 
 from seakeep.errors import RequestError
 from seakeep.study import read_study
-from seakeep.study.settings import validate_study
+from seakeep.study.settings import StudySettings
 from seakeep.study.windows import windows_overlap
+from seakeep.toml import validated
 
 
 def refused(**tables):
+    content = {"study": {"campaign": "campaign.toml"}, **tables}
     with pytest.raises(RequestError) as caught:
-        validate_study({"study": {"campaign": "campaign.toml"}, **tables}, "study.toml")
+        validated(StudySettings, content, "study.toml", "study")
     return str(caught.value)
 
 
 def test_what_is_left_out_is_the_papers():
-    settings = validate_study({"study": {"campaign": "campaign.toml"}}, "study.toml")
+    settings = validated(
+        StudySettings, {"study": {"campaign": "campaign.toml"}}, "study.toml", "study"
+    )
     assert settings.study.preset == "paper"
     assert settings.training.windows == 10
     assert {n: m.kind for n, m in settings.models.items()} == {

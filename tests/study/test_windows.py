@@ -6,8 +6,9 @@ import xarray as xr
 
 from seakeep.errors import RequestError
 from seakeep.models.settings import periods_to_samples
-from seakeep.study.settings import validate_study
+from seakeep.study.settings import StudySettings
 from seakeep.study.windows import Needs, choose_tests, choose_training
+from seakeep.toml import validated
 
 DT = 0.1
 
@@ -21,7 +22,8 @@ def recorded(samples, *, waves="irregular", sea_state="", first=0.0, **spans):
 
 
 def settings(**tables):
-    return validate_study({"study": {"campaign": "campaign.toml", "seed": 5}, **tables}, "s.toml")
+    content = {"study": {"campaign": "campaign.toml", "seed": 5}, **tables}
+    return validated(StudySettings, content, "s.toml", "study")
 
 
 def samples_of(run, start, stop):

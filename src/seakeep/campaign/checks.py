@@ -35,6 +35,7 @@ from seakeep.signals.quality import (
 )
 from seakeep.signals.resolution import reading_step
 from seakeep.signals.synchronise import ASSUMED
+from seakeep.toml import number
 
 __all__ = [
     "Finding",
@@ -262,13 +263,14 @@ def check_pairs(
     dt = float(run["time"][1] - run["time"][0])
     for pair in settings.redundant.values() if run.sizes["time"] >= 16 else ():
         trusted = _filled(run[pair.channels[0]])
+        window = None if pair.window is None else number(pair.window)
         for name in pair.channels[1:]:
             x = _filled(run[name])
             held = None
             if f"{name}_flags" in run.coords:
                 held = (run[f"{name}_flags"].to_numpy() & STUCK) > 0
             step = float(run[name].attrs.get("reading_step", np.nan))
-            agreement = compare_sensors(x, trusted, dt, pair.window, held, step)
+            agreement = compare_sensors(x, trusted, dt, window, held, step)
             compared[name] = agreement
             for fault in agreement.faults():
                 text = f"against {pair.channels[0]}: {fault}"

@@ -65,8 +65,8 @@ def derived_examples(names: Sequence[str], period: float | None, rate: float) ->
 def _band(period: float | None, rate: float) -> str:
     if period is None:
         return f"[0.4, {min(5.0, 0.4 * rate):.3g}]  # Hz"
-    edges = f'["0.3 /T", "{min(8.0, 0.4 * rate * period):.2g} /T"]'
-    return f"{edges}  # around the waves, T a period; in Hz if T is counted on it"
+    edges = f"[{0.3 / period:.2g}, {min(8.0 / period, 0.4 * rate):.2g}]"
+    return f"{edges}  # Hz, around the waves"
 
 
 def preparation_table(

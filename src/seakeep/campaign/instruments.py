@@ -30,6 +30,7 @@ from seakeep.signals import (
     onto_uniform,
 )
 from seakeep.signals.synchronise import ASSUMED
+from seakeep.toml import number
 
 __all__ = ["Logger", "channels_of", "clocks_of", "homes", "open_loggers", "reference_of"]
 
@@ -247,4 +248,4 @@ def _clock(
     if not np.ptp(series) or not np.ptp(other):
         raise DataError(f"'{pair[0]}' or '{pair[1]}' is constant. Choose signals that move.")
     find = clock_from_shared if own.shared else clock_from_correlation
-    return find(series, time, other, instants, own.window, own.largest_lag)
+    return find(series, time, other, instants, number(own.window), number(own.largest_lag))

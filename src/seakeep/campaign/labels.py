@@ -15,6 +15,7 @@ from seakeep.campaign.settings import CampaignSettings, RunSettings
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import Clock
 from seakeep.signals.clocks import instant_text
+from seakeep.toml import number
 
 __all__ = ["attributes_of", "cropped", "role_of", "version"]
 
@@ -128,7 +129,8 @@ def cropped(
         _refuse_empty(f"runs.{name}.{key}", span, time, dt, record)
     if settings.span is None:
         return run
-    kept = run.isel(time=inside(time, settings.span, dt))
+    whole = number(settings.span[0]), number(settings.span[1])
+    kept = run.isel(time=inside(time, whole, dt))
     for key in ("train", "test"):
         if (span := getattr(settings, key)) is not None:
             time = kept["time"].to_numpy()

@@ -16,7 +16,6 @@ from seakeep.campaign.channels import Group, read_groups
 from seakeep.campaign.finish import Told, finished, reference_time
 from seakeep.campaign.instruments import open_loggers
 from seakeep.campaign.labels import attributes_of, role_of
-from seakeep.campaign.periods import counted, in_seconds, parse_periods
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.resampling import on_one_axis, strays
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
@@ -24,6 +23,7 @@ from seakeep.campaign.survey import Failures, Survey, spare, survey
 from seakeep.campaign.validation import read_settings
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
 from seakeep.signals import Clock, uniform_step
+from seakeep.toml import in_seconds, lengths, parse_length
 
 __all__ = ["Campaign", "Progress", "read_campaign"]
 
@@ -143,7 +143,7 @@ class Campaign:
     def _counts_in_periods(self) -> bool:
         """Whether something on which prepared runs depend is stated in encounter periods."""
         models = ("model", "models")
-        return any(place[0] not in models for place in counted(self.settings))
+        return any(place[0] not in models for place in lengths(self.settings))
 
     def _in_seconds(self, period: float | None) -> CampaignSettings:
         """Settings with all that counts in encounter periods turned into seconds and hertz."""
@@ -344,8 +344,8 @@ class Campaign:
         """
         if not isinstance(stated, str):
             return float(stated)
-        length = parse_periods(stated)
-        if length.power != 1:
+        length = parse_length(stated)
+        if length.unit != "T":
             raise RequestError(f"received '{stated}', a frequency. Give a length such as '15 T'.")
         return length.at(self.encounter_period())
 

@@ -18,6 +18,7 @@ from seakeep.errors import DataError, MissingFileError, SeakeepError, SeakeepWar
 from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step, waves_part
 from seakeep.signals.spectra import energy_period
 from seakeep.signals.synchronise import without_doubtful_drift
+from seakeep.toml import number
 
 __all__ = ["Failures", "Survey", "as_one", "spare", "survey"]
 
@@ -136,9 +137,9 @@ def survey(
     periods: dict[str, float] = {}
     doubts: dict[str, str] = {}
     bad: Failures = {}
-    for number, run in enumerate(runs, 1):
+    for count, run in enumerate(runs, 1):
         if progress is not None:
-            progress(0, len(runs), f"clocks and waves of {run} ({number} of {len(runs)})")
+            progress(0, len(runs), f"clocks and waves of {run} ({count} of {len(runs)})")
         try:
             loggers = open_loggers(files_of(run), settings)
             clocks[run] = clocks_of(loggers, settings.instruments, run)
@@ -234,9 +235,7 @@ def _period(
 
 def used_span(settings: RunSettings) -> tuple[float, float]:
     """First and last instant of a run that is used at all, s."""
-    spans = [each for each in (settings.span, settings.train, settings.test) if each is not None]
-    if settings.span is not None:
-        return settings.span
-    if not spans:
-        return (-np.inf, np.inf)
-    return min(each[0] for each in spans), max(each[1] for each in spans)
+    stated = (settings.span,) if settings.span else (settings.train, settings.test)
+    spans = [(number(each[0]), number(each[1])) for each in stated if each is not None]
+    starts, ends = zip(*spans, strict=True) if spans else ((-np.inf,), (np.inf,))
+    return min(starts), max(ends)

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import xarray as xr
 
 from seakeep.campaign import Campaign
-from seakeep.campaign.periods import parse_periods
 from seakeep.errors import RequestError
+from seakeep.toml import parse_length
 
 __all__ = ["instant_of", "samples_of"]
 
@@ -82,16 +82,16 @@ def samples_of(
 
 def _count(stated: str, name: str, otherwise: str) -> float:
     try:
-        length = parse_periods(stated)
+        length = parse_length(stated)
     except RequestError:
         length = None
-    if length is None or length.power != 1:
+    if length is None or length.unit != "T":
         comma = " Write a decimal point, no comma." if "," in stated else ""
         raise RequestError(
             f"{name}: received '{stated}'. Give {otherwise}, or encounter periods such as "
             f"'15 T'.{comma}"
         )
-    return length.count
+    return length.value
 
 
 def _period(campaign: Campaign, runs: Iterable[xr.Dataset]) -> float:

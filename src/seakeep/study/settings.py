@@ -11,18 +11,17 @@ import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from seakeep.campaign import Campaign, read_campaign
 from seakeep.campaign.checksums import sha256_of
 from seakeep.campaign.readers import expand
 from seakeep.campaign.settings import ModelSettings
-from seakeep.campaign.tables import Names, Positive, Table
-from seakeep.campaign.validation import mistakes_of, read_toml
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import did_you_mean
 from seakeep.study.store import FORMAT
+from seakeep.toml import Count, Mistake, Names, Positive, Table, read_toml, refusal, validated
 
 __all__ = [
     "Study",
@@ -35,7 +34,6 @@ __all__ = [
 
 Preset = Literal["paper", "recommended"]
 Placement = Literal["random", "apart"]
-Count = Annotated[int, Field(ge=1)]
 
 
 class GeneralStudySettings(Table):
@@ -297,75 +295,50 @@ def read_study(path: Path | str) -> Study:
         key at fault, the value received, and the mend.
     """
     path = Path(path).expanduser()
-    settings = validate_study(read_toml(path, "study"), str(path))
+    settings = validated(StudySettings, read_toml(path, "study"), path, "study")
     campaign = read_campaign(expand(settings.study.campaign, path.parent))
     study = Study(path, settings, campaign)
-    mistakes = _cross_checks(study)
-    if mistakes:
-        raise _refusal(str(path), mistakes)
+    if mistakes := _cross_checks(study):
+        raise refusal(path, "study", mistakes)
     return study
 
 
-def validate_study(received: dict[str, Any], name: str) -> StudySettings:
-    """Validate the contents of a study file.
-
-    Parameters
-    ----------
-    received : dict
-        What the TOML says.
-    name : str
-        What the message calls the file.
-
-    Returns
-    -------
-    StudySettings
-        The same, checked.
-
-    Raises
-    ------
-    RequestError
-        With one line a mistake: key, value, mend.
-    """
-    try:
-        return StudySettings.model_validate(received)
-    except ValidationError as error:
-        raise _refusal(name, mistakes_of(error, StudySettings)) from None
-
-
-def _refusal(name: str, mistakes: list[str]) -> RequestError:
-    heading = "1 mistake" if len(mistakes) == 1 else f"{len(mistakes)} mistakes"
-    return RequestError(
-        f"{name}: {heading} in the study file\n" + "\n".join(f"  {each}" for each in mistakes)
-    )
-
-
-def _cross_checks(study: Study) -> list[str]:
+def _cross_checks(study: Study) -> list[Mistake]:
     """What the study says against what the campaign has."""
     campaign, settings = study.campaign, study.settings
     mistakes = []
     known = campaign.settings.channel_names
     for key, names in (("states", study.states), ("inputs", study.inputs)):
         mistakes += [
-            f"study.{key}: received {name!r}, and the campaign has no such channel."
-            f"{did_you_mean(name, known)} Channels: {', '.join(known)}."
+            Mistake(
+                ("study", key),
+                f"received {name!r}, and the campaign has no such channel."
+                f"{did_you_mean(name, known)} Channels: {', '.join(known)}.",
+            )
             for name in names
             if name not in known
         ]
     if both := set(study.states) & set(study.inputs):
-        mistakes.append(f"study.inputs: {sorted(both)[0]!r} is among the states too; choose one.")
-    tables = {f"tests.{name}": each.runs for name, each in settings.tests.items()}
-    for table, runs in {"training": settings.training.runs, **tables}.items():
+        words = f"{sorted(both)[0]!r} is among the states too; choose one."
+        mistakes.append(Mistake(("study", "inputs"), words))
+    tables: dict[tuple[str, ...], Names]
+    tables = {("tests", name): each.runs for name, each in settings.tests.items()}
+    for table, runs in {("training",): settings.training.runs, **tables}.items():
         for run in runs:
             if run not in campaign.runs:
-                mistakes.append(
-                    f"{table}.runs: received {run!r}, and the campaign has no such run."
+                words = (
+                    f"received {run!r}, and the campaign has no such run."
                     f"{did_you_mean(run, campaign.runs)} Runs: {', '.join(campaign.runs)}."
                 )
+                mistakes.append(Mistake((*table, "runs"), words))
     for name, model in settings.models.items():
+        unknown = model.unknown_keys().items()
+        mistakes += [Mistake(("models", name, key), words) for key, words in unknown]
         for key in ("states", "inputs"):
             if getattr(model, key):
-                mistakes.append(
-                    f"models.{name}.{key}: all models of a study share their channels, so that "
-                    f"they can be compared. State {key} in [study]."
+                words = (
+                    "all models of a study share their channels, so that they can be compared. "
+                    f"State {key} in [study]."
                 )
+                mistakes.append(Mistake(("models", name, key), words))
     return mistakes

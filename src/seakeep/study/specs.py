@@ -6,13 +6,13 @@ from dataclasses import replace
 from typing import Any
 
 from seakeep.campaign import ModelSettings, PriorSettings
-from seakeep.campaign.periods import Periods, counted
 from seakeep.errors import RequestError
 from seakeep.models import HankelDMDc
 from seakeep.models.ensemble import BayesianHankelDMDc
 from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform
 from seakeep.models.settings import periods_to_samples
 from seakeep.study.settings import Study, StudyModelSettings
+from seakeep.toml import Length, lengths
 
 __all__ = ["Spec", "build_spec", "counts_in_periods", "model_settings"]
 
@@ -57,7 +57,7 @@ def _missing(stated: ModelSettings | StudyModelSettings) -> list[str]:
 
 def counts_in_periods(settings: ModelSettings) -> bool:
     """Whether a model is stated in encounter periods: by a preset, a key, or as an ensemble."""
-    return settings.preset is not None or settings.kind == ENSEMBLE or any(counted(settings))
+    return settings.preset is not None or settings.kind == ENSEMBLE or any(lengths(settings))
 
 
 def build_spec(settings: ModelSettings, encounter_period: float | None, dt: float) -> Spec:
@@ -98,8 +98,8 @@ def build_spec(settings: ModelSettings, encounter_period: float | None, dt: floa
             )
     else:
         for key, value in stated.items():
-            if isinstance(value, Periods):
-                stated[key] = periods_to_samples(value.count, encounter_period, dt)
+            if isinstance(value, Length):
+                stated[key] = periods_to_samples(value.value, encounter_period, dt)
     if settings.preset is not None and encounter_period is not None:
         kind: type[Spec] = BayesianHankelDMDc if ensemble else HankelDMDc
         preset = kind.paper if settings.preset == "paper" else kind.recommended

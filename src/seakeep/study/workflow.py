@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import xarray as xr
 
 from seakeep.campaign import Campaign, load_prepared
-from seakeep.campaign.periods import Periods
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.models import HankelDMDc, HankelDMDcModel, HankelEnsemble
@@ -15,6 +14,7 @@ from seakeep.study.needs import needs_of
 from seakeep.study.repeats import warn_of_repeats
 from seakeep.study.slow import warn_of_slow_model
 from seakeep.study.specs import Spec, build_spec, counts_in_periods
+from seakeep.toml import Length
 
 __all__ = ["fit_campaign", "training_runs"]
 
@@ -108,8 +108,8 @@ def fit_campaign(
     spec = build_spec(settings, period, dt)
     runs = training_runs(prepared, _longest_window(spec, dt))
     stop = settings.stop
-    if isinstance(stop, Periods) and period is not None:
-        stop = stop.at(period)
+    if isinstance(stop, Length):
+        stop = None if period is None else stop.at(period)
     identified = spec.fit(runs, list(settings.states), list(settings.inputs), stop=stop)
     both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
     warn_of_repeats(identified, campaign, both)

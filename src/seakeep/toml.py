@@ -1,0 +1,523 @@
+"""Read our TOML files (campaign, study, tank), with one set of messages about what is wrong.
+
+A file is described by pydantic tables derived from :class:`Table`. The description of each field
+is the remedy that a message proposes. Lengths in encounter periods are :class:`Length`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+import typing
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeVar
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    Tag,
+    ValidationError,
+)
+
+from seakeep.errors import RequestError, did_you_mean
+
+__all__ = [
+    "Count",
+    "Delay",
+    "Duration",
+    "Finite",
+    "Instant",
+    "Length",
+    "Mistake",
+    "Names",
+    "NotNegative",
+    "Pair",
+    "Positive",
+    "Span",
+    "Table",
+    "Window",
+    "in_seconds",
+    "lengths",
+    "number",
+    "parse_length",
+    "read_toml",
+    "refusal",
+    "unknown_key",
+    "validated",
+]
+
+SHOWN = 60
+"""Characters of a received value that a message shows at most."""
+
+KNOWN_BY = {
+    "campaign": ("channels", "rig", "preparation"),
+    "study": ("study", "tests", "training"),
+    "tank": ("facility", "vessel", "hull", "moorings", "simulation"),
+}
+"""Tables by which each kind of file is recognised when it stands in the place of another kind."""
+
+_WRITTEN = re.compile(
+    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf)\s*(/?)\s*T\u0302?\s*"
+)
+_HEADER = re.compile(r"\s*\[{1,2}([^\[\]=]+)\]{1,2}\s*(?:#.*)?")
+_KEY = re.compile(r"\s*((?:[\w.\s-]|\"[^\"]*\"|'[^']*')+?)\s*=")
+_PART = re.compile(r"\"([^\"]*)\"|'([^']*)'|([\w-]+)")
+
+Settings = TypeVar("Settings", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class Length:
+    """A length in encounter periods (unit ``"T"``), or a frequency per period (``"/T"``).
+
+    Examples
+    --------
+    >>> str(Length(1.5)), Length(1.5).at(1.64), str(Length(4.0, "/T"))
+    ('1.5 T', 2.46, '4 /T')
+    """
+
+    value: float
+    unit: Literal["T", "/T"] = "T"
+
+    def at(self, period: float) -> float:
+        """Seconds or hertz, for an encounter period in seconds."""
+        return self.value * period if self.unit == "T" else self.value / period
+
+    def __str__(self) -> str:
+        return f"{self.value:.15g} {self.unit}"
+
+
+def parse_length(text: str) -> Length:
+    """Read a length or a frequency in encounter periods, such as ``"1.5 T"`` or ``"4 /T"``.
+
+    Raises
+    ------
+    RequestError
+        If the text says something else.
+
+    Examples
+    --------
+    >>> parse_length("15 T").at(2.0), parse_length("4 /T").at(2.0)
+    (30.0, 2.0)
+    """
+    match = _WRITTEN.fullmatch(text)
+    if match is None:
+        raise RequestError(
+            "a text in place of a number counts in encounter periods, such as '1.5 T'; seconds, "
+            "samples and hertz are numbers without quotes"
+        )
+    return Length(float(match[1]), "/T" if match[2] else "T")
+
+
+def _length(value: object) -> Length:
+    found = value if isinstance(value, Length) else parse_length(str(value))
+    if found.unit != "T":
+        raise ValueError("a length in encounter periods is written like '1.5 T'")
+    return found
+
+
+def _finite(length: Length) -> Length:
+    if not math.isfinite(length.value):
+        raise ValueError("this length must be finite")
+    return length
+
+
+def _not_negative(length: Length) -> Length:
+    if not 0 <= length.value < math.inf:
+        raise ValueError("this length must be finite and not negative")
+    return length
+
+
+def _positive(length: Length) -> Length:
+    if not 0 < length.value < math.inf:
+        raise ValueError("this length must be finite and positive")
+    return length
+
+
+def _rising(span: tuple[float | Length, float | Length]) -> tuple[float | Length, float | Length]:
+    start, end = (each.value if isinstance(each, Length) else each for each in span)
+    mixed = isinstance(span[0], Length) != isinstance(span[1], Length)
+    known = not (math.isnan(start) or math.isnan(end)) and start < math.inf and end > -math.inf
+    if not known or not (start < end or mixed):
+        raise ValueError(
+            "a span is [begin, end] in seconds of the file's clock or in encounter periods "
+            "('10 T'), begin before end; 'inf' stands for the end of the record"
+        )
+    return span
+
+
+def _branch(value: object) -> str:
+    return "<length>" if isinstance(value, str | Length) else "<number>"
+
+
+_Length = Annotated[Length, PlainValidator(_length), PlainSerializer(str)]
+_PERIODS = Discriminator(_branch)
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Pair = Annotated[tuple[Positive, Positive], Field(strict=False)]
+Count = Annotated[int, Field(ge=1)]
+Names = Annotated[tuple[str, ...], Field(strict=False)]
+Duration = Annotated[
+    Annotated[Positive, Tag("<number>")]
+    | Annotated[_Length, AfterValidator(_positive), Tag("<length>")],
+    _PERIODS,
+]
+"""A positive duration: seconds or a :class:`Length`."""
+Instant = Annotated[
+    Annotated[Finite, Tag("<number>")]
+    | Annotated[_Length, AfterValidator(_finite), Tag("<length>")],
+    _PERIODS,
+]
+"""An instant: seconds or a :class:`Length`."""
+Delay = Annotated[
+    Annotated[int, Field(ge=0), Tag("<number>")]
+    | Annotated[_Length, AfterValidator(_not_negative), Tag("<length>")],
+    _PERIODS,
+]
+"""A number of samples, or a :class:`Length` that becomes samples once the step is known."""
+Window = Annotated[
+    Annotated[int, Field(ge=2), Tag("<number>")]
+    | Annotated[_Length, AfterValidator(_positive), Tag("<length>")],
+    _PERIODS,
+]
+"""The same, of at least two samples."""
+_Edge = Annotated[Annotated[float, Tag("<number>")] | Annotated[_Length, Tag("<length>")], _PERIODS]
+Span = Annotated[tuple[_Edge, _Edge], Field(strict=False), AfterValidator(_rising)]
+"""Begin and end, each in seconds or a :class:`Length`."""
+
+
+class Table(BaseModel):
+    """A frozen table that refuses keys it does not know."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, populate_by_name=True)
+    others: ClassVar[type[BaseModel] | None] = None
+    """What a key is whose name the user chooses, where fixed keys stand beside such keys."""
+
+
+def number(value: float | Length) -> float:
+    """Value of a key once :func:`in_seconds` has resolved its table."""
+    assert not isinstance(value, Length)
+    return value
+
+
+def _children(table: BaseModel) -> Iterator[tuple[str, object]]:
+    yield from ((name, getattr(table, name)) for name in type(table).model_fields)
+    yield from (table.model_extra or {}).items()
+
+
+def lengths(value: object, place: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """Places of the keys of a table that count in encounter periods."""
+    if isinstance(value, Length):
+        yield place
+    elif isinstance(value, BaseModel | dict):
+        for name, each in _children(value) if isinstance(value, BaseModel) else value.items():
+            yield from lengths(each, (*place, str(name)))
+    elif isinstance(value, tuple) and any(isinstance(each, Length) for each in value):
+        yield place
+
+
+def in_seconds(table: Settings, period: float) -> Settings:
+    """Replace each :class:`Length` of a table, tables in it included, by seconds or hertz.
+
+    Parameters
+    ----------
+    table : BaseModel
+        The settings.
+    period : float
+        Encounter period, s.
+
+    Returns
+    -------
+    BaseModel
+        A copy; the table itself where nothing in it counts in periods.
+
+    Raises
+    ------
+    RequestError
+        If a span of which one end counts in periods runs backwards.
+    """
+    found: Settings = _resolved(table, period, ())
+    return found
+
+
+def _resolved(value: Any, period: float, place: tuple[str, ...]) -> Any:
+    if isinstance(value, Length):
+        return value.at(period)
+    if isinstance(value, BaseModel):
+        update = {
+            name: _resolved(each, period, (*place, name))
+            for name, each in _children(value)
+            if any(True for _ in lengths(each))
+        }
+        return value.model_copy(update=update) if update else value
+    if isinstance(value, dict):
+        return {name: _resolved(each, period, (*place, str(name))) for name, each in value.items()}
+    if isinstance(value, tuple) and any(isinstance(each, Length) for each in value):
+        start, end = (_resolved(each, period, place) for each in value)
+        if not start < end:
+            raise RequestError(
+                f"{'.'.join(place)}: received [{value[0]}, {value[1]}], which with an encounter "
+                f"period of {period:.6g} s is [{start:g}, {end:g}]. State the lower one first."
+            )
+        return start, end
+    return value
+
+
+class Mistake(NamedTuple):
+    """One mistake in a file: the place of its key, and what is wrong there."""
+
+    place: tuple[str, ...]
+    words: str
+
+
+def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
+    """Read a TOML file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    what : str
+        What the messages call it: "campaign", "study" or "tank".
+    mend : str, optional
+        A sentence with a leading space, added where the file does not exist.
+
+    Returns
+    -------
+    dict
+        What it says.
+
+    Raises
+    ------
+    RequestError
+        If the file is missing, cannot be read, is no TOML, or is one of our files of another kind.
+    """
+    text = _text_of(path, what, mend)
+    try:
+        found = tomllib.loads(text.replace("\r\n", "\n"))
+    except tomllib.TOMLDecodeError as error:
+        raise RequestError(
+            f"{path} is not valid TOML: {error}. Write texts in quotes, lists in [ ], "
+            "one 'key = value' a line, and each table and key once." + _if_no_toml(path, what)
+        ) from None
+    except RecursionError:
+        raise RequestError(
+            f"{path} is not a {what} file: its lists or tables are nested hundreds of levels deep. "
+            "Remove the superfluous brackets."
+        ) from None
+    except ValueError as error:  # an integer of thousands of digits
+        raise RequestError(
+            f"{path} holds a value that cannot be read: {str(error).split(';')[0]}. Shorten it."
+        ) from None
+    others = {kind: keys for kind, keys in KNOWN_BY.items() if kind != what}
+    for other, keys in others.items():
+        tables = [f"[{key}]" for key in keys if key in found]
+        if tables and not any(key in found for key in KNOWN_BY[what]):
+            raise RequestError(
+                f"{path} is a {other} file (it has {', '.join(tables)}), and a {what} file is "
+                "expected here. Name the right file."
+            )
+    return found
+
+
+def _text_of(path: Path, what: str, mend: str) -> str:
+    """Text of a file; only a regular file is opened."""
+    try:
+        if path.is_dir():
+            raise RequestError(f"{path} is a folder; give the {what}'s TOML file in it.")
+        if path.exists() and not path.is_file():
+            raise RequestError(f"{path} is not a regular file; give the {what}'s TOML file.")
+        content = path.read_bytes()
+    except FileNotFoundError:
+        beside = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+        raise RequestError(
+            f"the {what} file {path} does not exist.{did_you_mean(path.name, beside)}{mend}"
+        ) from None
+    except OSError as error:
+        raise RequestError(
+            f"the {what} file {path} cannot be read: {error.strerror or error}. Check its name and "
+            "its permissions."
+        ) from None
+    except ValueError as error:  # a NUL in the name; not a RequestError of our own
+        if isinstance(error, RequestError):
+            raise
+        raise RequestError(f"the {what} file {str(path)!r} cannot be read: {error}.") from None
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise RequestError(
+            f"{path}, line {line}: not UTF-8, which TOML asks for. Save the file as UTF-8."
+            + _if_no_toml(path, what)
+        ) from None
+
+
+def _if_no_toml(path: Path, what: str) -> str:
+    if path.suffix.lower() == ".toml":
+        return ""
+    return (
+        f" If it holds measurements: a {what} file is expected here, whose name ends in .toml. "
+        f"Draft a campaign with 'seakeep init {path.name}'."
+    )
+
+
+def validated(
+    root: type[Settings],
+    received: Mapping[str, Any],
+    source: Path | str,
+    what: str,
+    also: Callable[[Settings], Iterable[Mistake]] | None = None,
+) -> Settings:
+    """Validate the contents of a file.
+
+    Parameters
+    ----------
+    root : type
+        The table of the whole file.
+    received : mapping
+        What the file says.
+    source : Path or str
+        The file; or what the messages call the source where there is none.
+    what : str
+        What the messages call it: "campaign", "study" or "tank".
+    also : callable, optional
+        Gives the mistakes of settings whose keys and types are right.
+
+    Returns
+    -------
+    BaseModel
+        The settings.
+
+    Raises
+    ------
+    RequestError
+        With one line per mistake: line in the file, key, value received, remedy.
+    """
+    try:
+        settings = root.model_validate(received)
+    except ValidationError as error:
+        raise refusal(source, what, _mistakes_of(error, root)) from None
+    if also is not None and (mistakes := list(also(settings))):
+        raise refusal(source, what, mistakes)
+    return settings
+
+
+def refusal(source: Path | str, what: str, mistakes: Iterable[Mistake]) -> RequestError:
+    """One error that names all mistakes of a file, each with its line where it can be found."""
+    text = ""
+    if isinstance(source, Path):
+        text = source.read_bytes().decode("utf-8-sig", "replace")
+    told = []
+    for place, words in dict.fromkeys(mistakes):
+        number = _line_of(text, place)
+        line = "" if number is None else f"line {number}, "
+        told.append(f"  {line}{'.'.join(place) or 'the file'}: {words}")
+    heading = "1 mistake" if len(told) == 1 else f"{len(told)} mistakes"
+    return RequestError(f"{source}: {heading} in the {what} file\n" + "\n".join(told))
+
+
+def _line_of(text: str, place: tuple[str, ...]) -> int | None:
+    """Number of the line that states a key, or the innermost table around it."""
+    best, depth, table = None, 0, ()  # type: tuple[int | None, int, tuple[str, ...]]
+    for number, line in enumerate(text.splitlines(), 1):
+        if match := _HEADER.fullmatch(line):
+            here = table = _parts(match[1])
+        elif match := _KEY.match(line):
+            here = (*table, *_parts(match[1]))
+        else:
+            continue
+        if len(here) > depth and place[: len(here)] == here:
+            best, depth = number, len(here)
+    return best
+
+
+def _parts(dotted: str) -> tuple[str, ...]:
+    return tuple("".join(found) for found in _PART.findall(dotted))
+
+
+def _mistakes_of(error: ValidationError, root: type[BaseModel]) -> list[Mistake]:
+    """Turn what pydantic refused into our own words."""
+    out = []
+    for item in error.errors(include_url=False):
+        # Pydantic's own words in a place: '[key]' of a table, '<number>' for a branch of a union.
+        place = [str(part) for part in item["loc"] if not str(part).startswith("<")]
+        table, description, depth = _place(place, root)
+        key = tuple(part for part in place[:depth] if part != "[key]")
+        out.append(Mistake(key, _reason(item, place, table, description)))
+    return out
+
+
+def _reason(item: Any, place: list[str], table: type[BaseModel] | None, description: str) -> str:
+    kind, value = item["type"], item["input"]
+    give = f" Give {description}." if description else ""
+    if kind == "extra_forbidden" and table is not None:
+        known = [field.alias or name for name, field in table.model_fields.items()]
+        return unknown_key(place[-1], value, known)
+    if (kind == "missing" and place[-1].isdigit()) or kind == "too_long":
+        return f"received {_shown(value)}, a list of the wrong length ({len(value)}).{give}"
+    if kind == "missing":
+        return f"missing. Add it: {description}." if description else "missing. Add it."
+    if kind == "value_error":
+        return f"{item['ctx']['error']}; received {_shown(value)}."
+    message = str(item["msg"]).removeprefix("Input ").replace("valid ", "")
+    message = message.replace("a integer", "an integer")
+    return f"received {_shown(value)}, which {message}.{give}"
+
+
+def unknown_key(key: str, value: object, known: list[str]) -> str:
+    """Words of a mistake: a key that its table does not have."""
+    near = did_you_mean(key, known)
+    return f"unknown key, received {_shown(value)}.{near} Keys here: {', '.join(known)}."
+
+
+def _shown(value: object) -> str:
+    """Value as a message shows it, cut where it is long."""
+    if isinstance(value, dict):
+        text = "a table with " + (", ".join(map(str, value)) or "no keys")
+    elif isinstance(value, bool):
+        text = str(value).lower()
+    else:
+        text = repr(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
+
+
+def _place(loc: list[str], root: type[BaseModel]) -> tuple[type[BaseModel] | None, str, int]:
+    """Table in which the last key stands, that key's description, and how many keys count."""
+    table: type[BaseModel] | None = root
+    owner, description, annotation = table, "", None
+    for depth, key in enumerate(loc):
+        if table is not None:
+            owner = table
+            fields = {field.alias or name: field for name, field in table.model_fields.items()}
+            if key not in fields:
+                if (others := getattr(table, "others", None)) is None:
+                    return owner, "", depth + 1
+                table = others
+                continue
+            annotation, description = fields[key].annotation, fields[key].description or ""
+        elif typing.get_origin(annotation) is dict:
+            annotation = typing.get_args(annotation)[1]
+        else:
+            return owner, description, depth
+        table = _table_in(annotation)
+    return owner, description, len(loc)
+
+
+def _table_in(annotation: Any) -> type[BaseModel] | None:
+    """Return the table that an annotation allows, behind unions and annotations."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    if typing.get_origin(annotation) is dict:
+        return None
+    found = (_table_in(each) for each in typing.get_args(annotation))
+    return next((table for table in found if table is not None), None)
