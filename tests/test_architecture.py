@@ -14,6 +14,7 @@ SOURCE = Path(__file__).parents[1] / "src" / "seakeep"
 
 FLOORS = (
     ("errors", "interruption"),
+    ("arrays",),
     ("files",),
     ("conventions", "waves"),
     ("toml",),

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean
-from seakeep.signals.clocks import check_order, instant_text
+from seakeep.signals.time_axis import check_order, instant_text
 
 __all__ = ["Paired", "channel_names", "pair"]
-
-FloatArray = npt.NDArray[np.float64]
 
 INSTANT_TOLERANCE = 0.01
 """Part of a step by which an instant of one Dataset may differ from that of another."""

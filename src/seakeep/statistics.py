@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from seakeep.arrays import as_generator
 from seakeep.core import bootstrap as _bootstrap
 from seakeep.core import coverage as _coverage
 from seakeep.core import divergence as _divergence
@@ -39,7 +40,6 @@ from seakeep.core.density import (
     kernel_density,
 )
 from seakeep.core.divergence import JsdInterval, jensen_shannon
-from seakeep.core.samples import as_generator
 from seakeep.core.trend import TrendTest, trend_test
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.pairing import channel_names, pair

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import RequestError
 
 __all__ = ["GRAVITY", "group_speed", "phase_speed", "wavelength_to_frequency", "wavenumber"]
@@ -16,11 +17,9 @@ __all__ = ["GRAVITY", "group_speed", "phase_speed", "wavelength_to_frequency", "
 GRAVITY = 9.81
 """Acceleration of gravity, m/s²."""
 
-FloatArray = npt.NDArray[np.float64]
-
 
 def _checked(name: str, value: npt.ArrayLike) -> FloatArray:
-    array = np.asarray(value, dtype=float)
+    array = as_real(value, name)
     if np.any(~np.isfinite(array) & ~np.isposinf(array)) or np.any(array < 0):
         raise RequestError(
             f"{name} must be zero or positive; received {value!r}. "

@@ -175,8 +175,8 @@ MISTAKES = [
         'step = "differentiate"',
         'step = "derive"',
         "derived.pitch_rate.step: received 'derive', which should be 'integrate', "
-        "'differentiate', 'band_pass', 'low_pass', 'envelope_squared', 'blend', 'transfer' or "
-        "'remove_gravity'.",
+        "'differentiate', 'band_pass', 'low_pass', 'envelope_squared', "
+        "'complementary_filter', 'transfer' or 'remove_gravity'.",
     ),
     (
         'step = "differentiate"',

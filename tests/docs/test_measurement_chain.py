@@ -38,7 +38,14 @@ def test_functions_and_keys_of_the_table_exist():
         *(GeneralSettings, RigSettings, RunSettings),
     )
     keys = {key for model in models for key in model.model_fields} | {"alignment"}
-    steps = {"low_pass", "integrate", "blend", "differentiate", "transfer", "remove_gravity"}
+    steps = {
+        "low_pass",
+        "integrate",
+        "complementary_filter",
+        "differentiate",
+        "transfer",
+        "remove_gravity",
+    }
     for _, functions, toml, _ in rows:
         for name in re.findall(r"`([a-z_.0-9]+)`", functions):
             module, _, last = name.rpartition(".")

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import delay_by_celerity, delay_by_dispersion, encounter_period
-from seakeep.signals.alignment import band_limit, carry_by_celerity, carry_by_dispersion
+from seakeep.signals.propagation import band_limit, carry_by_celerity, carry_by_dispersion
 from seakeep.waves import wavenumber
 
 DEPTH = 3.6

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import special
 
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import DataError
 from seakeep.signals import resample, uniform_step
 
 
@@ -177,8 +177,8 @@ def test_constants_are_kept_exactly_to_the_ends():
         ),
         (
             lambda t: resample(np.where(t > 5, np.nan, t), t, t),
-            RequestError,
-            "values that are not finite, the first at sample 51",
+            DataError,
+            "NaN or infinite, of 100, the first at sample 51",
         ),
     ],
 )

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seakeep.errors import RequestError
+from seakeep.errors import DataError, RequestError
 from seakeep.signals import band_pass, differentiate, envelope_squared, integrate
 
 DT = 0.01
@@ -79,7 +79,7 @@ def test_error_of_the_derivative_is_the_one_stated():
 
 
 def test_derivative_needs_five_samples():
-    with pytest.raises(RequestError, match="at least 5 are needed"):
+    with pytest.raises(DataError, match="at least 5 are needed"):
         differentiate([1.0, 2.0, 3.0, 4.0], 0.1)
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from seakeep.errors import RequestError
+from seakeep.errors import DataError, RequestError
 from seakeep.signals import low_pass, lowpass_taps
 
 
@@ -102,13 +102,16 @@ def test_channels_side_by_side():
     [
         (lambda: low_pass(np.ones(50), 0.1, 6.0), r"0 < passband < stopband < half the sampling"),
         (lambda: low_pass(np.ones(50), 0.0, 1.0), r"the time step must be positive \(s\); rec"),
-        (lambda: low_pass(1.0, 0.1, 1.0), "the series has 0 samples along its first axis"),
+        (
+            lambda: low_pass(1.0, 0.1, 1.0),
+            "the series has shape .* expected time along the first axis",
+        ),
         (
             lambda: low_pass([0.0, np.nan, 1.0], 0.1, 1.0),
-            "holds 1 values that are not finite, the first at sample 1. Fill or cut the gap",
+            "holds 1 value.* NaN or infinite, of .* the first at sample 1. Fill or cut the gap",
         ),
     ],
 )
 def test_what_cannot_be_filtered(call, message):
-    with pytest.raises(RequestError, match=message):
+    with pytest.raises((RequestError, DataError), match=message):
         call()

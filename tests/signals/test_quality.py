@@ -12,8 +12,8 @@ from seakeep.signals.quality import (
     find_saturation,
     find_stuck,
     level_drift,
+    reading_step,
 )
-from seakeep.signals.resolution import reading_step
 
 DT = 0.04
 T = DT * np.arange(3000)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from seakeep.errors import RequestError
-from seakeep.signals import find_repeat
+from seakeep.signals import find_leakage
 
 DT = 1.64 / 32
 TIME = DT * np.arange(4096)
@@ -25,7 +25,7 @@ def sea(seed=0, jitter=0.0, noise=0.0):
 @pytest.mark.parametrize("seed", range(3))
 def test_equally_spaced_components_come_back_after_116_5_seconds(seed):
     record = sea(seed, noise=0.03)
-    found = find_repeat([sea(9)[:HALF], record[:HALF]], record[HALF:], DT)
+    found = find_leakage([sea(9)[:HALF], record[:HALF]], record[HALF:], DT)
     assert found is not None
     assert (found.training, found.share > 0.6) == (1, True)
     later = HALF * DT + found.test_start - found.training_start
@@ -42,18 +42,18 @@ def test_equally_spaced_components_come_back_after_116_5_seconds(seed):
 @pytest.mark.parametrize("seed", range(5))
 def test_other_seas_do_not(seed):
     record = sea(seed)
-    assert find_repeat([sea(seed + 10), sea(seed + 20)], record, DT) is None
+    assert find_leakage([sea(seed + 10), sea(seed + 20)], record, DT) is None
     jittered = sea(seed, jitter=1.0)
-    assert find_repeat([jittered[:HALF]], jittered[HALF:], DT) is None
+    assert find_leakage([jittered[:HALF]], jittered[HALF:], DT) is None
 
 
 def test_regular_waves_repeat_by_their_nature():
     wave = 0.05 * np.sin(3.0 * TIME) * (1 + 0.04 * np.sin(0.3 * TIME))
-    assert find_repeat([wave[:HALF]], wave[HALF:], DT) is None
+    assert find_leakage([wave[:HALF]], wave[HALF:], DT) is None
 
 
 def test_the_same_record_is_a_plain_repeat():
-    found = find_repeat([sea()], sea()[500:2500], DT)
+    found = find_leakage([sea()], sea()[500:2500], DT)
     assert found is not None
     assert found.share == 1.0
     assert found.phase == pytest.approx(0.0, abs=0.05)  # the Hilbert transform's ends
@@ -61,17 +61,17 @@ def test_the_same_record_is_a_plain_repeat():
 
 
 def test_still_water_and_short_training_repeat_nothing():
-    assert find_repeat([sea()], np.zeros(100), DT) is None
-    assert find_repeat([sea()[:100]], sea(), DT) is None
+    assert find_leakage([sea()], np.zeros(100), DT) is None
+    assert find_leakage([sea()[:100]], sea(), DT) is None
 
 
 def test_still_water_before_the_waves_is_no_part_of_the_comparison():
     # Two wave trains that build up after still water: they differ in all but that.
     ramp = np.clip((TIME - 20.0) / 10.0, 0.0, 1.0)
     trains = [ramp * np.sin(2 * np.pi * TIME / period) for period in (0.9, 0.63)]
-    assert find_repeat([trains[0]], trains[1], DT) is None
+    assert find_leakage([trains[0]], trains[1], DT) is None
     late = np.concatenate([np.zeros(600), sea()[:1400]])
-    found = find_repeat([sea()], late, DT)
+    found = find_leakage([sea()], late, DT)
     assert found is not None
     assert found.share == 1.0
     assert found.test_start - found.training_start == pytest.approx(600 * DT, abs=DT)
@@ -79,4 +79,4 @@ def test_still_water_before_the_waves_is_no_part_of_the_comparison():
 
 def test_a_threshold_is_a_part_of_one():
     with pytest.raises(RequestError, match=r"threshold must lie between 0 and 1; received 1\.5"):
-        find_repeat([sea()], sea(), DT, threshold=1.5)
+        find_leakage([sea()], sea(), DT, threshold=1.5)

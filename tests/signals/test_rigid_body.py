@@ -6,7 +6,7 @@ import xarray as xr
 
 from seakeep.errors import RequestError
 from seakeep.signals import (
-    blend,
+    complementary_filter,
     differentiate,
     froude_factor,
     remove_gravity,
@@ -85,13 +85,13 @@ def test_blend_keeps_slow_motion_and_needs_no_drift_removal():
     x = slow + fast + 0.006 * rng.standard_normal(t.size)
     a = -(0.21**2) * slow - 3.4**2 * fast + 0.03 * rng.standard_normal(t.size) + 0.1
     rate = 0.25 * 0.21 * np.cos(0.21 * t) + 0.03 * 3.4 * np.cos(3.4 * t)
-    error = blend(x, a, 0.05, 0.15) - rate
+    error = complementary_filter(x, a, 0.05, 0.15) - rate
     # White noise of 0.03 m/s² at 20 Hz, integrated above 0.15 Hz, is 0.0039 m/s.
     assert error.std() < 0.0045
-    position = blend(x, a, 0.05, 0.15, times=2)
+    position = complementary_filter(x, a, 0.05, 0.15, times=2)
     assert (position - slow - fast).std() < 0.5 * 0.006
     with pytest.raises(RequestError, match=r"the crossover must lie between 0 and 8 Hz"):
-        blend(x, a, 0.05, 9.0)
+        complementary_filter(x, a, 0.05, 9.0)
 
 
 @pytest.mark.parametrize(

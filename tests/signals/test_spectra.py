@@ -16,7 +16,7 @@ from seakeep.signals import (
     waves_part,
     zero_up_crossings,
 )
-from seakeep.signals.spectra import paper_welch
+from seakeep.signals.waves import paper_welch
 
 
 @given(

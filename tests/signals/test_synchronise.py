@@ -11,8 +11,7 @@ from seakeep.signals import (
     clock_from_shared,
     pool_drift,
 )
-from seakeep.signals.pulses import find_pulses
-from seakeep.signals.synchronise import without_doubtful_drift
+from seakeep.signals.synchronisation import find_pulses, without_doubtful_drift
 
 
 def pulses(t, period=20.0, width=0.5):

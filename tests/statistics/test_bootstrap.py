@@ -218,7 +218,7 @@ def test_block_length_settings_out_of_range(settings, message):
 
 
 def test_block_length_of_several_series_at_once():
-    with pytest.raises(RequestError, match=r"shape \(50, 2\); one series of shape \(time,\)"):
+    with pytest.raises(RequestError, match=r"shape \(50, 2\); expected \(time,\)"):
         block_length(NOISE.reshape(50, 2))
 
 

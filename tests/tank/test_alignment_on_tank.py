@@ -91,9 +91,9 @@ def test_the_paper_s_halves_repeat_and_other_runs_do_not(runs):
     first, second, third = (run["eta_fwd"].values for run in runs.values())
     dt = next(iter(runs.values())).attrs["dt"]
     half = first.size // 2
-    found = seakeep.signals.find_repeat([first[:half]], first[half:], dt)
+    found = seakeep.signals.find_leakage([first[:half]], first[half:], dt)
     assert found is not None
     assert found.correlation > 0.99
     later = half * dt + found.test_start - found.training_start
     assert later == pytest.approx(99 / 0.85, abs=dt)
-    assert seakeep.signals.find_repeat([second, third], first, dt) is None
+    assert seakeep.signals.find_leakage([second, third], first, dt) is None

@@ -25,8 +25,8 @@ from seakeep.campaign.validation import derivation_order, needed_channels, sourc
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import Clock, bridge, inspect_times, onto_uniform, uniform_step
-from seakeep.signals.clocks import instant_text, span_text
 from seakeep.signals.quality import BRIDGED, MISSING, flag_attributes
+from seakeep.signals.time_axis import instant_text, span_text
 
 __all__ = ["Group", "read_groups"]
 

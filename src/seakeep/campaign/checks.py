@@ -15,7 +15,6 @@ from seakeep.campaign.settings import CampaignSettings, PreparationSettings
 from seakeep.conventions import displayed
 from seakeep.errors import SeakeepWarning
 from seakeep.signals import Clock, bridge, misplaced_probes
-from seakeep.signals.gaps import stretches
 from seakeep.signals.quality import (
     BRIDGED,
     FLAGS,
@@ -32,9 +31,10 @@ from seakeep.signals.quality import (
     find_stuck,
     flag_attributes,
     level_drift,
+    reading_step,
 )
-from seakeep.signals.resolution import reading_step
-from seakeep.signals.synchronise import ASSUMED
+from seakeep.signals.synchronisation import ASSUMED
+from seakeep.signals.time_axis import stretches
 from seakeep.toml import number
 
 __all__ = [

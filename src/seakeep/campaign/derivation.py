@@ -14,7 +14,7 @@ from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError, SeakeepError
 from seakeep.signals import (
     band_pass,
-    blend,
+    complementary_filter,
     differentiate,
     envelope_squared,
     integrate,
@@ -27,7 +27,7 @@ from seakeep.signals import (
 )
 from seakeep.signals.expressions import parse
 from seakeep.signals.quality import BRIDGED, MISSING, flag_attributes
-from seakeep.signals.rigid_body import GRAVITY
+from seakeep.waves import GRAVITY
 
 __all__ = ["derive"]
 
@@ -91,7 +91,7 @@ def _derived(dataset: xr.Dataset, name: str, settings: DerivedSettings, dt: floa
         unit = settings.unit or (canonical.units if canonical else "-")
         origin = settings.expression
     else:
-        if settings.step in ("transfer", "remove_gravity", "blend"):
+        if settings.step in ("transfer", "remove_gravity", "complementary_filter"):
             values, unit, origin = _body_step(dataset, name, settings, dt)
         else:
             values, unit, origin = _step(dataset[str(settings.source)], settings, dt)
@@ -135,7 +135,7 @@ def _body_step(
     """Values, unit and description of a step that needs several channels."""
     source = dataset[str(settings.source)]
     series, unit = source.to_numpy(), str(source.attrs["units"])
-    if settings.step == "blend":
+    if settings.step == "complementary_filter":
         times, crossover = settings.times or 1, settings.crossover or 0.0
         slow = dataset[str(settings.position)].to_numpy()
         described = (
@@ -143,7 +143,7 @@ def _body_step(
             f"{settings.position} below"
         )
         return (
-            blend(slow, series, dt, crossover, times),
+            complementary_filter(slow, series, dt, crossover, times),
             si_unit(f"({unit}) * s^{times}"),
             described,
         )

@@ -29,7 +29,7 @@ from seakeep.signals import (
     clock_from_shared,
     onto_uniform,
 )
-from seakeep.signals.synchronise import ASSUMED
+from seakeep.signals.synchronisation import ASSUMED
 from seakeep.toml import number
 
 __all__ = ["Logger", "channels_of", "clocks_of", "homes", "open_loggers", "reference_of"]

@@ -14,7 +14,7 @@ from seakeep.campaign.resampling import inside
 from seakeep.campaign.settings import CampaignSettings, RunSettings
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import Clock
-from seakeep.signals.clocks import instant_text
+from seakeep.signals.time_axis import instant_text
 from seakeep.toml import number
 
 __all__ = ["attributes_of", "cropped", "role_of", "version"]

@@ -16,8 +16,8 @@ from seakeep.campaign.instruments import channels_of
 from seakeep.campaign.settings import CampaignSettings, PreparationSettings, RunSettings
 from seakeep.campaign.survey import used_span
 from seakeep.errors import SeakeepWarning
-from seakeep.signals.clocks import PASSBAND
-from seakeep.signals.sampling import energy_above
+from seakeep.signals.filters import PASSBAND
+from seakeep.signals.quality import energy_above
 
 __all__ = [
     "WARNED",

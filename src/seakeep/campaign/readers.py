@@ -23,7 +23,7 @@ from seakeep.campaign.tdms import read_tdms
 from seakeep.campaign.text import read_text
 from seakeep.conventions import conversion, si_unit
 from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
-from seakeep.signals.clocks import check_order, instant_text
+from seakeep.signals.time_axis import check_order, instant_text
 
 __all__ = ["expand", "read_columns", "read_table"]
 

@@ -13,8 +13,8 @@ from seakeep.campaign.derivation import derive
 from seakeep.campaign.settings import CampaignSettings, PreparationSettings
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import low_pass, resample, uniform_step
-from seakeep.signals.clocks import instant_text
 from seakeep.signals.quality import MISSING
+from seakeep.signals.time_axis import instant_text
 
 __all__ = ["common_axis", "inside", "on_one_axis", "strays"]
 

@@ -275,7 +275,7 @@ _STEP_KEYS: dict[str, set[str]] = {
     "differentiate": set(),
     "low_pass": {"passband", "stopband"},
     "envelope_squared": set(),
-    "blend": {"times", "position", "crossover"},
+    "complementary_filter": {"times", "position", "crossover"},
     "transfer": {"offset", "axis"},
     "remove_gravity": {"axis", "components", "zeroed"},
 }
@@ -283,12 +283,15 @@ _NEEDED = {
     "integrate": ("band", "(Hz), such as band = [0.3, 5.0]"),
     "band_pass": ("band", "(Hz), such as band = [0.3, 5.0]"),
     "low_pass": ("passband", "(Hz)"),
-    "blend": ("position", "and 'crossover' (Hz), such as position = 'surge', crossover = 0.15"),
+    "complementary_filter": (
+        "position",
+        "and 'crossover' (Hz), such as position = 'surge', crossover = 0.15",
+    ),
     "transfer": ("offset", "[x, y, z] (m) from the measured point to the wanted one"),
 }
 Step = Literal[
     "integrate", "differentiate", "band_pass", "low_pass", "envelope_squared",
-    "blend", "transfer", "remove_gravity",
+    "complementary_filter", "transfer", "remove_gravity",
 ]  # fmt: skip
 
 
@@ -315,11 +318,12 @@ class DerivedSettings(Table):
     )
     stopband: Positive | None = Field(default=None, description="edge of the stop band, Hz")
     position: str | None = Field(
-        default=None, description="'blend': the measured position that gives the slow part"
+        default=None,
+        description="'complementary_filter': the measured position that gives the slow part",
     )
     crossover: Positive | None = Field(
         default=None,
-        description="'blend': where both count half, below the waves, Hz",
+        description="'complementary_filter': where both count half, below the waves, Hz",
     )
     offset: Vector | None = Field(
         default=None,

@@ -16,8 +16,8 @@ from seakeep.campaign.resampling import inside, on_one_axis
 from seakeep.campaign.settings import CampaignSettings, RunSettings
 from seakeep.errors import DataError, MissingFileError, SeakeepError, SeakeepWarning
 from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step, waves_part
-from seakeep.signals.spectra import energy_period
-from seakeep.signals.synchronise import without_doubtful_drift
+from seakeep.signals.synchronisation import without_doubtful_drift
+from seakeep.signals.waves import energy_period
 from seakeep.toml import number
 
 __all__ = ["Failures", "Survey", "as_one", "spare", "survey"]

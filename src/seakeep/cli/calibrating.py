@@ -85,7 +85,7 @@ def calibrate(
     from seakeep.campaign import load_prepared, read_campaign
     from seakeep.models import HankelEnsemble, load_model
     from seakeep.models.forecasting import counted
-    from seakeep.signals.clocks import instant_text, span_text
+    from seakeep.signals.time_axis import instant_text, span_text
     from seakeep.study.lengths import samples_of
 
     fitted = load_model(ensemble)
@@ -145,7 +145,7 @@ def _instant(
     """An instant that lies inside one of the runs at least; a stop of 'inf' is the end of all."""
     if stated is None:
         return None
-    from seakeep.signals.clocks import instant_text, span_text
+    from seakeep.signals.time_axis import instant_text, span_text
     from seakeep.study.lengths import instant_of
 
     found = instant_of(stated, campaign, runs.values(), name)

@@ -119,7 +119,7 @@ def forecast(
     from seakeep.campaign import read_campaign
     from seakeep.models import HankelDMDcModel, HankelEnsemble, load_model
     from seakeep.report.tables import forecast_header, forecast_words, write_forecast
-    from seakeep.signals.clocks import instant_text
+    from seakeep.signals.time_axis import instant_text
     from seakeep.study import forecast_at_full_scale, with_degrees
     from seakeep.study.lengths import instant_of, samples_of
 

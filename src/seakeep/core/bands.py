@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from seakeep.arrays import FloatArray, as_real, number, positive
 from seakeep.core.metrics import over_channels, paired
-from seakeep.core.samples import FloatArray
 from seakeep.errors import RequestError
 
 __all__ = ["BandErrors", "band_error_over_time", "split_bands"]
@@ -64,11 +64,12 @@ def split_bands(
     >>> bool(np.abs(low[100:-100, 0] - slow[100:-100]).max() < 0.01)
     True
     """
-    x = np.asarray(series, dtype=float)
+    x = as_real(series, "series")
     if x.ndim < 2 or x.shape[-2] < 8:
         raise RequestError(
             f"series has shape {x.shape}; (…, time, channel) with at least eight samples is needed."
         )
+    dt, frequency = positive(dt, "the time step", "s"), number(frequency, "the frequency")
     if not (dt > 0 and 0 < frequency < 0.5 / dt):
         raise RequestError(
             f"bands split at {frequency:g} Hz do not fit a time step of {dt:g} s; the split must "

@@ -15,11 +15,10 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.core.samples import (
+from seakeep.arrays import (
     FloatArray,
     IntArray,
     as_generator,
-    as_segments,
     as_series,
     whole_number,
 )
@@ -73,8 +72,21 @@ class BlockChoice:
         return round(min(self.optimum, 1e18)) > self.cap
 
 
+def _as_segments(segments: Sequence[int] | None, samples: int) -> IntArray:
+    """Return the lengths of the pieces of which a series was joined; None is one piece."""
+    if segments is None:
+        return np.array([samples], dtype=np.intp)
+    lengths = np.array([whole_number(item, "a segment") for item in segments], dtype=np.intp)
+    if int(lengths.sum()) != samples:
+        raise RequestError(
+            f"the segments add up to {int(lengths.sum())} samples and the series has {samples}. "
+            "Give the length of each joined piece, in order."
+        )
+    return lengths
+
+
 def _varying(series: npt.ArrayLike) -> FloatArray:
-    x = as_series("the series", series, FEWEST_SAMPLES)
+    x = as_series(series, "the series", minimum=FEWEST_SAMPLES)
     if x.min() == x.max():
         raise DataError(
             f"the series is constant ({x[0]:g}); it has no correlation, block length or density. "
@@ -114,7 +126,7 @@ def lag_one_correlation(series: npt.ArrayLike, segments: Sequence[int] | None = 
         If the series is constant, has gaps, or has fewer than eight samples.
     """
     x = _varying(series)
-    pieces = as_segments(segments, x.size)
+    pieces = _as_segments(segments, x.size)
     zero, one = _autocovariance(x, 1, pieces)
     return float(x.size * one / ((x.size - pieces.size) * zero))
 
@@ -180,7 +192,7 @@ def choose_block_length(
     if kind not in ("circular", "stationary"):
         raise RequestError(f"kind must be 'circular' or 'stationary'; received '{kind}'.")
     x = _varying(series)
-    pieces = as_segments(segments, x.size)
+    pieces = _as_segments(segments, x.size)
     cap = min(x.size // 4, int(pieces.min()))
     if rule == "carlstein":
         optimum = _carlstein(x, pieces)
@@ -316,7 +328,7 @@ def resolve_block_length(
     """
     if isinstance(block, str):
         return block_length(series, block, segments=segments)
-    return whole_number("block_length", block)
+    return whole_number(block, "block_length")
 
 
 def bootstrap_indices(
@@ -351,11 +363,11 @@ def bootstrap_indices(
     RequestError
         If a number is out of range, or a block is longer than the shortest segment.
     """
-    whole_number("n_samples", n_samples)
-    whole_number("n_series", n_series)
-    whole_number("block_length", block_length)
+    whole_number(n_samples, "n_samples")
+    whole_number(n_series, "n_series")
+    whole_number(block_length, "block_length")
     as_generator(rng)
-    lengths = as_segments(segments, n_samples)
+    lengths = _as_segments(segments, n_samples)
     shortest = int(lengths.min())
     if block_length > shortest:
         what = "the series" if segments is None else "the shortest segment"
@@ -421,9 +433,7 @@ def moving_block_bootstrap(
     array([[1., 2., 3., 2., 3., 4.],
            [3., 4., 5., 3., 4., 5.]])
     """
-    x = np.asarray(series, dtype=float)
-    if x.ndim not in (1, 2):
+    x = as_series(series, "series", minimum=1, channels=True)
+    if x.ndim > 2:
         raise RequestError(f"series has shape {x.shape}; (time,) or (time, channel) is needed.")
-    if not np.all(np.isfinite(x)):
-        as_series("series", x.ravel(), 1)
     return x[bootstrap_indices(x.shape[0], n_series, block_length, rng, segments)]

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.arrays import FloatArray, as_real, fraction
 from seakeep.errors import DataError, RequestError
 
 __all__ = ["ConformalMargin", "band_scores", "conformal_margin"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,8 @@ def band_scores(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayL
     DataError
         If the measurement has gaps.
     """
-    low, high, y = (np.asarray(item, dtype=float) for item in (lower, upper, measured))
+    low, high = as_real(lower, "lower"), as_real(upper, "upper")
+    y = as_real(measured, "measured")
     if not low.shape == high.shape == y.shape:
         raise RequestError(
             f"lower has shape {low.shape}, upper {high.shape} and measured {y.shape}; all must be "
@@ -125,14 +125,13 @@ def conformal_margin(
     >>> float(found.margin[0]), float(found.warranted[0])
     (7.0, 0.8)
     """
-    s = np.asarray(scores, dtype=float)
+    s = as_real(scores, "scores")
     if s.ndim != 3 or 0 in s.shape:
         raise RequestError(
             f"scores has shape {s.shape}; (window, time, channel) with at least one of each is "
             "needed."
         )
-    if not 0 < level < 1:
-        raise RequestError(f"level must lie between 0 and 1; received {level!r}.")
+    level = fraction(level, "level")
     if block_length is not None and not 1 <= block_length <= s.shape[1]:
         raise RequestError(
             f"block_length must lie between 1 and the {s.shape[1]} samples of a window; received "

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.arrays import FloatArray, as_real, number
 from seakeep.errors import DataError, RequestError
 
 __all__ = ["BandCoverage", "BoxStatistics", "box_statistics", "coverage"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,8 @@ def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
     >>> float(band.inside), float(band.below), float(band.width)
     (0.5, 0.25, 1.0)
     """
-    low, high, m = (np.asarray(item, dtype=float) for item in (lower, upper, measured))
+    low, high = as_real(lower, "lower"), as_real(upper, "upper")
+    m = as_real(measured, "measured")
     plain = m.ndim == 1 and low.ndim == 1
     tail = slice(-1 if plain else -2, None)
     shapes = {item.shape[tail] for item in (low, high, m)}
@@ -169,11 +169,11 @@ def box_statistics(values: npt.ArrayLike, reach: float = 1.5) -> BoxStatistics:
     >>> box.median, box.upper_whisker, box.outliers
     (3.5, 5.0, array([20.]))
     """
-    everything = np.asarray(values, dtype=float).ravel()
+    everything = as_real(values, "values").ravel()
     x = np.sort(everything[np.isfinite(everything)])
     if x.size == 0:
         raise DataError(f"none of {everything.size} value(s) is finite; there is no box to draw.")
-    if not reach >= 0:
+    if not number(reach, "reach") >= 0:
         raise RequestError(f"reach must be zero or more; received {reach}.")
     first, middle, third = (float(item) for item in np.quantile(x, [0.25, 0.5, 0.75]))
     room = reach * (third - first)

@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft
 
+from seakeep.arrays import FloatArray, IntArray, as_bundle, as_real, fraction, whole_number
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
-from seakeep.core.samples import FloatArray, IntArray, as_bundle, as_grid, whole_number
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 
 __all__ = [
@@ -72,6 +72,16 @@ class DensityInterval:
     def uncertainty(self) -> FloatArray:
         """Width of the interval, U of the paper."""
         return self.upper - self.lower
+
+
+def _as_grid(values: npt.ArrayLike) -> FloatArray:
+    """Return the grid of a density; refuse one that does not increase."""
+    grid = as_real(values, "the grid")
+    if grid.ndim != 1 or grid.size < 2:
+        raise RequestError(f"the grid has shape {grid.shape}; at least two points are needed.")
+    if not np.all(np.isfinite(grid)) or not np.all(np.diff(grid) > 0):
+        raise RequestError("the grid must increase strictly and be finite; sort it, once each.")
+    return grid
 
 
 def _bandwidths(x: FloatArray, bandwidth: Bandwidth) -> FloatArray:
@@ -137,7 +147,7 @@ def kernel_bandwidth(series: npt.ArrayLike, bandwidth: Bandwidth = "paper") -> f
     >>> round(kernel_bandwidth([0.0, 1.0, 2.0, 3.0, 4.0], "silverman"), 4)
     0.9736
     """
-    x = as_bundle("the series", series)
+    x = as_bundle(series, "the series")
     if x.shape[0] != 1:
         raise RequestError(f"one series is needed for a bandwidth; received {x.shape[0]}.")
     return float(_positive(_bandwidths(x, bandwidth), x)[0])
@@ -228,7 +238,7 @@ def kernel_density(
     >>> round(float(np.trapezoid(p, grid)), 4)
     1.0
     """
-    x, points = as_bundle("the series", series), as_grid(grid)
+    x, points = as_bundle(series, "the series"), _as_grid(grid)
     out = _densities(x, points, _positive(_bandwidths(x, bandwidth), x))
     return out[0] if np.ndim(series) == 1 else out
 
@@ -263,13 +273,13 @@ def density_grid(
     SeakeepWarning
         If its step is over 1.5 bandwidths of a series; a divergence on it is then coarse.
     """
-    whole_number("points", points, 2)
+    whole_number(points, "points", 2)
     if not series or not margin >= 0:
         raise RequestError(
             f"a grid needs at least one series and a margin of zero or more; received "
             f"{len(series)} series and margin={margin}."
         )
-    all_of_them = [as_bundle("the series", item) for item in series]
+    all_of_them = [as_bundle(item, "the series") for item in series]
     widths = [_positive(_bandwidths(x, bandwidth), x) for x in all_of_them]
     room = margin * max(float(h.max()) for h in widths)
     low = min(float(x.min()) for x in all_of_them) - room
@@ -312,7 +322,7 @@ def checked_grid(
     """
     if grid is None:
         return density_grid(*series, bandwidth=bandwidth)
-    points = as_grid(grid)
+    points = _as_grid(grid)
     low = min(float(x.min()) for x in series)
     high = max(float(x.max()) for x in series)
     if points[0] > low or points[-1] < high:
@@ -397,9 +407,8 @@ def density_interval(
     DataError
         If a series is constant, has gaps, or is too short.
     """
-    x = as_bundle("the series", series)
-    if not 0.0 < level < 1.0:
-        raise RequestError(f"level must lie between 0 and 1; received {level}.")
+    x = as_bundle(series, "the series")
+    level = fraction(level, "level")
     points = checked_grid(grid, [x], bandwidth)
     block = resolve_block_length(x[0], block_length, segments)
     positions = bootstrap_indices(x.shape[1], n_series, block, rng, segments)

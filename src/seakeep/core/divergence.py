@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import rel_entr
 
+from seakeep.arrays import FloatArray, as_bundle, as_real, as_series
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.core.density import Bandwidth, bootstrapped_densities, checked_grid, kernel_density
-from seakeep.core.samples import FloatArray, as_bundle, as_series
 from seakeep.errors import RequestError
 
 __all__ = ["JsdInterval", "jensen_shannon", "jsd_interval"]
@@ -80,7 +80,7 @@ def jensen_shannon(p: npt.ArrayLike, q: npt.ArrayLike) -> FloatArray:
     >>> round(float(jensen_shannon([1.0, 0.0], [0.0, 1.0])), 4)
     0.6931
     """
-    first, second = np.asarray(p, dtype=float), np.asarray(q, dtype=float)
+    first, second = as_real(p, "p"), as_real(q, "q")
     if first.ndim < 1 or second.ndim < 1 or first.shape[-1] != second.shape[-1]:
         raise RequestError(
             f"p has shape {first.shape} and q {second.shape}; both must be given on one grid."
@@ -155,8 +155,8 @@ def jsd_interval(
     one that a record of this length cannot tell from none. It is not a lower bound, because
     paired draws share their sampling error and the floor's do not.
     """
-    m = as_series("measured", measured)
-    p = as_bundle("predicted", predicted)
+    m = as_series(measured, "measured")
+    p = as_bundle(predicted, "predicted")
     if p.shape[1] != m.size:
         raise RequestError(
             f"predicted has {p.shape[1]} samples and measured {m.size}; the same block starts "

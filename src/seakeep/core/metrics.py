@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.arrays import BoolArray, FloatArray, as_real
 from seakeep.errors import RequestError
 
 __all__ = [
@@ -21,8 +22,6 @@ __all__ = [
     "nrmse",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 SLACK_PART = 0.01
 """A channel whose measured SD is below this part of its training SD is not judged."""
@@ -36,7 +35,7 @@ def paired(
     The SD is NaN where a channel is slack, and where the measurement has a gap; the first is not
     judged, the second is (and found to be NaN).
     """
-    p, m = np.asarray(predicted, dtype=float), np.asarray(measured, dtype=float)
+    p, m = as_real(predicted, "predicted"), as_real(measured, "measured")
     if m.ndim == 1 and p.ndim >= 1 and p.shape[-1:] == m.shape:
         p, m = p[..., None], m[:, None]
     if m.ndim < 2 or p.ndim < 2 or p.shape[-2:] != m.shape[-2:]:
@@ -61,7 +60,7 @@ def paired(
             f"a window of {m.shape[-2]} sample(s) has no standard deviation; judge at least two."
         )
     spread = m.std(axis=-2, ddof=1)
-    reference = np.asarray(0.0 if training_std is None else training_std, dtype=float)
+    reference = as_real(0.0 if training_std is None else training_std, "training_std")
     if reference.shape not in ((), m.shape[-1:]):
         raise RequestError(
             f"training_std has shape {reference.shape}; one value for each of the {m.shape[-1]} "

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from seakeep.arrays import FloatArray, as_generator, as_series, fraction, whole_number
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
-from seakeep.core.samples import FloatArray, as_series, whole_number
 from seakeep.errors import DataError, RequestError
 
 __all__ = ["TrendTest", "trend_test"]
@@ -46,7 +46,7 @@ class TrendTest:
 
 
 def _instants(time: npt.ArrayLike | None, samples: int) -> FloatArray:
-    t = np.arange(samples, dtype=float) if time is None else as_series("time", time)
+    t = np.arange(samples, dtype=float) if time is None else as_series(time, "time")
     if t.size != samples:
         raise RequestError(f"time has {t.size} instants and the series {samples} samples.")
     steps = np.diff(t)
@@ -111,11 +111,11 @@ def trend_test(
     >>> found.p_value < 0.01, round(found.slope, 3)
     (True, 0.01)
     """
-    x = as_series("the series", error_over_time, 8)
+    x = as_series(error_over_time, "the series", minimum=8)
     t = _instants(time, x.size)
-    whole_number("n_series", n_series)
-    if not 0.0 < level < 1.0:
-        raise RequestError(f"level must lie between 0 and 1; received {level}.")
+    whole_number(n_series, "n_series")
+    level = fraction(level, "level")
+    as_generator(rng)
     centred = t - t.mean()
     weights = centred / (centred @ centred)
     slope = float(weights @ x)

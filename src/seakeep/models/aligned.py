@@ -16,7 +16,7 @@ from seakeep.models import forecasting, labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment, fit_alignment
 from seakeep.models.forecasting import ForecastWindow
 from seakeep.models.offsets import wants_offset
-from seakeep.signals.alignment import CarriedElevation
+from seakeep.signals.propagation import CarriedElevation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

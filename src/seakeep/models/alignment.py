@@ -25,7 +25,7 @@ from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice
 from seakeep.signals import effective_celerity
-from seakeep.signals.alignment import (
+from seakeep.signals.propagation import (
     CarriedElevation,
     band_limit,
     carry_by_celerity,

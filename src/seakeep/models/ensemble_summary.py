@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from seakeep.errors import SeakeepWarning
 from seakeep.models.forecasting import alignment_line, counted, with_units
-from seakeep.signals.clocks import span_text
+from seakeep.signals.time_axis import span_text
 
 if TYPE_CHECKING:
     from seakeep.models.fitted_ensemble import HankelEnsemble

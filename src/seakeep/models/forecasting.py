@@ -13,7 +13,7 @@ import xarray as xr
 from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.identification import Scale
-from seakeep.signals.clocks import fixed, instant_text, span_text
+from seakeep.signals.time_axis import fixed, instant_text, span_text
 
 if TYPE_CHECKING:
     from seakeep.models.alignment import FittedAlignment

@@ -13,7 +13,7 @@ import xarray as xr
 
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.signals import uniform_step
-from seakeep.signals.clocks import instant_text, span_text
+from seakeep.signals.time_axis import instant_text, span_text
 
 __all__ = ["ChannelLabel", "as_runs", "channel_labels", "channel_matrix", "nearest_sample"]
 

@@ -5,16 +5,25 @@ in hertz. Nothing here knows of files, the tracking of a video aside.
 """
 
 from seakeep.signals.agreement import compare_motion
-from seakeep.signals.alignment import delay_by_celerity, delay_by_dispersion
-from seakeep.signals.blending import blend
-from seakeep.signals.celerity import correlation_peak, effective_celerity, phase_celerity
-from seakeep.signals.clocks import resample, uniform_step
-from seakeep.signals.derive import band_pass, differentiate, envelope_squared, integrate
-from seakeep.signals.filters import low_pass, lowpass_taps
+from seakeep.signals.calculus import (
+    band_pass,
+    complementary_filter,
+    differentiate,
+    envelope_squared,
+    integrate,
+)
+from seakeep.signals.filters import low_pass, lowpass_taps, resample
 from seakeep.signals.froude import froude_factor, to_full_scale
-from seakeep.signals.gaps import TimeReport, bridge, inspect_times, onto_uniform
-from seakeep.signals.lags import Lags, windowed_lags
-from seakeep.signals.repeats import find_repeat
+from seakeep.signals.lags import Lags, correlation_peak, windowed_lags
+from seakeep.signals.leakage import find_leakage
+from seakeep.signals.propagation import (
+    delay_by_celerity,
+    delay_by_dispersion,
+    effective_celerity,
+    misplaced_probes,
+    phase_celerity,
+    probe_separation,
+)
 from seakeep.signals.rigid_body import (
     remove_gravity,
     rotation_matrix,
@@ -22,8 +31,16 @@ from seakeep.signals.rigid_body import (
     transfer_position,
     transfer_velocity,
 )
-from seakeep.signals.separation import misplaced_probes, probe_separation
-from seakeep.signals.spectra import (
+from seakeep.signals.synchronisation import (
+    Clock,
+    clock_from_correlation,
+    clock_from_pulses,
+    clock_from_shared,
+    pool_drift,
+)
+from seakeep.signals.time_axis import TimeReport, bridge, inspect_times, onto_uniform, uniform_step
+from seakeep.signals.tracking import TrackingSettings, track_video
+from seakeep.signals.waves import (
     encounter_period,
     peak_period,
     significant_height,
@@ -33,14 +50,6 @@ from seakeep.signals.spectra import (
     waves_part,
     zero_up_crossings,
 )
-from seakeep.signals.synchronise import (
-    Clock,
-    clock_from_correlation,
-    clock_from_pulses,
-    clock_from_shared,
-    pool_drift,
-)
-from seakeep.signals.tracking import TrackingSettings, track_video
 
 __all__ = [
     "Clock",
@@ -48,12 +57,12 @@ __all__ = [
     "TimeReport",
     "TrackingSettings",
     "band_pass",
-    "blend",
     "bridge",
     "clock_from_correlation",
     "clock_from_pulses",
     "clock_from_shared",
     "compare_motion",
+    "complementary_filter",
     "correlation_peak",
     "delay_by_celerity",
     "delay_by_dispersion",
@@ -61,7 +70,7 @@ __all__ = [
     "effective_celerity",
     "encounter_period",
     "envelope_squared",
-    "find_repeat",
+    "find_leakage",
     "froude_factor",
     "inspect_times",
     "integrate",

@@ -10,18 +10,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 import xarray as xr
 
+from seakeep.arrays import FloatArray, positive
 from seakeep.conventions import conversion
 from seakeep.errors import DataError, RequestError, did_you_mean
-from seakeep.signals.clocks import check_order
-from seakeep.signals.filters import positive
+from seakeep.signals.time_axis import check_order
 
 __all__ = ["Agreement", "compare_motion"]
 
-FloatArray = npt.NDArray[np.float64]
 
 SHORTEST = 16
 """Samples in common below which a correlation says nothing."""
@@ -139,7 +137,7 @@ def compare_motion(
     (0.1, 1.0)
     """
     if max_lag is not None:
-        positive("max_lag", max_lag, "s")
+        positive(max_lag, "max_lag", "s")
     names = list(channels)
     for name in names:
         for which, data in (("tracked", tracked), ("reference", reference)):

@@ -16,11 +16,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean
 
 __all__ = ["Expression", "parse"]
 
-FloatArray = npt.NDArray[np.float64]
 
 LONGEST = 1000
 """Characters an expression may have: more is a program, and Python's parser recurses."""

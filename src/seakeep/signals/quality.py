@@ -12,23 +12,25 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from seakeep.arrays import BoolArray, FloatArray, as_series, positive
 from seakeep.errors import RequestError
-from seakeep.signals.filters import as_series, odd_extension, positive
-from seakeep.signals.gaps import stretches
+from seakeep.signals.filters import odd_extension
 from seakeep.signals.lags import Lags, windowed_lags
+from seakeep.signals.time_axis import stretches
 
 __all__ = [
     "Agreement",
     "compare_sensors",
     "dominant_period",
+    "energy_above",
     "find_outliers",
     "find_saturation",
     "find_stuck",
     "level_drift",
+    "noise_level",
+    "reading_step",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 MISSING, BRIDGED, OUTLIER, SATURATED, STUCK, REPLACED = 1, 2, 4, 8, 16, 32
 
@@ -97,7 +99,7 @@ def find_outliers(
 
     Raises
     ------
-    RequestError
+    DataError
         If the series has gaps or is shorter than a window.
 
     Examples
@@ -117,11 +119,16 @@ def find_outliers(
     around = np.pad(away, width, mode="reflect")
     near = np.lib.stride_tricks.sliding_window_view(around, 2 * width + 1)
     spread = 1.4826 * np.median(near, axis=1)
-    # Second differences of white noise have six times its variance, and know no slope.
-    noise = 1.4826 * float(np.median(np.abs(np.diff(x, 2)))) / np.sqrt(6.0)
+    noise = noise_level(x)
     scale = float(np.subtract(*np.percentile(x, [99, 1]))) / 4.653  # of a normal series, its SD
     found: BoolArray = away > np.maximum(threshold * np.maximum(spread, noise), least * scale)
     return found
+
+
+def noise_level(series: FloatArray) -> float:
+    """Standard deviation of a series' white noise, by the median of its second differences."""
+    # Second differences of white noise have six times its variance, and know no slope.
+    return 1.4826 * float(np.median(np.abs(np.diff(series, 2)))) / float(np.sqrt(6.0))
 
 
 def find_saturation(series: npt.ArrayLike, shortest: int = 4) -> BoolArray:
@@ -190,7 +197,9 @@ def find_stuck(
     Raises
     ------
     RequestError
-        If a series has gaps, or the two differ in length.
+        If the two differ in length.
+    DataError
+        If a series has gaps.
 
     Examples
     --------
@@ -202,7 +211,7 @@ def find_stuck(
     array([300, 399])
     """
     x = as_series(series)
-    count = max(3, round(shortest / positive("the time step", dt, "s")))
+    count = max(3, round(shortest / positive(dt, "the time step", "s")))
     other = None if witness is None else as_series(witness)
     if other is not None and other.shape != x.shape:
         raise RequestError(
@@ -380,7 +389,7 @@ def compare_sensors(
     held : array_like of bool, shape (time,), optional
         Samples at which the sensor is known to be stuck; a lag of what stands still means nothing.
     step : float, optional
-        Step in which the sensor reads, as :func:`seakeep.signals.resolution.reading_step` finds it
+        Step in which the sensor reads, as :func:`seakeep.signals.quality.reading_step` finds it
         in the record.
 
     Returns
@@ -392,7 +401,9 @@ def compare_sensors(
     Raises
     ------
     RequestError
-        If the series have gaps or differ in length.
+        If the series differ in length.
+    DataError
+        If a series has gaps.
     """
     x, y = as_series(series), as_series(trusted)
     period = dominant_period(y, dt) if y.std() > 0 else float("nan")
@@ -454,3 +465,119 @@ def _growth(found: Lags, period: float) -> float:
     """Lag gained from the first two windows to the last two, s."""
     straight = np.unwrap(found.lag[_together(found)], period=period)
     return float(straight[-2:].mean() - straight[:2].mean()) if straight.size > 3 else 0.0
+
+
+LEAST_STEPS = 10
+"""Steps out of a held value from which a median is taken; a sensor that froze once makes two."""
+
+STRAIGHT, STRAIGHT_SHARE = 1e-7, 0.7
+"""Second differences below this part of a record's range are those of a straight line; and the
+part of the changes that continue one, from which on a record counts as interpolated."""
+
+
+def reading_step(series: npt.ArrayLike) -> float:
+    """Step in which the readings of a sensor change.
+
+    A sensor that resolves no less than a step repeats a reading until the motion has grown to the
+    next one. The step is the median size of the changes out of and into readings that were held.
+    A camera's readings that were interpolated to a faster rate are straight between its frames;
+    a change then counts from frame to frame.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Uniformly sampled, as it was recorded: no filter, no other resampling.
+
+    Returns
+    -------
+    float
+        The step, in the unit of the series; NaN where fewer than ten changes out of or into a held
+        reading are seen, as in the record of a sensor that resolves its own noise.
+
+    Raises
+    ------
+    DataError
+        If the series has gaps.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> x = np.sin(np.arange(2000) / 30)
+    >>> round(reading_step(0.25 * np.round(x / 0.25)), 9)
+    0.25
+    """
+    x = as_series(series)
+    change = np.diff(x)
+    if x.size < 3 or not change.any():
+        return float("nan")
+    frame = _frame(change, STRAIGHT * float(np.ptp(x)))
+    steps = []
+    for begin, end in stretches(change == 0):  # x[begin] to x[end] are equal
+        if end - begin < max(2, frame):
+            continue
+        steps += [abs(x[begin - frame] - x[begin])] if begin >= frame else []
+        steps += [abs(x[end + frame] - x[end])] if end + frame < x.size else []
+    return float(np.median(steps)) if len(steps) >= LEAST_STEPS else float("nan")
+
+
+def _frame(change: FloatArray, tolerance: float) -> int:
+    """Samples from one frame to the next; one where a record is not straight between frames."""
+    moving = (change[1:] != 0) & (change[:-1] != 0)
+    straight = moving & (np.abs(np.diff(change)) <= tolerance)
+    if straight.sum() < STRAIGHT_SHARE * np.count_nonzero(change):
+        return 1
+    # A frame of n samples has n changes of one slope, the first and last of them cut by its ends.
+    return int(np.median([end - begin for begin, end in stretches(straight)])) + 2
+
+
+WAVES = (0.3, 3.0)
+"""Frequencies that count as those of waves, in parts of their peak's: drift lies below, and of a
+Pierson-Moskowitz spectrum, whose tail is the highest of the usual ones, 1.5 % of the energy above:
+:math:`1 - \\exp(-1.25 / 3^4)`."""
+
+
+def energy_above(series: npt.ArrayLike, dt: float, edge: float) -> tuple[float, float]:
+    """Part of the energy of waves that lies above a frequency.
+
+    Noise and ringing above three times the peak's frequency do not count: to lose them does no
+    harm.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Uniformly sampled series without gaps.
+    dt : float
+        Time step, s.
+    edge : float
+        The frequency, Hz.
+
+    Returns
+    -------
+    (float, float)
+        The part, 0 to 1, and the period of the spectrum's peak, s; NaN where nothing moves or the
+        series has fewer than eight samples.
+
+    Raises
+    ------
+    RequestError
+        If the step is not positive.
+    DataError
+        If the series has gaps.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(0, 100, 0.05)
+    >>> share, period = energy_above(np.sin(2 * np.pi * t) + 0.5 * np.sin(4 * np.pi * t), 0.05, 1.5)
+    >>> round(share, 2), round(period, 2)
+    (0.2, 1.0)
+    """
+    x = as_series(series)
+    positive(dt, "the time step", "s")
+    period = dominant_period(x, dt) if np.ptp(x) else float("nan")
+    if not np.isfinite(period):
+        return float("nan"), float("nan")
+    power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size))) ** 2
+    lines = np.fft.rfftfreq(x.size, dt)
+    waves = (lines >= WAVES[0] / period) & (lines <= WAVES[1] / period)
+    return float(power[waves & (lines > edge)].sum() / power[waves].sum()), period

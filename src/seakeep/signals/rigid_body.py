@@ -10,7 +10,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import RequestError
+from seakeep.waves import GRAVITY
 
 __all__ = [
     "remove_gravity",
@@ -20,13 +22,9 @@ __all__ = [
     "transfer_velocity",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-
-GRAVITY = 9.81
-
 
 def _vectors(name: str, values: npt.ArrayLike) -> FloatArray:
-    array = np.asarray(values, dtype=float)
+    array = as_real(values, name)
     if array.ndim != 2 or array.shape[1] != 3:
         raise RequestError(
             f"{name} must have the shape (time, 3), one column for each of x, y and z; received "
@@ -36,7 +34,7 @@ def _vectors(name: str, values: npt.ArrayLike) -> FloatArray:
 
 
 def _offset(offset: npt.ArrayLike) -> FloatArray:
-    array = np.asarray(offset, dtype=float)
+    array = as_real(offset, "the offset")
     if array.shape != (3,) or not np.all(np.isfinite(array)):
         raise RequestError(
             f"the offset between two points is (x, y, z) in metres; received {offset!r}."

@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import DataError
 from seakeep.signals.panel import CORNERS
 
 __all__ = ["FLAGS", "Limits", "Reference", "judge", "reference_panel"]
 
-FloatArray = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.int64]
 
 FLAGS = {

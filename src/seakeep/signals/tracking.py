@@ -24,15 +24,16 @@ import numpy.typing as npt
 import scipy
 import xarray as xr
 
+from seakeep.arrays import FloatArray, positive
 from seakeep.errors import DataError, RequestError, SeakeepWarning
-from seakeep.signals.filters import low_pass, positive
+from seakeep.signals.filters import low_pass
 from seakeep.signals.frames import Video, open_video
 from seakeep.signals.panel import Segmentation, Sighting, find_panel
 from seakeep.signals.sightings import FLAGS, Limits, Reference, judge, reference_panel
+from seakeep.signals.time_axis import stretches
 
 __all__ = ["TrackingSettings", "track_video"]
 
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 
 REPORT_EVERY = 150
@@ -106,9 +107,9 @@ class TrackingSettings:
 
     def __post_init__(self) -> None:
         for name, unit in (("rest", "s"), ("tolerance", "a part"), ("max_speed", "m/s")):
-            positive(name, getattr(self, name), unit)
+            positive(getattr(self, name), name, unit)
         if self.metres_per_pixel is not None:
-            positive("metres_per_pixel", self.metres_per_pixel, "m")
+            positive(self.metres_per_pixel, "metres_per_pixel", "m")
         if len(self.panel) != 2 or not self.panel[0] > 1.2 * self.panel[1] > 0:
             raise RequestError(
                 f"panel is (length, height) in metres, the length at least 1.2 times the height, "
@@ -339,17 +340,11 @@ def _motions(
     table, bridged = _bridged(raw, good, how.bridge * rate)
     stop = _stopband(how)
     if how.passband is not None and stop is not None:
-        for begin, end in _stretches(np.isfinite(table[:, 0])):
+        for begin, end in stretches(np.isfinite(table[:, 0])):
             if end - begin > 1:
                 table[begin:end] = low_pass(table[begin:end], 1.0 / rate, how.passband, stop)
     motions = dict(zip(("surge", "heave", "pitch"), table.T, strict=True))
     return motions, bridged.astype(np.int8)
-
-
-def _stretches(there: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First index, and the one after the last, of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
-    return [(int(begin), int(end)) for begin, end in edges.reshape(-1, 2)]
 
 
 def _bridged(
@@ -357,7 +352,7 @@ def _bridged(
 ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
     """Fill inner gaps of at most `longest` frames; say which frames were filled."""
     filled = np.zeros(good.size, dtype=bool)
-    for begin, end in _stretches(~good):
+    for begin, end in stretches(~good):
         if begin > 0 and end < good.size and end - begin <= longest + 1e-9:
             filled[begin:end] = True
     if filled.any():

@@ -21,7 +21,7 @@ from seakeep.models.forecasting import status_at_clock
 from seakeep.models.identification import is_constant
 from seakeep.models.workers import Backend
 from seakeep.signals import froude_factor, to_full_scale
-from seakeep.signals.clocks import span_text
+from seakeep.signals.time_axis import span_text
 from seakeep.study.lengths import instant_of, samples_of
 from seakeep.study.repeats import warn_of_repeats
 

@@ -11,7 +11,7 @@ import xarray as xr
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.errors import SeakeepWarning
 from seakeep.models import HankelDMDcModel, HankelEnsemble
-from seakeep.signals import find_repeat
+from seakeep.signals import find_leakage
 
 __all__ = ["warn_of_repeats"]
 
@@ -76,7 +76,7 @@ def _warn(
         whole = all(np.all(np.isfinite(each)) for each in (*records.values(), test[channel].values))
         if not (records and whole) or min(test.sizes["time"], *map(len, records.values())) < 8:
             continue
-        found = find_repeat(list(records.values()), test[channel].values, dt)
+        found = find_leakage(list(records.values()), test[channel].values, dt)
         if found is None:
             continue
         source = list(records)[found.training]

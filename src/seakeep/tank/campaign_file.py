@@ -121,7 +121,7 @@ def _channels(settings: TankSettings, kind: str, lost: bool) -> list[str]:
     lines += [
         "[derived.surge_rate]",
         'from = "surge_acceleration"',
-        'step = "blend"',
+        'step = "complementary_filter"',
         'position = "surge"',
         f"crossover = {CROSSOVER}",
         "",

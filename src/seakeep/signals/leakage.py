@@ -10,14 +10,11 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.errors import RequestError
-from seakeep.signals.filters import as_series, positive
-from seakeep.signals.spectra import encounter_period, waves_part
+from seakeep.arrays import ComplexArray, FloatArray, as_series, fraction, positive
+from seakeep.signals.waves import encounter_period, waves_part
 
-__all__ = ["Repeat", "find_repeat", "is_regular"]
+__all__ = ["Leakage", "find_leakage", "is_regular"]
 
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 REGULAR = 0.2
 """Envelopes that vary by less than this part of their mean are those of regular waves (a random
@@ -25,7 +22,7 @@ sea's vary by 0.52)."""
 
 
 @dataclass(frozen=True)
-class Repeat:
+class Leakage:
     """A stretch of test input that was in the training input.
 
     Parameters
@@ -51,13 +48,13 @@ class Repeat:
     phase: float
 
 
-def find_repeat(
+def find_leakage(
     training: Sequence[npt.ArrayLike],
     test: npt.ArrayLike,
     dt: float,
     threshold: float = 0.9,
     periods: float = 30.0,
-) -> Repeat | None:
+) -> Leakage | None:
     r"""Look for stretches of a test input that the training input holds, up to a constant phase.
 
     A sea of equally spaced components comes back after one over their spacing, turned by a
@@ -82,14 +79,16 @@ def find_repeat(
 
     Returns
     -------
-    Repeat or None
+    Leakage or None
         The best match and how much of the test record repeats; None if nothing does, or if the
         test input is a regular wave, which repeats by its nature.
 
     Raises
     ------
     RequestError
-        If a number is out of range or a record has gaps.
+        If a number is out of range.
+    DataError
+        If a record has gaps.
 
     Notes
     -----
@@ -104,23 +103,22 @@ def find_repeat(
     >>> omega, phase = 2 * np.pi * (0.3 + 0.01 * np.arange(60)), rng.uniform(0, 6.28, 60)
     >>> t = np.arange(0, 180, 0.1)
     >>> sea = np.cos(np.outer(t, omega) + phase).sum(axis=1)  # comes back after 100 s
-    >>> round(find_repeat([sea[:900]], sea[900:], 0.1).correlation, 2)
+    >>> round(find_leakage([sea[:900]], sea[900:], 0.1).correlation, 2)
     1.0
     """
-    if not 0 < threshold < 1:
-        raise RequestError(f"threshold must lie between 0 and 1; received {threshold!r}.")
-    step = positive("the time step", dt, "s")
+    threshold = fraction(threshold, "threshold")
+    step = positive(dt, "the time step", "s")
     record = as_series(test, minimum=8)
     if np.ptp(record) == 0 or np.sum(np.diff(np.sign(record - record.mean())) > 0) < 2:
         return None
     part = waves_part(record, step)
     record = record[part]
     waves = _analytic(record)
-    length = round(positive("periods", periods, "1") * encounter_period(record, step) / step)
+    length = round(positive(periods, "periods", "1") * encounter_period(record, step) / step)
     length = min(length, record.size)
     if _even(waves):
         return None
-    best: Repeat | None = None
+    best: Leakage | None = None
     repeated = np.zeros(record.size, dtype=bool)
     pool = [(index, as_series(each, minimum=8)) for index, each in enumerate(training)]
     ready = [(index, _analytic(each)) for index, each in pool if each.size >= length]
@@ -136,11 +134,11 @@ def find_repeat(
             if best is None or height > best.correlation:
                 phase = float(np.angle(match[at]))
                 begin = (part.start + start) * step
-                best = Repeat(0.0, height, index, at * step, begin, phase)
+                best = Leakage(0.0, height, index, at * step, begin, phase)
     if best is None:
         return None
     share = float(repeated.mean())
-    return Repeat(
+    return Leakage(
         share, best.correlation, best.training, best.training_start, best.test_start, best.phase
     )
 

@@ -1,4 +1,4 @@
-r"""Channels derived from measured ones: integrals, derivatives, envelopes."""
+"""Integrals, derivatives and envelopes of series, and the join of two sensors of one motion."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
+from seakeep.arrays import FloatArray, as_series, positive
 from seakeep.errors import RequestError
-from seakeep.signals.filters import as_series, positive
 
-__all__ = ["band_pass", "differentiate", "envelope_squared", "integrate"]
-
-FloatArray = npt.NDArray[np.float64]
+__all__ = ["band_pass", "complementary_filter", "differentiate", "envelope_squared", "integrate"]
 
 
 def band_gain(frequency: FloatArray, band: tuple[float, float]) -> FloatArray:
@@ -119,7 +117,7 @@ def predicted_extension(
 
 def _checked_band(band: tuple[float, float], dt: float) -> tuple[float, float]:
     low, high = band
-    nyquist = 0.5 / positive("the time step", dt, "s")
+    nyquist = 0.5 / positive(dt, "the time step", "s")
     if not 0 < low < high <= nyquist:
         raise RequestError(
             f"a band needs 0 < low < high, and high at most the Nyquist frequency ({nyquist:g} "
@@ -132,7 +130,7 @@ def _checked_band(band: tuple[float, float], dt: float) -> tuple[float, float]:
 def _integrated(
     series: npt.ArrayLike, dt: float, band: tuple[float, float], times: int
 ) -> FloatArray:
-    array = as_series(series, minimum=4)
+    array = as_series(series, minimum=4, channels=True)
     low, _ = edges = _checked_band(band, dt)
     # Averaged column by column, so that a channel has the same bits alone and beside others.
     columns = np.ascontiguousarray(array.reshape(array.shape[0], -1).T)
@@ -203,7 +201,9 @@ def integrate(
     Raises
     ------
     RequestError
-        If the band is empty, negative or above the Nyquist frequency, or the series has gaps.
+        If the band is empty, negative or above the Nyquist frequency.
+    DataError
+        If the series has gaps.
 
     Examples
     --------
@@ -237,7 +237,7 @@ def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
 
     Raises
     ------
-    RequestError
+    DataError
         If the series has gaps or fewer than five samples.
 
     Notes
@@ -252,8 +252,8 @@ def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
     >>> bool(np.allclose(differentiate(t**4, 0.1), 4 * t**3))
     True
     """
-    x = as_series(series, minimum=5)
-    step = positive("the time step", dt, "s")
+    x = as_series(series, minimum=5, channels=True)
+    step = positive(dt, "the time step", "s")
     out = np.empty_like(x)
     out[2:-2] = (x[:-4] - 8 * x[1:-3] + 8 * x[3:-1] - x[4:]) / 12
     first = np.array([-25.0, 48, -36, 16, -3]) / 12
@@ -284,7 +284,7 @@ def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
 
     Raises
     ------
-    RequestError
+    DataError
         If the series has gaps.
 
     Examples
@@ -295,8 +295,8 @@ def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
     >>> bool(np.max(np.abs(envelope - 0.04)[500:-500]) < 2e-3)
     True
     """
-    array = as_series(series, minimum=4)
-    positive("the time step", dt, "s")
+    array = as_series(series, minimum=4, channels=True)
+    positive(dt, "the time step", "s")
     array = array - array.mean(axis=0)
     padding = array.shape[0] - 1
     extended = np.pad(array, [(padding, padding)] + [(0, 0)] * (array.ndim - 1), mode="reflect")
@@ -304,3 +304,99 @@ def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
     quadrature = _filtered(extended, np.where(frequency > 0, -1j, 0.0), padding)
     squared: FloatArray = array**2 + quadrature**2
     return squared
+
+
+def complementary_filter(
+    position: npt.ArrayLike,
+    acceleration: npt.ArrayLike,
+    dt: float,
+    crossover: float,
+    times: int = 1,
+) -> FloatArray:
+    r"""Integrate an acceleration, its slow part replaced by that of a measured position.
+
+    An integrated acceleration drifts; a tracked position is noisy where it moves fast. With a
+    raised-cosine weight w that falls from one to zero about the crossover, the spectrum of the
+    result is :math:`w\,(i\omega)^{2-n} X + (1 - w)\,A / (i\omega)^n`: no drift has to be removed,
+    because none is integrated, and slow motion that is true stays.
+
+    Parameters
+    ----------
+    position : array_like, shape (time,)
+        Measured position, m (or an angle, rad).
+    acceleration : array_like, shape (time,)
+        Measured acceleration in the same direction, of the same point.
+    dt : float
+        Time step, s.
+    crossover : float
+        Frequency at which both count half, Hz: below the waves, above the drift of the
+        acceleration. The change runs from 0.75 to 1.25 times it.
+    times : {1, 2}, optional
+        How often to integrate: 1 gives the rate, 2 the position.
+
+    Returns
+    -------
+    ndarray, shape (time,)
+        Rate or position; the position keeps the mean of `position`.
+
+    Raises
+    ------
+    RequestError
+        If the series differ in length, or the crossover does not fit.
+    DataError
+        If a series has gaps.
+
+    Notes
+    -----
+    A pair of complementary filters. Either end is continued by linear prediction, as in
+    :func:`seakeep.signals.integrate`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(0, 120, 0.05)
+    >>> slow, fast = 2 * np.pi / 30, 2 * np.pi * 0.6
+    >>> x = np.sin(slow * t) + 0.1 * np.cos(fast * t)
+    >>> a = -(slow**2) * np.sin(slow * t) - 0.1 * fast**2 * np.cos(fast * t) + 0.2  # and an offset
+    >>> rate = slow * np.cos(slow * t) - 0.1 * fast * np.sin(fast * t)
+    >>> bool(np.max(np.abs(complementary_filter(x, a, 0.05, 0.2) - rate)[100:-100]) < 0.01)
+    True
+    """
+    if times not in (1, 2):
+        raise RequestError(
+            f"blend gives a rate or a position: times is 1 or 2; received {times!r}."
+        )
+    x, a = as_series(position, minimum=8), as_series(acceleration, minimum=8)
+    if x.shape != a.shape or x.ndim != 1:
+        raise RequestError(
+            f"position and acceleration must be one channel each, of one length; received shapes "
+            f"{x.shape} and {a.shape}."
+        )
+    nyquist = 0.5 / positive(dt, "the time step", "s")
+    if not 0 < crossover < 0.8 * nyquist:
+        raise RequestError(
+            f"the crossover must lie between 0 and {0.8 * nyquist:g} Hz (0.8 of the Nyquist "
+            f"frequency); received {crossover:g} Hz. Set it below the slowest wave."
+        )
+    padding = int(np.ceil(8.0 / (crossover * dt)))
+    order = min(int(np.ceil(1.6 / (crossover * dt))), 2000)
+    mean, trend = _line(x)
+    both = np.column_stack([x - trend, a - a.mean()])
+    long = predicted_extension(both, padding, fitted=padding, order=order)
+    frequency = fft.rfftfreq(long.shape[0], dt)
+    spectrum = fft.rfft(long, axis=0)
+    weight = 0.5 + 0.5 * np.cos(np.pi * np.clip((frequency / crossover - 0.75) / 0.5, 0.0, 1.0))
+    omega = 2j * np.pi * frequency
+    safe = np.where(frequency > 0, omega, 1.0)
+    slow = spectrum[:, 0] * (omega if times == 1 else 1.0)
+    fast = np.where(weight < 1, spectrum[:, 1] / safe**times, 0.0)
+    joined = fft.irfft(weight * slow + (1 - weight) * fast, n=long.shape[0])
+    out: FloatArray = joined[padding : padding + x.size]
+    return out + (mean / dt if times == 1 else trend)
+
+
+def _line(x: FloatArray) -> tuple[float, FloatArray]:
+    """Slope a sample and values of the straight line through a series."""
+    at = np.arange(x.size) - 0.5 * (x.size - 1)
+    slope = float(at @ x / (at @ at))
+    return slope, x.mean() + slope * at

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from seakeep.arrays import FloatArray, IntArray, as_series, positive
 from seakeep.errors import DataError, RequestError
-from seakeep.signals.filters import as_series, positive
+from seakeep.signals.lags import parabola_peak
 
 __all__ = [
     "WaveStatistics",
@@ -27,8 +28,6 @@ __all__ = [
     "welch_segments",
     "zero_up_crossings",
 ]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -163,17 +162,17 @@ def zero_up_crossings(
     if hysteresis > 0:
         before = _clear(x, before, hysteresis * float(x.std()))
     first = before - x[before] / (x[before + 1] - x[before])
-    crossings: FloatArray = (part.start + first) * positive("the time step", dt, "s")
+    crossings: FloatArray = (part.start + first) * positive(dt, "the time step", "s")
     return crossings
 
 
-def _clear(x: FloatArray, before: npt.NDArray[np.intp], limit: float) -> npt.NDArray[np.intp]:
+def _clear(x: FloatArray, before: IntArray, limit: float) -> IntArray:
     """Of the crossings between a clear trough and the next clear crest, the middle one."""
     beyond = np.flatnonzero(np.abs(x) > limit)
     rising = np.flatnonzero((x[beyond[:-1]] < 0) & (x[beyond[1:]] > 0))
     lowest = np.searchsorted(before, beyond[rising])
     highest = np.searchsorted(before, beyond[rising + 1]) - 1
-    middle: npt.NDArray[np.intp] = before[(lowest + highest) // 2]
+    middle: IntArray = before[(lowest + highest) // 2]
     return middle
 
 
@@ -251,7 +250,7 @@ def energy_period(series: npt.ArrayLike, dt: float) -> float:
     """
     x = as_series(series)
     power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size)))[4:] ** 2
-    lines = np.fft.rfftfreq(x.size, positive("the time step", dt, "s"))[4:]
+    lines = np.fft.rfftfreq(x.size, positive(dt, "the time step", "s"))[4:]
     return float((power / lines).sum() / power.sum()) if power.any() else float("nan")
 
 
@@ -369,7 +368,7 @@ def wave_spectrum(
     (0.5, 0.5)
     """
     x = as_series(series)
-    rate = 1.0 / positive("the time step", dt, "s")
+    rate = 1.0 / positive(dt, "the time step", "s")
     length, shared = welch_segments(x.shape[0], dt, segment, overlap)
     if padded is not None and padded < length:
         raise RequestError(
@@ -400,7 +399,7 @@ def paper_welch(dt: float) -> tuple[int, int, int]:
     >>> paper_welch(0.002)
     (4096, 128, 65536)
     """
-    step = positive("the time step", dt, "s")
+    step = positive(dt, "the time step", "s")
     segment, overlap, padded = (max(round(n * 0.002 / step), 1) for n in (2**12, 2**7, 2**16))
     return segment, min(overlap, segment - 1), padded
 
@@ -448,9 +447,7 @@ def peak_period(
     options = paper_welch(dt) if preset == "paper" else (None, None, None)
     frequency, density = wave_spectrum(x, dt, *options)
     top = int(np.clip(np.argmax(density), 1, density.size - 2))
-    before, here, after = density[top - 1 : top + 2]
-    bend = before - 2 * here + after
-    shift = float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0 else 0.0
+    shift = np.clip(parabola_peak(*density[top - 1 : top + 2])[0], -0.5, 0.5)
     return float(1.0 / (frequency[top] + shift * frequency[1]))
 
 

@@ -1,22 +1,226 @@
-"""Gaps and jitter of time axes, told and masked; gaps bridged where that is asked for."""
+"""Time axes: order, step, gaps and jitter; gaps bridged where that is asked for."""
 
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 import scipy
 
+from seakeep.arrays import BoolArray, FloatArray, positive
 from seakeep.errors import DataError, RequestError
-from seakeep.signals.clocks import check_order, printed_tolerance
-from seakeep.signals.filters import positive
 
-__all__ = ["Bridged", "TimeReport", "bridge", "inspect_times", "onto_uniform", "stretches"]
+__all__ = [
+    "Bridged",
+    "TimeReport",
+    "bridge",
+    "check_order",
+    "inspect_times",
+    "instant_text",
+    "onto_uniform",
+    "span_text",
+    "stretches",
+    "uniform_step",
+]
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+STEP_TOLERANCE = 0.01
+"""A time axis is uniform if no instant is further than this part of a step from its grid."""
+
+
+def as_seconds(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
+    """Return times as floats; refuse dates, words and what else is not a number of seconds.
+
+    Parameters
+    ----------
+    time : array_like
+        Instants, s.
+    name : str, optional
+        What the message calls the owner of the times.
+
+    Returns
+    -------
+    ndarray
+        The times, of the same shape.
+
+    Raises
+    ------
+    DataError
+        If they are not numbers.
+    """
+    t = np.asarray(time)
+    if t.dtype.kind not in "iuf":
+        raise DataError(
+            f"the times of {name} are of type {t.dtype}; seconds as numbers are expected. "
+            "Subtract the first instant and divide by one second."
+        )
+    return t.astype(float, copy=False)
+
+
+def instant_text(instant: float, dt: float) -> str:
+    """Write an instant to a thousandth of a time step, whatever it is counted from.
+
+    Parameters
+    ----------
+    instant : float
+        s.
+    dt : float
+        Time step, s; 0 asks for all digits of the instant.
+
+    Returns
+    -------
+    str
+        Without the unit, and without zeros at its end.
+
+    Examples
+    --------
+    >>> instant_text(1700000034.35, 0.05), instant_text(2.0, 0.05)
+    ('1700000034.35', '2')
+    """
+    known = 15 - len(f"{abs(instant):.0f}")  # digits of a double
+    wanted = 3 - math.floor(math.log10(dt)) if dt > 0 else known
+    return fixed(instant, max(0, min(wanted, known)))
+
+
+def span_text(begin: float, end: float, dt: float) -> str:
+    """Write a span of time, with its unit; instants as :func:`instant_text`."""
+    return f"{instant_text(begin, dt)} to {instant_text(end, dt)} s"
+
+
+def fixed(value: float, decimals: int) -> str:
+    """Write a number to so many decimals, without zeros at its end."""
+    text = f"{value:.{decimals}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
+    """Return the times as floats; refuse values that are not finite, repeated or unsorted.
+
+    Parameters
+    ----------
+    time : array_like, shape (time,)
+        Instants, s.
+    name : str, optional
+        What the message calls the owner of the times.
+
+    Returns
+    -------
+    ndarray
+        The times.
+
+    Raises
+    ------
+    DataError
+        If a time is no number, not finite, repeated, or smaller than the one before.
+    """
+    t = as_seconds(time, name)
+    if t.ndim != 1 or t.size < 2:
+        raise DataError(f"{name} has {t.size} instant(s); a time axis needs at least two.")
+    if not np.all(np.isfinite(t)):
+        at = int(np.flatnonzero(~np.isfinite(t))[0])
+        raise DataError(
+            f"the times of {name} hold a value that is not finite at sample {at} "
+            f"({int(np.sum(~np.isfinite(t)))} in all). Remove these rows, or repair the times."
+        )
+    steps = np.diff(t)
+
+    def told(sample: int) -> str:
+        return f"{instant_text(t[sample], float(np.median(np.abs(steps))))} s"
+
+    if np.any(steps == 0):
+        at = int(np.flatnonzero(steps == 0)[0])
+        raise DataError(
+            f"the times of {name} repeat: {told(at)} stands at samples {at} and {at + 1} "
+            f"({int(np.sum(steps == 0))} repetitions in all). Remove the double rows, or raise the "
+            "number of decimals the logger writes."
+        )
+    if np.any(steps < 0):
+        at = int(np.flatnonzero(steps < 0)[0])
+        raise DataError(
+            f"the times of {name} are not sorted: {told(at + 1)} follows {told(at)} at sample "
+            f"{at + 1}. Sort the rows by time, or split the file where the clock was restarted."
+        )
+    return t
+
+
+def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
+    """Time step of a uniformly sampled axis.
+
+    Parameters
+    ----------
+    time : array_like, shape (time,)
+        Instants, s.
+    name : str, optional
+        What a message calls the owner of the times.
+
+    Returns
+    -------
+    float
+        The step, s: the span divided by the number of intervals.
+
+    Raises
+    ------
+    DataError
+        If the times are no numbers, unsorted, repeated, or further from a uniform grid than a
+        hundredth of a step and than the decimals explain with which they were written.
+
+    Examples
+    --------
+    >>> uniform_step([0.0, 0.1, 0.2, 0.3])
+    0.1
+    """
+    t = as_seconds(time, name)
+    if t.ndim != 1 or t.size < 2:
+        check_order(t, name)
+    step = float((t[-1] - t[0]) / (t.size - 1))
+    off = np.abs(t - (t[0] + step * np.arange(t.size)))
+    # Times this close to a rising grid are finite and sorted; else the order is looked at.
+    close = step > 0 and np.max(off) <= STEP_TOLERANCE * step
+    if not close:
+        check_order(t, name)
+    if not close and np.max(off) > max(STEP_TOLERANCE * step, printed_tolerance(t, step)):
+        raise DataError(_irregularity(t, name))
+    # A decimal step such as 0.04 that was summed or printed comes back as what was meant.
+    rounded = float(f"{step:.10g}")
+    return rounded if abs(rounded - step) * t.size < 1e-6 * step else step
+
+
+def printed_tolerance(t: FloatArray, step: float) -> float:
+    """How far rounding to the decimals that the times were written with may move an instant."""
+    for decimals in range(7):
+        unit = 10.0**-decimals
+        if unit <= 0.1 * step:
+            scaled = t / unit
+            if np.max(np.abs(scaled - np.rint(scaled))) < 1e-3:
+                return 1.001 * unit  # half a unit at the instant, half at the ends of the grid
+    return 0.0
+
+
+def _irregularity(t: FloatArray, name: str) -> str:
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+
+    def told(sample: int) -> str:
+        return f"{instant_text(t[sample], usual)} s"
+
+    counts = steps / usual
+    gaps = np.flatnonzero(counts > 1.5)
+    if gaps.size and np.max(np.abs(counts - np.rint(counts))) < 0.1:
+        longest = gaps[np.argmax(steps[gaps])]
+        return (
+            f"the times of {name} have {gaps.size} gap(s): after t = {told(int(gaps[0]))}, "
+            f"{int(np.rint(counts[gaps[0]])) - 1} sample(s) of {usual:g} s are missing; the "
+            f"longest gap, after t = {told(int(longest))}, lasts {steps[longest]:g} s. Fill the "
+            "gap, or use the record before or after it."
+        )
+    at = int(np.argmax(np.abs(steps - usual)))
+    return (
+        f"the times of {name} are not uniform: steps run from {steps.min():g} to {steps.max():g} s "
+        f"(median {usual:g} s), the oddest after t = {told(at)}. Interpolate the series onto a "
+        "uniform step before reading it, or split it where the clock changed."
+    )
 
 
 @dataclass(frozen=True)
@@ -247,7 +451,7 @@ def bridge(series: npt.ArrayLike, dt: float, longest: float) -> Bridged:
     array([0., 1., 2., 3.])
     """
     x = np.asarray(series, dtype=float)
-    positive("the time step", dt, "s")
+    positive(dt, "the time step", "s")
     if x.ndim != 1:
         raise RequestError(f"one series at a time is bridged; received shape {x.shape}.")
     missing = ~np.isfinite(x)

@@ -1,0 +1,245 @@
+"""Arrays and numbers of the public functions: their types, and the door that checks them.
+
+Every public function passes its arrays through :func:`as_real` or :func:`as_series`, which refuse
+what is not an array of real numbers: masked values, complex numbers, dates, text, Datasets and rows
+of unequal length. The message says what was received and how to mend it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from seakeep.errors import DataError, RequestError
+
+__all__ = [
+    "BoolArray",
+    "ComplexArray",
+    "FloatArray",
+    "IntArray",
+    "as_bundle",
+    "as_generator",
+    "as_real",
+    "as_series",
+    "fraction",
+    "number",
+    "positive",
+    "whole_number",
+]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.intp]
+ComplexArray = npt.NDArray[np.complex128]
+
+LARGEST = 10**300
+"""Integers beyond this are taken for it: no float holds them."""
+
+_REMEDIES = {
+    "c": "Give its real part or its modulus",
+    "M": "Give seconds: (t - t[0]) / numpy.timedelta64(1, 's')",
+    "m": "Give seconds: t / numpy.timedelta64(1, 's')",
+    "U": "Convert the text to numbers",
+    "S": "Convert the text to numbers",
+}
+
+
+def as_real(values: object, name: str) -> FloatArray:
+    """Return real numbers as an array of floats.
+
+    Parameters
+    ----------
+    values : array_like
+        Numbers, of any shape; a masked array without masked values is taken as it is.
+    name : str
+        What messages call them.
+
+    Returns
+    -------
+    ndarray
+
+    Raises
+    ------
+    RequestError
+        If they are not real numbers: masked values, complex, dates, text, a Dataset, or rows of
+        unequal length.
+
+    Examples
+    --------
+    >>> as_real([1, 2], "the series")
+    array([1., 2.])
+    """
+    if type(values) is np.ndarray and values.dtype == np.float64:
+        return values
+    if hasattr(values, "data_vars"):
+        raise RequestError(
+            f"{name} must be an array; received a Dataset. Select one channel: data['heave']."
+        )
+    _check_mask(values, name)
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise RequestError(
+            f"{name} must be an array of numbers; received rows of unequal length ({error}). "
+            "Give every row the same number of values."
+        ) from None
+    if array.dtype.kind not in "fiub":
+        remedy = _REMEDIES.get(array.dtype.kind, "Convert every value to a number, gaps to NaN")
+        raise RequestError(
+            f"{name} must be real numbers; received {type(values).__name__} of type "
+            f"{array.dtype}. {remedy}."
+        )
+    return np.asarray(array, dtype=np.float64)
+
+
+def _check_mask(values: object, name: str) -> None:
+    """Refuse masked values, in lists of arrays and in DataArrays too."""
+    inner = getattr(values, "data", None) if hasattr(values, "dims") else None
+    parts = values if isinstance(values, list | tuple) else (values, inner)
+    masked = sum(
+        int(np.ma.getmaskarray(part).sum()) for part in parts if isinstance(part, np.ma.MaskedArray)
+    )
+    if masked:
+        raise RequestError(
+            f"{name} holds {masked} masked value(s), which would be read as if they were "
+            "not masked. Fill them with numpy.ma.filled(values, numpy.nan) and treat them as a "
+            "gap, or leave them out."
+        )
+
+
+def as_series(
+    values: object, name: str = "the series", *, minimum: int = 2, channels: bool = False
+) -> FloatArray:
+    """Return a uniformly sampled series without gaps, or several side by side.
+
+    Parameters
+    ----------
+    values : array_like, shape (time,), or (time, …) with `channels`
+        Samples.
+    name : str, optional
+        What messages call it.
+    minimum : int, optional
+        Fewest samples.
+    channels : bool, optional
+        Whether there may be axes behind that of time.
+
+    Returns
+    -------
+    ndarray, of the same shape
+
+    Raises
+    ------
+    RequestError
+        If it is not an array of real numbers, or of another shape.
+    DataError
+        If it has fewer samples, or values that are not finite.
+    """
+    array = as_real(values, name)
+    if array.ndim == 0 or (array.ndim > 1 and not channels):
+        wanted = "time along the first axis: (time,) or (time, channel)" if channels else "(time,)"
+        raise RequestError(
+            f"{name} has shape {array.shape}; expected {wanted}. Select one channel and one "
+            "run, or keep the axis of time."
+        )
+    if array.shape[0] < minimum:
+        raise DataError(
+            f"{name} has {array.shape[0]} sample(s); at least {minimum} are needed; received shape "
+            f"{array.shape}. Time runs along the first axis; give a longer series."
+        )
+    if array.size == 0:
+        raise RequestError(f"{name} has shape {array.shape}; give at least one channel.")
+    return _finite(array, name)
+
+
+def as_bundle(values: object, name: str = "the series", *, minimum: int = 2) -> FloatArray:
+    """Return one series, or several of equal length, as rows.
+
+    Parameters
+    ----------
+    values : array_like, shape (time,) or (series, time)
+        Samples; time runs along the last axis.
+    name : str, optional
+        What messages call them.
+    minimum : int, optional
+        Fewest samples of each.
+
+    Returns
+    -------
+    ndarray, shape (series, time)
+
+    Raises
+    ------
+    RequestError
+        If it is not an array of real numbers, has no axis or more than two, or holds no series.
+    DataError
+        If the series are shorter, or a value is not finite.
+    """
+    array = as_real(values, name)
+    if array.ndim not in (1, 2) or (array.ndim == 2 and array.shape[0] == 0):
+        raise RequestError(f"{name} has shape {array.shape}; expected (time,) or (series, time).")
+    if array.shape[-1] < minimum:
+        raise DataError(
+            f"{name} has {array.shape[-1]} sample(s); at least {minimum} are needed. Give a longer "
+            "series."
+        )
+    _finite(array.T, name)
+    return np.atleast_2d(array)
+
+
+def _finite(array: FloatArray, name: str) -> FloatArray:
+    there = np.isfinite(array)
+    if not there.all():
+        first = int(np.flatnonzero(~there.reshape(array.shape[0], -1).all(axis=1))[0])
+        raise DataError(
+            f"{name} holds {int(np.count_nonzero(~there))} value(s) that are NaN or infinite, of "
+            f"{array.size}, the first at sample {first}. Fill or cut the gap first "
+            "(seakeep.signals.bridge); leave a diverged forecast out and count it."
+        )
+    return array
+
+
+def number(value: object, name: str) -> float:
+    """Return a real number as a float; refuse text, dates, arrays, NaN and what is masked."""
+    plain: Any = value
+    if hasattr(plain, "item"):
+        plain = plain.item() if np.size(plain) == 1 and plain is not np.ma.masked else None
+    if isinstance(plain, bool) or not isinstance(plain, int | float) or plain != plain:
+        raise RequestError(f"{name} must be a number; received {value!r}.")
+    return float(min(max(plain, -LARGEST), LARGEST)) if isinstance(plain, int) else float(plain)
+
+
+def positive(value: object, name: str, unit: str) -> float:
+    """Return a finite, positive number as a float."""
+    found = number(value, name)
+    if not np.isfinite(found) or found <= 0:
+        raise RequestError(f"{name} must be positive ({unit}); received {value!r}.")
+    return found
+
+
+def fraction(value: object, name: str) -> float:
+    """Return a number between 0 and 1, both excluded."""
+    found = number(value, name)
+    if not 0 < found < 1:
+        raise RequestError(f"{name} must lie between 0 and 1; received {value!r}.")
+    return found
+
+
+def whole_number(value: object, name: str, least: int = 1) -> int:
+    """Return a whole number of at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise RequestError(
+            f"{name} must be a whole number of at least {least}; received {value!r}."
+        )
+    return int(value)
+
+
+def as_generator(rng: object) -> np.random.Generator:
+    """Return a source of random numbers; refuse a seed."""
+    if not isinstance(rng, np.random.Generator):
+        raise RequestError(
+            f"rng must be a numpy.random.Generator; received {type(rng).__name__}. Make one with "
+            "numpy.random.default_rng(seed)."
+        )
+    return rng
