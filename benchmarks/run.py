@@ -49,7 +49,7 @@ def one_model(history: str, with_peers: bool):
 
     after = slice(start + 1, start + STEPS)
 
-    def package(delay_rows, precision="double", arrays=False):
+    def package(delay_rows, arrays=False):
         spec = seakeep.HankelDMDc(
             state_delays=STATE_DELAYS,
             input_delays=INPUT_DELAYS,
@@ -57,7 +57,6 @@ def one_model(history: str, with_peers: bool):
             window=SNAPSHOTS,
             history=history,
             delay_rows=delay_rows,
-            precision=precision,
         )
 
         def call():
@@ -75,8 +74,6 @@ def one_model(history: str, with_peers: bool):
         "seakeep, delay_rows='exact'": package("exact"),
         "seakeep, delay_rows='ridge', forecast_arrays": package("ridge", arrays=True),
         "seakeep, delay_rows='exact', forecast_arrays": package("exact", arrays=True),
-        "seakeep, delay_rows='ridge', single precision": package("ridge", "single"),
-        "seakeep, delay_rows='exact', single precision": package("exact", "single"),
     }
     if with_peers:
         contenders |= peers.contenders(problem, history)
@@ -116,16 +113,13 @@ def members(
     count: int,
     windows: int,
     workers: tuple[int, ...] = (1,),
-    ridge=None,
-    single: bool = False,
     trainings: int = 1,
     deterministic: bool = False,
 ):
     """Contenders of ensembles: the same draws, forecast from one or several starts.
 
-    `ridge` replaces the paper's prior of 50 to 150, where single precision is refused. With several
-    training windows and the deterministic model beside the draws these are the cells of the
-    paper's study; plain NumPy identifies once a training window and draw too.
+    With several training windows and the deterministic model beside the draws these are the cells
+    of the paper's study; plain NumPy identifies once a training window and draw too.
     """
     spacing = SNAPSHOTS // 4
     problem = linear_system(samples=4608 + 2 * (trainings - 1) * spacing)
@@ -134,11 +128,10 @@ def members(
     first = problem.stop + 400
     starts = np.linspace(first, len(problem.states) - STEPS - 2, windows).astype(int)
     paper = seakeep.BayesianHankelDMDc.paper(encounter_period=32 * DT, dt=DT, n_members=count)
-    paper = paper if ridge is None else dataclasses.replace(paper, ridge=ridge)
     one = seakeep.HankelDMDc.paper(encounter_period=32 * DT, dt=DT) if deterministic else None
 
-    def package(delay_rows, number, precision="double"):
-        changes = {"delay_rows": delay_rows, "precision": precision}
+    def package(delay_rows, number):
+        changes = {"delay_rows": delay_rows}
         spec = dataclasses.replace(paper, **changes)
         single_model = None if one is None else dataclasses.replace(one, **changes)
         return lambda: forecast_cells(spec, single_model, run, stops * DT, starts * DT, number)
@@ -151,9 +144,6 @@ def members(
             text = f"seakeep, delay_rows='{delay_rows}'"
             text += "" if number == 1 else f", {number} workers"
             contenders[text] = package(delay_rows, number)
-        if single:
-            text = f"seakeep, delay_rows='{delay_rows}', single precision"
-            contenders[text] = package(delay_rows, 1, "single")
     return contenders
 
 
@@ -172,31 +162,6 @@ def as_array(result) -> np.ndarray:
     if isinstance(result, np.ndarray):
         return result
     return np.stack([result[state].values for state in names()[0]], axis=1)
-
-
-def rounding() -> dict[str, float]:
-    """Largest difference of one model's forecasts in single precision from those in double."""
-    out = {}
-    for history in ("inside", "before"):
-        contenders, problem = one_model(history, with_peers=False)
-        spread = problem.states.std(axis=0, ddof=1)
-        for delay_rows in ("ridge", "exact"):
-            name = f"seakeep, delay_rows='{delay_rows}'"
-            double = as_array(contenders[name]())
-            single = as_array(contenders[f"{name}, single precision"]())
-            largest = np.max(np.abs(single - double) / spread)
-            out[f"history {history}, delay_rows='{delay_rows}'"] = float(largest)
-    return out
-
-
-def precision(arguments: argparse.Namespace) -> dict[str, list[timing.Timing]]:
-    """Single beside double precision, with draws of λ where both are allowed."""
-    out = {}
-    for windows, count in ((1, arguments.members), (10, arguments.study_members)):
-        title = f"Precision: {count} draws with λ of 100 to 200, forecasts a draw: {windows}"
-        contenders = members(count, windows, ridge=seakeep.Uniform(100, 200), single=True)
-        out[title] = timing.interleave(contenders, arguments.many_rounds)
-    return out
 
 
 def read_arguments() -> argparse.Namespace:
@@ -225,7 +190,7 @@ def read_arguments() -> argparse.Namespace:
         "--figures", type=Path, help="copy the figures of the scaling here, such as docs/figures"
     )
     parser.add_argument("--no-peers", action="store_true", help="leave other packages out")
-    parts = ["one", "ensemble", "study", "single", "rounding", "scaling"]
+    parts = ["one", "ensemble", "study", "scaling"]
     parser.add_argument("--only", choices=parts, help="one part alone; the others are kept")
     return parser.parse_args()
 
@@ -265,11 +230,8 @@ def main() -> None:
             deterministic=True,
         )
         sections[title] = timing.interleave(contenders, arguments.study_rounds, memory=False)
-    if arguments.only in (None, "single"):
-        sections |= precision(arguments)
-    differences = rounding() if arguments.only in (None, "rounding") else {}
     part = arguments.only is not None
-    print(timing.write(arguments.out, sections, notes, survey, differences, part))
+    print(timing.write(arguments.out, sections, notes, survey, part))
     if arguments.only is None:
         print(scaling.run(arguments.out, arguments.figures))
 

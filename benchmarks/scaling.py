@@ -2,7 +2,7 @@
 
 One length at a time is varied around the problem of the paper's size, on one BLAS thread. Times are
 the least processor time of a few repetitions; memory is the peak of what Python and NumPy hold,
-with temporary blocks cut to what is used of them. Beside each measured line stands its model:
+Beside each measured line stands its model:
 operations at the rate of a large matrix product on this machine, the limit of the core, and numbers
 held times eight bytes.
 """
@@ -25,10 +25,9 @@ from threadpoolctl import threadpool_limits
 
 import seakeep
 from seakeep.core import identify, rollout, training_window
-from seakeep.core import scratch as memory
 from seakeep.core.lagged import BLOCK_WIDTH
-from seakeep.core.propagation import doublings, shifting_steps
-from seakeep.core.scratch import Scratch
+from seakeep.core.rollout import _doublings as doublings
+from seakeep.core.rollout import _shifting_steps as shifting_steps
 from seakeep.report.style import COLOURS, figure_style, new_figure, save_figure
 
 PIECE = 4_000_000
@@ -87,15 +86,14 @@ def forecast_operations(size: Size, rows: str) -> float:
     if rows == "exact":
         return 2 * size.states * (a + b) * steps * w
     if w == 1:
-        times = doublings(a, b, 1, steps)[0]
+        times = doublings(a, b, 1, steps, rows == "ridge")
         once = 2 * a * (a + b) / 2**times + 2 * size.states * (a + b)
         powers = times * 2 * a * a * (a + b)
         return min(2 * a * (a + b) * steps, powers + once * steps)
-    times = doublings(a, 0, w + size.inputs, steps)[0]
-    blocks, columns = steps / 2**times, w + size.inputs
-    powers = times * 2 * a**3 + 2 * (2**times - 1) * size.states * a * a
-    runs = 2 * a * a * columns * blocks + 2 * size.states * a * columns * steps
-    return powers + runs + 2 * a * a * size.inputs * (size.z + 1)
+    times = doublings(a, b, w, steps, False)
+    blocks = steps / 2**times
+    powers = times * 2 * a * a * (a + b)
+    return powers + 2 * a * (a + b) * w * blocks + 2 * size.states * (a + b) * w * steps
 
 
 def fit_bytes(size: Size, rows: str) -> float:
@@ -117,11 +115,11 @@ def forecast_bytes(size: Size, rows: str) -> float:
         rows = size.steps * size.windows / K
         return 8 * (result + block * (a + b) + rows * (b + K * size.states))
     if size.windows == 1:
-        times = doublings(a, b, 1, size.steps)[0]
-        whole = size.steps * (a + b) / 2**times
-        return 8 * (result + (times + 1) * a * (a + b) + min(whole, PIECE))
-    times = doublings(a, 0, size.windows + size.inputs, size.steps)[0]
-    return 8 * (2 * result + (times + 2) * a * a + b * a)
+        times = doublings(a, b, 1, size.steps, rows == "ridge")
+    else:
+        times = doublings(a, b, size.windows, size.steps, False)
+    whole = size.windows * size.steps * (a + b) / 2**times
+    return 8 * (result + 2 * a * (a + b) + min(whole, PIECE))
 
 
 class Case:
@@ -134,12 +132,10 @@ class Case:
         # The series of members are those of the paper's size, long enough for its priors.
         self.problem = linear_system(max(2 * length, 4608), size.states, size.inputs)
         self.x, self.u = self.problem.states, self.problem.inputs
-        self.scratch = Scratch()
 
     def fit(self) -> np.ndarray:
         """[Â B̂] from the window of m snapshots."""
         size = self.size
-        self.scratch.reset()
         window = training_window(self.problem.stop, size.m, size.s, size.z, "before")
         return identify(
             [self.x],
@@ -149,7 +145,6 @@ class Case:
             input_delays=size.z,
             ridge=RIDGE,
             all_rows=self.rows == "ridge",
-            scratch=self.scratch,
         ).coefficients
 
     def forecast(self) -> Callable[[], np.ndarray]:
@@ -161,8 +156,7 @@ class Case:
         inputs = np.stack([self.u[k - size.z : k + size.steps] for k in starts])
 
         def call() -> np.ndarray:
-            self.scratch.reset()
-            return rollout(a, b, histories, inputs, n_states=size.states, scratch=self.scratch)
+            return rollout(a, b, histories, inputs, n_states=size.states)
 
         return call
 
@@ -187,7 +181,7 @@ class Case:
         if kind == "forecast":
             return forecast_operations(size, rows), forecast_bytes(size, rows)
         one = fit_operations(size, rows) + forecast_operations(size, rows)
-        held = max(fit_bytes(size, rows), forecast_bytes(size, rows), memory.BLOCK + memory.PAGE)
+        held = max(fit_bytes(size, rows), forecast_bytes(size, rows))
         # All members' series, and a copy that is put in order for the quantiles.
         return size.members * one, held + 2 * 8 * size.members * size.steps * size.states
 
@@ -245,22 +239,11 @@ def measure(axis: str, rows: str, rate: float, repeats: int) -> list[Point]:
 
 
 def _peak(case: Case, kind: str) -> float:
-    # Blocks of memory no larger than what is cut out of them; members, which differ in size, share
-    # a block as ever.
-    usual = memory.BLOCK, memory.PAGE
-    if kind != "ensemble":
-        memory.BLOCK, memory.PAGE = 0, 64
-    try:
-        case.scratch = Scratch()
-        call = case.call(kind)
-        case.scratch = Scratch()
-        tracemalloc.start()
-        call()
-        peak = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-    finally:
-        memory.BLOCK, memory.PAGE = usual
-        case.scratch = Scratch()
+    call = case.call(kind)
+    tracemalloc.start()
+    call()
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
     return peak / 2**20
 
 

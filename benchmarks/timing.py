@@ -149,7 +149,6 @@ def write(
     sections: Mapping[str, list[Timing]],
     notes: Mapping[str, Mapping[str, float]],
     survey: Mapping[str, Mapping[str, float]],
-    rounding: Mapping[str, float],
     part: bool = False,
 ) -> str:
     """Write the tables as JSON and Markdown beside each other, and return the Markdown.
@@ -164,8 +163,6 @@ def write(
         A number more a contender, by the title of its table: the accuracy.
     survey : mapping of str to mapping of str to float
         Milliseconds on another machine, by the title of their table.
-    rounding : mapping of str to float
-        Largest difference of single from double precision by its case, standard deviations.
     part : bool, optional
         Whether the other tables of the folder are kept.
 
@@ -181,10 +178,9 @@ def write(
         old = {name: [Timing(**row) for row in rows] for name, rows in before["tables"].items()}
         sections = old | dict(sections)
         notes, survey = before["accuracy"] | dict(notes), before["survey"] | dict(survey)
-        rounding = before.get("rounding", {}) | dict(rounding)
     data = {name: [asdict(row) for row in rows] for name, rows in sections.items()}
     everything = {"machine": facts, "accuracy": dict(notes), "survey": dict(survey)}
-    everything |= {"rounding": dict(rounding), "tables": data}
+    everything["tables"] = data
     (path / "benchmark.json").write_text(json.dumps(everything, indent=1), "utf-8")
     text = [describe(facts)]
     for name, rows in sections.items():
@@ -203,10 +199,6 @@ def write(
             if accuracy:
                 cells.append(f"{accuracy[r.name]:.3f}" if r.name in accuracy else "–")
             text.append(f"| {' | '.join(cells)} |")
-    if rounding:
-        text += ["", "### Single precision beside double, the same forecasts", ""]
-        text += ["|  | largest difference, standard deviations |", "|---|---|"]
-        text += [f"| {name} | {value:.1e} |" for name, value in rounding.items()]
     text += [
         "",
         "Peak: what Python and NumPy took in the process that calls; that of workers is their own.",

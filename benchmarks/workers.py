@@ -31,7 +31,6 @@ from pathlib import Path
 from problem import DT, STEPS, as_run, linear_system, names
 
 import seakeep
-from seakeep.core.scratch import Scratch
 from seakeep.models.workers import Crew, side_by_side
 from seakeep.study import read_study, run_study
 
@@ -57,7 +56,7 @@ eigenvalues = false
 """
 
 
-def nothing(data: object, item: int, scratch: Scratch) -> int:
+def nothing(data: object, item: int) -> int:
     """The smallest piece of work."""
     return item
 

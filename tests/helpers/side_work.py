@@ -9,27 +9,27 @@ import scipy.linalg
 import threadpoolctl
 
 
-def blas_threads(data, item, scratch):
+def blas_threads(data, item):
     np.linalg.norm(scipy.linalg.cholesky(np.eye(3)))  # both libraries are loaded and used
     found = [each["num_threads"] for each in threadpoolctl.threadpool_info()]
     return os.getpid(), found
 
 
-def square(data, item, scratch):
+def square(data, item):
     time.sleep(0.02)
     return os.getpid(), data * item**2
 
 
-def fall(data, item, scratch):
+def fall(data, item):
     if item == data:
         os.kill(os.getpid(), signal.SIGKILL)
     return item
 
 
-def refuse(data, item, scratch):
+def refuse(data, item):
     raise ValueError(f"item {item}")
 
 
-def sleep(data, item, scratch):
+def sleep(data, item):
     time.sleep(data)
     return os.getpid()

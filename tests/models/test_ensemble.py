@@ -429,7 +429,7 @@ def test_spectral_radii_are_those_of_the_members_for_any_workers(run, tmp_path):
     radii = fitted(run, ridge=STABLE).spectral_radii()
     ensemble = fitted(run, ridge=STABLE)
     for number in range(6):
-        # The same matrix through the same routine; scratch memory may lie otherwise.
+        # The same matrix through the same routine; memory may lie otherwise.
         expected = ensemble.member(number).spectral_radius
         assert radii[number] == pytest.approx(expected, rel=1e-12)
     told = []

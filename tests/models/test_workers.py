@@ -19,7 +19,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seakeep
-from seakeep.core.scratch import Scratch
 from seakeep.errors import RequestError
 from seakeep.models import processes, workers
 from seakeep.models.members import TrainingArrays, forecast_member, member_radius
@@ -74,7 +73,7 @@ def test_arrays_depend_neither_on_the_crew_nor_on_the_order(
     ensemble, run = ensemble_of(members, seed, delay_rows)
     starts = [31.0 + 2 * k for k in range(windows)]
     task = _task(ensemble, run, starts)
-    alone = [forecast_member(task, draw, Scratch()) for draw in ensemble.members]
+    alone = [forecast_member(task, draw) for draw in ensemble.members]
     shuffled = list(range(members))
     order.shuffle(shuffled)
     draws = [ensemble.members[k] for k in shuffled]

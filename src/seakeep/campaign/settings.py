@@ -667,9 +667,6 @@ class ModelSettings(Table):
     ridge_scale: Literal["absolute", "per_snapshot"] | None = Field(default=None, description="")
     rank: Annotated[int, Field(ge=1)] | None = Field(default=None, description="a positive integer")
     standardize: bool | None = Field(default=None, description="true or false")
-    precision: Literal["double", "single"] | None = Field(
-        default=None, description="'double' or 'single'"
-    )
     stop: Instant | None = Field(
         default=None, description="end of the training window, s or periods such as '60 T'"
     )

@@ -31,7 +31,6 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.core.lagged import lagged_response, lagged_sums, recent
-from seakeep.core.scratch import Scratch
 
 __all__ = ["Piece", "PrimalSystem", "gram_trace", "primal_system", "snapshot_gram"]
 
@@ -124,8 +123,6 @@ def primal_system(
     pieces: Sequence[Piece],
     state_delays: int,
     input_delays: int,
-    scratch: Scratch,
-    single: bool = False,
     room: int = 0,
 ) -> PrimalSystem:
     r"""Gram matrix :math:`\hat Y \hat Y^T` and right-hand side :math:`X' \hat Y^T`.
@@ -136,17 +133,13 @@ def primal_system(
         Runs.
     state_delays, input_delays : int
         s and z.
-    scratch : Scratch
-        Memory.
-    single : bool, optional
-        Whether the Gram matrix is rounded to single precision; all sums are made in double.
     room : int, optional
         Rows and columns beyond the Gram matrix, for right-hand sides.
 
     Returns
     -------
     PrimalSystem
-        Its Gram matrix is part of `scratch`.
+        Gram matrix, right-hand side, heads and edges.
     """
     s, z = state_delays, input_delays
     N, Q = pieces[0].states.shape[1], pieces[0].inputs.shape[1]
@@ -161,8 +154,8 @@ def primal_system(
         # One more lag and one column less than the heads need: the sums of the next states are
         # the same sums one lag later, up to one product at either end.
         newest = np.concatenate([u[start + 1 : end + 1], x[start + 1 : end + 1]], axis=1)
-        sums_u = lagged_sums(newest, u, start + 1, z + 2, scratch)
-        sums_x = lagged_sums(newest, x, start + 1, s + 2, scratch)
+        sums_u = lagged_sums(newest, u, start + 1, z + 2)
+        sums_x = lagged_sums(newest, x, start + 1, s + 2)
         snapshot = np.concatenate([recent(u, start, z + 1), recent(x, start, s + 1)])
         heads += np.concatenate([u[start], x[start]])[:, None] * snapshot
         heads[:, :inputs] += sums_u[:, : Q * (z + 1)]
@@ -174,10 +167,8 @@ def primal_system(
         for row, at in ((edges[2 * number], start - 1), (edges[2 * number + 1], end)):
             row[Q:inputs] = recent(u, at, z)
             row[inputs + N :] = recent(x, at, s)
-    gram = scratch.take((size + room, size + room))
+    gram = np.empty((size + room, size + room))
     _fill_primal(gram[:size, :size], heads, edges, N, Q, inputs)
-    if single:
-        gram = _rounded(gram, [*_panels(0, inputs, Q), *_panels(inputs, size, N)], scratch)
     return PrimalSystem(gram, right, heads, edges, N, Q, inputs)
 
 
@@ -213,8 +204,6 @@ def snapshot_gram(
     pieces: Sequence[Piece],
     state_delays: int,
     input_delays: int,
-    scratch: Scratch,
-    single: bool = False,
     room: int = 0,
 ) -> FloatArray:
     r"""Gram matrix :math:`\hat Y^T \hat Y` of the snapshots of all runs.
@@ -225,10 +214,6 @@ def snapshot_gram(
         Runs.
     state_delays, input_delays : int
         s and z.
-    scratch : Scratch
-        Memory; the result is part of it.
-    single : bool, optional
-        Whether the result is rounded to single precision; all sums are made in double.
     room : int, optional
         Rows and columns beyond the Gram matrix, for right-hand sides.
 
@@ -259,11 +244,8 @@ def snapshot_gram(
             head[begin:stop] = lagged_response(piece.states, own_x, piece.first, piece.count)
             head[begin:stop] += lagged_response(piece.inputs, own_u, piece.first, piece.count)
     size = len(steps)
-    gram: FloatArray = scratch.take((size + room, size + room))
+    gram = np.empty((size + room, size + room))
     _fill_snapshots(gram[:size, :size], heads, steps, signed, ends)
-    if single:
-        runs = pairwise(ends.tolist())
-        gram = _rounded(gram, [panel for run in runs for panel in _panels(*run, 1)], scratch)
     return gram
 
 
@@ -291,15 +273,6 @@ def _fill_snapshots(
                 for other, end in others:
                     row = gram[at, other + 1 : end]
                     row += gram[at - 1, other : end - 1]
-
-
-def _rounded(gram: FloatArray, panels: Sequence[tuple[int, int]], scratch: Scratch) -> FloatArray:
-    """The panels of a Gram matrix as they were made, in single precision."""
-    out: FloatArray = scratch.take(gram.shape, np.float32)
-    size = panels[-1][1]
-    for begin, stop in panels:
-        out[begin:stop, begin:size] = gram[begin:stop, begin:size]
-    return out
 
 
 def _panels(begin: int, end: int, block: int) -> Iterator[tuple[int, int]]:

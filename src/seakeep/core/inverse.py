@@ -27,16 +27,13 @@ import numpy.typing as npt
 from scipy.linalg import lapack
 
 from seakeep.core.gram import PrimalSystem
-from seakeep.core.scratch import Scratch
 
 __all__ = ["ridge_rows"]
 
 FloatArray = npt.NDArray[np.float64]
 
 
-def ridge_rows(
-    system: PrimalSystem, factor: FloatArray, ridge: float, scratch: Scratch
-) -> FloatArray:
+def ridge_rows(system: PrimalSystem, factor: FloatArray, ridge: float) -> FloatArray:
     r"""Coefficients of all rows of the next extended state.
 
     The rows that shift the delayed states need no right-hand side: with P the rows of the
@@ -51,8 +48,6 @@ def ridge_rows(
         Lower Cholesky factor of M, in Fortran order.
     ridge : float
         λ.
-    scratch : Scratch
-        Memory.
 
     Returns
     -------
@@ -64,7 +59,7 @@ def ridge_rows(
     extended, width, edges = size - inputs, N + Q, len(system.edges)
     tau = -1.0 if _is_smooth(system) else 1.0
     rank = edges + 2 * width
-    rows = scratch.take((rank + N, size))
+    rows = np.empty((rank + N, size))
     rows[:edges] = system.edges
     newest, solving = rows[edges : edges + width], rows[edges + width : rank]
     newest[...] = 0.0
@@ -78,7 +73,7 @@ def ridge_rows(
     _sum_over_lags(rows[:rank, inputs:], N, tau)
     rows[rank:] = system.right
     solved = np.asarray(lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0]).T
-    plus, minus = _generators(solved[:rank], system, tau, scratch)
+    plus, minus = _generators(solved[:rank], system, tau)
     # One block of rows more than is returned: the oldest lag begins the running sums.
     out = np.empty((extended + N, size))
     out[:N, :extended] = solved[rank:, inputs:]
@@ -124,13 +119,12 @@ def _sum_over_lags(rows: FloatArray, channels: int, tau: float) -> None:
 
 
 def _generators(
-    solved: FloatArray, system: PrimalSystem, tau: float, scratch: Scratch
+    solved: FloatArray, system: PrimalSystem, tau: float
 ) -> tuple[FloatArray, FloatArray]:
     """Rows g of G with H − Zᵀ H Z = Σ g gᵀ over the first less the same over the second."""
     N, Q, inputs = system.states, system.channels, system.inputs
     size, edges, width = solved.shape[1], len(system.edges), N + Q
-    moved = scratch.take(solved.shape)
-    moved[...] = solved
+    moved = solved.copy()
     moved[:, : inputs - Q] -= tau * solved[:, Q:inputs]
     moved[:, inputs : size - N] -= tau * solved[:, inputs + N :]
     newest, heads = moved[edges : edges + width], moved[edges + width :]

@@ -12,8 +12,6 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.core.scratch import Scratch
-
 __all__ = ["lagged_response", "lagged_sums", "recent"]
 
 FloatArray = npt.NDArray[np.float64]
@@ -44,9 +42,7 @@ def recent(series: FloatArray, at: int, lags: int) -> FloatArray:
     return series[at - lags + 1 : at + 1][::-1].reshape(-1)
 
 
-def lagged_sums(
-    left: FloatArray, series: FloatArray, first: int, lags: int, scratch: Scratch
-) -> FloatArray:
+def lagged_sums(left: FloatArray, series: FloatArray, first: int, lags: int) -> FloatArray:
     r"""Sums :math:`\sum_i a_i\, b_{k+i-l}^T` for the lags l = 0 … `lags` − 1.
 
     Parameters
@@ -60,8 +56,6 @@ def lagged_sums(
         `lags` − 1.
     lags : int
         Number of lags.
-    scratch : Scratch
-        Memory for the block of lags.
 
     Returns
     -------
@@ -79,12 +73,13 @@ def lagged_sums(
     newest_first = np.zeros((rows + depth - 1, channels))
     newest_first[: count + lags - 1] = series[first - lags + 1 : first + count][::-1]
     step = newest_first.strides[0]
-    laid_out = scratch.take((rows, depth * channels))
-    laid_out[:] = np.lib.stride_tricks.as_strided(
-        newest_first,
-        shape=(rows, depth * channels),
-        strides=(step, newest_first.strides[1]),
-        writeable=False,
+    laid_out = np.ascontiguousarray(
+        np.lib.stride_tricks.as_strided(
+            newest_first,
+            shape=(rows, depth * channels),
+            strides=(step, newest_first.strides[1]),
+            writeable=False,
+        )
     )
     turned = np.ascontiguousarray(left[::-1].T)
     for block in range(blocks):

@@ -12,7 +12,7 @@ is chosen by shape and conditioning:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -24,28 +24,16 @@ from seakeep.core.embedding import TrainingWindow, snapshot_matrices
 from seakeep.core.gram import Piece, gram_trace, primal_system, snapshot_gram
 from seakeep.core.inverse import ridge_rows
 from seakeep.core.lagged import lagged_sums
-from seakeep.core.scratch import Scratch
-from seakeep.errors import RequestError
 
-__all__ = ["Method", "Precision", "Solution", "check_single", "identify"]
+__all__ = ["Method", "Solution", "identify"]
 
 FloatArray = npt.NDArray[np.float64]
 Method = Literal["primal", "dual", "svd"]
-Precision = Literal["double", "single"]
 
 GRAM_LIMIT = 1e-6
 """Least effective λ, as a part of the largest squared singular value, for a Gram matrix.
 
 Its condition number is then below 1e6, and ten digits are left of sixteen."""
-
-SINGLE_RIDGE = 100.0
-"""Least effective λ for single precision."""
-SINGLE_LIMIT = 1e-4
-"""What :data:`GRAM_LIMIT` is, for a factor in single precision.
-
-Rounding is 6e-8 there, so an error of a free run stays within 1e-4 standard deviations with a few
-to spare for what is summed over the horizon."""
-DOUBLE = "Use precision='double', or raise ridge"
 
 
 @dataclass(frozen=True)
@@ -70,23 +58,15 @@ class Solution:
     rank: int
 
 
-def _gram_suffices(
-    ridge: float, trace: float, gram: FloatArray | None, limit: float = GRAM_LIMIT
-) -> bool | None:
-    """Whether λ ≥ 1e-6 σ²_max; None where only the (upper triangle of the) Gram matrix can tell."""
-    # Two bounds of the largest squared singular value from above, then the value itself.
-    if ridge >= limit * trace:
-        return True
-    if ridge <= 0:
-        return False
-    if gram is None:
-        return None
+def _gram_suffices(ridge: float, gram: FloatArray) -> bool:
+    """Whether λ ≥ 1e-6 σ²_max, from the upper triangle of the Gram matrix."""
+    # A bound of the largest squared singular value from above, then the value itself.
     upper = np.triu(gram)
-    if ridge >= limit * float(np.linalg.norm(upper + np.triu(upper, 1).T)):
+    if ridge >= GRAM_LIMIT * float(np.linalg.norm(upper + np.triu(upper, 1).T)):
         return True
     top = len(gram) - 1
     largest = linalg.eigvalsh(upper, lower=False, subset_by_index=[top, top], check_finite=False)
-    return bool(ridge >= limit * largest[0])
+    return bool(ridge >= GRAM_LIMIT * largest[0])
 
 
 def _factor(gram: FloatArray, ridge: float, beside: int = 0) -> FloatArray:
@@ -97,8 +77,7 @@ def _factor(gram: FloatArray, ridge: float, beside: int = 0) -> FloatArray:
     """
     size = len(gram)
     gram.reshape(-1)[:: size + 1] += ridge
-    potrf = lapack.spotrf if gram.dtype == np.float32 else lapack.dpotrf
-    factor, failed = potrf(gram.T, lower=1, overwrite_a=1, clean=0)
+    factor, failed = lapack.dpotrf(gram.T, lower=1, overwrite_a=1, clean=0)
     if failed:
         raise np.linalg.LinAlgError(
             f"the Gram matrix of {size - beside} rows with ridge {ridge:g} is not positive "
@@ -118,12 +97,11 @@ def _solve_beside(padded: FloatArray, right: FloatArray, ridge: float) -> FloatA
     count, size = right.shape
     padded[:size, size:] = right.T
     padded[size:, size:] = 0.0
-    np.fill_diagonal(padded[size:, size:], np.finfo(padded.dtype).max / 4)
+    np.fill_diagonal(padded[size:, size:], np.finfo(float).max / 4)
     factor = _factor(padded, ridge, count)
-    half = np.zeros((count, len(padded)), padded.dtype)
+    half = np.zeros((count, len(padded)))
     half[:, :size] = padded[:size, size:].T
-    trsm = blas.strsm if padded.dtype == np.float32 else blas.dtrsm
-    solved = trsm(1.0, factor, half.T, lower=1, trans_a=1, overwrite_b=1)
+    solved = blas.dtrsm(1.0, factor, half.T, lower=1, trans_a=1, overwrite_b=1)
     return np.asarray(solved).T[:, :size]
 
 
@@ -142,34 +120,6 @@ def _by_singular_values(
     return Solution(coefficients, "svd", ridge, kept)
 
 
-def check_single(ridge: float, rank: int | None) -> None:
-    """Refuse single precision where it would lose too many digits.
-
-    Parameters
-    ----------
-    ridge : float
-        Effective λ.
-    rank : int or None
-        Number of singular values, instead of λ.
-
-    Raises
-    ------
-    RequestError
-        If λ is below 100, or a rank is given.
-    """
-    if rank is not None:
-        raise RequestError(
-            f"precision='single' does not go with rank = {rank}: singular values need the digits. "
-            "Use precision='double'."
-        )
-    if ridge < SINGLE_RIDGE:
-        raise RequestError(
-            f"precision='single' needs an effective ridge of at least {SINGLE_RIDGE:g}; received "
-            f"{ridge:g}. {DOUBLE} (it counts times the number of snapshot pairs where "
-            "ridge_scale='per_snapshot')."
-        )
-
-
 def identify(
     states: Sequence[FloatArray],
     inputs: Sequence[FloatArray],
@@ -182,8 +132,6 @@ def identify(
     rank: int | None = None,
     all_rows: bool = True,
     method: Method | None = None,
-    precision: Precision = "double",
-    scratch: Scratch | None = None,
 ) -> Solution:
     r"""Identify :math:`[\hat A\; \hat B]` from one or several runs.
 
@@ -210,22 +158,11 @@ def identify(
         alone.
     method : {"primal", "dual", "svd"}, optional
         Forces a form; by default shape and conditioning decide.
-    precision : {"double", "single"}, optional
-        Precision of the result and, where the first N rows alone are regressed, of the factor and
-        of what is solved with it. Sums over snapshots are made in double precision, and so are
-        all rows: their displacement structure magnifies rounding (:mod:`seakeep.core.inverse`).
-    scratch : Scratch, optional
-        Memory of an earlier call to use again.
 
     Returns
     -------
     Solution
         Coefficients of shape (N(s+1) or N, N(s+1) + Q(z+1)).
-
-    Raises
-    ------
-    RequestError
-        If single precision is asked for where it would lose too many digits.
     """
     pieces = [
         Piece(x, u, window.first_column, window.columns)
@@ -233,31 +170,16 @@ def identify(
     ]
     columns = sum(piece.count for piece in pieces)
     effective = ridge * columns if per_snapshot else ridge
-    single = precision == "single"
-    if single:
-        check_single(effective, rank)
-    memory = scratch or Scratch()
-    factored = single and not all_rows
-    problem = _Delayed(pieces, state_delays, input_delays, all_rows, memory, factored)
-    if factored and not problem.suffices(effective, SINGLE_LIMIT):
-        raise RequestError(
-            f"precision='single' needs an effective ridge of at least {SINGLE_LIMIT:g} of the "
-            f"largest squared singular value of the {columns} snapshot pairs; received "
-            f"{effective:g}. {DOUBLE}."
-        )
+    problem = _Delayed(pieces, state_delays, input_delays, all_rows)
     chosen = "svd" if rank is not None else method or problem.choose(effective)
     full_rank = min(problem.rows, columns)
     if chosen == "svd":
         regressors, targets = problem.matrices()
         if rank is not None:
             return _by_singular_values(regressors, targets, 0.0, rank)
-        solution = _by_singular_values(regressors, targets, effective, None)
-    else:
-        form = problem.primal if chosen == "primal" else problem.dual
-        solution = Solution(form(effective), chosen, effective, full_rank)
-    if single:
-        solution = replace(solution, coefficients=solution.coefficients.astype(np.float32))
-    return solution
+        return _by_singular_values(regressors, targets, effective, None)
+    form = problem.primal if chosen == "primal" else problem.dual
+    return Solution(form(effective), chosen, effective, full_rank)
 
 
 @dataclass(frozen=True)
@@ -268,8 +190,6 @@ class _Delayed:
     state_delays: int
     input_delays: int
     all_rows: bool
-    scratch: Scratch
-    single: bool = False
 
     @property
     def shape(self) -> tuple[Sequence[Piece], int, int]:
@@ -305,21 +225,16 @@ class _Delayed:
 
     def choose(self, ridge: float) -> Method:
         """The form, or singular values where λ is too small for a Gram matrix."""
-        return self.form() if self.suffices(ridge, GRAM_LIMIT) else "svd"
-
-    def suffices(self, ridge: float, limit: float) -> bool:
-        """Whether λ is at least `limit` of the largest squared singular value."""
-        trace = gram_trace(self.pieces, self.state_delays, self.input_delays)
-        settled = _gram_suffices(ridge, trace, None, limit)
-        if settled is None:
-            settled = _gram_suffices(ridge, trace, self.gram(), limit)
-        return bool(settled)
+        settled = ridge >= GRAM_LIMIT * gram_trace(*self.shape)
+        if settled or (ridge > 0 and _gram_suffices(ridge, self.gram())):
+            return self.form()
+        return "svd"
 
     def gram(self) -> FloatArray:
         """The smaller Gram matrix, its upper triangle."""
         if self.rows <= self.columns:
-            return primal_system(*self.shape, self.scratch).gram
-        return snapshot_gram(*self.shape, self.scratch)
+            return primal_system(*self.shape).gram
+        return snapshot_gram(*self.shape)
 
     def matrices(self) -> tuple[FloatArray, FloatArray]:
         """Hankel matrices of regressors and targets, built."""
@@ -342,10 +257,10 @@ class _Delayed:
     def primal(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
         if self.all_rows:
-            system = primal_system(*self.shape, self.scratch)
-            return ridge_rows(system, _factor(system.gram, ridge), ridge, self.scratch)
+            system = primal_system(*self.shape)
+            return ridge_rows(system, _factor(system.gram, ridge), ridge)
         room = self.pieces[0].states.shape[1]
-        system = primal_system(*self.shape, self.scratch, self.single, room)
+        system = primal_system(*self.shape, room)
         top = _solve_beside(system.gram, system.right, ridge)
         return np.concatenate([top[:, system.inputs :], top[:, : system.inputs]], axis=1)
 
@@ -359,18 +274,18 @@ class _Delayed:
         targets = np.concatenate([piece.targets for piece in self.pieces])
         N = targets.shape[1]
         if not self.all_rows:
-            gram = snapshot_gram(*self.shape, self.scratch, self.single, N)
+            gram = snapshot_gram(*self.shape, N)
             weights = _solve_beside(gram, targets.T, ridge).T
             top, at = np.zeros((N, self.rows)), 0
             for piece in self.pieces:
                 own = weights[at : at + piece.count].astype(float)
                 at += piece.count
-                x = lagged_sums(own, piece.states, piece.first, self.state_delays + 1, self.scratch)
-                u = lagged_sums(own, piece.inputs, piece.first, self.input_delays + 1, self.scratch)
+                x = lagged_sums(own, piece.states, piece.first, self.state_delays + 1)
+                u = lagged_sums(own, piece.inputs, piece.first, self.input_delays + 1)
                 top[:, : self.states] += x
                 top[:, self.states :] += u
             return top
-        factor = _factor(snapshot_gram(*self.shape, self.scratch), ridge)
+        factor = _factor(snapshot_gram(*self.shape), ridge)
         stacked = np.concatenate([self.matrices()[0], targets.T])
         half = blas.dtrsm(1.0, factor, stacked.T, lower=1, overwrite_b=1)
         regressors, newest = half[:, : self.rows], half[:, self.rows :]

@@ -1,42 +1,59 @@
 r"""Free runs of :math:`\hat x_{k+1} = \hat A \hat x_k + \hat B \hat u_k`, many windows at once.
 
-Windows side by side are rows of one matrix, and several steps are one product
-(:mod:`seakeep.core.propagation`). Several windows of a model with a full Â share its response to an
-impulse (:mod:`seakeep.core.superposition`). A long run is taken in pieces, so that what is held
-beside the result does not grow with its length.
+Windows side by side are rows of one matrix, and several steps are one product. With delayed
+inputs, those of K steps are one row :math:`v_k = [u_{k+K-1}; …; u_{k-z}]`, and
+
+.. math:: \hat x_{k+K} = A_K \hat x_k + B_K v_k, \qquad
+          [x_{k+1}; …; x_{k+K}] = O_K \hat x_k + P_K v_k .
+
+*Square* Â: K doubles by :math:`A_{2K} = A_K A_K`, :math:`B_{2K} = [B_K\;0] + [0\;A_K B_K]`, and
+the outputs of the second half are those of the first, from :math:`A_K \hat x_k + B_K v_k`. That
+costs a few large products and saves many small ones.
+
+*Exact shift* (N rows): the outputs are the state, so no :math:`A_K` is needed, and a further row
+of :math:`O_K` costs little: its product with the shift moves it by N, and that with the N rows of
+Â is its first block times them.
+
+*Mirrored* Â: ridge on all rows makes those of the delayed states :math:`P - \lambda P (C + \lambda
+I)^{-1}`, so they are symmetric but for their last N columns. One window alone is bound by reading
+Â from memory, and half of it need not be read: a fifth of the time of the free run.
+
+A long run is taken in pieces, so that what is held beside the result does not grow with its length.
 """
 
 from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import blas
 
-from seakeep.core.propagation import (
-    Propagator,
-    doublings,
-    mirrored,
-    shifting_propagator,
-    square_propagator,
-)
-from seakeep.core.scratch import Scratch
-from seakeep.core.superposition import (
-    convolve,
-    grows,
-    impulse_states,
-    state_at_rest,
-    superposition_cost,
-)
 from seakeep.errors import RequestError
 
-__all__ = ["rollout"]
+__all__ = ["feedback_rollout", "rollout"]
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
 PIECE = 4_000_000
 """Numbers, about, that a piece of a long run holds at once."""
 SYMMETRIC = 1e-8
 """Part of its largest entry by which a symmetric matrix may differ from its mirror image."""
+OUTPUT_ROWS = 192
+"""Rows of the outputs of one block of an exact-shift propagator, at most, about."""
+SHIFTING_COST = (2500.0, 6000.0, 900.0)
+"""Nanoseconds of a block of an exact-shift propagator beyond its product, and of one more row of
+blocks when it is made: fixed, per state."""
+GEMM_RATE = 50.0
+"""Floating-point operations per nanosecond in products of large matrices (rough)."""
+SKINNY_COST = (4000.0, 0.1, 0.055)
+"""Nanoseconds of a product of a square matrix with w rows: fixed, per entry, per entry and row."""
+MIRRORED_ENTRY = 0.065
+"""Nanoseconds per entry of a product of a mirrored matrix with one row."""
+MOST_DOUBLINGS = 6
 
 
 def rollout(
@@ -46,15 +63,13 @@ def rollout(
     inputs: npt.ArrayLike,
     *,
     n_states: int | None = None,
-    scratch: Scratch | None = None,
 ) -> FloatArray:
     r"""Free run of one model over several windows side by side.
 
     Parameters
     ----------
     A : array_like, shape (N(s+1), N(s+1)) or (N, N(s+1))
-        State matrix. With N rows alone the delayed states are shifted exactly. One of type
-        float32 asks for single precision throughout.
+        State matrix. With N rows alone the delayed states are shifted exactly.
     B : array_like, shape (rows of A, Q(z+1))
         Input matrix; no columns for a model without input.
     histories : array_like, shape (window, N(s+1)) or (window, s+1, N)
@@ -64,13 +79,10 @@ def rollout(
         Extended inputs :math:`\hat u_0 … \hat u_{steps-1}`, newest block first; or the samples
         themselves, oldest first. A model without input takes shape (window, steps, 0).
     n_states : int, optional
-        N. By default it is read from `histories` with three axes, or from an `A` with N rows, or
-        from the lower rows of a square `A`: an exact shift, or regressed rows, which are a
-        symmetric matrix but for their last N columns. A square `A` that is neither has no delays
-        that could be told, and its whole state is returned. Give N where `A` has two rows and was
-        regressed: one number is always symmetric.
-    scratch : Scratch, optional
-        Memory of an earlier call to use again.
+        N. By default it is taken from `histories` with three axes, or from an `A` with N rows. For
+        extended states and a square `A` it is the smallest N for which the rows of the delayed
+        states are a symmetric matrix but for their last N columns, as an exact shift and
+        regressed rows are; without one, the whole state is returned.
 
     Returns
     -------
@@ -87,8 +99,7 @@ def rollout(
     >>> rollout([[0.5]], [[1.0]], [[1.0]], [[[0.0], [1.0], [0.0]]])[0, :, 0]
     array([0.5  , 1.25 , 0.625])
     """
-    kind = np.float32 if np.asarray(A).dtype == np.float32 else np.float64
-    arrays: list[FloatArray] = [np.asarray(each, kind) for each in (A, B, histories, inputs)]
+    arrays: list[FloatArray] = [np.asarray(each, float) for each in (A, B, histories, inputs)]
     a, b, start, driving = np.atleast_2d(arrays[0]), *arrays[1:]
     if start.ndim not in (2, 3) or driving.ndim != 3 or b.ndim != 2 or len(b) != len(a):
         raise RequestError(
@@ -96,7 +107,7 @@ def rollout(
             "(window, s+1, N), inputs (window, steps, Q(z+1)) or (window, z+steps, Q); received "
             f"{a.shape}, {b.shape}, {start.shape}, {driving.shape}."
         )
-    count = _count_states(a, b, start, n_states)
+    count = _count_states(a, start, n_states)
     if start.ndim == 3:
         start = start[:, ::-1].reshape(len(start), start.shape[1] * start.shape[2])
     if start.shape[1] != a.shape[1] or start.shape[0] != driving.shape[0]:
@@ -104,116 +115,66 @@ def rollout(
             f"histories {np.shape(histories)} and inputs {driving.shape} do not fit A {a.shape}: "
             f"a history has {a.shape[1]} values, and both have one row a window."
         )
-    if a.shape[0] == a.shape[1] and _shifts_exactly(a, b, count):
-        a, b = a[:count], b[:count]
     channels, steps = _input_steps(b, driving)
     if not len(start):
         return np.empty((0, steps, count))
     with np.errstate(over="ignore", invalid="ignore"):
-        memory = scratch or Scratch()
-        out = None
-        if _superposes(a, b, count, driving, steps):
-            out = _superpose(a, b, count, start, driving, steps, memory)
-        if out is None:
-            symmetric, propagator = _prepare(a, b, count, channels, len(start), steps, memory)
-            out = _run(propagator, symmetric, start, driving, steps, count, memory)
-        out = out.astype(float, copy=False)
-    _cut_lost(out, float(np.finfo(kind).max))
+        out = _run(_propagator(a, b, count, channels, len(start), steps), start, driving, steps)
+    _cut_lost(out)
     return out
 
 
-def _superposes(a: FloatArray, b: FloatArray, count: int, inputs: FloatArray, steps: int) -> bool:
-    """Whether the windows are many enough for the response to an impulse to cost least."""
-    windows, length, channels = inputs.shape
-    size = len(a)
-    if size < a.shape[1] or not channels or windows * count * (length + steps) > PIECE:
-        return False
-    width = a.itemsize / 8
-    cost = superposition_cost(size, count, channels, length - steps, windows, steps, width)
-    stepwise = doublings(size, b.shape[1], windows, steps, width)[1]
-    # A transform would spread a gap over all instants.
-    return cost < stepwise and bool(np.isfinite(inputs).all())
-
-
-def _superpose(
+def feedback_rollout(
     a: FloatArray,
     b: FloatArray,
-    count: int,
-    start: FloatArray,
+    states: FloatArray,
     inputs: FloatArray,
     steps: int,
-    scratch: Scratch,
-) -> FloatArray | None:
-    """Free runs by superposition; None where that would lose digits."""
-    windows, length, channels = inputs.shape
-    memory = scratch.mark()
-    impulse = impulse_states(a, b, channels, scratch)
-    rest = state_at_rest(impulse, inputs)
-    begun = np.concatenate([start - rest, impulse[-1]])
-    silent = np.zeros((len(begun), steps, 0), a.dtype)
-    _, propagator = _prepare(a, b[:, :0], count, 0, len(begun), steps, scratch)
-    free = _run(propagator, None, begun, silent, steps, count, scratch)
-    early = impulse[:, :, :count].copy()
-    scratch.release(memory)
-    kernel = np.concatenate([early, free[windows:].transpose(1, 0, 2)])[:length]
-    if grows(kernel, length - steps):
-        return None
-    forced = convolve(np.ascontiguousarray(kernel.transpose(1, 2, 0)), inputs, steps)
-    return free[:windows] + forced.transpose(0, 2, 1)
+    next_input: Callable[[int, FloatArray], FloatArray],
+) -> FloatArray:
+    r"""Run :math:`\hat x_{j+1} = \hat A \hat x_j + \hat B \hat u_j` with :math:`u_j(x_j)`.
+
+    Parameters
+    ----------
+    a, b : ndarray, shapes (rows, N(s+1)) and (rows, Q(z+1))
+        Matrices; N rows stand for exact delay rows, else all rows are given.
+    states : ndarray, shape (s + 1, N)
+        History, oldest first.
+    inputs : ndarray, shape (z + 1, Q)
+        History, oldest first, up to the same instant.
+    steps : int
+        Number of instants.
+    next_input : callable
+        ``next_input(k, x)`` gives the input, shape (Q,), at the k-th instant after the start
+        (from 1), where the state x, shape (N,), was reached. It is not asked at the last one.
+
+    Returns
+    -------
+    ndarray, shape (steps, N)
+        States after the start.
+    """
+    count, width = states.shape[1], inputs.shape[1]
+    x, u = states[::-1].ravel(), inputs[::-1].ravel()
+    exact = a.shape[0] == count < x.size
+    out = np.empty((steps, count))
+    for step in range(steps):
+        with np.errstate(over="ignore", invalid="ignore"):  # a lost run is cut by the caller
+            reached = a @ x + b @ u
+        x = np.concatenate([reached, x[:-count]]) if exact else reached
+        out[step] = x[:count]
+        if step < steps - 1:
+            u = np.concatenate([next_input(step + 1, out[step]), u[:-width]])
+    return out
 
 
-def _cut_lost(out: FloatArray, most: float) -> None:
-    """NaN from where a window exceeds `most`, or is not finite, on; in pieces of time."""
-    windows, steps, count = out.shape
-    length = max(1, PIECE // (16 * max(1, windows * count)))
-    lost = np.zeros((windows, 1), dtype=bool)
-    for first in range(0, steps, length):
-        piece = out[:, first : first + length]
-        gone: npt.NDArray[np.bool_] = np.any(~(np.abs(piece) <= most), axis=2)
-        gone[:, :1] |= lost
-        if gone.any():
-            piece[np.logical_or.accumulate(gone, axis=1)] = np.nan
-            lost = np.any(gone, axis=1, keepdims=True)
-
-
-def _prepare(
-    a: FloatArray,
-    b: FloatArray,
-    count: int,
-    channels: int,
-    windows: int,
-    steps: int,
-    scratch: Scratch,
-) -> tuple[FloatArray | None, Propagator]:
-    """Symmetric half of Â, where it is used, and the propagator."""
-    if a.shape[0] == count and a.shape[1] > count:
-        propagator = shifting_propagator(a, b, channels, steps)
-        if not np.isfinite(propagator.output_state).all():
-            propagator = shifting_propagator(a, b, channels, 1)
-        return None, propagator
-    symmetric = mirrored(a, b.shape[1], count, steps, scratch) if windows == 1 else None
-    times = 0
-    if symmetric is None:
-        times, _ = doublings(a.shape[1], b.shape[1], windows, steps, a.itemsize / 8)
-    propagator = square_propagator(a, b, count, channels, times, scratch)
-    assert propagator.state is not None
-    # A model that grows without bound overflows sooner in powers of Â than in single steps.
-    if times and not np.isfinite(propagator.state).all():
-        propagator = square_propagator(a, b, count, channels, 0, scratch)
-    return symmetric, propagator
-
-
-def _count_states(a: FloatArray, b: FloatArray, start: FloatArray, given: int | None) -> int:
+def _count_states(a: FloatArray, start: FloatArray, given: int | None) -> int:
     rows, size = a.shape
     if given is not None:
         count = given
     elif start.ndim == 3:
         count = start.shape[2]
-    elif rows < size:
-        count = rows
     else:
-        divisors = (n for n in range(1, size + 1) if size % n == 0)
-        count = next(n for n in divisors if _shifts_exactly(a, b, n) or _is_regressed(a, n))
+        count = rows if rows < size else _delayed_states(a)
     if count < 1 or size % count or rows not in (count, size):
         raise RequestError(
             f"A of shape {a.shape} does not belong to {count} states: its columns must be a "
@@ -222,49 +183,17 @@ def _count_states(a: FloatArray, b: FloatArray, start: FloatArray, given: int | 
     return count
 
 
-def _is_regressed(a: FloatArray, count: int) -> bool:
-    """Whether the lower rows are those of a least-squares fit to delayed states.
-
-    Their targets are rows P of the regressors themselves, so the fit is P times a smoother of the
-    regressors onto themselves, with ridge or without, which is symmetric and not negative.
-    """
-    kept = len(a) - count
-    block = a[count:, :kept]
-    if kept < 2:
-        return False
-    diagonal = np.diagonal(block)
-    if not np.all(diagonal > 0) and not _stands_still(diagonal, count):
-        return False
-    tolerance = SYMMETRIC * np.abs(block).max()
-    # The first row tells most other matrices apart.
-    return bool(
-        np.all(np.abs(block[0] - block[:, 0]) <= tolerance)
-        and np.all(np.abs(block - block.T) <= tolerance)
-    )
-
-
-def _stands_still(diagonal: FloatArray, count: int) -> bool:
-    """Whether what is not positive are channels that were zero in training, in every delay."""
-    rounding = 100 * float(np.finfo(diagonal.dtype).eps) * np.abs(diagonal).max()
-    still = (np.abs(diagonal) <= rounding).reshape(-1, count)
-    return (
-        bool(np.all(diagonal >= -rounding))
-        and not np.all(still)
-        and np.array_equal(still.all(axis=0), still.any(axis=0))
-    )
-
-
-def _shifts_exactly(a: FloatArray, b: FloatArray, count: int) -> bool:
-    kept = a.shape[1] - count
-    lower, moved = a[count:], np.eye(min(kept, 1), kept)
-    # The first of these rows tells most other matrices apart.
-    if kept and (np.any(b[count]) or not np.array_equal(lower[:1, :kept], moved)):
-        return False
-    return (
-        not np.any(b[count:])
-        and not np.any(lower[:, kept:])
-        and bool(np.all(lower[:, :kept] == np.eye(kept)))
-    )
+def _delayed_states(a: FloatArray) -> int:
+    """N of a square Â whose lower rows shift or regress the delayed states; else all of it."""
+    size = len(a)
+    for count in (n for n in range(1, size) if size % n == 0):
+        block = a[count:, : size - count]
+        tolerance = SYMMETRIC * np.abs(block).max()
+        # One number is always symmetric; a smoother of states onto themselves is not negative.
+        told = len(block) > 1 or block[0, 0] == 1.0
+        if told and np.trace(block) > 0 and np.all(np.abs(block - block.T) <= tolerance):
+            return count
+    return size
 
 
 def _input_steps(b: FloatArray, inputs: FloatArray) -> tuple[int, int]:
@@ -291,44 +220,154 @@ def _input_steps(b: FloatArray, inputs: FloatArray) -> tuple[int, int]:
     return width, length - delays
 
 
-def _run(
-    propagator: Propagator,
-    symmetric: FloatArray | None,
-    start: FloatArray,
-    inputs: FloatArray,
-    steps: int,
-    count: int,
-    scratch: Scratch,
-) -> FloatArray:
+def _cut_lost(out: FloatArray) -> None:
+    """NaN from where a window is not finite on; in pieces of time."""
+    windows, steps, count = out.shape
+    length = max(1, PIECE // (16 * max(1, windows * count)))
+    lost = np.zeros((windows, 1), dtype=bool)
+    for first in range(0, steps, length):
+        piece = out[:, first : first + length]
+        gone: BoolArray = np.any(~np.isfinite(piece), axis=2)
+        gone[:, :1] |= lost
+        if gone.any():
+            piece[np.logical_or.accumulate(gone, axis=1)] = np.nan
+            lost = np.any(gone, axis=1, keepdims=True)
+
+
+@dataclass(frozen=True, eq=False)
+class _Propagator:
+    """K steps as one: O, P and, where the outputs are not the state, A_K and B_K.
+
+    Outputs stand newest first. `is_mirrored` is for one step of one window.
+    """
+
+    steps: int
+    output_state: FloatArray
+    output_input: FloatArray
+    state: FloatArray | None = None
+    state_input: FloatArray | None = None
+    is_mirrored: bool = False
+
+
+def _propagator(
+    a: FloatArray, b: FloatArray, count: int, channels: int, windows: int, steps: int
+) -> _Propagator:
+    """The propagator that costs least; of one step where a longer one overflows."""
+    if len(a) == count < a.shape[1]:
+        propagator = _shifting_propagator(a, b, channels, _shifting_steps(count, steps))
+        if np.isfinite(propagator.output_state).all():
+            return propagator
+        return _shifting_propagator(a, b, channels, 1)
+    is_mirrored = windows == 1 and _is_mirrored(a[count:, : len(a) - count])
+    times = _doublings(len(a), b.shape[1], windows, steps, is_mirrored)
+    if is_mirrored and not times:
+        return _Propagator(1, a[:count], b[:count], a, b, is_mirrored)
+    propagator = _square_propagator(a, b, count, channels, times)
+    assert propagator.state is not None
+    if np.isfinite(propagator.state).all():
+        return propagator
+    return _square_propagator(a, b, count, channels, 0)
+
+
+def _shifting_steps(states: int, steps: int) -> int:
+    """Steps of an exact-shift propagator that cost least over a free run."""
+    block, fixed, state = SHIFTING_COST
+    best = round(math.sqrt(steps * block / (fixed + state * states)))
+    return max(1, min(steps, best, -(-OUTPUT_ROWS // states)))
+
+
+def _shifting_propagator(a: FloatArray, b: FloatArray, channels: int, steps: int) -> _Propagator:
+    """Propagator of a model whose delayed states shift exactly."""
+    N, size = a.shape
+    width = b.shape[1]
+    output_state = np.empty((steps * N, size))
+    output_input = np.zeros((steps * N, width + (steps - 1) * channels))
+    row, at = a, (steps - 1) * N
+    output_state[at:] = a
+    # P of step i: û of the i-th instant enters through B̂, older ones through the step before.
+    output_input[at:, (steps - 1) * channels :] = b
+    for step in range(1, steps):
+        head = row[:, :N]
+        moved = head @ a
+        moved[:, : size - N] += row[:, N:]
+        previous, at, row = at, at - N, moved
+        output_state[at : at + N] = row
+        # Later inputs stand further left: the response of the step before, moved, and one more.
+        begin = (steps - 1 - step) * channels
+        output_input[at : at + N, begin : begin + width + (step - 1) * channels] = output_input[
+            previous : previous + N, begin + channels :
+        ]
+        output_input[at : at + N, begin + step * channels :] += head @ b
+    return _Propagator(steps, output_state, output_input)
+
+
+def _is_mirrored(block: FloatArray) -> bool:
+    if block.size < 2 or not np.array_equal(block[0], block[:, 0]):
+        return False
+    return np.array_equal(block, block.T)
+
+
+def _doublings(size: int, inputs: int, windows: int, steps: int, is_mirrored: bool) -> int:
+    """How often to double the step of a square model so that the free run costs least."""
+    fixed, entry, row = SKINNY_COST
+    best, least, preparation = 0, np.inf, 0.0
+    for times in range(MOST_DOUBLINGS + 1):
+        each = MIRRORED_ENTRY if is_mirrored and not times else entry
+        once = fixed + size * size * (each + row * (windows - 1))
+        blocks = -(-steps // 2**times)
+        forcing = 2.0 * blocks * windows * size * inputs / GEMM_RATE
+        cost = preparation + blocks * once + forcing
+        if cost < least:
+            best, least = times, cost
+        preparation += 2.0 * size * size * (size + inputs) / GEMM_RATE
+    return best
+
+
+def _square_propagator(
+    a: FloatArray, b: FloatArray, count: int, channels: int, times: int
+) -> _Propagator:
+    """Propagator of a model with a full Â, of two to the power of `times` steps."""
+    output_state, output_input, K = a[:count], b[:count], 1
+    for _ in range(times):
+        pad, (half, width) = K * channels, output_input.shape
+        # Newest first: the second half of the steps stands above the first.
+        wider_output = np.zeros((2 * half, width + pad))
+        wider_output[:half, pad:] = output_state @ b
+        wider_output[:half, :width] += output_input
+        wider_output[half:, pad:] = output_input
+        output_state = np.concatenate([output_state @ a, output_state])
+        output_input = wider_output
+        wider = np.empty((len(b), width + pad))
+        wider[:, :pad] = 0.0
+        np.matmul(a, b, out=wider[:, pad:])
+        wider[:, :width] += b
+        a, b, K = a @ a, wider, 2 * K
+    return _Propagator(K, output_state, output_input, a, b)
+
+
+def _run(propagator: _Propagator, start: FloatArray, inputs: FloatArray, steps: int) -> FloatArray:
     # In pieces of whole blocks of K steps; the state is handed on.
     windows, size = start.shape
-    K = propagator.steps
-    held = propagator.output_input.shape[1] + K * count
+    K, width = propagator.steps, len(propagator.output_state)
+    held = propagator.output_input.shape[1] + width
     held += 0 if propagator.state is None else 2 * size
     blocks = -(-steps // K)
-    most = max(1, PIECE // (held * max(windows, 1)))
-    out = np.empty((windows, blocks * K, count), start.dtype)
+    most = max(1, PIECE // (held * windows))
+    advance = _run_mirrored if propagator.is_mirrored else _run_square
+    if propagator.state is None:
+        advance = _run_shifting
+    out = np.empty((windows, blocks * K, width // K))
     state = start
     for first in range(0, blocks, most):
         number = min(most, blocks - first)
-        memory = scratch.mark()
-        rows = _input_rows(propagator, inputs, first, number, scratch)
-        if propagator.state is None:
-            newest_first, state = _run_shifting(propagator, state, rows, scratch)
-        elif symmetric is not None:
-            newest_first, state = _run_mirrored(propagator, symmetric, state, rows, scratch)
-        else:
-            newest_first, state = _run_square(propagator, state, rows, scratch)
+        rows = _input_rows(propagator, inputs, first, number)
+        newest_first, state = advance(propagator, state, rows)
         piece = out[:, first * K : (first + number) * K]
-        piece[:] = newest_first.reshape(windows, number * K, count)[:, ::-1]
-        state = state.copy()
-        scratch.release(memory)
+        piece[:] = newest_first.reshape(piece.shape)[:, ::-1]
     return out[:, :steps]
 
 
-def _input_rows(
-    propagator: Propagator, inputs: FloatArray, first: int, number: int, scratch: Scratch
-) -> FloatArray:
+def _input_rows(propagator: _Propagator, inputs: FloatArray, first: int, number: int) -> FloatArray:
     """Inputs of each block, newest first: shape (number * window, Q(z+K)); the last block first.
 
     Zeros stand where the last block reaches beyond the inputs; no output that is asked for sees
@@ -337,11 +376,11 @@ def _input_rows(
     windows, _, channels = inputs.shape
     K, width = propagator.steps, propagator.output_input.shape[1]
     if width == 0:
-        return np.zeros((number * windows, 0), inputs.dtype)
+        return np.zeros((number * windows, 0))
     delays = width // channels - K
-    begin, length = first * K, number * K + delays
-    newest_first = np.zeros((windows, length, channels), inputs.dtype)
-    piece = inputs[:, begin : begin + length]
+    length = number * K + delays
+    newest_first = np.zeros((windows, length, channels))
+    piece = inputs[:, first * K : first * K + length]
     newest_first[:, length - piece.shape[1] :] = piece[:, ::-1]
     window, step, channel = newest_first.strides
     blocks = np.lib.stride_tricks.as_strided(
@@ -350,23 +389,19 @@ def _input_rows(
         strides=(K * step, window, channel),
         writeable=False,
     )
-    out: FloatArray = scratch.take((number, windows, width), inputs.dtype)
-    out[:] = blocks
-    return out.reshape(number * windows, width)
+    return blocks.reshape(number * windows, width)
 
 
 def _run_shifting(
-    propagator: Propagator, start: FloatArray, rows: FloatArray, scratch: Scratch
+    propagator: _Propagator, start: FloatArray, rows: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     # Samples lie newest first in one long row a window, so the extended state of every block is a
     # contiguous piece of it and nothing is ever moved. Rows come with the last block first too.
     windows = len(start)
     width, size = propagator.output_state.shape
     number = len(rows) // windows
-    forcing = scratch.take((len(rows), width), rows.dtype)
-    np.matmul(rows, propagator.output_input.T, out=forcing)
-    forcing = forcing.reshape(number, windows, width)
-    samples = scratch.take((windows, number * width + size), rows.dtype)
+    forcing = (rows @ propagator.output_input.T).reshape(number, windows, width)
+    samples = np.empty((windows, number * width + size))
     samples[:, number * width :] = start
     if windows == 1:
         line, output = samples[0], propagator.output_state
@@ -383,40 +418,15 @@ def _run_shifting(
     return samples[:, : number * width], samples[:, :size]
 
 
-def _run_mirrored(
-    propagator: Propagator,
-    symmetric: FloatArray,
-    start: FloatArray,
-    rows: FloatArray,
-    scratch: Scratch,
-) -> tuple[FloatArray, FloatArray]:
-    assert propagator.state_input is not None
-    number, size, N = len(rows), start.shape[1], len(propagator.output_state)
-    padded = len(symmetric)
-    # A row holds a state and, after it, what the symmetric product says beyond the oldest delay.
-    states = scratch.zeros((number + 1, padded + N))
-    states[number, :size] = start[0]
-    np.matmul(rows, propagator.state_input.T, out=states[:number, :size])
-    half, newest = symmetric.T, np.ascontiguousarray(propagator.output_state).T
-    symv, gemv = blas.dsymv, blas.dgemv
-    before = states[number]
-    for block in range(number - 1, -1, -1):
-        row = states[block]
-        symv(1.0, half, before[:padded], beta=1.0, y=row[N:], overwrite_y=1, lower=1)
-        gemv(1.0, newest, before[:size], beta=1.0, y=row[:N], overwrite_y=1, trans=1)
-        before = row
-    return states[:number, :N].reshape(1, -1), states[:1, :size]
-
-
 def _run_square(
-    propagator: Propagator, start: FloatArray, rows: FloatArray, scratch: Scratch
+    propagator: _Propagator, start: FloatArray, rows: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     windows, size = start.shape
     number = len(rows) // windows
     assert propagator.state is not None
     assert propagator.state_input is not None
     # states[block + 1] starts block; states[0] is what the piece ends with.
-    states = scratch.take((number + 1, windows, size), rows.dtype)
+    states = np.empty((number + 1, windows, size))
     states[number] = start
     np.matmul(rows, propagator.state_input.T, out=states[:number].reshape(-1, size))
     if windows == 1:
@@ -431,3 +441,25 @@ def _run_square(
     outputs += rows @ propagator.output_input.T
     newest_first = outputs.reshape(number, windows, -1).transpose(1, 0, 2)
     return np.ascontiguousarray(newest_first).reshape(windows, -1), states[0]
+
+
+def _run_mirrored(
+    propagator: _Propagator, start: FloatArray, rows: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    number, size, N = len(rows), start.shape[1], len(propagator.output_state)
+    assert propagator.state is not None
+    assert propagator.state_input is not None
+    half = np.zeros((size, size))
+    half[: size - N] = propagator.state[N:]
+    # A row holds a state and, after it, what the symmetric product says beyond the oldest delay.
+    states = np.zeros((number + 1, size + N))
+    states[number, :size] = start[0]
+    states[:number, :size] = rows @ propagator.state_input.T
+    symmetric, newest = half.T, np.ascontiguousarray(propagator.output_state).T
+    before = states[number]
+    for row in states[number - 1 :: -1]:
+        state = before[:size]
+        blas.dsymv(1.0, symmetric, state, beta=1.0, y=row[N:], overwrite_y=1, lower=1)
+        blas.dgemv(1.0, newest, state, beta=1.0, y=row[:N], overwrite_y=1, trans=1)
+        before = row
+    return states[:number, :N].reshape(1, -1), states[:1, :size]

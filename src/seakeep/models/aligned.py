@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.core.feedback import feedback_rollout
+from seakeep.core.rollout import feedback_rollout
 from seakeep.errors import RequestError
 from seakeep.models import forecasting, labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment, fit_alignment

@@ -13,7 +13,6 @@ from typing import Any, Generic, Literal, TypeVar, get_args
 
 import threadpoolctl
 
-from seakeep.core.scratch import Scratch
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.models.checks import check_choice
 
@@ -32,7 +31,7 @@ Backend = Literal["processes", "threads", "auto"]
 Data = TypeVar("Data")
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-Function = Callable[[Data, Item, Scratch], Result]
+Function = Callable[[Data, Item], Result]
 
 
 class WorkerLostError(SeakeepError):
@@ -82,7 +81,7 @@ class Crew:
 
 
 class Desk(Generic[Data]):
-    """What all items need, and memory for each that is at work.
+    """What all items need.
 
     Parameters
     ----------
@@ -92,18 +91,10 @@ class Desk(Generic[Data]):
 
     def __init__(self, data: Data) -> None:
         self._data = data
-        self._idle: list[Scratch] = []
 
     def do(self, function: Function[Data, Item, Result], item: Item) -> Result:
-        """Call ``function(data, item, scratch)``; several threads may do so at a time."""
-        try:
-            scratch = self._idle.pop()
-        except IndexError:
-            scratch = Scratch()
-        try:
-            return function(self._data, item, scratch)
-        finally:
-            self._idle.append(scratch)
+        """Call ``function(data, item)``; several threads may do so at a time."""
+        return function(self._data, item)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.core.regression import check_single
 from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.aligned import align_training
@@ -19,13 +18,12 @@ from seakeep.models.draws import Sampling, TrainOn, draw_members
 from seakeep.models.fitted_ensemble import HankelEnsemble
 from seakeep.models.identification import Stop, check_names, last_sample, stop_instants, until
 from seakeep.models.labelled import Runs, as_runs
-from seakeep.models.members import TrainingArrays, member_columns, reach
+from seakeep.models.members import TrainingArrays, reach
 from seakeep.models.priors import LogUniform, Prior, Uniform, check_prior, describe
 from seakeep.models.settings import (
     DelayRows,
     HankelSettings,
     History,
-    Precision,
     RidgeScale,
     check_integer,
     periods_to_samples,
@@ -68,7 +66,7 @@ class BayesianHankelDMDc:
         in one run, drawn for each member; or a window that ends anywhere up to ``stop`` in one run.
     dt : float, optional
         Time step the runs must have, s; None takes theirs.
-    history, delay_rows, ridge_scale, rank, standardize, alignment, precision
+    history, delay_rows, ridge_scale, rank, standardize, alignment
         As in :class:`HankelDMDc`. What an alignment estimates, it estimates once for all members,
         from all that is given up to ``stop``: no member's draw moves another's input.
 
@@ -100,7 +98,6 @@ class BayesianHankelDMDc:
     rank: int | None = None
     standardize: bool = True
     alignment: ProbeAlignment | None = None
-    precision: Precision = "double"
     seed_sequence: np.random.SeedSequence = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -127,7 +124,6 @@ class BayesianHankelDMDc:
             rank=self.rank,
             standardize=self.standardize,
             alignment=self.alignment,
-            precision=self.precision,
         )
 
     @classmethod
@@ -243,11 +239,6 @@ class BayesianHankelDMDc:
             lasts.append(last_sample(time, stops[name], name))
         samples = [last + 1 for last in lasts]
         members = draw_members(self, dt, samples)
-        if self.precision == "single":
-            for draw in members:
-                columns = member_columns(draw, samples, self.history)
-                scale = columns if self.ridge_scale == "per_snapshot" else 1
-                check_single(draw.ridge * scale, self.rank)
         earliest = reach(members, samples, self.history == "inside")
         arrays, labels = _training_arrays(named, states, inputs, samples, earliest)
         return HankelEnsemble(

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.core.scratch import Scratch
 from seakeep.models import aligned
 from seakeep.models.forecasting import ForecastWindow
 from seakeep.models.members import Task, forecast_member
@@ -105,18 +104,16 @@ def _put_all(
 
 
 def _put_one(
-    data: tuple[Shelf, Function[Any, Any, FloatArray], Any], item: tuple[int, Any], scratch: Scratch
+    data: tuple[Shelf, Function[Any, Any, FloatArray], Any], item: tuple[int, Any]
 ) -> npt.NDArray[np.int64]:
     shelf, function, inner = data
     number, own = item
-    values = function(inner, own, scratch)
+    values = function(inner, own)
     shelf.put(number, values)
     return first_lost(values)
 
 
-def _closed_loops(
-    data: tuple[HankelEnsemble, Sequence[aligned.Loop]], number: int, _: Scratch
-) -> FloatArray:
+def _closed_loops(data: tuple[HankelEnsemble, Sequence[aligned.Loop]], number: int) -> FloatArray:
     ensemble, loops = data
     member = ensemble.member(number)
     return np.stack([aligned.closed_loop(member, loop) for loop in loops])

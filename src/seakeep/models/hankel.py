@@ -54,10 +54,6 @@ class HankelDMDc(HankelSettings):
     alignment : ProbeAlignment, optional
         Alignment of the wave input to the moving vessel, the same in fit and forecast; a mapping
         of its keys is taken too.
-    precision : {"double", "single"}, optional
-        Of the factor and the free runs; sums over snapshots are in double precision always. Single
-        is faster and needs an effective λ of at least 100: free runs of 480 steps then stay
-        within 1e-4 standard deviations of double.
 
     Raises
     ------
@@ -159,8 +155,7 @@ class HankelDMDc(HankelSettings):
         Raises
         ------
         RequestError
-            If a channel is unknown, `stop` lies outside a run, or single precision would lose too
-            many digits.
+            If a channel is unknown, or `stop` lies outside a run.
         DataError
             If a run is too short, has gaps or times that are not uniform, another step than the
             first, or a constant channel while ``standardize`` is set.
@@ -194,7 +189,6 @@ class HankelDMDc(HankelSettings):
             per_snapshot=self.ridge_scale == "per_snapshot",
             rank=self.rank,
             all_rows=self.delay_rows == "ridge",
-            precision=self.precision,
         )
         return HankelDMDcModel(
             settings=self,

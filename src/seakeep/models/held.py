@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.core.scratch import Scratch
 from seakeep.errors import RequestError
 from seakeep.models.calibration import Band, check_band, warn_of_horizon, widened
 from seakeep.models.crew import one_blas_thread
@@ -122,11 +121,10 @@ class HeldEnsemble:
         x, u = check_arrays(ensemble, x_history, u_history, u_future, steps)
         if band == "calibrated":
             warn_of_horizon(ensemble, "these arrays", int(steps), stacklevel=3)
-        out, scratch = np.empty((len(self.members), int(steps), x.shape[1])), Scratch()
+        out = np.empty((len(self.members), int(steps), x.shape[1]))
         with one_blas_thread():
             for series, member in zip(out, self.members, strict=True):
-                scratch.reset()
-                series[:] = free_runs(member, x[None], u[None], int(steps), scratch)[0]
+                series[:] = free_runs(member, x[None], u[None], int(steps))[0]
         kept = out[first_lost(out) < 0]
         mean, std, lower, upper = widened(ensemble, statistics_of(kept, level), band)
         return BandForecast(mean, std, lower, upper, len(out) - len(kept))
@@ -145,6 +143,5 @@ def hold(ensemble: HankelEnsemble, crew: Crew, progress: Progress | None) -> Hel
     return HeldEnsemble(ensemble, tuple(told(found, ensemble.n_members, progress)))
 
 
-def _identify(data: tuple[TrainingArrays, HankelSettings], draw: Draw, scratch: Scratch) -> Member:
-    scratch.reset()
-    return identify_member(*data, draw, scratch)
+def _identify(data: tuple[TrainingArrays, HankelSettings], draw: Draw) -> Member:
+    return identify_member(*data, draw)

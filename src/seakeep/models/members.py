@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.core.embedding import History, TrainingWindow, training_window
+from seakeep.core.embedding import TrainingWindow, training_window
 from seakeep.core.regression import Solution, identify
-from seakeep.core.scratch import Scratch
 from seakeep.errors import RequestError
 from seakeep.models.draws import Draw
 from seakeep.models.identification import Scale, moments
@@ -132,7 +131,6 @@ def identify_member(
     arrays: TrainingArrays,
     settings: HankelSettings,
     draw: Draw,
-    scratch: Scratch | None = None,
 ) -> Member:
     """Identify one member, as :meth:`HankelDMDc.fit` does with its settings.
 
@@ -144,8 +142,6 @@ def identify_member(
         What all members share.
     draw : Draw
         What is the member's own.
-    scratch : Scratch, optional
-        Memory of an earlier member to use again.
 
     Returns
     -------
@@ -179,13 +175,11 @@ def identify_member(
         per_snapshot=settings.ridge_scale == "per_snapshot",
         rank=settings.rank,
         all_rows=settings.delay_rows == "ridge",
-        precision=settings.precision,
-        scratch=scratch,
     )
     return Member(draw, solution, tuple(chosen), tuple(windows), state_scale, input_scale)
 
 
-def forecast_member(task: Task, draw: Draw, scratch: Scratch) -> FloatArray:
+def forecast_member(task: Task, draw: Draw) -> FloatArray:
     """Identify one member and run it freely over all windows side by side.
 
     Parameters
@@ -194,18 +188,14 @@ def forecast_member(task: Task, draw: Draw, scratch: Scratch) -> FloatArray:
         Training data and what a forecast reads.
     draw : Draw
         The member.
-    scratch : Scratch
-        Memory that the member alone uses while it is at work.
 
     Returns
     -------
     ndarray, shape (window, steps, N)
         States in physical units; NaN from where a window diverges on.
     """
-    scratch.reset()
-    member = identify_member(task.arrays, task.settings, draw, scratch)
-    scratch.reset()
-    return free_runs(member, task.histories, task.inputs, task.steps, scratch)
+    member = identify_member(task.arrays, task.settings, draw)
+    return free_runs(member, task.histories, task.inputs, task.steps)
 
 
 def window_ends(arrays: TrainingArrays, draw: Draw, run: int, dt: float) -> tuple[float, float]:
@@ -255,9 +245,7 @@ def member_model(ensemble: HankelEnsemble, number: int) -> HankelDMDcModel:
     )
 
 
-def member_radius(
-    data: tuple[TrainingArrays, HankelSettings], draw: Draw, scratch: Scratch
-) -> float:
+def member_radius(data: tuple[TrainingArrays, HankelSettings], draw: Draw) -> float:
     """Identify one member and find the largest modulus of an eigenvalue of its Â.
 
     Parameters
@@ -266,8 +254,6 @@ def member_radius(
         Training data, and what all members share.
     draw : Draw
         The member.
-    scratch : Scratch
-        Memory that the member alone uses while it is at work.
 
     Returns
     -------
@@ -275,27 +261,11 @@ def member_radius(
         The spectral radius.
     """
     arrays, settings = data
-    scratch.reset()
     N = len(arrays.state_names)
     size = N * (draw.state_delays + 1)
-    top = identify_member(arrays, settings, draw, scratch).solution.coefficients[:, :size]
+    top = identify_member(arrays, settings, draw).solution.coefficients[:, :size]
     square = top if len(top) == size else np.concatenate([top, np.eye(size - N, size)])
     return float(np.abs(np.linalg.eigvals(square)).max())
-
-
-def member_columns(draw: Draw, samples: Sequence[int], history: History) -> int:
-    """Snapshot pairs that a member learns from; `samples` are those of each run up to its stop."""
-    runs = range(len(samples)) if draw.run is None else (draw.run,)
-    return sum(
-        training_window(
-            samples[run] - 1 if draw.last is None else draw.last,
-            draw.window,
-            draw.state_delays,
-            draw.input_delays,
-            history,
-        ).columns
-        for run in runs
-    )
 
 
 def reach(draws: Sequence[Draw], samples: Sequence[int], inside: bool) -> list[int]:

@@ -41,7 +41,7 @@ class HankelDMDcModel:
     settings : HankelSettings
         The settings it was identified with.
     coefficients : ndarray, shape (N(s+1) or N, N(s+1) + Q(z+1))
-        Regressed rows of [Â B̂], on standardised deviations, in the precision of the settings.
+        Regressed rows of [Â B̂], on standardised deviations.
     dt : float
         Time step, s.
     state_labels, input_labels : tuple of ChannelLabel

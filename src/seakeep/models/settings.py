@@ -11,7 +11,6 @@ from typing import Literal
 import numpy as np
 
 from seakeep.core.embedding import History
-from seakeep.core.regression import Precision
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.checks import check_choice
@@ -20,7 +19,6 @@ __all__ = [
     "DelayRows",
     "HankelSettings",
     "History",
-    "Precision",
     "RidgeScale",
     "check_integer",
     "check_ridge",
@@ -106,7 +104,6 @@ class HankelSettings:
     rank: int | None = None
     standardize: bool = True
     alignment: ProbeAlignment | None = None
-    precision: Precision = "double"
 
     def __post_init__(self) -> None:
         check_integer("state_delays", self.state_delays, 0)
@@ -117,7 +114,6 @@ class HankelSettings:
         check_choice("history", self.history, ("before", "inside"))
         check_choice("delay_rows", self.delay_rows, ("ridge", "exact"))
         check_choice("ridge_scale", self.ridge_scale, ("absolute", "per_snapshot"))
-        check_choice("precision", self.precision, ("double", "single"))
         if not isinstance(self.standardize, bool | np.bool_):
             raise RequestError(f"standardize must be True or False; received {self.standardize!r}.")
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))

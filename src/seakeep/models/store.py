@@ -104,13 +104,13 @@ def unpack(dataset: xr.Dataset) -> Parts:
         labels=labels,
         scales=scales,
         dt=float(dataset.attrs["dt"]),
-        coefficients=_values(dataset, "coefficients", settings.get("precision", "double")),
+        coefficients=_values(dataset, "coefficients"),
         alignment=json.loads(dataset.attrs.get("alignment", "null")),
     )
 
 
-def _values(dataset: xr.Dataset, name: str, precision: str = "double") -> FloatArray:
-    return np.ascontiguousarray(dataset[name].values, dtype=precision)
+def _values(dataset: xr.Dataset, name: str) -> FloatArray:
+    return np.ascontiguousarray(dataset[name].values, dtype=float)
 
 
 def as_json(value: object) -> str:

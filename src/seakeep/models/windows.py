@@ -10,7 +10,6 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.core.rollout import rollout
-from seakeep.core.scratch import Scratch
 from seakeep.errors import RequestError
 from seakeep.models import aligned
 from seakeep.models.ensemble_labels import label_channels, window_coords
@@ -57,7 +56,6 @@ def free_runs(
     histories: FloatArray,
     inputs: FloatArray,
     steps: int,
-    scratch: Scratch | None = None,
 ) -> FloatArray:
     """Free runs over several windows, in physical units.
 
@@ -71,8 +69,6 @@ def free_runs(
         Inputs up to the instant before the last one forecast.
     steps : int
         Instants forecast.
-    scratch : Scratch, optional
-        Memory to use again.
 
     Returns
     -------
@@ -90,7 +86,6 @@ def free_runs(
         model.state_scale.deviations(histories[:, -1 - model.state_delays :]),
         model.input_scale.deviations(driving),
         n_states=count,
-        scratch=scratch,
     )
     with np.errstate(over="ignore"):  # a run that is lost is cut just below
         values = model.state_scale.physical(deviations, out=deviations)

@@ -11,7 +11,6 @@ from typing import Any
 import xarray as xr
 
 from seakeep.campaign.prepare import Progress
-from seakeep.core.scratch import Scratch
 from seakeep.models.priors import Prior, describe
 from seakeep.models.workers import Crew, WorkerLostError, as_finished, check_crew
 from seakeep.study.cells import Unit, cells_of, compute, units_of
@@ -214,9 +213,7 @@ def _words(plan: Plan, unit: Unit) -> str:
     return f"{unit.model}, training set {plan.training[unit.training].name}"
 
 
-def _work(
-    data: tuple[Plan, dict[str, xr.Dataset]], unit: Unit, scratch: Scratch
-) -> list[tuple[str, dict[str, Any]]]:
+def _work(data: tuple[Plan, dict[str, xr.Dataset]], unit: Unit) -> list[tuple[str, dict[str, Any]]]:
     """Cells of a unit; whoever asked for them writes them, for a worker may have another disk."""
     plan, runs = data
     found: list[tuple[str, dict[str, Any]]] = []
