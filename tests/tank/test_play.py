@@ -1,4 +1,7 @@
 import hashlib
+import os
+import subprocess
+import sys
 import tomllib
 
 import numpy as np
@@ -42,6 +45,20 @@ def test_same_seed_same_bytes(short, tmp_path, kind):
         "truth/regular_2.nc",
         *(f"raw/regular_2/{n}.{kind}" for n in ("wave_probes", "mru", "loads", "video")),
     }
+
+
+def test_same_bytes_whether_compiled_now_or_read_from_the_cache(tmp_path):
+    (tmp_path / "short.toml").write_text(
+        "[runs.sea]\nstartup = 2.0\nduration = 8.0\n"
+        "spectrum = { height = 0.15, peak_period = 2.0 }\n",
+        encoding="utf-8",
+    )
+    cache = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    command = [sys.executable, "-m", "seakeep", "tank", "--settings", "short.toml", "--out"]
+    for name in ("compiled", "cached"):
+        subprocess.run([*command, name], cwd=tmp_path, env=cache, check=True, capture_output=True)
+    assert list((tmp_path / "cache").rglob("*.nbc"))
+    assert digests(tmp_path / "compiled") == digests(tmp_path / "cached")
 
 
 def test_other_seed_other_waves_and_noise(short, rig):

@@ -15,8 +15,10 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 
-# Reassociation lets the memory integral run in vector registers; NaN is still NaN.
-_FAST = {"reassoc", "contract"}
+# Reassociation lets the memory integral run in vector registers; NaN is still NaN. Contraction to
+# fused multiply-adds is left out: code compiled in this process and code read from the cache fuse
+# other pairs, and the last bits would differ between the first run and the second.
+_FAST = {"reassoc"}
 
 
 @numba.njit(cache=True)
