@@ -345,3 +345,34 @@ def test_units_that_differ_are_refused():
 def test_training_spreads_must_be_one_a_channel():
     with pytest.raises(RequestError, match=r"training_std has shape \(3,\); .* 2 channels"):
         metrics.nrmse(**both(), training_std=[1.0, 1.0, 1.0])
+
+
+def test_a_measure_is_added_by_one_function_and_one_line(tmp_path, monkeypatch):
+    """As CONTRIBUTING shows it."""
+    (tmp_path / "extra_measures.py").write_text(
+        "import numpy as np\n"
+        "from seakeep.core.metrics import paired\n"
+        "from seakeep.metrics import labelled\n"
+        "def mean_absolute_error(*, predicted, measured, training_std=None):\n"
+        "    p, m, spread, judged = paired(predicted, measured, training_std)\n"
+        "    return np.mean(np.abs(p - m), axis=-2) / spread\n"
+        "mae = labelled(mean_absolute_error, keeps='channel', label='MAE')\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    import extra_measures
+
+    expected = np.array([0.5, 5.0]) / SD
+    np.testing.assert_allclose(extra_measures.mae(**both()), expected, rtol=1e-14)
+    each = extra_measures.mae(predicted=labelled(PREDICTED), measured=labelled(MEASURED))
+    assert float(each.heave) == pytest.approx(expected[0], rel=1e-14)
+    assert each.heave.attrs == {"units": "1", "long_name": "MAE of heave"}
+
+
+@pytest.mark.parametrize("kind", [complex, "datetime64[s]", "timedelta64[s]"])
+def test_channels_that_are_no_real_numbers_are_refused(kind):
+    data = labelled(MEASURED)
+    data["heave"] = ("time", np.arange(4).astype(kind))
+    with pytest.raises(DataError, match=r"'heave' of predicted is of type .*, not a real number"):
+        metrics.nrmse(predicted=data, measured=labelled(MEASURED))
+    with pytest.raises(DataError, match=r"'heave' of measured is of type .*, not a real number"):
+        metrics.nrmse(predicted=labelled(MEASURED), measured=data)

@@ -59,10 +59,15 @@ def channel_names(data: xr.Dataset, name: str) -> list[str]:
     DataError
         If one has no dimension ``time``.
     """
-    names = [str(key) for key, each in data.data_vars.items() if each.dtype.kind in "iufb"]
+    names = [str(key) for key, each in data.data_vars.items() if each.dtype.kind not in "OUST"]
     if not names:
         raise RequestError(f"{name} holds no channel; there is nothing to judge.")
     for channel in names:
+        if data[channel].dtype.kind not in "iufb":
+            raise DataError(
+                f"channel '{channel}' of {name} is of type {data[channel].dtype}, not a real "
+                "number. Convert it, or select the channels to judge."
+            )
         if "time" not in data[channel].dims:
             raise DataError(
                 f"{name} has no coordinate 'time' in channel '{channel}' (dimensions: "

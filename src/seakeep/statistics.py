@@ -8,16 +8,17 @@ from the `numpy.random.Generator` that is passed.
 
 from __future__ import annotations
 
+import functools
 import warnings
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import as_generator
+from seakeep.arrays import FloatArray, as_generator
 from seakeep.core import bootstrap as _bootstrap
 from seakeep.core import coverage as _coverage
 from seakeep.core import divergence as _divergence
@@ -72,69 +73,67 @@ __all__ = [
     "trend_test",
 ]
 
-Labelled = npt.ArrayLike | xr.Dataset
 
-
-def _all_or_none(named: dict[str, object]) -> bool:
-    labelled = [isinstance(item, xr.Dataset) for item in named.values()]
-    if any(labelled) and not all(labelled):
-        received = ", ".join(f"{name}: {type(item).__name__}" for name, item in named.items())
+def _labelled(**sides: object) -> bool:
+    """Whether all are Datasets; refuse a mixture."""
+    kinds = [isinstance(side, xr.Dataset) for side in sides.values()]
+    if any(kinds) and not all(kinds):
+        received = ", ".join(f"{name}: {type(side).__name__}" for name, side in sides.items())
         raise RequestError(f"give Datasets throughout, or arrays throughout; received {received}.")
-    return all(labelled)
+    return all(kinds)
 
 
+@overload
 def moving_block_bootstrap(
-    series: npt.ArrayLike | xr.DataArray | xr.Dataset,
+    series: xr.Dataset,
+    n_series: int,
+    block_length: int,
+    rng: np.random.Generator,
+    *,
+    segments: Sequence[int] | None = None,
+) -> xr.Dataset: ...
+@overload
+def moving_block_bootstrap(
+    series: xr.DataArray,
+    n_series: int,
+    block_length: int,
+    rng: np.random.Generator,
+    *,
+    segments: Sequence[int] | None = None,
+) -> xr.DataArray: ...
+@overload
+def moving_block_bootstrap(
+    series: npt.ArrayLike,
+    n_series: int,
+    block_length: int,
+    rng: np.random.Generator,
+    *,
+    segments: Sequence[int] | None = None,
+) -> FloatArray: ...
+@functools.wraps(_bootstrap.moving_block_bootstrap)
+def moving_block_bootstrap(
+    series: Any,
     n_series: int,
     block_length: int,
     rng: np.random.Generator,
     *,
     segments: Sequence[int] | None = None,
 ) -> Any:
-    """Redraw a series, or several side by side, from overlapping blocks.
-
-    Parameters
-    ----------
-    series : array_like, shape (time,) or (time, channel), DataArray or Dataset over time
-        Uniform samples without gaps; all channels are redrawn from the same blocks.
-    n_series : int
-        Number of redrawn series (100 in the paper).
-    block_length : int
-        Samples of a block; :func:`block_length` proposes one.
-    rng : numpy.random.Generator
-        Source of the block starts.
-    segments : sequence of int, optional
-        Lengths of the joined pieces. No block then crosses a join; by default it may, as in the
-        paper.
-
-    Returns
-    -------
-    ndarray, shape (n_series, time) or (n_series, time, channel), DataArray or Dataset
-        Labelled results have the dimensions (draw, time) and keep the times.
-
-    Raises
-    ------
-    RequestError
-        If the block does not fit, or a setting is out of range.
-    DataError
-        If a value is not finite.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> drawn = moving_block_bootstrap(np.arange(8.0), 3, 4, np.random.default_rng(0))
-    >>> drawn.shape
-    (3, 8)
-    """
+    """Take DataArrays and Datasets too; the docstring shown is that of the array function."""
+    redraw = functools.partial(
+        _bootstrap.moving_block_bootstrap,
+        n_series=n_series,
+        block_length=block_length,
+        rng=rng,
+        segments=segments,
+    )
     if isinstance(series, xr.DataArray):
         name = "series" if series.name is None else str(series.name)
         whole = series.rename(name).to_dataset()
         drawn = moving_block_bootstrap(whole, n_series, block_length, rng, segments=segments)
         return drawn[name].rename(series.name)
     if not isinstance(series, xr.Dataset):
-        return _bootstrap.moving_block_bootstrap(
-            series, n_series, block_length, rng, segments=segments
-        )
+        return redraw(series)
     names = channel_names(series, "series")
     wrong = [name for name in names if series[name].dims != ("time",)]
     if wrong:
@@ -142,10 +141,7 @@ def moving_block_bootstrap(
             f"'{wrong[0]}' has the dimensions {series[wrong[0]].dims}; ('time',) is needed. "
             "Select one run and one member."
         )
-    columns = np.stack([series[name].values for name in names], axis=-1)
-    values = _bootstrap.moving_block_bootstrap(
-        columns, n_series, block_length, rng, segments=segments
-    )
+    values = redraw(np.stack([series[name].values for name in names], axis=-1))
     coords = {"time": series["time"]} if "time" in series.coords else None
     return xr.Dataset(
         {
@@ -158,8 +154,8 @@ def moving_block_bootstrap(
 
 def _divergence_of(
     name: str,
-    p: npt.NDArray[np.float64],
-    measured: npt.NDArray[np.float64],
+    p: FloatArray,
+    measured: FloatArray,
     block: int | BlockRule,
     rng: np.random.Generator,
     settings: dict[str, Any],
@@ -179,9 +175,34 @@ def _divergence_of(
         raise DataError(f"channel '{name}': {error}") from error
 
 
+@overload
 def jsd_interval(
-    predicted: Labelled,
-    measured: Labelled,
+    predicted: xr.Dataset,
+    measured: xr.Dataset,
+    *,
+    block_length: int | BlockRule,
+    rng: np.random.Generator,
+    n_series: int = 100,
+    bandwidth: Bandwidth = "paper",
+    grid: npt.ArrayLike | None = None,
+    segments: Sequence[int] | None = None,
+) -> xr.Dataset: ...
+@overload
+def jsd_interval(
+    predicted: npt.ArrayLike,
+    measured: npt.ArrayLike,
+    *,
+    block_length: int | BlockRule,
+    rng: np.random.Generator,
+    n_series: int = 100,
+    bandwidth: Bandwidth = "paper",
+    grid: npt.ArrayLike | None = None,
+    segments: Sequence[int] | None = None,
+) -> JsdInterval: ...
+@functools.wraps(_divergence.jsd_interval)
+def jsd_interval(
+    predicted: Any,
+    measured: Any,
     *,
     block_length: int | BlockRule,
     rng: np.random.Generator,
@@ -190,52 +211,16 @@ def jsd_interval(
     grid: npt.ArrayLike | None = None,
     segments: Sequence[int] | None = None,
 ) -> Any:
-    """Jensen–Shannon divergence with its interval, always beside its noise floor.
-
-    Parameters
-    ----------
-    predicted : array_like, shape (time,) or (series, time), or Dataset
-        Predictions at the instants of `measured`; several of a channel are pooled. With Datasets,
-        its channels are judged, each against the one of that name.
-    measured : array_like, shape (time,), or Dataset over time
-        Measurement.
-    block_length : int, "carlstein" or "politis_white"
-        Samples of a block, or the rule, applied to each measured channel.
-    rng : numpy.random.Generator
-        Source of the block starts; of Datasets each channel has a spawned child, in their order.
-    n_series : int
-        Number of redrawn series (100 in the paper).
-    bandwidth : {"paper", "silverman"} or float
-        As for :func:`kernel_bandwidth`.
-    grid : array_like, shape (grid,), optional
-        Evenly spaced values that cover all series; by default 512 over their pooled range and
-        three bandwidths on either side. Not with Datasets, whose channels have their own.
-    segments : sequence of int, optional
-        Lengths of the joined pieces; no block then crosses a join.
-
-    Returns
-    -------
-    JsdInterval, or Dataset over ``channel``
-        The Dataset holds the numbers without the draws, and ``uncertainty``.
-
-    Raises
-    ------
-    RequestError
-        If channels, lengths or settings do not fit.
-    DataError
-        If a series is constant, has gaps, or units or instants differ.
-    """
+    """Take Datasets too; the docstring shown is that of the array function."""
     settings: dict[str, Any] = {
         "n_series": n_series,
         "bandwidth": bandwidth,
         "segments": segments,
     }
-    if not _all_or_none({"predicted": predicted, "measured": measured}):
+    if not _labelled(predicted=predicted, measured=measured):
         return _divergence.jsd_interval(
             predicted, measured, block_length=block_length, rng=rng, grid=grid, **settings
         )
-    assert isinstance(predicted, xr.Dataset)
-    assert isinstance(measured, xr.Dataset)
     if grid is not None:
         raise RequestError("channels of a Dataset have grids of their own; leave grid out.")
     pairs = pair(predicted=predicted, measured=measured)
@@ -272,34 +257,17 @@ def jsd_interval(
     )
 
 
-def coverage(lower: Labelled, upper: Labelled, measured: Labelled) -> Any:
-    """Part of the instants at which a band holds the measurement, and the band's mean width.
-
-    Parameters
-    ----------
-    lower, upper : array_like, shape (…, time, channel) or (time,), or Dataset
-        Bounds of the band, in the units of `measured`.
-    measured : array_like, shape (…, time, channel) or (time,), or Dataset
-        Measurement, or on the tank the truth.
-
-    Returns
-    -------
-    BandCoverage, or Dataset over the leading dimensions and ``channel``
-        Part inside, below and above; mean width, in the channel's unit (coordinate ``unit``) and
-        in measured standard deviations.
-
-    Raises
-    ------
-    RequestError
-        If shapes or channels do not fit, or the bounds are swapped.
-    DataError
-        If the measurement has gaps, or units or instants differ.
-    """
-    if not _all_or_none({"lower": lower, "upper": upper, "measured": measured}):
+@overload
+def coverage(lower: xr.Dataset, upper: xr.Dataset, measured: xr.Dataset) -> xr.Dataset: ...
+@overload
+def coverage(
+    lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
+) -> BandCoverage: ...
+@functools.wraps(_coverage.coverage)
+def coverage(lower: Any, upper: Any, measured: Any) -> Any:
+    """Take Datasets too; the docstring shown is that of the array function."""
+    if not _labelled(lower=lower, upper=upper, measured=measured):
         return _coverage.coverage(lower, upper, measured)
-    assert isinstance(lower, xr.Dataset)
-    assert isinstance(upper, xr.Dataset)
-    assert isinstance(measured, xr.Dataset)
     pairs = pair(lower=lower, upper=upper, measured=measured)
     names, lead = pairs.names, pairs.lead
     m = pairs.arrays["measured"]

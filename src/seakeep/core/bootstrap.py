@@ -397,12 +397,12 @@ def moving_block_bootstrap(
 
     Parameters
     ----------
-    series : array_like, shape (time,) or (time, channel)
-        Uniform samples without gaps; the channels are redrawn together, from the same blocks.
+    series : array_like, shape (time,) or (time, channel), DataArray or Dataset over time
+        Uniform samples without gaps; all channels are redrawn from the same blocks.
     n_series : int
         Number of redrawn series (100 in the paper).
     block_length : int
-        Samples of a block.
+        Samples of a block; :func:`block_length` proposes one.
     rng : numpy.random.Generator
         Source of the block starts.
     segments : sequence of int, optional
@@ -411,7 +411,8 @@ def moving_block_bootstrap(
 
     Returns
     -------
-    ndarray, shape (n_series, time) or (n_series, time, channel)
+    ndarray, shape (n_series, time) or (n_series, time, channel), DataArray or Dataset
+        Labelled results have the dimensions (draw, time) and keep the times.
 
     Raises
     ------

@@ -41,23 +41,24 @@ def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
 
     Parameters
     ----------
-    lower, upper : array_like, shape (…, time, channel) or (time,)
+    lower, upper : array_like, shape (…, time, channel) or (time,), or Dataset
         Bounds, infinite where a margin is; a channel with a NaN in either (too few members left)
         gives NaN.
-    measured : array_like, shape (…, time, channel) or (time,)
+    measured : array_like, shape (…, time, channel) or (time,), or Dataset
         Measurement, or on the tank the truth, in the same units.
 
     Returns
     -------
-    BandCoverage
-        Arrays of shape (…, channel); without the channel axis for a series.
+    BandCoverage, or Dataset over the leading dimensions and ``channel``
+        Arrays of shape (…, channel); without the channel axis for a series. The Dataset has the
+        channels' units in the coordinate ``unit``.
 
     Raises
     ------
     RequestError
         If the shapes differ, or the bounds are swapped.
     DataError
-        If the measurement has gaps, or fewer than two instants.
+        If the measurement has gaps or fewer than two instants, or units or instants differ.
 
     Examples
     --------

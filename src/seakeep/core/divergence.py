@@ -117,35 +117,37 @@ def jsd_interval(
 
     Parameters
     ----------
-    predicted : array_like, shape (time,) or (series, time)
+    predicted : array_like, shape (time,) or (series, time), or Dataset
         Predictions at the instants of `measured`; the draws of several (one of each training
-        window) are pooled.
-    measured : array_like, shape (time,)
+        window) are pooled. With Datasets its channels are judged, each against the one of that
+        name.
+    measured : array_like, shape (time,), or Dataset over time
         Measurement.
     block_length : int, "carlstein" or "politis_white"
-        Samples of a block, or the rule, applied to the measurement.
+        Samples of a block, or the rule, applied to each measured channel.
     rng : numpy.random.Generator
-        Source of the block starts.
+        Source of the block starts; of Datasets each channel has a spawned child, in their order.
     n_series : int
         Number of redrawn series (100 in the paper).
     bandwidth : {"paper", "silverman"} or float
         As for :func:`seakeep.core.density.kernel_bandwidth`; each redrawn series has its own.
     grid : array_like, shape (grid,), optional
         Evenly spaced values that cover all series; by default 512 over their pooled range and
-        three bandwidths on either side.
+        three bandwidths on either side. Not with Datasets, whose channels have their own.
     segments : sequence of int, optional
         Lengths of the joined pieces; no block then crosses a join.
 
     Returns
     -------
-    JsdInterval
+    JsdInterval, or Dataset over ``channel``
+        The Dataset holds the numbers without the draws, and ``uncertainty``.
 
     Raises
     ------
     RequestError
         If lengths differ, a setting is out of range, or the grid does not cover the series.
     DataError
-        If a series is constant, has gaps, or is too short.
+        If a series is constant, has gaps or is too short, or units or instants differ.
 
     Notes
     -----

@@ -87,13 +87,20 @@ def is_slack(
 
     Returns
     -------
-    ndarray of bool, shape (channel,)
+    ndarray of bool, shape (channel,), or Dataset
         True for a channel whose measured SD is below 1 % of its training SD, or zero.
 
     Raises
     ------
-    RequestError
+    RequestError, DataError
         As :func:`nrmse`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> measured = np.stack([np.sin(np.arange(9)), np.zeros(9)], axis=1)
+    >>> is_slack(predicted=measured, measured=measured)
+    array([False,  True])
     """
     return ~paired(predicted, measured, training_std)[3]
 
@@ -108,25 +115,35 @@ def nrmse(
 
     Parameters
     ----------
-    predicted, measured : array_like, shape (…, time, channel)
+    predicted, measured : array_like, shape (…, time, channel), or Dataset
         Histories in the same units.
     training_std : array_like, shape (channel,), optional
-        Standard deviations in training; a channel whose measured SD is below 1 % of it (a slack
-        line) is NaN.
+        Standard deviations in training, by default the ones that a forecast carries; a channel
+        whose measured SD is below 1 % of it (a slack line) is NaN.
 
     Returns
     -------
-    ndarray, shape (…, channel)
-        NRMSE. A forecast that diverged (NaN) gives NaN too.
+    ndarray, shape (…, channel), or Dataset
+        NRMSE (the summand of the paper's ANRMSE, k = 1, SD with ddof = 1 over the window). A
+        forecast that diverged (NaN) gives NaN too.
 
     Raises
     ------
     RequestError
-        If the shapes differ or the window has fewer than two samples.
+        If shapes or channels do not fit, or the window has fewer than two samples.
+    DataError
+        If the instants or units of two Datasets differ.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.linspace(0, 20, 400)
+    >>> measured = np.stack([np.sin(t), np.cos(t)], axis=1)
+    >>> nrmse(predicted=0.9 * measured, measured=measured).round(2)
+    array([0.1, 0.1])
     """
     p, m, spread, _ = paired(predicted, measured, training_std)
-    out: FloatArray = np.sqrt(np.mean((p - m) ** 2, axis=-2)) / spread
-    return out
+    return root_mean_square(p - m) / spread
 
 
 def anrmse(
@@ -144,16 +161,16 @@ def anrmse(
 
     Returns
     -------
-    ndarray, shape (…)
+    float, or an array over the leading axes
         NaN if no channel can be judged, or the forecast diverged.
 
     Raises
     ------
-    RequestError
+    RequestError, DataError
         As :func:`nrmse`.
     """
     p, m, spread, judged = paired(predicted, measured, training_std)
-    return over_channels(np.sqrt(np.mean((p - m) ** 2, axis=-2)) / spread, judged)
+    return over_channels(root_mean_square(p - m) / spread, judged)
 
 
 def error_over_time(
@@ -162,7 +179,7 @@ def error_over_time(
     measured: npt.ArrayLike,
     training_std: npt.ArrayLike | None = None,
 ) -> FloatArray:
-    """ε(t): absolute error at each instant in measured SDs, averaged over the channels.
+    """Error at each instant in measured SDs, averaged over the channels: ε(t) of the paper.
 
     Parameters
     ----------
@@ -171,12 +188,11 @@ def error_over_time(
 
     Returns
     -------
-    ndarray, shape (…, time)
-        ε (paper, equation of ε(t)).
+    ndarray, shape (…, time), or DataArray
 
     Raises
     ------
-    RequestError
+    RequestError, DataError
         As :func:`nrmse`.
     """
     p, m, spread, judged = paired(predicted, measured, training_std)
@@ -198,19 +214,16 @@ def normalised_extremes_error(
 
     Returns
     -------
-    ndarray, shape (…, channel)
+    ndarray, shape (…, channel), or Dataset
         The summand of :func:`nammae`.
 
     Raises
     ------
-    RequestError
+    RequestError, DataError
         As :func:`nrmse`.
     """
     p, m, spread, _ = paired(predicted, measured, training_std)
-    low = np.abs(p.min(axis=-2) - m.min(axis=-2))
-    high = np.abs(p.max(axis=-2) - m.max(axis=-2))
-    out: FloatArray = 0.5 * (low + high) / spread
-    return out
+    return extremes_error(p, m) / spread
 
 
 def nammae(
@@ -228,19 +241,16 @@ def nammae(
 
     Returns
     -------
-    ndarray, shape (…)
-        Average over the channels that can be judged.
+    float, or an array over the leading axes
+        Average of :func:`normalised_extremes_error` over the channels that can be judged.
 
     Raises
     ------
-    RequestError
+    RequestError, DataError
         As :func:`nrmse`.
     """
-    each = normalised_extremes_error(
-        predicted=predicted, measured=measured, training_std=training_std
-    )
-    judged = paired(predicted, measured, training_std)[3]
-    return over_channels(each, judged)
+    p, m, spread, judged = paired(predicted, measured, training_std)
+    return over_channels(extremes_error(p, m) / spread, judged)
 
 
 def fit_percent(
@@ -258,19 +268,32 @@ def fit_percent(
 
     Returns
     -------
-    ndarray, shape (…, channel)
+    ndarray, shape (…, channel), or Dataset
         :math:`100 (1 - \|y - \hat y\| / \|y - \bar y\|)`: 100 is perfect, 0 is no better than
         the mean, negative is worse.
 
     Raises
     ------
-    RequestError
+    RequestError, DataError
         As :func:`nrmse`.
     """
     p, m, spread, _ = paired(predicted, measured, training_std)
-    samples = m.shape[-2]
     norm = np.sqrt(np.sum((p - m) ** 2, axis=-2))
-    out: FloatArray = 100.0 * (1.0 - norm / (spread * np.sqrt(samples - 1)))
+    out: FloatArray = 100.0 * (1.0 - norm / (spread * np.sqrt(m.shape[-2] - 1)))
+    return out
+
+
+def root_mean_square(error: FloatArray) -> FloatArray:
+    """Root mean square over time."""
+    out: FloatArray = np.sqrt(np.mean(error**2, axis=-2))
+    return out
+
+
+def extremes_error(p: FloatArray, m: FloatArray) -> FloatArray:
+    """Mean absolute error of minimum and maximum over time."""
+    low = np.abs(p.min(axis=-2) - m.min(axis=-2))
+    high = np.abs(p.max(axis=-2) - m.max(axis=-2))
+    out: FloatArray = 0.5 * (low + high)
     return out
 
 
