@@ -99,11 +99,11 @@ def plain_cells(draws, deterministic: bool, problem, stops, starts):
     return call
 
 
-def forecast_cells(ensemble, model, run, stops, starts, workers: int) -> None:
+def forecast_cells(ensemble, model, run, stops, starts) -> None:
     """The same with the package: an ensemble, and perhaps a model, a training window."""
     for stop in stops:
         fitted = ensemble.fit(run, *names(), stop=stop)
-        fitted.summarize_windows(run, starts, STEPS, workers=workers)
+        fitted.summarize_windows(run, starts, STEPS)
         if model is not None:
             one = model.fit(run, *names(), stop=stop)
             one.forecast_windows(run, starts, STEPS)
@@ -112,7 +112,6 @@ def forecast_cells(ensemble, model, run, stops, starts, workers: int) -> None:
 def members(
     count: int,
     windows: int,
-    workers: tuple[int, ...] = (1,),
     trainings: int = 1,
     deterministic: bool = False,
 ):
@@ -130,20 +129,17 @@ def members(
     paper = seakeep.BayesianHankelDMDc.paper(encounter_period=32 * DT, dt=DT, n_members=count)
     one = seakeep.HankelDMDc.paper(encounter_period=32 * DT, dt=DT) if deterministic else None
 
-    def package(delay_rows, number):
+    def package(delay_rows):
         changes = {"delay_rows": delay_rows}
         spec = dataclasses.replace(paper, **changes)
         single_model = None if one is None else dataclasses.replace(one, **changes)
-        return lambda: forecast_cells(spec, single_model, run, stops * DT, starts * DT, number)
+        return lambda: forecast_cells(spec, single_model, run, stops * DT, starts * DT)
 
     draws = paper.fit(run, *names(), stop=stops[0] * DT).draws
     plain = plain_cells(draws, deterministic, problem, stops, starts)
     contenders = {"plain NumPy, loops over the same cells": plain}
     for delay_rows in ("ridge", "exact"):
-        for number in workers:
-            text = f"seakeep, delay_rows='{delay_rows}'"
-            text += "" if number == 1 else f", {number} workers"
-            contenders[text] = package(delay_rows, number)
+        contenders[f"seakeep, delay_rows='{delay_rows}'"] = package(delay_rows)
     return contenders
 
 
@@ -179,7 +175,6 @@ def read_arguments() -> argparse.Namespace:
         "--trainings", type=int, default=1, help="training windows of the study; the paper's is 10"
     )
     parser.add_argument("--study-rounds", type=int, default=3, help="repetitions of the study")
-    parser.add_argument("--workers", type=int, default=2, help="workers compared with one")
     parser.add_argument(
         "--out",
         type=Path,
@@ -210,10 +205,9 @@ def main() -> None:
             notes[title] = accuracy(contenders, problem)
             if history == "inside":
                 survey[title] = peers.SURVEY
-    numbers = (1,) if arguments.workers == 1 else (1, arguments.workers)
     if arguments.only in (None, "ensemble"):
         title = f"Ensemble of {arguments.members}, one forecast each"
-        contenders = members(arguments.members, 1, numbers)
+        contenders = members(arguments.members, 1)
         sections[title] = timing.interleave(contenders, arguments.many_rounds)
         if arguments.members == 100:
             survey[title] = peers.SURVEY_ENSEMBLE
@@ -225,7 +219,6 @@ def main() -> None:
         contenders = members(
             arguments.study_members,
             10,
-            numbers,
             trainings=arguments.trainings,
             deterministic=True,
         )

@@ -137,7 +137,7 @@ def channels() -> dict[str, list[str]]:
 @pytest.fixture
 def patient_cluster(monkeypatch: pytest.MonkeyPatch) -> None:
     """A scheduler on a busy machine has minutes to answer, not the seconds that a user waits."""
-    monkeypatch.setattr("seakeep.models.cluster.PATIENCE", 300.0)
+    monkeypatch.setattr("seakeep.models.executor.PATIENCE", 300.0)
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from seakeep import (
     estimate_probe_offset,
     load_model,
 )
-from seakeep.models import ensemble_series
+from seakeep.models import processes
 
 
 def spec(alignment):
@@ -173,19 +173,6 @@ def test_an_offset_is_found_with_its_spread(models):
     assert corrected < 0.1
 
 
-def test_a_run_may_ask_for_its_offset(models):
-    run = drifting_run(7, moved=-0.4).assign_attrs(probe_offset_span=(0.0, 60.0))
-    forecast = models["dispersion"].forecast(run, start=60.0, steps=100)
-    assert forecast.attrs["probe_offset"] == pytest.approx(0.4, abs=0.03)
-    assert 0 < forecast.attrs["probe_offset_spread"] < 0.05
-    assert run.attrs["probe_offset_span"] == (0.0, 60.0)
-    # What lies after the stated part is not read for it.
-    late = run.copy(deep=True)
-    late["heave"].values[800:] = 0.0
-    again = models["dispersion"].forecast(late, start=60.0, steps=100)
-    assert again.attrs["probe_offset"] == forecast.attrs["probe_offset"]
-
-
 def test_the_offset_of_the_settings_moves_fit_and_forecast_alike(runs, models):
     alignment = ProbeAlignment(mode="dispersion", surge="measured", offset=0.3)
     model = spec(alignment).fit(runs, STATES, INPUTS)
@@ -286,22 +273,13 @@ def test_what_an_alignment_estimates_is_the_same_for_all_members(runs):
     assert f"celerity {few.alignment.celerity:.4g} m/s; surge measured" in few.summary()
 
 
-def test_a_predicted_surge_uses_the_workers_and_gives_the_same_arrays(runs, monkeypatch):
+def test_a_predicted_surge_gives_the_same_arrays_with_an_executor(runs):
     ensemble = aligned_ensemble(runs, mode="dispersion", surge="predicted")
     run = drifting_run(7)
     alone = ensemble.forecast(run, start=60.0, steps=30)
-    seen = []
-    real = ensemble_series.side_by_side
-
-    def watch(function, data, items, crew):
-        seen.append((crew.workers, crew.backend))
-        return real(function, data, items, crew)
-
-    monkeypatch.setattr(ensemble_series, "side_by_side", watch)
-    for workers, backend in ((2, "threads"), (2, "processes")):
-        other = ensemble.forecast(run, start=60.0, steps=30, workers=workers, backend=backend)
-        xr.testing.assert_identical(alone, other)
-    assert seen == [(2, "threads"), (2, "processes")]
+    with processes(2) as executor:
+        other = ensemble.forecast(run, start=60.0, steps=30, executor=executor)
+    xr.testing.assert_identical(alone, other)
 
 
 @pytest.mark.parametrize("surge", ["measured", "predicted"])
@@ -312,9 +290,6 @@ def test_an_aligned_ensemble_says_on_what_it_depends_and_comes_back(runs, surge,
     assert forecast.attrs.get("conditional_on", "") == ("surge" if surge == "measured" else "")
     loaded = load_model(ensemble.save(tmp_path / "ens.nc"))
     xr.testing.assert_identical(loaded.forecast(run, start=60.0, steps=20), forecast)
-    asking = run.assign_attrs(probe_offset_span=(0.0, 50.0))
-    with pytest.raises(RequestError, match=r"an ensemble does not do\. Estimate it with a mod"):
-        ensemble.forecast(asking, start=60.0, steps=20)
 
 
 @pytest.mark.parametrize(
@@ -394,13 +369,6 @@ def without(run, *names, positions=True):
             ["heave"],
             INPUTS,
             "run 1 has no channel 'surge'. .*It has: heave, eta_fwd, eta_cog",
-        ),
-        (
-            {},
-            lambda run: run.assign_attrs(probe_offset_span=(0.0, 9.0)),
-            STATES,
-            INPUTS,
-            "run 1 asks for its probe offset to be estimated, which takes a model, so it cannot tr",
         ),
     ],
 )

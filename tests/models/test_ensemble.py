@@ -1,5 +1,6 @@
 import dataclasses
 import signal
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -190,14 +191,6 @@ def test_an_infinite_quantile_is_drawn_again(run):
     draws = fitted(run, state_delay=Rare(), n_members=20).draws
     assert draws.attrs["redrawn"] > 0
     assert np.all(draws.state_delay <= 0.5)
-
-
-def test_the_same_seed_gives_the_same_arrays_for_any_workers(run):
-    ensemble = fitted(run)
-    serial = ensemble.forecast(run, start=65.0, steps=50)
-    for workers, backend in ((2, "threads"), (3, "threads"), (2, "processes")):
-        other = ensemble.forecast(run, start=65.0, steps=50, workers=workers, backend=backend)
-        xr.testing.assert_identical(serial, other)
 
 
 def test_the_seed_may_be_a_sequence_or_a_generator(run):
@@ -433,7 +426,9 @@ def test_spectral_radii_are_those_of_the_members_for_any_workers(run, tmp_path):
         expected = ensemble.member(number).spectral_radius
         assert radii[number] == pytest.approx(expected, rel=1e-12)
     told = []
-    again = ensemble.spectral_radii(workers=2, progress=lambda *step: told.append(step))
+    again = ensemble.spectral_radii(
+        executor=ThreadPoolExecutor(2), progress=lambda *step: told.append(step)
+    )
     np.testing.assert_array_equal(again, radii)
     assert told == [(k, 6, f"member {k}") for k in range(1, 7)]
     ensemble.spectral_radii(progress=lambda *step: told.append(step))
@@ -537,12 +532,6 @@ def test_settings_out_of_range(changes, text):
 
 def test_messages_of_forecasts(run):
     ensemble = fitted(run)
-    with pytest.raises(RequestError, match="workers must be a positive integer; received 0"):
-        ensemble.forecast(run, start=65.0, steps=5, workers=0)
-    with pytest.raises(
-        RequestError, match="backend must be 'processes', 'threads' or 'auto'; received 'x'"
-    ):
-        ensemble.forecast(run, start=65.0, steps=5, backend="x")
     with pytest.raises(RequestError, match="level must lie between 0 and 1; received 95"):
         ensemble.forecast_summary(run, start=65.0, steps=5, level=95)
     with pytest.raises(RequestError, match="starts is empty"):

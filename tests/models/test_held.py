@@ -1,6 +1,7 @@
 """Members that are held give the ensemble's own numbers, from plain arrays that are checked."""
 
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -81,7 +82,9 @@ def test_the_numbers_are_those_of_the_ensemble(delay_rows, band, arrays):
 
 def test_who_identifies_them_makes_no_difference(ensemble, held, arrays):
     told = []
-    threads = ensemble.hold(workers=2, backend="threads", progress=lambda *each: told.append(each))
+    threads = ensemble.hold(
+        executor=ThreadPoolExecutor(2), progress=lambda *each: told.append(each)
+    )
     for one, other in zip(
         held.forecast_arrays(**arrays, steps=STEPS),
         threads.forecast_arrays(**arrays, steps=STEPS),

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from seakeep.errors import RequestError
 from seakeep.models.labelled import nearest_sample
 from seakeep.study import read_study, run_study
 from seakeep.study.plan import make_plan
@@ -112,16 +111,6 @@ def test_what_forecasts_are_conditional_on_has_its_own_name(folder):
     (folder / "study.toml").write_text(read, "utf-8")
     study = read_study(folder / "study.toml")
     assert _conditional(make_plan(study)[0]) == "x_tracked"
-
-
-def test_a_probe_offset_to_be_estimated_is_refused(folder):
-    text = (folder / "campaign.toml").read_text("utf-8")
-    asks = text.replace('role = "test"', 'role = "test"\nprobe_offset_span = [0, 20]')
-    (folder / "campaign.toml").write_text(asks, "utf-8")
-    with pytest.raises(RequestError, match=r"the run 'wave' asks for its probe offset.*state prob"):
-        make_plan(read_study(folder / "study.toml"))
-    (folder / "campaign.toml").write_text(asks.replace("_span = [0, 20]", " = 0.1"), "utf-8")
-    make_plan(read_study(folder / "study.toml"))
 
 
 def test_cells_by_predicted_surge_are_what_the_models_say(folder):

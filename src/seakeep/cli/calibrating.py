@@ -16,7 +16,7 @@ from seakeep.cli.options import (
     Level,
     Scheduler,
     Workers,
-    crew,
+    member_executor,
     read_files,
 )
 from seakeep.conventions import displayed
@@ -112,12 +112,12 @@ def calibrate(
         raise RequestError(f"--start {start} ({begin} s) lies at or after --stop {stop} ({end} s).")
     count = samples_of(steps, read, every, fitted.dt, "--steps")
     parts = {name: _part(each, first, last) for name, each in prepared.items()}
-    with progress_bar("Calibrating") as progress:
+    with member_executor(workers, scheduler) as executor, progress_bar("Calibrating") as progress:
         calibrated = fitted.calibrate(
             parts,
             count,
             DEFAULT_LEVEL if level is None else level,
-            **crew(workers, scheduler),
+            executor=executor,
             progress=quietly(progress),
         )
     results().print(_table(calibrated))

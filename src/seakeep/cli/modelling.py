@@ -19,7 +19,7 @@ from seakeep.cli.options import (
     Scheduler,
     Steps,
     Workers,
-    crew,
+    member_executor,
     read_files,
 )
 from seakeep.errors import RequestError, did_you_mean
@@ -65,9 +65,11 @@ def fit(
     with progress_bar("Preparing") as progress:
         identified = fit_campaign(read, model, progress)
     if isinstance(identified, HankelEnsemble):
-        with progress_bar("Stability") as progress:
-            tell = quietly(progress)
-            identified.spectral_radii(**crew(workers, scheduler), progress=tell)
+        with (
+            member_executor(workers, scheduler) as executor,
+            progress_bar("Stability") as progress,
+        ):
+            identified.spectral_radii(executor=executor, progress=quietly(progress))
     typer.echo(identified.summary())
     identified.save(out)
     messages().print(f"Wrote {out}. Judge it with: seakeep compare {out} {campaign}")
@@ -138,8 +140,11 @@ def forecast(
     first = instant_of(start, read, [prepared], "--start")
     count = None if steps is None else samples_of(steps, read, [prepared], identified.dt, "--steps")
     if isinstance(identified, HankelEnsemble):
-        with progress_bar("Forecasting") as progress:
-            how = crew(workers, scheduler) | {"progress": quietly(progress)}
+        with (
+            member_executor(workers, scheduler) as executor,
+            progress_bar("Forecasting") as progress,
+        ):
+            how: dict[str, Any] = {"executor": executor, "progress": quietly(progress)}
             if members:
                 result = identified.forecast(prepared, first, count, **how)
             else:
@@ -223,7 +228,7 @@ def compare(
         _refuse_for_one(model, given | {"--scheduler": scheduler is not None})
     read = read_campaign(campaign)
     _check_outputs(out, run or read.test_runs, format_, read_files(read, model))
-    with progress_bar("Comparing") as progress:
+    with member_executor(workers, scheduler) as executor, progress_bar("Comparing") as progress:
         comparisons = compare_runs(
             identified,
             read,
@@ -233,7 +238,7 @@ def compare(
             progress,
             members=quietly(progress),
             **_band(identified, level, band),
-            **crew(workers, scheduler),
+            executor=executor,
         )
     if full_scale:
         scale = _scale(read)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +12,8 @@ from seakeep.cli.console import worker_count
 from seakeep.errors import RequestError
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from seakeep.campaign import Campaign
 
 __all__ = [
@@ -25,7 +27,7 @@ __all__ = [
     "Steps",
     "Workers",
     "checked_count",
-    "crew",
+    "member_executor",
     "read_files",
 ]
 
@@ -59,7 +61,7 @@ Workers = Annotated[
     int | None,
     typer.Option(
         "--workers",
-        help="Processes for members of a large ensemble; by default one a core.",
+        help="Processes for the members of a large ensemble; by default none but this one.",
         min=1,
     ),
 ]
@@ -96,28 +98,14 @@ def read_files(campaign: Campaign, *others: Path) -> list[Path]:
     return files
 
 
-def crew(workers: int | None, scheduler: str | None) -> dict[str, Any]:
-    """Who works on the members of an ensemble, as the methods of an ensemble take it.
+def member_executor(
+    workers: int | None, scheduler: str | None
+) -> AbstractContextManager[Executor | None]:
+    """Executor for the members of an ensemble; without either option this process."""
+    from seakeep.models.executor import make_executor
 
-    Parameters
-    ----------
-    workers : int or None
-        As asked for; by default one a core.
-    scheduler : str or None
-        Address of a Dask cluster.
-
-    Returns
-    -------
-    dict
-        ``workers``, ``backend`` and ``scheduler``.
-
-    Raises
-    ------
-    RequestError
-        If both are given.
-    """
-    count = checked_count(workers, scheduler)
-    return {"workers": count, "backend": "auto", "scheduler": scheduler}
+    given = workers is not None or scheduler is not None
+    return make_executor(checked_count(workers, scheduler) if given else 1, scheduler)
 
 
 def checked_count(workers: int | None, scheduler: str | None) -> int:

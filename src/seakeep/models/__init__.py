@@ -7,8 +7,8 @@ from pathlib import Path
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.models import ensemble_store, store
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
-from seakeep.models.choice import AlignmentChoice, choose_alignment
 from seakeep.models.ensemble import BayesianHankelDMDc
+from seakeep.models.executor import processes
 from seakeep.models.fitted_ensemble import HankelEnsemble
 from seakeep.models.hankel import HankelDMDc
 from seakeep.models.held import BandForecast, HeldEnsemble
@@ -18,7 +18,6 @@ from seakeep.models.priors import Fixed, LogUniform, Uniform
 from seakeep.models.summaries import summarize
 
 __all__ = [
-    "AlignmentChoice",
     "BandForecast",
     "BayesianHankelDMDc",
     "FittedAlignment",
@@ -31,9 +30,9 @@ __all__ = [
     "ProbeAlignment",
     "ProbeOffset",
     "Uniform",
-    "choose_alignment",
     "estimate_probe_offset",
     "load_model",
+    "processes",
     "summarize",
 ]
 

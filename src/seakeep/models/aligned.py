@@ -11,11 +11,9 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.core.rollout import feedback_rollout
-from seakeep.errors import RequestError
 from seakeep.models import forecasting, labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment, fit_alignment
 from seakeep.models.forecasting import ForecastWindow
-from seakeep.models.offsets import wants_offset
 from seakeep.signals.propagation import CarriedElevation
 
 if TYPE_CHECKING:
@@ -90,11 +88,6 @@ def align_training(
     fitted = fit_alignment(settings, runs, states, inputs, window)
     out = {}
     for name, run in runs.items():
-        if wants_offset(run):
-            raise RequestError(
-                f"{name} asks for its probe offset to be estimated, which takes a model, so it "
-                "cannot train one. State probe_offset (m), or train on other runs."
-            )
         time = np.asarray(run["time"].values, dtype=float)
         first = 0 if window is None else max(time.size - window - reach, 0)
         samples = slice(first, time.size)

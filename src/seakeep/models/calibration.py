@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -17,10 +18,9 @@ from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice
 from seakeep.models.ensemble_series import shelved
-from seakeep.models.progress import Progress
+from seakeep.models.executor import Progress
 from seakeep.models.summaries import STATISTICS, check_level, reduce_members
 from seakeep.models.windows import read_windows
-from seakeep.models.workers import Crew
 
 if TYPE_CHECKING:
     from seakeep.models.fitted_ensemble import HankelEnsemble
@@ -86,14 +86,14 @@ def calibrate(
     runs: labelled.Runs,
     steps: int,
     level: float,
-    crew: Crew,
+    executor: Executor | None,
     progress: Progress | None = None,
 ) -> Calibration:
     """Find the margins of an ensemble; see :meth:`HankelEnsemble.calibrate`."""
     named = labelled.as_runs(runs)
     level = check_level(level)
     free = _free_starts(ensemble, named, steps)
-    scores = _scores(ensemble, named, free, steps, level, crew, progress)
+    scores = _scores(ensemble, named, free, steps, level, executor, progress)
     if not scores:
         longest = max(run.sizes["time"] for run in named.values()) - ensemble.history_samples
         reason = "members have read what is left of them"
@@ -115,7 +115,7 @@ def held_out_scores(
     runs: Mapping[str, xr.Dataset],
     steps: int,
     level: float,
-    crew: Crew,
+    executor: Executor | None = None,
 ) -> dict[str, FloatArray]:
     """Scores of the band in windows end to end, none of which a member has read.
 
@@ -129,8 +129,8 @@ def held_out_scores(
         Instants of a window.
     level : float
         Probability between the bounds.
-    crew : Crew
-        Who does the work.
+    executor : Executor, optional
+        As in :meth:`HankelEnsemble.forecast`.
 
     Returns
     -------
@@ -138,7 +138,7 @@ def held_out_scores(
         Runs in which there is such a window.
     """
     level = check_level(level)
-    return _scores(ensemble, runs, _free_starts(ensemble, runs, steps), steps, level, crew)
+    return _scores(ensemble, runs, _free_starts(ensemble, runs, steps), steps, level, executor)
 
 
 def _free_starts(
@@ -155,7 +155,7 @@ def _scores(
     free: Mapping[str, list[float]],
     steps: int,
     level: float,
-    crew: Crew,
+    executor: Executor | None,
     progress: Progress | None = None,
 ) -> dict[str, FloatArray]:
     """Scores in windows from these starts; a step of progress is a member in one of the runs."""
@@ -164,8 +164,8 @@ def _scores(
         run = runs[name]
         tell = None if progress is None else _counted(progress, number, len(free), name)
         windows = read_windows(ensemble, run, starts, steps)
-        with shelved(ensemble, run, windows, crew, tell) as (shelf, lost):
-            values = reduce_members(shelf, lost, level, crew.workers)
+        with shelved(ensemble, run, windows, executor, tell) as (shelf, lost):
+            values = reduce_members(shelf, lost, level)
         lower, upper = (values[:, STATISTICS.index(key)] for key in ("lower", "upper"))
         measured = np.stack(
             [_measured(ensemble, run, name, window.start, steps) for window in windows]

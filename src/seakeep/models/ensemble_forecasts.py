@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,11 +15,10 @@ from seakeep.models import aligned
 from seakeep.models.calibration import Band, check_band, warn_of_horizon, widened
 from seakeep.models.ensemble_labels import label_channels, statuses, verdict, window_coords
 from seakeep.models.ensemble_series import shelved
+from seakeep.models.executor import Progress
 from seakeep.models.forecasting import ForecastWindow
-from seakeep.models.progress import Progress
 from seakeep.models.summaries import check_level, reduce_members, statistic_coordinate
 from seakeep.models.windows import read_windows
-from seakeep.models.workers import Crew
 
 if TYPE_CHECKING:
     from seakeep.models.fitted_ensemble import HankelEnsemble
@@ -33,12 +33,12 @@ def all_members(
     run: xr.Dataset,
     start: float,
     steps: int | None,
-    crew: Crew,
+    executor: Executor | None,
     progress: Progress | None,
 ) -> xr.Dataset:
     """Free runs; see :meth:`HankelEnsemble.forecast`."""
     windows = read_windows(ensemble, run, [start], steps)
-    with shelved(ensemble, run, windows, crew, progress, whole=True) as (shelf, lost):
+    with shelved(ensemble, run, windows, executor, progress, whole=True) as (shelf, lost):
         (values,) = shelf.all()
     variables = _labelled(ensemble, values, ("member", "time"))
     status = statuses(lost[:, 0], windows[0].time.values, ensemble.dt)
@@ -57,11 +57,11 @@ def summary(
     steps: int | None,
     level: float,
     band: Band,
-    crew: Crew,
+    executor: Executor | None,
     progress: Progress | None,
 ) -> xr.Dataset:
     """Statistics; see :meth:`HankelEnsemble.forecast_summary`."""
-    windows, values, lost = _reduced(ensemble, run, [start], steps, level, band, crew, progress)
+    windows, values, lost = _reduced(ensemble, run, [start], steps, level, band, executor, progress)
     window = windows[0]
     variables = _labelled(ensemble, values[0], ("statistic", "time"))
     status = statuses(lost[:, 0], window.time.values, ensemble.dt)
@@ -83,12 +83,12 @@ def all_members_of_windows(
     run: xr.Dataset,
     starts: Sequence[float],
     steps: int,
-    crew: Crew,
+    executor: Executor | None,
     progress: Progress | None,
 ) -> xr.Dataset:
     """Free runs; see :meth:`HankelEnsemble.forecast_windows`."""
     windows = read_windows(ensemble, run, starts, steps)
-    with shelved(ensemble, run, windows, crew, progress, whole=True) as (shelf, lost):
+    with shelved(ensemble, run, windows, executor, progress, whole=True) as (shelf, lost):
         values = shelf.all()
     variables = _labelled(ensemble, values, ("window", "member", "lead"))
     status = [
@@ -107,11 +107,11 @@ def summary_of_windows(
     steps: int,
     level: float,
     band: Band,
-    crew: Crew,
+    executor: Executor | None,
     progress: Progress | None,
 ) -> xr.Dataset:
     """Statistics; see :meth:`HankelEnsemble.summarize_windows`."""
-    windows, values, lost = _reduced(ensemble, run, starts, steps, level, band, crew, progress)
+    windows, values, lost = _reduced(ensemble, run, starts, steps, level, band, executor, progress)
     variables = _labelled(ensemble, values, ("window", "statistic", "lead"))
     variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
     coords = window_coords(windows, ensemble.dt)
@@ -127,7 +127,7 @@ def _reduced(
     steps: int | None,
     level: float,
     band: Band,
-    crew: Crew,
+    executor: Executor | None,
     progress: Progress | None,
 ) -> tuple[list[ForecastWindow], FloatArray, npt.NDArray[np.int64]]:
     """Windows, statistics (window, 4, steps, N), and where members were lost (member, window)."""
@@ -136,8 +136,8 @@ def _reduced(
     windows = read_windows(ensemble, run, starts, steps)
     if band == "calibrated":
         warn_of_horizon(ensemble, windows[0].name, windows[0].steps)
-    with shelved(ensemble, run, windows, crew, progress) as (shelf, lost):
-        values = widened(ensemble, reduce_members(shelf, lost, level, crew.workers), band)
+    with shelved(ensemble, run, windows, executor, progress) as (shelf, lost):
+        values = widened(ensemble, reduce_members(shelf, lost, level), band)
     return windows, values, lost
 
 

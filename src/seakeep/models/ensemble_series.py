@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +12,12 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.models import aligned
+from seakeep.models.executor import Progress, in_order
 from seakeep.models.forecasting import ForecastWindow
 from seakeep.models.members import Task, forecast_member
-from seakeep.models.progress import Progress, told
 from seakeep.models.shelf import Layout, Shelf, open_shelf
 from seakeep.models.summaries import first_lost
 from seakeep.models.windows import stacked
-from seakeep.models.workers import Crew, Function, side_by_side
 
 if TYPE_CHECKING:
     from seakeep.models.fitted_ensemble import HankelEnsemble
@@ -32,7 +32,7 @@ def shelved(
     ensemble: HankelEnsemble,
     run: xr.Dataset,
     windows: Sequence[ForecastWindow],
-    crew: Crew,
+    executor: Executor | None,
     progress: Progress | None = None,
     *,
     whole: bool = False,
@@ -47,9 +47,7 @@ def shelved(
         The run.
     windows : sequence of ForecastWindow
         From :func:`read_windows`, of one length.
-    crew : Crew
-        Who does the work. Processes of this machine put the series into a file themselves.
-    progress
+    executor, progress
         As in :meth:`HankelEnsemble.forecast`.
     whole : bool, optional
         Whether the series are wanted in one piece.
@@ -66,8 +64,8 @@ def shelved(
     RequestError
         If the temporary folder has no room.
     """
-    function: Function[Any, Any, FloatArray]
-    data: object
+    function: Any
+    data: Any
     items: Sequence[Any]
     if ensemble.alignment is not None and ensemble.alignment.settings.surge == "predicted":
         loops = [aligned.prepare_loop(ensemble, run, window) for window in windows]
@@ -76,41 +74,13 @@ def shelved(
         data = Task(ensemble.arrays, ensemble.settings, *stacked(windows), windows[0].steps)
         function, items = forecast_member, ensemble.members
     size = len(windows), ensemble.n_members, windows[0].steps, len(ensemble.states)
-    layout = Layout(*size, size[2]) if whole else Layout.in_pieces(*size, hands=crew.workers)
+    layout = Layout(*size, size[2]) if whole else Layout.in_pieces(*size)
     lost = np.empty((ensemble.n_members, len(windows)), dtype=np.int64)
-    with open_shelf(layout, shared=crew.has_processes, whole=whole) as shelf:
-        for number, found in enumerate(
-            told(_put_all(shelf, function, data, items, crew), len(items), progress)
-        ):
-            lost[number] = found
+    with open_shelf(layout, whole=whole) as shelf:
+        for number, values in enumerate(in_order(function, data, items, executor, progress)):
+            shelf.put(number, values)
+            lost[number] = first_lost(values)
         yield shelf, lost
-
-
-def _put_all(
-    shelf: Shelf,
-    function: Function[Any, Any, FloatArray],
-    data: object,
-    items: Sequence[Any],
-    crew: Crew,
-) -> Iterator[npt.NDArray[np.int64]]:
-    """Put all members on the shelf; yields where each was lost."""
-    if crew.scheduler is None:
-        yield from side_by_side(_put_one, (shelf, function, data), list(enumerate(items)), crew)
-        return
-    # Workers of a cluster may sit on other machines, which do not see the shelf.
-    for number, values in enumerate(side_by_side(function, data, items, crew)):
-        shelf.put(number, values)
-        yield first_lost(values)
-
-
-def _put_one(
-    data: tuple[Shelf, Function[Any, Any, FloatArray], Any], item: tuple[int, Any]
-) -> npt.NDArray[np.int64]:
-    shelf, function, inner = data
-    number, own = item
-    values = function(inner, own)
-    shelf.put(number, values)
-    return first_lost(values)
 
 
 def _closed_loops(data: tuple[HankelEnsemble, Sequence[aligned.Loop]], number: int) -> FloatArray:

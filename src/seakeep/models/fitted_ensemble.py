@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,13 +18,12 @@ from seakeep.models.alignment import FittedAlignment
 from seakeep.models.calibration import Band, Calibration, calibrate
 from seakeep.models.draws import Draw
 from seakeep.models.ensemble_summary import warn_of_unstable
+from seakeep.models.executor import Progress, in_order
 from seakeep.models.held import HeldEnsemble, hold
 from seakeep.models.labelled import ChannelLabel, Runs
 from seakeep.models.members import TrainingArrays, member_model, member_radius, window_ends
 from seakeep.models.model import HankelDMDcModel
-from seakeep.models.progress import Progress, told
 from seakeep.models.settings import HankelSettings
-from seakeep.models.workers import Backend, Crew, side_by_side
 
 __all__ = ["HankelEnsemble"]
 
@@ -170,9 +170,7 @@ class HankelEnsemble:
     def spectral_radii(
         self,
         *,
-        workers: int = 1,
-        backend: Backend = "processes",
-        scheduler: str | None = None,
+        executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> FloatArray:
         """Largest modulus of an eigenvalue of each member; a member is stable below one.
@@ -181,7 +179,7 @@ class HankelEnsemble:
 
         Parameters
         ----------
-        workers, backend, scheduler, progress
+        executor, progress
             As in :meth:`forecast`.
 
         Returns
@@ -195,10 +193,7 @@ class HankelEnsemble:
         """
         if self.radii is None:
             data = (self.arrays, self.settings)
-            found = side_by_side(
-                member_radius, data, self.members, Crew(workers, backend, scheduler)
-            )
-            radii = np.array(list(told(found, self.n_members, progress)))
+            radii = np.array(list(in_order(member_radius, data, self.members, executor, progress)))
             radii.flags.writeable = False
             object.__setattr__(self, "radii", radii)
             warn_of_unstable(radii)
@@ -221,9 +216,7 @@ class HankelEnsemble:
         start: float,
         steps: int | None = None,
         *,
-        workers: int = 1,
-        backend: Backend = "processes",
-        scheduler: str | None = None,
+        executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> xr.Dataset:
         """Free runs of all members.
@@ -232,16 +225,9 @@ class HankelEnsemble:
         ----------
         run, start, steps
             As in :meth:`HankelDMDcModel.forecast`.
-        workers : int, optional
-            Members at work at a time; the result does not depend on it.
-        backend : {"processes", "threads", "auto"}, optional
-            Kind of worker. Processes stay ready for a minute after a call; a script that starts
-            them needs ``if __name__ == "__main__":``. Threads start at once, but most of a
-            member's work holds the interpreter's lock. "auto" begins without either, and starts
-            processes where they save more time than they take to start.
-        scheduler : str, optional
-            Address of the scheduler of a running Dask cluster, ``"tcp://host:8786"``, whose
-            workers do the work instead (extra ``cluster``).
+        executor : concurrent.futures.Executor, optional
+            Who identifies and runs the members: :func:`seakeep.models.processes`, or Dask's
+            ``client.get_executor()``; by default this process. The result does not depend on it.
         progress : callable, optional
             Called as ``progress(done, total, what)`` after each member.
 
@@ -256,9 +242,7 @@ class HankelEnsemble:
         RequestError, DataError
             As :meth:`HankelDMDcModel.forecast`.
         """
-        return ensemble_forecasts.all_members(
-            self, run, start, steps, Crew(workers, backend, scheduler), progress
-        )
+        return ensemble_forecasts.all_members(self, run, start, steps, executor, progress)
 
     def forecast_summary(
         self,
@@ -268,16 +252,14 @@ class HankelEnsemble:
         level: float = 0.95,
         *,
         band: Band = "members",
-        workers: int = 1,
-        backend: Backend = "processes",
-        scheduler: str | None = None,
+        executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> xr.Dataset:
         """Mean, standard deviation and band of the members, never all of them at once.
 
         Parameters
         ----------
-        run, start, steps, workers, backend, scheduler, progress
+        run, start, steps, executor, progress
             As in :meth:`forecast`.
         level : float, optional
             Probability between ``lower`` and ``upper``.
@@ -289,29 +271,26 @@ class HankelEnsemble:
         Dataset
             As :func:`seakeep.summarize` makes of :meth:`forecast`, dimensions (statistic, time),
             with ``status`` over ``member``. More than 32 MiB of members are spilled to a
-            temporary file and reduced in pieces of time; processes put all of them there.
+            temporary file and reduced in pieces of time.
 
         Raises
         ------
         RequestError, DataError
             As :meth:`forecast`.
         """
-        crew = Crew(workers, backend, scheduler)
-        return ensemble_forecasts.summary(self, run, start, steps, level, band, crew, progress)
+        return ensemble_forecasts.summary(self, run, start, steps, level, band, executor, progress)
 
     def hold(
         self,
         *,
-        workers: int = 1,
-        backend: Backend = "processes",
-        scheduler: str | None = None,
+        executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> HeldEnsemble:
         """Identify all members once and keep them, for forecasts in a loop or on board.
 
         Parameters
         ----------
-        workers, backend, scheduler, progress
+        executor, progress
             As in :meth:`forecast`.
 
         Returns
@@ -326,7 +305,7 @@ class HankelEnsemble:
         RequestError
             If the members carry the waves to the surge that they predict.
         """
-        return hold(self, Crew(workers, backend, scheduler), progress)
+        return hold(self, executor, progress)
 
     def calibrate(
         self,
@@ -334,9 +313,7 @@ class HankelEnsemble:
         steps: int,
         level: float = 0.95,
         *,
-        workers: int = 1,
-        backend: Backend = "processes",
-        scheduler: str | None = None,
+        executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> Self:
         """Widen the band so that it holds unseen measurements as often as it says.
@@ -354,7 +331,7 @@ class HankelEnsemble:
             Instants of a window: as many as will be forecast.
         level : float, optional
             Probability that the band is to have.
-        workers, backend, scheduler, progress
+        executor, progress
             As in :meth:`forecast`; a step is a member in one of the runs.
 
         Returns
@@ -369,8 +346,7 @@ class HankelEnsemble:
         DataError
             If a run cannot be used.
         """
-        crew = Crew(workers, backend, scheduler)
-        return replace(self, calibration=calibrate(self, runs, steps, level, crew, progress))
+        return replace(self, calibration=calibrate(self, runs, steps, level, executor, progress))
 
     def forecast_windows(
         self,
@@ -378,16 +354,14 @@ class HankelEnsemble:
         starts: Sequence[float],
         steps: int,
         *,
-        workers: int = 1,
-        backend: Backend = "processes",
-        scheduler: str | None = None,
+        executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> xr.Dataset:
         """Free runs of all members from several starts side by side.
 
         Parameters
         ----------
-        run, steps, workers, backend, scheduler, progress
+        run, steps, executor, progress
             As in :meth:`forecast`; `steps` holds for all.
         starts : sequence of float
             Instants of the last measured state, s.
@@ -404,7 +378,7 @@ class HankelEnsemble:
             As :meth:`forecast`.
         """
         return ensemble_forecasts.all_members_of_windows(
-            self, run, starts, steps, Crew(workers, backend, scheduler), progress
+            self, run, starts, steps, executor, progress
         )
 
     def summarize_windows(
@@ -415,16 +389,14 @@ class HankelEnsemble:
         level: float = 0.95,
         *,
         band: Band = "members",
-        workers: int = 1,
-        backend: Backend = "processes",
-        scheduler: str | None = None,
+        executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> xr.Dataset:
         """Mean, standard deviation and band from several starts, never all members at once.
 
         Parameters
         ----------
-        run, starts, steps, workers, backend, scheduler, progress
+        run, starts, steps, executor, progress
             As in :meth:`forecast_windows`.
         level : float, optional
             Probability between ``lower`` and ``upper``.
@@ -441,9 +413,8 @@ class HankelEnsemble:
         RequestError, DataError
             As :meth:`forecast`.
         """
-        crew = Crew(workers, backend, scheduler)
         return ensemble_forecasts.summary_of_windows(
-            self, run, starts, steps, level, band, crew, progress
+            self, run, starts, steps, level, band, executor, progress
         )
 
     def save(self, path: str | Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -10,14 +11,12 @@ import numpy.typing as npt
 
 from seakeep.errors import RequestError
 from seakeep.models.calibration import Band, check_band, warn_of_horizon, widened
-from seakeep.models.crew import one_blas_thread
+from seakeep.models.executor import Progress, in_order, one_blas_thread
 from seakeep.models.forecasting import check_arrays
 from seakeep.models.members import Member, TrainingArrays, identify_member
-from seakeep.models.progress import Progress, told
 from seakeep.models.settings import HankelSettings
 from seakeep.models.summaries import check_level, first_lost, statistics_of
 from seakeep.models.windows import free_runs
-from seakeep.models.workers import Crew, side_by_side
 
 if TYPE_CHECKING:
     from seakeep.models.draws import Draw
@@ -130,7 +129,9 @@ class HeldEnsemble:
         return BandForecast(mean, std, lower, upper, len(out) - len(kept))
 
 
-def hold(ensemble: HankelEnsemble, crew: Crew, progress: Progress | None) -> HeldEnsemble:
+def hold(
+    ensemble: HankelEnsemble, executor: Executor | None, progress: Progress | None
+) -> HeldEnsemble:
     """Identify all members; see :meth:`HankelEnsemble.hold`."""
     alignment = ensemble.alignment
     if alignment is not None and alignment.settings.surge == "predicted":
@@ -139,8 +140,10 @@ def hold(ensemble: HankelEnsemble, crew: Crew, progress: Progress | None) -> Hel
             "arrays have no places of probes for. Use forecast_summary, or fit with an alignment "
             "of surge='none'."
         )
-    found = side_by_side(_identify, (ensemble.arrays, ensemble.settings), ensemble.members, crew)
-    return HeldEnsemble(ensemble, tuple(told(found, ensemble.n_members, progress)))
+    data = (ensemble.arrays, ensemble.settings)
+    return HeldEnsemble(
+        ensemble, tuple(in_order(_identify, data, ensemble.members, executor, progress))
+    )
 
 
 def _identify(data: tuple[TrainingArrays, HankelSettings], draw: Draw) -> Member:

@@ -18,7 +18,6 @@ from seakeep.models import aligned, export, forecasting, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.identification import Scale
 from seakeep.models.labelled import ChannelLabel
-from seakeep.models.offsets import settle_offset
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import Training
 from seakeep.models.windows import forecast_windows, free_runs
@@ -223,7 +222,6 @@ class HankelDMDcModel:
         DataError
             If the step or the units are not the model's, or needed samples are missing.
         """
-        run = settle_offset(self, run)
         window = forecasting.read_window(self, run, start, steps)
         if self.alignment is None:
             return forecasting.label_forecast(self, window, self._free_run(window))
@@ -255,7 +253,7 @@ class HankelDMDcModel:
         RequestError, DataError
             As :meth:`forecast`, or if there is no start.
         """
-        return forecast_windows(self, settle_offset(self, run), starts, steps)
+        return forecast_windows(self, run, starts, steps)
 
     def _free_run(self, window: forecasting.ForecastWindow) -> FloatArray:
         return self.forecast_arrays(
@@ -283,7 +281,7 @@ class HankelDMDcModel:
         RequestError, DataError
             As :meth:`forecast`.
         """
-        return aligned.aligned_inputs(self, settle_offset(self, run))
+        return aligned.aligned_inputs(self, run)
 
     def forecast_arrays(
         self,
@@ -390,7 +388,6 @@ class HankelDMDcModel:
         RequestError, DataError
             As :meth:`forecast`.
         """
-        run = settle_offset(self, run)
         window = forecasting.read_window(self, run, start, 1)
         history = window.input_history
         if self.alignment is not None:

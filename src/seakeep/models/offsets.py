@@ -18,13 +18,7 @@ from seakeep.waves import phase_speed
 if TYPE_CHECKING:
     from seakeep.models.model import HankelDMDcModel
 
-__all__ = [
-    "ProbeOffset",
-    "check_offset",
-    "estimate_probe_offset",
-    "settle_offset",
-    "wants_offset",
-]
+__all__ = ["ProbeOffset", "estimate_probe_offset"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -143,50 +137,6 @@ def estimate_probe_offset(
     )
 
 
-def settle_offset(model: HankelDMDcModel, run: xr.Dataset) -> xr.Dataset:
-    """Estimate a run's probe offset where its attributes ask for it; else hand the run on.
-
-    Parameters
-    ----------
-    model : HankelDMDcModel
-        The model.
-    run : Dataset
-        A run; ``attrs["probe_offset_span"]`` names the part from which to estimate.
-
-    Returns
-    -------
-    Dataset
-        With ``attrs["probe_offset"]`` and ``attrs["probe_offset_spread"]``.
-
-    Raises
-    ------
-    RequestError, DataError
-        As :func:`estimate_probe_offset`.
-    """
-    if model.alignment is None or not isinstance(run, xr.Dataset):
-        return run
-    span = run.attrs.get("probe_offset_span")
-    if span is None or "probe_offset" in run.attrs:
-        return run
-    found = estimate_probe_offset(model, run, (float(span[0]), float(span[1])))
-    return run.assign_attrs(probe_offset=found.offset, probe_offset_spread=found.spread)
-
-
-def wants_offset(run: xr.Dataset) -> bool:
-    """Whether a run asks for its probe offset to be estimated."""
-    return "probe_offset_span" in run.attrs and "probe_offset" not in run.attrs
-
-
-def check_offset(run: xr.Dataset) -> None:
-    """Refuse a run whose probe offset an ensemble would have to estimate."""
-    if wants_offset(run):
-        raise RequestError(
-            f"{labelled.run_name(run, 'the run')} asks for its probe offset to be estimated, which "
-            "an ensemble does not do. Estimate it with a model (seakeep.estimate_probe_offset) and "
-            "state probe_offset (m)."
-        )
-
-
 def _part(model: HankelDMDcModel, run: xr.Dataset, span: tuple[float, float]) -> xr.Dataset:
     name = labelled.run_name(run, "the run")
     labelled.check_run(run, name)
@@ -199,8 +149,6 @@ def _part(model: HankelDMDcModel, run: xr.Dataset, span: tuple[float, float]) ->
             f"an offset takes at least {needed} (the model's history and {BLOCKS} more). Lengthen "
             "the span."
         )
-    # A new dict: a selection may share its attributes with the run.
-    part.attrs = {key: value for key, value in part.attrs.items() if key != "probe_offset_span"}
     return part
 
 

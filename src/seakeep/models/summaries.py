@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import numpy.typing as npt
@@ -95,9 +94,7 @@ def first_lost(values: FloatArray) -> npt.NDArray[np.int64]:
     return np.where(np.take_along_axis(gone, first[..., None], axis=-1)[..., 0], first, -1)
 
 
-def reduce_members(
-    shelf: Shelf, lost: npt.NDArray[np.int64], level: float, threads: int = 1
-) -> FloatArray:
+def reduce_members(shelf: Shelf, lost: npt.NDArray[np.int64], level: float) -> FloatArray:
     """Reduce members to statistics, piece by piece in time.
 
     A member that is lost (NaN) anywhere in a window is left out of that window's statistics from
@@ -112,8 +109,6 @@ def reduce_members(
         First instant lost, or −1.
     level : float
         Probability between the two quantiles.
-    threads : int, optional
-        Pieces reduced side by side.
 
     Returns
     -------
@@ -122,15 +117,10 @@ def reduce_members(
     """
     layout = shelf.layout
     out = np.empty((layout.windows, 4, layout.steps, layout.channels))
-
-    def reduce(window: int, piece: int) -> None:
-        block = shelf.get(window, piece)[lost[:, window] < 0]
-        out[window, :, layout.instants(piece)] = statistics_of(block, level)
-
-    with ThreadPoolExecutor(threads) as pool:
-        todo = [(w, p) for w in range(layout.windows) for p in range(layout.pieces)]
-        for done in [pool.submit(reduce, *each) for each in todo]:
-            done.result()
+    for window in range(layout.windows):
+        for piece in range(layout.pieces):
+            block = shelf.get(window, piece)[lost[:, window] < 0]
+            out[window, :, layout.instants(piece)] = statistics_of(block, level)
     return out
 
 

@@ -15,7 +15,6 @@ from seakeep.models import aligned
 from seakeep.models.ensemble_labels import label_channels, window_coords
 from seakeep.models.forecasting import ForecastWindow, cut_divergence, read_window, status_text
 from seakeep.models.identification import Scale
-from seakeep.models.offsets import check_offset
 from seakeep.models.summaries import first_lost
 
 if TYPE_CHECKING:
@@ -133,7 +132,6 @@ def read_windows(
     windows = [read_window(model, run, start, steps) for start in starts]
     if model.alignment is None:
         return windows
-    check_offset(run)
     if model.alignment.settings.surge == "predicted":
         return windows
     return [aligned.align_window(model, run, window) for window in windows]

@@ -12,7 +12,6 @@ import xarray as xr
 from seakeep.core.calibration import conformal_margin
 from seakeep.models.calibration import held_out_scores
 from seakeep.models.fitted_ensemble import HankelEnsemble
-from seakeep.models.workers import Crew
 from seakeep.study.plan import Plan
 from seakeep.study.windows import TrainingSet
 from seakeep.study.workflow import between
@@ -62,7 +61,7 @@ def calibration_arrays(
     else:
         names = plan.calibrated_on
         parts = {name: between(runs[name], runs[name].attrs["train_span"]) for name in names}
-        scores = list(held_out_scores(fitted, parts, steps, plan.level, Crew()).values())
+        scores = list(held_out_scores(fitted, parts, steps, plan.level).values())
     if not scores:
         nothing = np.full(len(plan.states), np.nan)
         return {"margin": nothing, "blocks": nothing, "warranted": nothing, "windows": 0}
@@ -87,5 +86,5 @@ def _of_others(
         held = {n: between(runs[n], (b, e)) for n, b, e in training.spans if n in group}
         if rest and held:
             ensemble = fit(TrainingSet(f"{training.name}, calibration", rest))
-            scores += held_out_scores(ensemble, held, steps, plan.level, Crew()).values()
+            scores += held_out_scores(ensemble, held, steps, plan.level).values()
     return scores

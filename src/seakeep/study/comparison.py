@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,7 +20,6 @@ from seakeep.models import HankelDMDcModel, HankelEnsemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasting import status_at_clock
 from seakeep.models.identification import is_constant
-from seakeep.models.workers import Backend
 from seakeep.signals import froude_factor, to_full_scale
 from seakeep.signals.time_axis import span_text
 from seakeep.study.lengths import instant_of, samples_of
@@ -206,9 +206,7 @@ def compare(
     members: Progress | None = None,
     level: float = 0.95,
     band: Band = "members",
-    workers: int = 1,
-    backend: Backend = "auto",
-    scheduler: str | None = None,
+    executor: Executor | None = None,
 ) -> list[Comparison]:
     """Forecast runs of a campaign and put the measurement beside.
 
@@ -235,7 +233,7 @@ def compare(
     band : {"members", "calibrated"}, optional
         Of an ensemble: quantiles of the members, or these moved outwards as
         :meth:`seakeep.models.HankelEnsemble.calibrate` found.
-    workers, backend, scheduler
+    executor
         As in :meth:`seakeep.models.HankelEnsemble.forecast`.
 
     Returns
@@ -284,9 +282,7 @@ def compare(
             steps,
             level,
             band=band,
-            workers=workers,
-            backend=backend,
-            scheduler=scheduler,
+            executor=executor,
             progress=tell,
         )
 

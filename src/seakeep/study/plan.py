@@ -11,7 +11,6 @@ from seakeep.campaign import load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import DataError, RequestError
 from seakeep.models import HankelDMDc
-from seakeep.models.offsets import wants_offset
 from seakeep.models.settings import periods_to_samples
 from seakeep.study.needs import needs_of
 from seakeep.study.settings import Study
@@ -153,8 +152,6 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
         calibrated_on=tuple(training_names) if settings.calibrates else (),
     )
     _check_pairs(plan)
-    if any(spec.alignment is not None for spec in specs.values()):
-        _check_offsets(plan, runs)
     return plan, runs
 
 
@@ -198,18 +195,6 @@ def _check_channels(name: str, run: xr.Dataset, channels: list[str]) -> None:
             raise DataError(
                 f"channel '{channel}' of the run '{name}' has missing values. Fill or cut the gap "
                 "in the campaign, or leave the run out."
-            )
-
-
-def _check_offsets(plan: Plan, runs: dict[str, xr.Dataset]) -> None:
-    """Refuse a run whose probe offset each model would estimate in its own way."""
-    tested = dict.fromkeys(window.run for windows in plan.tests.values() for window in windows)
-    for name in tested:
-        if wants_offset(runs[name]):
-            raise RequestError(
-                f"the run '{name}' asks for its probe offset to be estimated, and a study judges "
-                "all models on the same waves. Estimate it once with a model "
-                "(seakeep.estimate_probe_offset) and state probe_offset (m) in the campaign."
             )
 
 

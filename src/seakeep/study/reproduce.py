@@ -13,7 +13,7 @@ import xarray as xr
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.files import replacing
-from seakeep.models.workers import Crew, check_crew
+from seakeep.models.executor import make_executor
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
 from seakeep.study.store import StudyResult, storing, versions
@@ -98,7 +98,8 @@ def reproduce(
     StorageError
         If the disk is full.
     """
-    check_crew(Crew(workers, scheduler=scheduler))
+    with make_executor(workers, scheduler):  # refused before the campaign is played
+        pass
     out, counts = Path(out), size or Size()
     with storing(out):
         out.mkdir(parents=True, exist_ok=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,8 @@ from typing import Any
 import xarray as xr
 
 from seakeep.campaign.prepare import Progress
+from seakeep.models.executor import WorkerLostError, as_finished, make_executor
 from seakeep.models.priors import Prior, describe
-from seakeep.models.workers import Crew, WorkerLostError, as_finished, check_crew
 from seakeep.study.cells import Unit, cells_of, compute, units_of
 from seakeep.study.description import describe_study
 from seakeep.study.lock import alone_in
@@ -89,14 +90,25 @@ def run_study(
     SeakeepWarning
         If training windows hold fewer than five periods of a slow motion.
     """
-    crew = Crew(workers, scheduler=scheduler)
     out = Path(out)
     tell = progress or (lambda done, total, what: None)
     cells = CellFolder(out, study.digest)
     cells.check()
     if (found := _finished(study, out, tell)) is not None:
         return retell(found, _words_of_study(study))
-    check_crew(crew)
+    with make_executor(workers, scheduler) as executor:
+        return _run(study, out, cells, executor, tell, extra or {}, notes or {})
+
+
+def _run(
+    study: Study,
+    out: Path,
+    cells: CellFolder,
+    executor: Executor | None,
+    tell: Progress,
+    extra: Mapping[str, xr.Dataset],
+    notes: Mapping[str, str],
+) -> StudyResult:
     plan, runs = make_plan(study, lambda done, total, name: tell(done, total, f"preparing {name}"))
     warn_of_slow_study(plan, runs)
     cells.open(study.name)
@@ -104,12 +116,12 @@ def run_study(
         if (found := _finished(study, out, tell)) is None:  # by another process, meanwhile
             units = units_of(plan, study.settings.output.eigenvalues)
             left = [u for u in units if not all(cells.has(name) for name in cells_of(plan, u))]
-            _compute_all(plan, runs, cells, units, left, crew, tell)
+            _compute_all(plan, runs, cells, units, left, executor, tell)
             tell(len(units), len(units), "statistics and densities")
             groups = {**describe_study(study, plan, runs), **merge_cells(study, plan, runs, cells)}
             groups.update(judge(groups, study.settings, list(plan.states)))
-            groups.update(extra or {})
-            attributes = {**_attributes(study, plan, groups), **(notes or {})}
+            groups.update(extra)
+            attributes = {**_attributes(study, plan, groups), **notes}
             found = write_result(out, attributes, groups)
         cells.clear()
     return found
@@ -187,7 +199,7 @@ def _compute_all(
     cells: CellFolder,
     units: list[Unit],
     left: list[Unit],
-    crew: Crew,
+    executor: Executor | None,
     tell: Progress,
 ) -> None:
     done, total = len(units) - len(left), len(units)
@@ -195,7 +207,7 @@ def _compute_all(
     if not left:
         return
     try:
-        for number, found in as_finished(_work, (plan, dict(runs)), left, crew):
+        for number, found in as_finished(_work, (plan, dict(runs)), left, executor):
             for name, arrays in found:
                 cells.write(name, arrays)
             done += 1

@@ -1,0 +1,350 @@
+"""Work side by side on any :class:`concurrent.futures.Executor`, or in this process without one.
+
+An executor is a pool of processes (:func:`processes`), Dask's ``client.get_executor()``, or what
+else offers ``submit``. Results do not depend on it: BLAS has one thread wherever work is done.
+"""
+
+from __future__ import annotations
+
+import functools
+import multiprocessing
+import os
+import pickle
+import platform
+import re
+import signal
+import threading
+import uuid
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from concurrent.futures import ProcessPoolExecutor as Pool
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from importlib import metadata
+from itertools import islice
+from multiprocessing.connection import wait as wait_for
+from typing import Any, TypeVar
+
+import threadpoolctl
+
+from seakeep.errors import RequestError, SeakeepError
+
+__all__ = [
+    "Progress",
+    "WorkerLostError",
+    "as_finished",
+    "in_order",
+    "make_executor",
+    "one_blas_thread",
+    "processes",
+]
+
+Data = TypeVar("Data")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+Function = Callable[[Data, Item], Result]
+Progress = Callable[[int, int, str], None]
+"""Called as ``progress(done, total, what)``."""
+
+BATCHES = 32
+"""Pieces, at most, into which small items are handed out: each carries the data once."""
+AHEAD = 16
+"""Pieces handed out at a time: enough for as many workers, few enough that results stay few."""
+PATIENCE = 10.0
+"""Seconds in which a Dask scheduler must answer, and after which silent workers are looked for."""
+ALIKE = ("seakeep", "numpy", "scipy")
+"""Packages whose versions must be the same everywhere, so that arrays are."""
+
+
+class WorkerLostError(SeakeepError):
+    """A worker was stopped from outside, and its work with it."""
+
+
+def in_order(
+    function: Function[Data, Item, Result],
+    data: Data,
+    items: Sequence[Item],
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    what: str = "member",
+) -> Iterator[Result]:
+    """Yield ``function(data, item)`` for each item, in the order of the items."""
+    found = _in_order(function, data, items, executor)
+    for done, result in enumerate(found, start=1):
+        if progress is not None:
+            progress(done, len(items), f"{what} {done}")
+        yield result
+
+
+def _in_order(
+    function: Function[Data, Item, Result],
+    data: Data,
+    items: Sequence[Item],
+    executor: Executor | None,
+) -> Iterator[Result]:
+    if executor is None:
+        for item in items:
+            with one_blas_thread():
+                result = function(data, item)
+            yield result
+        return
+    size = -(-len(items) // BATCHES)
+    batches = (items[first : first + size] for first in range(0, len(items), max(size, 1)))
+    with _submitting(function, data, executor) as submit:
+        pending = deque(submit(batch) for batch in islice(batches, AHEAD))
+        while pending:
+            _wait_for_any([pending[0]], executor)
+            results = pending.popleft().result()
+            pending.extend(submit(batch) for batch in islice(batches, 1))
+            yield from results
+
+
+def as_finished(
+    function: Function[Data, Item, Result],
+    data: Data,
+    items: Sequence[Item],
+    executor: Executor | None = None,
+) -> Iterator[tuple[int, Result]]:
+    """Yield the number of an item and ``function(data, item)`` as they finish: large pieces."""
+    if executor is None:
+        yield from enumerate(_in_order(function, data, items, None))
+        return
+    with _submitting(function, data, executor) as submit:
+        waiting = enumerate(items)
+        pending = {submit([item]): number for number, item in islice(waiting, AHEAD)}
+        while pending:
+            finished = _wait_for_any(pending, executor)
+            failed = [future for future in finished if future.exception() is not None]
+            for future in finished - set(failed):  # what is done is handed on before an error is
+                number = pending.pop(future)
+                for following, item in islice(waiting, 1):
+                    pending[submit([item])] = following
+                yield number, future.result()[0]
+            for future in failed:
+                future.result()
+
+
+def one_blas_thread() -> AbstractContextManager[object]:
+    """Limit BLAS to one thread: small products side by side beat products spread over cores."""
+    limit: AbstractContextManager[object] = _blas().limit(limits=1, user_api="blas")
+    return limit
+
+
+@functools.cache
+def _blas() -> threadpoolctl.ThreadpoolController:
+    import scipy.linalg  # noqa: F401  (its BLAS must be loaded to be found)
+
+    return threadpoolctl.ThreadpoolController()
+
+
+@contextmanager
+def processes(workers: int) -> Iterator[Executor]:
+    """Pool of processes, each with BLAS on one thread; ended when the block is left.
+
+    Parameters
+    ----------
+    workers : int
+        Number of processes. A script that starts them needs ``if __name__ == "__main__":``.
+
+    Yields
+    ------
+    concurrent.futures.Executor
+        For the keyword ``executor`` of an ensemble's methods.
+
+    Raises
+    ------
+    RequestError
+        If `workers` is not a positive integer.
+    WorkerLostError
+        If a process was stopped from outside.
+
+    Examples
+    --------
+    >>> with processes(2) as executor:  # doctest: +SKIP
+    ...     band = ensemble.forecast_summary(run, start=60.0, steps=480, executor=executor)
+    """
+    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+        raise RequestError(f"workers must be a positive integer; received {workers!r}.")
+    pool = Pool(workers, multiprocessing.get_context("spawn"), initializer=_start_worker)
+    try:
+        yield pool
+    except BaseException:
+        for child in list((pool._processes or {}).values()):
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _start_worker() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
+    parent = multiprocessing.parent_process()
+    if parent is not None:  # a parent that was killed leaves no worker behind
+        sentinel = parent.sentinel
+        threading.Thread(target=lambda: (wait_for([sentinel]), os._exit(1)), daemon=True).start()
+
+
+def make_executor(
+    workers: int = 1, scheduler: str | None = None
+) -> AbstractContextManager[Executor | None]:
+    """Executor of a command: None for one worker, a pool of processes, or a Dask cluster.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Processes on this machine; 1 works in this process.
+    scheduler : str, optional
+        Address of the scheduler of a running Dask cluster, such as ``tcp://host:8786``, whose
+        workers do the work instead.
+
+    Returns
+    -------
+    context manager
+        Yields the executor.
+
+    Raises
+    ------
+    RequestError
+        If a value does not exist, both are given, or the cluster cannot be used.
+    """
+    if scheduler is not None:
+        if workers != 1:
+            raise RequestError(
+                f"workers = {workers} counts workers on this machine, and scheduler = "
+                f"{scheduler!r} hands all work to a cluster. Give one of the two."
+            )
+        return _dask(scheduler)
+    return nullcontext() if workers == 1 and not isinstance(workers, bool) else processes(workers)
+
+
+@contextmanager
+def _dask(scheduler: str) -> Iterator[Executor]:
+    try:
+        import dask
+        from distributed import Client
+    except ImportError as error:
+        raise RequestError(
+            f"work on a Dask cluster needs {error.name}, which is not installed. Install it with: "
+            "pip install 'seakeep[cluster]'"
+        ) from error
+    if re.fullmatch(r"(tcp|tls|ucx|wss?)://\S+:\d+/?|inproc://\S+", scheduler) is None:
+        raise RequestError(
+            f"'{scheduler}' is no address of a Dask scheduler. Give protocol, host and port, as "
+            "`dask scheduler` prints them: tcp://HOST:8786."
+        )
+    try:
+        client = Client(scheduler, timeout=PATIENCE, set_as_default=False, name="seakeep")
+    except (OSError, TimeoutError, ValueError) as error:
+        raise RequestError(
+            f"no Dask scheduler answers at {scheduler!r} within {PATIENCE:g} s ({error}). Start "
+            "one with `dask scheduler`, give its address as tcp://HOST:8786, and check that no "
+            "firewall blocks it."
+        ) from error
+    # A task carries its data; Dask's advice to scatter them is for data that outlive it.
+    with client, dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 TB"}):
+        try:
+            client.wait_for_workers(1, timeout=PATIENCE)
+        except TimeoutError:
+            raise RequestError(
+                f"the Dask scheduler at {scheduler} has no workers. Start some with `dask worker "
+                f"{scheduler} --nthreads 1 --nworkers auto`."
+            ) from None
+        yield client.get_executor(pure=False)
+
+
+def versions() -> dict[str, str]:
+    """Versions that must be the same everywhere, of this process."""
+    python = ".".join(platform.python_version_tuple()[:2])
+    return {"python": python, **{name: metadata.version(name) for name in ALIKE}}
+
+
+@contextmanager
+def _submitting(
+    function: Function[Data, Item, Result], data: Data, executor: Executor
+) -> Iterator[Callable[[Sequence[Item]], Future[list[Result]]]]:
+    """Hand out items; what is not done is cancelled when the block is left."""
+    payload, token = pickle.dumps((data, versions()), protocol=5), uuid.uuid4().hex
+    futures: list[Future[list[Result]]] = []
+
+    def submit(items: Sequence[Item]) -> Future[list[Result]]:
+        futures.append(executor.submit(_work, token, payload, function, items))
+        return futures[-1]
+
+    _check_alive(executor)
+    try:
+        yield submit
+    except BrokenProcessPool:  # the pool ends its futures itself
+        raise WorkerLostError(
+            "a worker process was stopped from outside (was there not enough memory?), or could "
+            "not start. With memory short, take fewer workers. In a script, processes need the "
+            "line: if __name__ == '__main__':"
+        ) from None
+    except BaseException as error:
+        for future in futures:
+            future.cancel()
+        if isinstance(error, CancelledError):
+            raise WorkerLostError(
+                "the connection to the scheduler of the cluster was lost. Start it again."
+            ) from None
+        if type(error).__name__ == "KilledWorker":  # of Dask, which may not be installed
+            raise WorkerLostError(
+                "a piece of work took several workers of the cluster with it (is their memory "
+                f"large enough?): {error}"
+            ) from None
+        raise
+
+
+def _wait_for_any(pending: Iterable[Future[Result]], executor: Executor) -> set[Future[Result]]:
+    """Futures that are done, at least one; a cluster without workers is not waited for."""
+    pending = list(pending)
+    while not (done := wait(pending, timeout=PATIENCE, return_when=FIRST_COMPLETED).done):
+        _check_alive(executor)
+    return done
+
+
+def _check_alive(executor: Executor) -> None:
+    """Refuse Dask's executor where no scheduler or no worker answers: it would wait for ever."""
+    client = getattr(executor, "_client", None)  # it has no public way to ask
+    if client is None:
+        return
+    try:
+        alive = client.status != "closed" and bool(client.nthreads())
+    except (OSError, TimeoutError, CancelledError):
+        alive = False
+    if not alive:
+        raise WorkerLostError(
+            "the Dask cluster has no workers that answer. Start its scheduler and its workers "
+            "again, and connect a new client."
+        )
+
+
+_received: tuple[str, Any] = "", None
+
+
+def _work(
+    token: str, payload: bytes, function: Function[Any, Item, Result], items: Sequence[Item]
+) -> list[Result]:
+    """Results of some items in a worker, which reads the data once."""
+    global _received
+    if (received := _received)[0] != token:
+        data, expected = pickle.loads(payload)
+        _check_versions(expected)
+        received = _received = token, data
+    with one_blas_thread():
+        return [function(received[1], item) for item in items]
+
+
+def _check_versions(expected: Mapping[str, str]) -> None:
+    """Refuse to work with other versions: the arrays would not be those of the caller."""
+    found = versions()
+    other = [
+        f"{name} {found[name]} (here {version})"
+        for name, version in expected.items()
+        if found.get(name) != version
+    ]
+    if other:
+        raise RequestError(
+            f"the worker {platform.node()} would not compute the same arrays: it has "
+            f"{', '.join(other)}. Install the same versions everywhere."
+        )

@@ -1,0 +1,292 @@
+"""Who does the work changes no array, and no process or file is left over."""
+
+import os
+import pickle
+import re
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+import side_work
+import xarray as xr
+
+import seakeep
+from seakeep.errors import RequestError
+from seakeep.models import executor as executors
+from seakeep.models import processes
+from seakeep.models.executor import WorkerLostError, as_finished, in_order, make_executor
+
+posix = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system knows no SIGKILL")
+
+
+@pytest.fixture(scope="module")
+def pool():
+    with processes(2) as executor:
+        yield executor
+
+
+@pytest.fixture(scope="module")
+def ensemble_and_run():
+    rng = np.random.default_rng(0)
+    time = 0.1 * np.arange(500)
+    eta = np.cos(np.outer(time, rng.uniform(2, 6, 20)) + rng.uniform(0, 6, 20)).sum(axis=1)
+    run = xr.Dataset(
+        {
+            "heave": ("time", np.convolve(eta, [0.1, 0.3, 0.2], "same")),
+            "pitch": ("time", np.convolve(eta, [0.3, -0.1, -0.2], "same")),
+            "eta": ("time", eta),
+        },
+        coords={"time": time},
+    )
+    spec = seakeep.BayesianHankelDMDc(
+        encounter_period=1.6,
+        train_length=seakeep.Uniform(6, 12),
+        state_delay=seakeep.Uniform(0.2, 0.8),
+        input_delay=seakeep.Uniform(0.3, 1.2),
+        ridge=seakeep.LogUniform(0.1, 10),
+        n_members=9,
+        delay_rows="ridge",
+    )
+    return spec.fit(run, ["heave", "pitch"], ["eta"], stop=30.0), run
+
+
+def test_results_come_in_order_and_progress_is_reported(pool):
+    seen = []
+    for executor in (None, pool, ThreadPoolExecutor(3)):
+        found = in_order(
+            side_work.square, 3, range(70), executor, lambda *each: seen.append(each), "item"
+        )
+        assert [value for _, value in found] == [3 * k**2 for k in range(70)]
+        assert seen[-1] == (70, 70, "item 70")
+        assert list(in_order(side_work.square, 3, [], executor)) == []
+
+
+def test_large_pieces_come_as_they_are_finished(pool):
+    found = dict(as_finished(side_work.square, 3, range(20), pool))
+    assert {number: value for number, (_, value) in found.items()} == {
+        number: 3 * number**2 for number in range(20)
+    }
+    assert len({pid for pid, _ in found.values()}) == 2
+
+
+def test_arrays_do_not_depend_on_the_executor(ensemble_and_run, pool):
+    ensemble, run = ensemble_and_run
+    alone = ensemble.forecast_windows(run, [31.0, 33.0], 40)
+    for executor in (pool, ThreadPoolExecutor(3)):
+        xr.testing.assert_identical(
+            alone, ensemble.forecast_windows(run, [31.0, 33.0], 40, executor=executor)
+        )
+
+
+def test_blas_has_one_thread_wherever_work_is_done(pool):
+    for executor in (None, pool):
+        for process, found in in_order(side_work.blas_threads, None, range(4), executor):
+            assert (process == os.getpid()) == (executor is None)
+            assert set(found) == {1}
+
+
+def test_data_are_pickled_once(ensemble_and_run, pool, monkeypatch):
+    ensemble, run = ensemble_and_run
+    pickled = []
+
+    def counting(self, protocol):
+        pickled.append(protocol)
+        return object.__reduce_ex__(self, protocol)
+
+    monkeypatch.setattr(type(ensemble.arrays), "__reduce_ex__", counting)
+    ensemble.forecast(run, start=31.0, steps=20, executor=pool)
+    assert len(pickled) == 1
+
+
+@posix
+def test_a_process_that_is_killed_at_work_is_reported():
+    with (
+        pytest.raises(WorkerLostError, match=r"stopped from outside.*take fewer workers"),
+        processes(2) as executor,
+    ):
+        list(in_order(side_work.fall, 5, range(20), executor))
+
+
+def test_an_error_of_an_item_ends_the_work(pool):
+    for executor in (None, pool):
+        with pytest.raises(ValueError, match="item 0"):
+            list(in_order(side_work.refuse, None, range(6), executor))
+
+
+def test_an_error_in_the_block_ends_its_processes():
+    def interrupted():
+        with processes(2) as executor:
+            work = in_order(side_work.sleep, 0.1, range(1000), executor)
+            found.append(next(work))
+            raise KeyboardInterrupt
+
+    begin, found = time.monotonic(), []
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    (pid,) = found
+    assert time.monotonic() - begin < 40  # fifty seconds of work for each were left
+    assert _ends(pid)
+
+
+@posix
+def test_a_parent_that_is_killed_leaves_no_process_behind(tmp_path):
+    script = tmp_path / "parent.py"
+    script.write_text(
+        "import side_work\n"
+        "from seakeep.models.executor import in_order, processes\n"
+        "if __name__ == '__main__':\n"
+        "    with processes(2) as pool:\n"
+        "        for pid in in_order(side_work.sleep, 0.2, range(100), pool):\n"
+        "            print(pid, flush=True)\n"
+    )
+    places = [*sys.path, str(Path(side_work.__file__).parent)]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(places)}
+    with subprocess.Popen(
+        [sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env=environment
+    ) as parent:
+        pids = {int(parent.stdout.readline()) for _ in range(4)}
+        parent.kill()
+    for pid in pids:
+        assert _ends(pid)
+
+
+def _ends(pid):
+    """Whether a process is gone within minutes; a zombie without other threads is gone too."""
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline:
+        try:
+            state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+            threads = len(list(Path(f"/proc/{pid}/task").iterdir()))
+        except FileNotFoundError:
+            if not Path("/proc").exists():
+                pytest.skip("the system shows no processes")
+            return True
+        except ProcessLookupError:
+            return True
+        if state == "Z" and threads == 1:
+            return True
+        time.sleep(0.02)
+    return False
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"workers": 0}, "workers must be a positive integer; received 0"),
+        ({"workers": True}, "workers must be a positive integer; received True"),
+        ({"workers": 2, "scheduler": "tcp://a:1"}, "hands all work to a cluster. Give one"),
+    ],
+)
+def test_workers_that_do_not_exist(arguments, words):
+    with pytest.raises(RequestError, match=words), make_executor(**arguments):
+        pass
+
+
+def test_one_worker_is_this_process():
+    with make_executor(1) as executor:
+        assert executor is None
+
+
+def test_other_versions_are_refused(monkeypatch):
+    here = executors.versions()
+    payload = pickle.dumps((None, here | {"numpy": "1.0"}))
+    words = rf"would not compute the same arrays: it has numpy {re.escape(here['numpy'])} \(here 1"
+    with pytest.raises(RequestError, match=words):
+        executors._work("token", payload, side_work.square, [1])
+
+
+class TestCluster:
+    """A real Dask cluster: a scheduler and workers, each a process on loopback."""
+
+    pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
+
+    @pytest.fixture(autouse=True)
+    def distributed(self):
+        return pytest.importorskip("distributed", reason="needs distributed (extra 'cluster')")
+
+    @pytest.fixture
+    def start(self, tmp_path):
+        from dask_processes import Cluster
+
+        started = []
+
+        def begin(workers):
+            started.append(Cluster(tmp_path, workers=workers))
+            return started[-1]
+
+        yield begin
+        for each in started:
+            each.close()
+
+    @pytest.mark.usefixtures("patient_cluster")
+    def test_members_are_those_of_this_process(self, start, ensemble_and_run):
+        ensemble, run = ensemble_and_run
+        with make_executor(scheduler=start(2).address) as executor:
+            found = ensemble.forecast_summary(run, start=31.0, steps=30, executor=executor)
+            for _, threads in in_order(side_work.blas_threads, None, range(8), executor):
+                assert set(threads) == {1}
+            with pytest.raises(ValueError, match="item 0"):
+                list(in_order(side_work.refuse, None, range(3), executor))
+        xr.testing.assert_identical(found, ensemble.forecast_summary(run, start=31.0, steps=30))
+
+    @pytest.mark.parametrize("lost", ["workers", "scheduler"])
+    def test_a_cluster_that_is_lost_is_not_waited_for(self, start, distributed, monkeypatch, lost):
+        monkeypatch.setattr(executors, "PATIENCE", 1.0)
+        cluster = start(1)
+        with distributed.Client(cluster.address, set_as_default=False, timeout=60) as client:
+            executor = client.get_executor(pure=False)
+            work = in_order(side_work.square, 1, range(4000), executor)
+            next(work)
+            for process in cluster.processes[:: 1 if lost == "scheduler" else -1][:1]:
+                process.kill()
+                process.wait()
+            with pytest.raises(WorkerLostError, match=r"no workers that answer|was lost"):
+                list(work)
+            begin = time.monotonic()
+            with pytest.raises(WorkerLostError, match=r"no workers that answer|was lost"):
+                list(in_order(side_work.square, 1, range(4), executor))
+            assert time.monotonic() - begin < 120
+
+    @pytest.mark.parametrize(
+        "address", ["nonsense", "http://127.0.0.1:8786", "tcp://host", "tcp://"]
+    )
+    def test_what_is_no_address_is_refused_at_once(self, address):
+        with (
+            pytest.raises(RequestError, match=rf"'{address}' is no address of a Dask scheduler"),
+            make_executor(scheduler=address),
+        ):
+            pass
+
+    def test_an_address_where_nobody_answers(self, monkeypatch):
+        monkeypatch.setattr(executors, "PATIENCE", 0.5)
+        with (
+            pytest.raises(RequestError, match=r"no Dask scheduler answers at .*`dask scheduler`"),
+            make_executor(scheduler="tcp://127.0.0.1:9"),
+        ):
+            pass
+
+    def test_a_scheduler_without_workers(self, start, monkeypatch, distributed):
+        waits = distributed.Client.wait_for_workers
+
+        def briefly(self, count, timeout):  # the time to connect stays long
+            waits(self, count, timeout=0.5)
+
+        monkeypatch.setattr(distributed.Client, "wait_for_workers", briefly)
+        with (
+            pytest.raises(RequestError, match=r"has no workers. Start some with `dask worker tcp"),
+            make_executor(scheduler=start(0).address),
+        ):
+            pass
+
+    def test_the_extra_that_is_missing(self, monkeypatch):
+        monkeypatch.setitem(sys.modules, "distributed", None)
+        with (
+            pytest.raises(RequestError, match=r"needs distributed, which is not installed"),
+            make_executor(scheduler="tcp://127.0.0.1:1"),
+        ):
+            pass
