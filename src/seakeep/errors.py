@@ -32,7 +32,7 @@ class RequestError(SeakeepError, ValueError):
 
 
 class MissingFileError(RequestError):
-    """A file that the request names is not there."""
+    """A file that the request names is not there, or cannot be read."""
 
 
 class DataError(SeakeepError, ValueError):

@@ -1,26 +1,195 @@
-"""Files that are either written whole or not at all."""
+"""Files: only regular ones are read, and they are written whole or not at all."""
 
 from __future__ import annotations
 
+import difflib
 import errno
+import hashlib
 import io
 import os
 import re
 import secrets
+import stat
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from seakeep.errors import RequestError
+from seakeep.errors import MissingFileError, RequestError, did_you_mean
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MARK", "check_output", "check_place", "make_folder", "replacing", "write_netcdf"]
+__all__ = [
+    "MARK",
+    "check_output",
+    "check_place",
+    "existing_file",
+    "make_folder",
+    "read_bytes",
+    "reading",
+    "replacing",
+    "sha256_of",
+    "write_netcdf",
+]
 
 MARK = "seakeep_file"
 """Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""
+
+SHOWN = 5
+"""Names of a folder that a message lists at most."""
+
+LONGEST = 300
+"""Characters of a path that a message shows at most."""
+
+SETTLED = 2.0
+"""Seconds for which a file must have been left alone before its checksum is remembered.
+
+Within the resolution of a file system's clock, 2 s at worst (FAT), a second change leaves the times
+of a file as they were.
+"""
+
+_KINDS = (
+    (stat.S_ISDIR, "a folder", "Give the file in it."),
+    (stat.S_ISFIFO, "a pipe", "Copy what comes out of it into a file first."),
+    (stat.S_ISSOCK, "a socket", "Give a file."),
+    (stat.S_ISCHR, "a device", "Give a file."),
+    (stat.S_ISBLK, "a device", "Give a file."),
+)
+_SUMS: dict[Path, tuple[tuple[int, ...], str]] = {}
+
+
+def existing_file(path: Path | str) -> Path:
+    """Path of a regular file that exists; ``~`` is replaced by the home folder.
+
+    Parameters
+    ----------
+    path : Path or str
+        What the user named.
+
+    Returns
+    -------
+    Path
+        The path.
+
+    Raises
+    ------
+    MissingFileError
+        If there is no such file, it is a folder, a pipe, a socket or a device, or the system
+        refuses to look at it.
+    """
+    try:
+        place = Path(path).expanduser()
+        mode = place.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        raise _missing(Path(path)) from None
+    # Names with NUL raise ValueError, `~` without a home RuntimeError.
+    except (OSError, ValueError, RuntimeError) as error:
+        raise _unreadable(path, error) from None
+    for is_kind, what, mend in _KINDS:
+        if is_kind(mode):
+            raise MissingFileError(
+                f"{_shown(path)} is {what}, and only regular files are read. {mend}"
+            )
+    return place
+
+
+@contextmanager
+def reading(path: Path | str) -> Iterator[Path]:
+    """Check that a file can be read, and report every fault of the system as one error.
+
+    Parameters
+    ----------
+    path : Path or str
+        What the user named.
+
+    Yields
+    ------
+    Path
+        The path of a regular file.
+
+    Raises
+    ------
+    MissingFileError
+        As :func:`existing_file`; also if the system fails while the file is read.
+    """
+    place = existing_file(path)
+    try:
+        yield place
+    except OSError as error:
+        raise _unreadable(path, error) from error
+
+
+def read_bytes(path: Path | str) -> bytes:
+    """Content of a regular file; raises as :func:`reading`."""
+    with reading(path) as place:
+        return place.read_bytes()
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file's content, in hexadecimal digits.
+
+    Parameters
+    ----------
+    path : Path
+        The file; it is read in pieces, and once as long as size and times stay the same.
+
+    Returns
+    -------
+    str
+        The checksum.
+
+    Raises
+    ------
+    MissingFileError
+        As :func:`reading`.
+    """
+    with reading(path) as place, place.open("rb") as file:
+        found = os.fstat(file.fileno())
+        state = found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
+        known = _SUMS.get(path)
+        if known is not None and known[0] == state:
+            return known[1]
+        started = time.time_ns()
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    if max(found.st_mtime_ns, found.st_ctime_ns) < started - SETTLED * 1e9:
+        _SUMS[path] = state, digest
+    return digest
+
+
+def _shown(path: Path | str) -> str:
+    text = str(path).replace("\0", "\\0")
+    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]}…{text[-LONGEST // 2 :]}"
+
+
+def _unreadable(path: Path | str, error: Exception) -> MissingFileError:
+    reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+    mend = "Correct the path."
+    if isinstance(error, PermissionError):
+        mend = "Change its permissions, or copy it to a place that you may read."
+    elif isinstance(error, OSError) and error.errno == errno.EIO:
+        mend = "Copy the file again, or check the disk."
+    return MissingFileError(f"{_shown(path)} cannot be read: {reason}. {mend}")
+
+
+def _missing(path: Path) -> MissingFileError:
+    try:
+        beside = sorted(each.name for each in path.parent.iterdir())
+    except OSError:
+        return MissingFileError(
+            f"{_shown(path)} does not exist: there is no folder {_shown(path.parent)}. Correct "
+            "the path."
+        )
+    near = did_you_mean(path.name, beside)
+    likeness = {name: difflib.SequenceMatcher(None, path.name, name).ratio() for name in beside}
+    nearest = sorted(sorted(beside, key=lambda name: -likeness[name])[:SHOWN])
+    listed = ", ".join(nearest) or "nothing"
+    if len(beside) > SHOWN:
+        listed = f"{len(beside)} names, the nearest of them {listed}"
+    return MissingFileError(
+        f"{_shown(path)} does not exist.{near} Its folder holds {listed}. Correct the name."
+    )
 
 
 @contextmanager

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from seakeep.campaign import checksums, load_prepared, read_campaign, write_prepared
-from seakeep.campaign.checksums import sha256_of
+from seakeep import files
+from seakeep.campaign import load_prepared, read_campaign, write_prepared
+from seakeep.files import sha256_of
 
 
 @pytest.fixture
@@ -28,7 +29,7 @@ def hashed(monkeypatch):
 @pytest.fixture
 def settled(monkeypatch):
     """A file that was written just now passes for one that was left alone."""
-    monkeypatch.setattr(checksums, "SETTLED", -60.0)
+    monkeypatch.setattr(files, "SETTLED", -60.0)
 
 
 def test_a_file_is_read_in_pieces(tmp_path):

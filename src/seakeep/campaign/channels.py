@@ -10,7 +10,6 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.campaign.checks import check_samples
-from seakeep.campaign.columns import is_unit
 from seakeep.campaign.derivation import derive
 from seakeep.campaign.instruments import Logger, channels_of, homes
 from seakeep.campaign.readers import labelled_table, time_column, time_step_of
@@ -24,6 +23,7 @@ from seakeep.campaign.settings import (
 from seakeep.campaign.validation import derivation_order, needed_channels, sources_of
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError
+from seakeep.formats.columns import is_unit
 from seakeep.signals import Clock, bridge, inspect_times, onto_uniform, uniform_step
 from seakeep.signals.quality import BRIDGED, MISSING, flag_attributes
 from seakeep.signals.time_axis import instant_text, span_text

@@ -10,9 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from seakeep.campaign.checksums import sha256_of
 from seakeep.errors import DataError, RequestError, did_you_mean
-from seakeep.files import make_folder, replacing
+from seakeep.files import make_folder, replacing, sha256_of
 
 __all__ = ["DATASETS", "PublicDataset", "data_folder", "fetch", "find_dataset", "state_of"]
 

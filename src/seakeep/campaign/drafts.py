@@ -10,7 +10,6 @@ import numpy as np
 import tomlkit
 from tomlkit.items import Table
 
-from seakeep.campaign.columns import Columns, named_unit
 from seakeep.campaign.draft_hints import (
     derived_examples,
     driving_wave,
@@ -30,10 +29,12 @@ from seakeep.campaign.guesses import (
     suggest_channel,
     waves_of,
 )
-from seakeep.campaign.readers import read_columns, time_column, time_step_of, time_unit_of
+from seakeep.campaign.readers import time_column, time_step_of, time_unit_of
 from seakeep.campaign.settings import FileSettings
 from seakeep.conventions import canonical_channel
 from seakeep.errors import DataError, RequestError
+from seakeep.formats import read_columns
+from seakeep.formats.columns import Columns, named_unit
 from seakeep.signals import encounter_period
 
 __all__ = ["draft_campaign"]
@@ -85,7 +86,7 @@ def draft_campaign(
         )
     paths = [Path(file) for file in files]
     known = {key: value for key, value in (options or {}).items() if value is not None}
-    tables = [read_columns(path, FileSettings.model_validate(known)) for path in paths]
+    tables = [read_columns(path, FileSettings.model_validate(known).known()) for path in paths]
     read = arranged(paths, tables, _times(tables))
     guesses = guess_channels(read)
     if not any(guess.channel for guess in guesses):

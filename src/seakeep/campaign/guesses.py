@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from seakeep.campaign.columns import Columns, is_unit, named_unit
+from seakeep.arrays import FloatArray
 from seakeep.conventions import canonical_channel, si_unit
 from seakeep.errors import DataError
+from seakeep.formats.columns import Columns, is_unit, named_unit
 from seakeep.signals import uniform_step
 
 __all__ = [
@@ -30,8 +30,6 @@ __all__ = [
     "waves_of",
     "words_of",
 ]
-
-FloatArray = npt.NDArray[np.float64]
 
 # What a column may be called, in the words of tanks in several countries: whole words, lower case.
 _WORDS = {

@@ -8,10 +8,9 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from seakeep.campaign.columns import Columns, meant_column
-from seakeep.campaign.readers import find_column, read_columns, time_column, times_of
+from seakeep.arrays import FloatArray
+from seakeep.campaign.readers import find_column, time_column, times_of
 from seakeep.campaign.settings import (
     CampaignSettings,
     ChannelSettings,
@@ -21,6 +20,8 @@ from seakeep.campaign.settings import (
     RunSettings,
 )
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
+from seakeep.formats import Columns, read_columns
+from seakeep.formats.columns import meant_column
 from seakeep.signals import (
     Clock,
     bridge,
@@ -33,8 +34,6 @@ from seakeep.signals.synchronisation import ASSUMED
 from seakeep.toml import number
 
 __all__ = ["Logger", "channels_of", "clocks_of", "homes", "open_loggers", "reference_of"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +95,7 @@ def open_loggers(paths: Mapping[str, Path], settings: CampaignSettings) -> dict[
     loggers = {}
     for name, path in paths.items():
         options = _options(settings.files, settings.instruments[name]) if name else settings.files
-        columns = read_columns(path, options)
+        columns = read_columns(path, options.known())
         if name and time_column(columns, options.time) is not None:
             options = options.model_copy(update={"sampling_rate": None})
         loggers[name] = Logger(name, path, columns, options)

@@ -1,8 +1,7 @@
-"""One function that reads a run's file, whatever it is: :func:`read_table`."""
+"""A run's file as a table with a time axis: :func:`read_table`."""
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import os
 import re
@@ -10,29 +9,21 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
-from seakeep.campaign.binary import read_matlab, read_netcdf
-from seakeep.campaign.checksums import sha256_of
-from seakeep.campaign.columns import Columns, is_unit, meant_column, named_unit
-from seakeep.campaign.kinds import refuse_foreign
-from seakeep.campaign.rosbag import is_recording, read_recording
+from seakeep.arrays import FloatArray
 from seakeep.campaign.settings import FileSettings
-from seakeep.campaign.tdms import read_tdms
-from seakeep.campaign.text import read_text
 from seakeep.conventions import conversion, si_unit
-from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
+from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.files import sha256_of
+from seakeep.formats import Columns, is_recording_folder, read_columns
+from seakeep.formats.columns import is_unit, meant_column, named_unit
 from seakeep.signals.time_axis import check_order, instant_text
 
-__all__ = ["expand", "read_columns", "read_table"]
-
-FloatArray = npt.NDArray[np.float64]
+__all__ = ["expand", "read_table"]
 
 _TIMES = {"time", "t", "times", "tid", "tempo", "zeit", "temps", "tiempo", "sec", "seconds",
           "elapsed", "elapsed time", "time elapsed", "timestamp"}  # fmt: skip
-SHOWN = 5
-"""Names of a folder that a message lists at most."""
 _VARIABLE = re.compile(r"\$\{([^}]*)\}")
 
 
@@ -70,80 +61,12 @@ def expand(file: str, folder: Path) -> Path:
 
 def checksum(path: Path) -> str:
     """SHA-256 of a file, or of the names and contents of the files in a bag's folder."""
-    _check_there(path)
-    if not path.is_dir():
+    if not is_recording_folder(path):
         return sha256_of(path)
     digest = hashlib.sha256()
     for part in sorted(each for each in path.iterdir() if each.is_file()):
         digest.update(part.name.encode() + b"\0" + bytes.fromhex(sha256_of(part)))
     return digest.hexdigest()
-
-
-def _check_there(path: Path) -> None:
-    if path.is_dir() and not is_recording(path, b""):
-        raise RequestError(f"{path} is a folder; give the file in it.")
-    if path.exists():
-        return
-    if not path.parent.is_dir():
-        raise MissingFileError(
-            f"{path} does not exist: there is no folder {path.parent}. Paths are relative to the "
-            "campaign file; ${NAME} stands for an environment variable."
-        )
-    beside = sorted(p.name for p in path.parent.iterdir())
-    near = did_you_mean(path.name, beside)
-    likeness = {name: difflib.SequenceMatcher(None, path.name, name).ratio() for name in beside}
-    nearest = sorted(sorted(beside, key=lambda name: -likeness[name])[:SHOWN])
-    shown = ", ".join(nearest) or "nothing"
-    if len(beside) > SHOWN:
-        shown = f"{len(beside)} names, the nearest of them {shown}"
-    raise MissingFileError(
-        f"{path} does not exist.{near} Its folder holds {shown}. Correct the name."
-    )
-
-
-def read_columns(path: Path, options: FileSettings | None = None) -> Columns:
-    """Read the columns of a file, without a look at its time axis.
-
-    Parameters
-    ----------
-    path : Path
-        The file; its kind is recognised by its first bytes, then by its suffix.
-    options : FileSettings, optional
-        What is known about the file.
-
-    Returns
-    -------
-    Columns
-        Its columns.
-
-    Raises
-    ------
-    RequestError
-        If the file does not exist.
-    DataError
-        If it is empty, damaged or of no kind that we read.
-    """
-    options = options or FileSettings()
-    _check_there(path)
-    if path.is_dir():
-        return read_recording(path, options)
-    with path.open("rb") as file:
-        head = file.read(600)
-    if not head:
-        raise DataError(f"{path} is empty (0 bytes). Export the run again.")
-    refuse_foreign(path, head)
-    suffix = path.suffix.lower()
-    if head.startswith(b"\x89HDF"):
-        return read_netcdf(path, options)
-    if head.startswith(b"MATLAB") or suffix == ".mat":
-        return read_matlab(path, options)
-    if head.startswith(b"CDF") or suffix in (".nc", ".nc4", ".h5", ".hdf5", ".hdf"):
-        return read_netcdf(path, options)
-    if head.startswith(b"TDSm") or suffix == ".tdms":
-        return read_tdms(path, options)
-    if is_recording(path, head):
-        return read_recording(path, options)
-    return read_text(path, options)
 
 
 def read_table(
@@ -178,7 +101,7 @@ def read_table(
         If the file is damaged, a cell is no number, or times are missing, repeated or unsorted.
     """
     path, options = Path(path), options or FileSettings()
-    return labelled_table(path, read_columns(path, options), options, columns)
+    return labelled_table(path, read_columns(path, options.known()), options, columns)
 
 
 def labelled_table(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import fields
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
@@ -22,6 +23,7 @@ from pydantic import (
 
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
+from seakeep.formats import Options
 from seakeep.toml import (
     Delay,
     Duration,
@@ -124,6 +126,10 @@ class FileSettings(Table):
         description="the part of a file that is read, where it holds several: the group of a TDMS, "
         "HDF5 or NetCDF file, the topic of a ROS 2 bag or MCAP file",
     )
+
+    def known(self) -> Options:
+        """What a reader is told of these."""
+        return Options(**{each.name: getattr(self, each.name) for each in fields(Options)})
 
 
 class ChannelSettings(Table):

@@ -16,10 +16,10 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from seakeep.campaign import Campaign, read_campaign
-from seakeep.campaign.checksums import sha256_of
 from seakeep.campaign.readers import expand
 from seakeep.campaign.settings import ModelSettings
 from seakeep.errors import did_you_mean
+from seakeep.files import sha256_of
 from seakeep.study.store import FORMAT
 from seakeep.toml import Count, Mistake, Names, Positive, Table, read_toml, refusal, validated
 

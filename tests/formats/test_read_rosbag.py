@@ -203,7 +203,7 @@ def test_messages_that_are_missing(tmp_path):
 def test_foreign_and_empty(tmp_path, name):
     path = tmp_path / name
     path.write_bytes("tid;hiv é\n1;2\n".encode("latin-1"))
-    with pytest.raises(DataError, match=r"is no (MCAP file|ROS 2 bag): it holds text and begins"):
+    with pytest.raises(DataError, match=r"is no (MCAP|ROS 2 bag) file: it holds text and begins"):
         read_table(path)
     path.write_bytes(b"")
     with pytest.raises(DataError, match=r"is empty \(0 bytes\)"):
@@ -211,7 +211,7 @@ def test_foreign_and_empty(tmp_path, name):
 
 
 def test_a_folder_that_is_no_bag(tmp_path):
-    with pytest.raises(RequestError, match="is a folder; give the file in it"):
+    with pytest.raises(RequestError, match="is a folder, and only regular files"):
         read_table(tmp_path)
     (tmp_path / "metadata.yaml").write_text("a: [", encoding="utf-8")
     with pytest.raises(DataError, match="cannot be read as a recording of ROS 2"):

@@ -6,6 +6,7 @@ Needs nptdms, the extra ``tdms`` (its licence is the LGPL, so it is never instal
 from __future__ import annotations
 
 import struct
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,42 +14,23 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.campaign.columns import Columns
-from seakeep.campaign.settings import FileSettings
+from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.formats.columns import Columns, check_lengths
+from seakeep.formats.reader import Options
 
 __all__ = ["read_tdms"]
-
-FloatArray = npt.NDArray[np.float64]
 
 LEAD_IN = 28
 _UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
 
 
-def read_tdms(path: Path, options: FileSettings) -> Columns:
-    """Read the channels of one group of a TDMS file.
+def read_tdms(path: Path, options: Options) -> Columns:
+    """Read the channels of one group of a TDMS file, scaled as the file says.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    options : FileSettings
-        Only `group` is used; it may be left out where the file has one group with channels, or
-        where the channels of all groups are sampled alike.
-
-    Returns
-    -------
-    Columns
-        Its channels, scaled as the file says, with the units of their properties; a column
-        ``time`` (s) from the waveform properties ``wf_start_offset`` and ``wf_increment`` where
-        there are such. Instants (channels of time stamps) are seconds after their first.
-
-    Raises
-    ------
-    RequestError
-        If nptdms is not installed, or the group does not exist or must be chosen.
-    DataError
-        If the file is empty, cut off or damaged, or channels differ in length or increment.
+    A column ``time`` (s) comes from the waveform properties ``wf_start_offset`` and
+    ``wf_increment``. Instants (channels of time stamps) are seconds after their first. `group` may
+    be left out where one group has channels, or all are sampled alike.
     """
     try:
         import nptdms
@@ -132,16 +114,14 @@ def _columns(path: Path, channels: list[Any], data: list[npt.NDArray[Any]]) -> C
         raise DataError(
             f"{path} holds no channels of numbers with at least two samples. Export the run again."
         )
-    lengths = {channel.name: values.size for channel, values in zip(channels, data, strict=True)}
-    if len(set(lengths.values())) > 1:
-        listed = ", ".join(f"{name} {length}" for name, length in lengths.items())
-        raise DataError(
-            f"{path}: the channels differ in length ({listed}). Put channels of one clock into one "
-            "group, and state it with group = 'NAME' in [files]."
-        )
-    bare = [channel.name for channel in channels]
+    check_lengths(
+        path,
+        {channel.name: values for channel, values in zip(channels, data, strict=True)},
+        "Put channels of one clock into one group, and state it with group = 'NAME' in [files].",
+    )
+    bare = Counter(channel.name for channel in channels)
     names = [
-        channel.name if bare.count(channel.name) == 1 else f"{channel.group_name}/{channel.name}"
+        channel.name if bare[channel.name] == 1 else f"{channel.group_name}/{channel.name}"
         for channel in channels
     ]
     values, units = {}, {}

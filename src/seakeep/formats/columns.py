@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
+from seakeep.arrays import FloatArray
 from seakeep.conventions import si_unit
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import DataError, RequestError, did_you_mean
 
-__all__ = ["Columns", "is_unit", "meant_column", "named_unit", "split_unit", "unique_names"]
-
-FloatArray = npt.NDArray[np.float64]
+__all__ = [
+    "Columns",
+    "check_lengths",
+    "is_unit",
+    "meant_column",
+    "named_unit",
+    "split_unit",
+    "unique_names",
+]
 
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*\Z")
 _PARENTHESES = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\s*\Z")
@@ -163,9 +169,17 @@ def unique_names(headers: Iterable[str]) -> tuple[list[str], list[str | None]]:
     """Names and units of headers; the unit stays in a name that would not be unique without it."""
     full = [header.strip() for header in headers]
     pairs = [split_unit(header) for header in full]
-    bare = [name for name, _ in pairs]
+    count = Counter(name for name, _ in pairs)
     names = [
-        name if bare.count(name) == 1 or not name else header
-        for name, header in zip(bare, full, strict=True)
+        name if count[name] == 1 or not name else header
+        for (name, _), header in zip(pairs, full, strict=True)
     ]
     return names, [unit for _, unit in pairs]
+
+
+def check_lengths(path: Path, vectors: Mapping[str, FloatArray], mend: str = "") -> None:
+    """Refuse channels that differ in length."""
+    if len({vector.size for vector in vectors.values()}) > 1:
+        listed = ", ".join(f"{name} {vector.size}" for name, vector in vectors.items())
+        mend = mend or "Save channels of one clock, each as long as the time."
+        raise DataError(f"{path}: the channels differ in length ({listed}). {mend}")

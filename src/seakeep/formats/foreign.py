@@ -1,4 +1,4 @@
-"""What kind of file a file is, by its first bytes; and what to do about one that is no table."""
+"""Files that are no tables, recognised by their first bytes, and what to do about them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from seakeep.errors import DataError
 
-__all__ = ["refuse_foreign"]
+__all__ = ["refuse_foreign", "refuse_text"]
 
 _DATA = "Name the file that holds the run's samples."
 _SHEET = "Save its sheet as CSV and name that file."
@@ -21,46 +21,24 @@ _FOREIGN = (
     (b"RIFF", "a recording in AVI or WAV", _TRACK),
     (b"\x1aE\xdf\xa3", "a video in Matroska", _TRACK),
 )
-_BINARY = {
-    ".mat": "a MATLAB file",
-    ".nc": "a NetCDF file",
-    ".nc4": "a NetCDF file",
-    ".h5": "an HDF5 file",
-    ".hdf": "an HDF5 file",
-    ".hdf5": "an HDF5 file",
-    ".tdms": "a TDMS file",
-    ".mcap": "an MCAP file",
-    ".db3": "a ROS 2 bag",
-}
-_OURS = (b"MATLAB", b"\x89HDF", b"CDF", b"TDSm", b"\x89MCAP", b"SQLite format 3")
 
 
 def refuse_foreign(path: Path, head: bytes) -> None:
-    """Refuse pictures, workbooks and the like, and text under the name of a binary format.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    head : bytes
-        Its first bytes, a few hundred.
-
-    Raises
-    ------
-    DataError
-        If it is none of the kinds that are read; the message says what it is instead.
-    """
-    for begin, what, mend in _FOREIGN:
-        if head.startswith(begin):
+    """Refuse pictures, workbooks, videos and the like by their first bytes."""
+    for start, what, mend in _FOREIGN:
+        if head.startswith(start):
             raise DataError(f"{path} is {what}, and no table. {mend}")
     if head[4:8] == b"ftyp":
         raise DataError(f"{path} is a video in MP4, and no table. {_TRACK}")
-    kind = _BINARY.get(path.suffix.lower())
-    if kind is not None and not head.startswith(_OURS) and _is_text(head):
+
+
+def refuse_text(path: Path, head: bytes, kind: str) -> None:
+    """Refuse text under the name of a binary format."""
+    if _is_text(head):
         shown = head[:24].decode("latin-1").splitlines()[0] if head.strip() else ""
         raise DataError(
-            f"{path} is no {kind.partition(' ')[2]}: it holds text and begins with {shown!r}. If "
-            "it is a table, name it .csv or .txt; else copy or export it again."
+            f"{path} is no {kind} file: it holds text and begins with {shown!r}. If it is a table, "
+            "name it .csv or .txt; else copy or export it again."
         )
 
 

@@ -8,8 +8,8 @@ import pytest
 import scipy
 
 from seakeep.campaign import read_table
-from seakeep.campaign.readers import read_columns
 from seakeep.errors import DataError, RequestError
+from seakeep.formats import read_columns
 
 T = np.arange(200) * 0.05
 HEAVE, WAVE = np.sin(T), np.cos(T)

@@ -2,8 +2,10 @@
 
 import gzip
 import io
+from time import perf_counter
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 from seakeep.campaign import read_table
 from seakeep.campaign.settings import FileSettings
 from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.formats.columns import unique_names
 
 PLAIN = "Time [s],Heave [mm],Pitch (deg),WP 1\n0,1.5,2,3\n0.1,-1.5,2e-3,4\n0.2,.5,+2,5\n"
 
@@ -237,7 +240,11 @@ def test_round_trip(tmp_path, values, delimiter, comma, units, compressed, newli
         (b"t,heave\n", DataError, "has a header and no rows of numbers"),
         (b"t,heave\ns,m\n", DataError, "has a header and no rows of numbers"),
         (b"t\n0\n1\n", DataError, "holds times and no channel"),
-        (b"\x93\x00\x01PNG" * 9, DataError, "holds binary data that are no text table. Readable"),
+        (
+            b"\x93\x00\x01PNG" * 9,
+            DataError,
+            "holds binary data of a kind that is not known. Export the run as CSV",
+        ),
         (gzip.compress(PLAIN.encode(), mtime=0)[:-12], DataError, r"cut off or damaged \(gzip: "),
         (
             "t,heave\n0,1\n1,x7\n2,3\n",
@@ -280,7 +287,7 @@ def test_round_trip(tmp_path, values, delimiter, comma, units, compressed, newli
             "time,0,0.1,0.2\nheave,1,2,3\n",
             DataError,
             r"the first line is 'time' and 3 numbers, which looks transposed \(2 rows, 4 columns\);"
-            " expected a header, then one row an instant and one column a channel",
+            " expected a header, then one row per instant and one column per channel",
         ),
         (
             "0,0.1,0.2\n1,2,3\n",
@@ -384,9 +391,11 @@ def test_file_that_is_not_there(tmp_path):
         match=r"run1\.csv does not exist\. Did you mean 'run_1\.csv'\? Its folder holds run_1\.csv",
     ):
         read_table(tmp_path / "run1.csv")
-    with pytest.raises(RequestError, match=r"there is no folder .*nowhere. Paths are relative to"):
+    with pytest.raises(RequestError, match=r"there is no folder .*nowhere\. Correct the path"):
         read_table(tmp_path / "nowhere" / "run1.csv")
-    with pytest.raises(RequestError, match="is a folder; give the file in it"):
+    with pytest.raises(
+        RequestError, match=r"is a folder, and only regular files are read\. Give the file in it"
+    ):
         read_table(tmp_path)
 
 
@@ -411,3 +420,86 @@ def test_what_only_a_computer_takes_for_a_number_is_refused(tmp_path, cell):
 def test_a_form_feed_breaks_no_line(tmp_path):
     table = read_table(write(tmp_path, b"time,h,note\n0,1,a\x0cb\n1,2,c\n"), columns=["h"])
     assert list(table["h"].values) == [1.0, 2.0]
+
+
+HEADS = {
+    "a mark": "#Time [s],Heave [mm],Pitch (deg),WP 1\n",
+    "a mark and units": "# Time\tHeave\tPitch\tWP 1\n# s\tmm\tdeg\t-\n",
+    "a mark, then a remark": "# Time [s],Heave [mm],Pitch (deg),WP 1\n# made by a logger\n",
+    "a mark, then a rule": "# Time [s],Heave [mm],Pitch (deg),WP 1\n#-------------\n",
+    "a mark over a row of units": "# Time,Heave,Pitch,WP 1\ns,mm,deg,-\n",
+    "a rule below": "Time [s],Heave [mm],Pitch (deg),WP 1\n-----,-----,-----,----\n",
+    "a rule above": "======\nTime [s],Heave [mm],Pitch (deg),WP 1\n",
+    "a rule below the units": "Time,Heave,Pitch,WP 1\ns,mm,deg,-\n--------------\n",
+    "ranges": "Time [s],Heave [mm],Pitch (deg),WP 1\n0 : -0,0 : -0,0 : -0,0 : -0\n",
+    "one range": "Time [s],Heave [mm],Pitch (deg),WP 1\n0 : -0\n",
+}
+
+
+@pytest.mark.parametrize("head", HEADS.values(), ids=HEADS)
+def test_heads_of_loggers(tmp_path, head):
+    run = read_table(write(tmp_path, head + PLAIN.split("\n", 1)[1]))
+    assert run["Heave"].attrs["units"] == "mm"
+    assert run["Pitch"].attrs["units"] == "deg"
+    np.testing.assert_array_equal(run["WP 1"], [3, 4, 5])
+
+
+def test_a_row_of_dashes_among_the_numbers_is_a_fault(tmp_path):
+    path = write(tmp_path, "t,heave\n0,1\n1,--\n2,3\n")
+    with pytest.raises(DataError, match=r"line 3, column 'heave': '--' is not a number"):
+        read_table(path)
+
+
+def test_comments_and_blank_lines_among_the_numbers(tmp_path):
+    path = write(tmp_path, "t,h\n0,1\n# a pause\n1,2\n\n,\n2,x\n3,4\n")
+    with pytest.raises(DataError, match=r"line 7, column 'h': 'x' is not a number"):
+        read_table(path)
+    path.write_text(path.read_text().replace("x", "3"))
+    np.testing.assert_array_equal(read_table(path)["h"], [1, 2, 3, 4])
+
+
+def test_exponents_of_fortran(tmp_path):
+    run = read_table(write(tmp_path, "t h\n0 1.5D+01\n1 -2d-1\n"))
+    np.testing.assert_array_equal(run["h"], [15.0, -0.2])
+
+
+def test_an_open_quotation_mark(tmp_path):
+    path = write(tmp_path, 't,h,note\n0,1,"a\n1,2,b\n')
+    with pytest.raises(DataError, match="Look for a quotation mark that is not closed"):
+        read_table(path)
+
+
+def test_a_gzip_that_unpacks_without_end(tmp_path):
+    path = write(tmp_path, gzip.compress(b"0" * 2**28 + b"0", 1, mtime=0), "run.csv.gz")
+    with pytest.raises(DataError, match=r"unpacks to more than 256 MiB, over 100 times its size"):
+        read_table(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-9", "hex", "a\0b"])
+def test_encodings_that_do_not_exist(tmp_path, encoding):
+    with pytest.raises(DataError, match=r"the encoding .* is not known\. Write 'utf-8'"):
+        read_table(write(tmp_path, PLAIN), FileSettings(encoding=encoding))
+
+
+def test_a_header_without_end(tmp_path):
+    path = write(tmp_path, "t," + "h" * 140_000 + "\n0,1\n1,2\n")
+    with pytest.raises(DataError, match=r"its head cannot be divided into cells \(field larger"):
+        read_table(path)
+
+
+def test_many_columns_take_a_time_that_grows_with_them(tmp_path):
+    """Twenty thousand names, which a search through all of them for each takes a minute."""
+    names = [f"x{i}" for i in range(20_000)]
+    start = perf_counter()
+    assert unique_names(names)[0] == names
+    assert perf_counter() - start < 2.0  # 0.1 s; 5 s where it grows with the square
+
+
+def test_a_text_is_parsed_once(tmp_path, monkeypatch):
+    parsed, read_csv = [], pd.read_csv
+    monkeypatch.setattr(pd, "read_csv", lambda *a, **k: parsed.append(1) or read_csv(*a, **k))
+    path = write(tmp_path, "t,h,state,on\n0,1,ok,True\n1,2,ok,False\n")
+    assert list(read_table(path, columns=["h"]).data_vars) == ["h"]
+    assert len(parsed) == 1
+    with pytest.raises(DataError, match="line 2, column 'on': True is not a number"):
+        read_table(path, columns=["on"])

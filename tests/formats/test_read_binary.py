@@ -152,10 +152,59 @@ def test_hdf5(tmp_path):
 def test_hdf5_group(tmp_path):
     write_hdf5(tmp_path / "run.h5", "basin/run7")
     check(read_table(tmp_path / "run.h5", FileSettings(group="basin/run7")))
-    with pytest.raises(DataError, match=r"holds no channels.*state 'group'"):
-        read_table(tmp_path / "run.h5")
-    with pytest.raises(DataError, match=r"has no group 'basin/run8'. Correct 'group'"):
+    check(read_table(tmp_path / "run.h5"))  # the only one
+    with pytest.raises(
+        DataError,
+        match=r"has no group 'basin/run8'\. Did you mean 'basin/run7'\? Its groups: 'basin/run7' "
+        r"\(3 sets\)\. Correct 'group'",
+    ):
         read_table(tmp_path / "run.h5", FileSettings(group="basin/run8"))
+
+
+def test_hdf5_groups_are_listed(tmp_path):
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        for group in ("run1", "run2"):
+            file[f"{group}/time"], file[f"{group}/heave"], file[f"{group}/wave"] = T, HEAVE, WAVE
+            file[f"{group}/heave"].attrs["units"] = "mm"
+    with pytest.raises(
+        DataError,
+        match=r"no channels outside its groups: 'run1' \(3 sets\), 'run2' \(3 sets\)\. State which "
+        r"one with group = 'NAME' in \[files\], or give --group NAME to seakeep init",
+    ):
+        read_table(tmp_path / "run.h5")
+    check(read_table(tmp_path / "run.h5", FileSettings(group="run2")))
+
+
+def test_hdf5_sets_of_several_columns_are_split(tmp_path):
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["time"], file["acc"] = T, np.column_stack([HEAVE, WAVE, T])
+        file["acc"].attrs["units"] = "m/s2"
+        file["picture"], file["cube"] = np.zeros((200, 65)), np.zeros((200, 2, 2))
+    columns = ["acc_1", "acc_2", "acc_3"]
+    run = read_table(tmp_path / "run.h5", columns=columns)
+    np.testing.assert_array_equal(run["acc_2"], WAVE)
+    assert [run[name].attrs["units"] for name in columns] == ["m/s2"] * 3
+    with pytest.raises(DataError, match=r"'picture' has 65 columns without names; beyond 64"):
+        read_table(tmp_path / "run.h5", columns=["picture"])
+    with pytest.raises(
+        DataError, match=r"'cube' has 3 dimensions \(200, 2, 2\), and a channel has"
+    ):
+        read_table(tmp_path / "run.h5", columns=["cube"])
+
+
+@pytest.mark.parametrize("suffix", ["h5", "mat"])
+def test_hdf5_that_declares_more_than_it_stores(tmp_path, suffix):
+    path = tmp_path / f"run.{suffix}"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["time"] = T
+        file.create_dataset("heave", (10**9,), "f8", chunks=(1024,))
+    if suffix == "mat":
+        with path.open("r+b") as raw:
+            raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+    with pytest.raises(
+        DataError, match=r"'heave' declares 1000000000 values \(7629 MiB\), and 0 Mi"
+    ):
+        read_table(path)
 
 
 def test_hdf5_integers_and_float32(tmp_path):

@@ -1,7 +1,7 @@
 """Tables in recordings of ROS 2: bags (a folder, or its file) and MCAP.
 
-A topic is a table: a row a message, a column a number in it. Needs rosbags, the extra ``ros``;
-no installation of ROS.
+A topic is a table: one row per message, one column per number in it. Needs rosbags, the extra
+``ros``; no installation of ROS.
 """
 
 from __future__ import annotations
@@ -13,17 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from seakeep.campaign.columns import Columns
-from seakeep.campaign.settings import FileSettings
+from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+from seakeep.formats.columns import Columns
+from seakeep.formats.reader import Options
 
-__all__ = ["is_recording", "read_recording"]
+__all__ = ["read_recording"]
 
-FloatArray = npt.NDArray[np.float64]
-
-_MCAP, _SQLITE = b"\x89MCAP0\r\n", b"SQLite format 3\x00"
 _STANDARD = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/")
 _UNITS = {
     "angular_velocity": "rad/s", "linear_acceleration": "m/s^2", "force": "N", "torque": "N m",
@@ -36,38 +33,14 @@ LARGEST_ARRAY = 64
 """Elements of an array field beyond which it is a picture or a cloud, not channels."""
 
 
-def is_recording(path: Path, head: bytes) -> bool:
-    """Whether a path is a ROS 2 bag's folder, one of its files, or an MCAP file."""
-    if path.is_dir():
-        return (path / "metadata.yaml").is_file()
-    return head.startswith((_MCAP, _SQLITE)) or path.suffix.lower() in (".mcap", ".db3")
+def read_recording(path: Path, options: Options) -> Columns:
+    """Read one topic of a ROS 2 bag (its folder or ``.db3`` file) or an MCAP file.
 
-
-def read_recording(path: Path, options: FileSettings) -> Columns:
-    """Read one topic of a ROS 2 bag or an MCAP file.
-
-    Parameters
-    ----------
-    path : Path
-        The bag's folder, its ``.db3`` file, or an ``.mcap`` file.
-    options : FileSettings
-        `group` is the topic; it may be left out where only one holds numbers.
-
-    Returns
-    -------
-    Columns
-        A column a number, named by its place in the message: ``angular_velocity.y``,
-        ``data[0]``. Units where the message is a standard one, whose units are fixed. ``time``:
-        the header's stamps where the message has a header that is stamped, else the times of
-        reception; ``receive_time`` beside it in the first case. Both count seconds from the
-        recording's first message, whatever its topic.
-
-    Raises
-    ------
-    RequestError
-        If rosbags is not installed, or the topic does not exist or must be chosen.
-    DataError
-        If the recording is empty, cut off, or of a kind that is not read.
+    A column per number, named by its place in the message: ``angular_velocity.y``, ``data[0]``.
+    Units where the message is a standard one, whose units are fixed. ``time``: the header's stamps
+    where the message has a header that is stamped, else the times of reception; ``receive_time``
+    beside it in the first case. Both count seconds from the recording's first message, whatever
+    its topic. `group` is the topic; it may be left out where only one holds numbers.
     """
     try:
         from rosbags import highlevel, typesys

@@ -1,0 +1,212 @@
+"""Tables in MATLAB files of every version."""
+
+from __future__ import annotations
+
+import struct
+import warnings
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from pymatreader import read_mat
+
+from seakeep.arrays import FloatArray
+from seakeep.errors import DataError
+from seakeep.formats.columns import Columns, check_lengths, unique_names
+from seakeep.formats.limits import check_declared
+from seakeep.formats.reader import Options
+
+__all__ = ["read_matlab"]
+
+_NAME_KEYS = ("names", "channels", "labels", "channel_names", "name")
+_UNIT_KEYS = ("units", "unit")
+_RATE_KEYS = ("fs", "Fs", "FS", "sampling_rate", "sample_rate")
+_STEP_KEYS = ("dt", "Ts", "DT")
+_VERSION_73 = b"MATLAB 7."
+"""Older files start with ``MATLAB 5.0 MAT-file``, whichever release wrote them."""
+
+
+def read_matlab(path: Path, options: Options) -> Columns:
+    """Read a MATLAB file: vectors, one struct of vectors, or a matrix with a list of names.
+
+    Units are taken from ``units``: a struct of texts, or a list beside the names.
+    """
+    found = _unwrapped({k: v for k, v in _loaded(path).items() if not k.startswith(("__", "#"))})
+    units = _units(found)
+    vectors = _named_matrix(path, found) or _vectors(path, found)
+    check_lengths(path, vectors)
+    names, in_headers = unique_names(vectors)
+    for name, unit in zip(names, in_headers, strict=True):
+        if unit is not None:
+            units.setdefault(name, unit)
+    values = dict(zip(names, vectors.values(), strict=True))
+    return Columns(
+        values=values,
+        units={name: unit for name, unit in units.items() if name in values},
+        headers=dict(zip(names, vectors, strict=True)),
+        sampling_rate=_rate(found),
+    )
+
+
+def _loaded(path: Path) -> dict[str, Any]:
+    """Variables of a file; those that MATLAB alone can read are left out."""
+    with path.open("rb") as file:
+        hdf5 = file.read(len(_VERSION_73)) == _VERSION_73
+    version = "version 7.3" if hdf5 else "version 5"
+    try:
+        opaque = _opaque(path) if hdf5 else {}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of classes: they are no channels
+            content = read_mat(path, ignore_fields=[name.rpartition("/")[2] for name in opaque])
+    except RecursionError:
+        raise _damaged(path, version, "structs and cells nest without end") from None
+    except (OSError, ValueError, TypeError, KeyError, IndexError, RuntimeError, AttributeError,
+            EOFError, NotImplementedError, AssertionError, MemoryError, zlib.error,
+            struct.error) as error:  # fmt: skip
+        raise _damaged(path, version, str(error) or type(error).__name__) from None
+    # HDF5 keeps no order, and pymatreader hands names on as a set.
+    content = _in_order(content) if hdf5 else content
+    if opaque and not content:
+        listed = ", ".join(f"{name} ({kind})" for name, kind in opaque.items())
+        raise DataError(
+            f"{path} holds only variables that MATLAB alone can read: {listed}. Save the columns "
+            "as a struct of vectors: run = table2struct(T, 'ToScalar', true)."
+        )
+    return content
+
+
+def _in_order(content: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: _in_order(v) if isinstance(v, dict) else v for k, v in sorted(content.items())}
+
+
+def _opaque(path: Path) -> dict[str, str]:
+    """Variables and fields that only MATLAB can read (table, string, sparse …), with their kind."""
+    found: dict[str, str] = {}
+
+    def look(name: str, item: h5py.Dataset | h5py.Group) -> None:
+        if name.startswith("#"):
+            return
+        if "MATLAB_sparse" in item.attrs:
+            found[name] = "sparse"
+        elif "MATLAB_object_decode" in item.attrs:
+            found[name] = bytes(item.attrs.get("MATLAB_class", b"object")).decode(
+                "ascii", "replace"
+            )
+
+    with h5py.File(path, "r") as file:
+        check_declared(path, file)
+        file.visititems(look)
+    return found
+
+
+def _damaged(path: Path, version: str, said: str) -> DataError:
+    return DataError(
+        f"{path} cannot be read as a MATLAB file of {version}: cut off or damaged "
+        f"({said.splitlines()[0]}). Save it again from MATLAB."
+    )
+
+
+def _unwrapped(found: dict[str, Any]) -> dict[str, Any]:
+    """What the only struct of a file holds, with the numbers and texts that stand beside it."""
+    while True:
+        structs = [key for key, value in found.items() if isinstance(value, dict)]
+        beside = {key: value for key, value in found.items() if not isinstance(value, dict)}
+        plain = all(isinstance(value, str) or np.size(value) == 1 for value in beside.values())
+        if len(structs) != 1 or structs[0] in _UNIT_KEYS or not plain:
+            return found
+        found = {**beside, **found[structs[0]]}
+
+
+def _rate(found: Mapping[str, Any]) -> float | None:
+    for keys, inverse in ((_RATE_KEYS, False), (_STEP_KEYS, True)):
+        for key in keys:
+            value = found.get(key)
+            if isinstance(value, int | float | np.number) and value > 0:
+                return 1.0 / float(value) if inverse else float(value)
+    return None
+
+
+def _texts(value: Any) -> list[str] | None:
+    if isinstance(value, str):
+        return None
+    cells = list(np.atleast_1d(np.asarray(value, dtype=object)))
+    return [cell.strip() for cell in cells] if all(isinstance(c, str) for c in cells) else None
+
+
+def _first(found: Mapping[str, Any], keys: tuple[str, ...]) -> Any:
+    return next((found[key] for key in keys if key in found), None)
+
+
+def _units(found: Mapping[str, Any]) -> dict[str, str]:
+    units = _first(found, _UNIT_KEYS)
+    if isinstance(units, dict):
+        return {name: unit for name, unit in units.items() if isinstance(unit, str)}
+    names, listed = _texts(_first(found, _NAME_KEYS)), None if units is None else _texts(units)
+    if names and listed and len(names) == len(listed):
+        return dict(zip(names, listed, strict=True))
+    return {}
+
+
+def _named_matrix(path: Path, found: Mapping[str, Any]) -> dict[str, FloatArray]:
+    """Columns of a matrix beside which their names stand; empty if there is none."""
+    raw = _first(found, _NAME_KEYS)
+    names = None if raw is None else _texts(raw)
+    if not names:
+        return {}
+    matrices = {k: v for k, v in found.items() if isinstance(v, np.ndarray) and v.ndim == 2}
+    for key, matrix in matrices.items():
+        if not np.issubdtype(matrix.dtype, np.number):
+            continue
+        rows, columns = matrix.shape
+        if columns == len(names):
+            out = {n: matrix[:, i].astype(float) for i, n in enumerate(names)}
+            vectors = {
+                k: v.astype(float)
+                for k, v in found.items()
+                if isinstance(v, np.ndarray) and v.dtype.kind in "fiu" and v.shape == (rows,)
+            }
+            return {**vectors, **out}
+        if rows == len(names):
+            raise _transposed(path, key, matrix.shape)
+    shapes = ", ".join(f"{key} {value.shape}" for key, value in matrices.items()) or "none"
+    raise DataError(
+        f"{path} lists {len(names)} channel names, and no matrix has as many columns (matrices: "
+        f"{shapes}). A matrix is (time, channel), one name a column."
+    )
+
+
+def _transposed(path: Path, key: str, shape: tuple[int, ...]) -> DataError:
+    return DataError(
+        f"{path}: '{key}' has shape {shape}, which looks transposed; expected (time, channel) = "
+        f"({shape[1]}, {shape[0]}). Save it transposed: nothing is turned silently."
+    )
+
+
+def _vectors(path: Path, found: Mapping[str, Any]) -> dict[str, FloatArray]:
+    vectors, matrices = {}, {}
+    for name, value in found.items():
+        array = np.asarray(value) if not isinstance(value, str | dict) else np.empty(0, object)
+        if not (np.issubdtype(array.dtype, np.number) or array.dtype == bool) or array.size < 2:
+            continue
+        if np.iscomplexobj(array) or array.ndim > 2:
+            continue
+        if array.ndim == 1:
+            vectors[name] = array.astype(float)
+        else:
+            matrices[name] = array
+    if vectors:
+        return vectors
+    for name, matrix in matrices.items():
+        if matrix.shape[0] < matrix.shape[1]:
+            raise _transposed(path, name, matrix.shape)
+        raise DataError(
+            f"{path}: the matrix '{name}' {matrix.shape} has no names for its columns. Save a cell "
+            "array 'names' beside it, or one vector a channel."
+        )
+    raise DataError(
+        f"{path} holds no channels; found {', '.join(found) or 'nothing'}. Save one vector a "
+        "channel, a struct of vectors, or a matrix (time, channel) with a cell array 'names'."
+    )

@@ -1,0 +1,156 @@
+"""Tables in NetCDF and HDF5 files."""
+
+from __future__ import annotations
+
+import struct
+import warnings
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import xarray as xr
+
+from seakeep.errors import DataError, did_you_mean
+from seakeep.formats.columns import Columns
+from seakeep.formats.limits import check_declared
+from seakeep.formats.reader import Options
+
+__all__ = ["read_netcdf"]
+
+WIDEST = 64
+"""Columns of a two-dimensional set beyond which it is a picture or a field, not channels."""
+
+
+def read_netcdf(path: Path, options: Options) -> Columns:
+    """Read a NetCDF or HDF5 file: one variable per channel, all along one dimension.
+
+    A set of shape (time, n) is split: by the labels of its second dimension, or ``NAME_1`` to
+    ``NAME_n``. `group` may be left out where one group alone holds channels.
+    """
+    dataset = _opened(path, options.group)
+    flat: dict[str, xr.DataArray] = {}
+    faults: dict[str, str] = {}
+    for name, variable in dataset.variables.items():
+        array = dataset[name] if name in dataset else xr.DataArray(variable)
+        if array.dtype.kind not in "fiub" or array.ndim == 0 or array.size < 2:
+            continue
+        try:
+            flat.update(_split(path, str(name), array))
+        except DataError as error:
+            faults[str(name)] = str(error)
+    if not flat and not faults:
+        raise DataError(
+            f"{path} holds no channels; found variables {', '.join(map(str, dataset.variables))}. "
+            "Expected one variable per channel along one dimension."
+        )
+    axis = _time_axis(flat, options.time)
+    length = next((array.size for array in flat.values() if array.dims == (axis,)), 0)
+    faults |= {
+        name: f"{path}: '{name}' has {array.size} values along '{array.dims[0]}', and the time "
+        f"{length} along '{axis}'. Save channels of one clock, each as long as the time, or "
+        "put each clock's channels into a file of its own."
+        for name, array in flat.items()
+        if array.dims != (axis,)
+    }
+    flat = {name: array for name, array in flat.items() if array.dims == (axis,)}
+    values = {name: array.to_numpy().astype(float) for name, array in flat.items()}
+    units = {
+        name: _text(array.attrs["units"]) for name, array in flat.items() if "units" in array.attrs
+    }
+    return Columns(values, units, faults, headers={name: name for name in [*values, *faults]})
+
+
+def _text(attribute: Any) -> str:
+    """Text of an attribute, which HDF5 may hold as bytes of any encoding."""
+    if not isinstance(attribute, bytes):
+        return str(attribute)
+    try:
+        return attribute.decode("utf-8")
+    except UnicodeDecodeError:
+        return attribute.decode("latin-1")
+
+
+def _opened(path: Path, group: str | None) -> xr.Dataset:
+    with path.open("rb") as file:
+        classic = file.read(3) == b"CDF"
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UnicodeWarning)  # units in another encoding: see _text
+            how: dict[str, Any] = {"engine": "scipy"}
+            if not classic:
+                how = {"engine": "h5netcdf", "group": _group(path, group), "phony_dims": "sort"}
+            with xr.open_dataset(path, decode_times=False, **how) as opened:
+                return opened.load()
+    except DataError:
+        raise
+    except (OSError, ValueError, TypeError, KeyError, IndexError, EOFError, RuntimeError,
+            AttributeError, MemoryError, struct.error, zlib.error) as error:  # fmt: skip
+        raise DataError(
+            f"{path} cannot be read as NetCDF or HDF5: cut off, damaged or of another kind "
+            f"({str(error).splitlines()[0] if str(error) else type(error).__name__}). "
+            "Copy or download it again."
+        ) from None
+
+
+def _group(path: Path, wanted: str | None) -> str | None:
+    """Group of an HDF5 file that is read: the one stated, the root, or the only one with sets."""
+    holding: dict[str, int] = {}
+
+    def look(name: str, item: h5py.Dataset | h5py.Group) -> None:
+        if isinstance(item, h5py.Dataset) and item.ndim and item.dtype.kind in "fiub":
+            parent = name.rpartition("/")[0]
+            holding[parent] = holding.get(parent, 0) + 1
+
+    with h5py.File(path, "r") as file:
+        check_declared(path, file)
+        file.visititems(look)
+        listed = ", ".join(f"'{name}' ({count} sets)" for name, count in holding.items() if name)
+        if wanted is not None and not isinstance(file.get(wanted), h5py.Group):
+            raise DataError(
+                f"{path} has no group '{wanted}'.{did_you_mean(wanted, filter(None, holding))} "
+                f"Its groups: {listed or 'none'}. Correct 'group' in [files]."
+            )
+    if wanted is not None or "" in holding or not holding:
+        return wanted
+    if len(holding) > 1:
+        raise DataError(
+            f"{path} holds no channels outside its groups: {listed}. State which one with group = "
+            "'NAME' in [files], or give --group NAME to seakeep init."
+        )
+    return next(iter(holding))
+
+
+def _time_axis(flat: Mapping[str, xr.DataArray], time: str | None) -> object:
+    if time is not None and time in flat:
+        return flat[time].dims[0]
+    dims = [array.dims[0] for array in flat.values()]
+    return "time" if "time" in dims else max(dims, key=dims.count, default="time")
+
+
+def _split(path: Path, name: str, array: xr.DataArray) -> dict[str, xr.DataArray]:
+    """Channels of a variable: itself, or its columns where it has two dimensions."""
+    if array.ndim == 1:
+        return {name: array}
+    if array.ndim > 2:
+        raise DataError(
+            f"{path}: '{name}' has {array.ndim} dimensions {tuple(array.shape)}, and a channel has "
+            "one. Save its parts as variables of their own."
+        )
+    (first, second), (rows, count) = array.dims, array.shape
+    if second == "time" or (first != "time" and rows < count):
+        raise DataError(
+            f"{path}: '{name}' has dimensions ({first}: {rows}, {second}: {count}), which "
+            "looks transposed; expected time first, (time, channel). Save it transposed: nothing "
+            "is turned silently."
+        )
+    labels = array.coords.get(second)
+    if labels is not None and labels.dtype.kind in "UOST":
+        return {str(label): array[:, i] for i, label in enumerate(labels.to_numpy())}
+    if count > WIDEST:
+        raise DataError(
+            f"{path}: '{name}' has {count} columns without names; beyond {WIDEST} it is taken for "
+            "a field, not for channels. Save its columns as variables of their own."
+        )
+    return {f"{name}_{i + 1}": array[:, i] for i in range(count)}

@@ -1,0 +1,67 @@
+"""What a reader is, and what it may be told about a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from seakeep.formats.columns import Columns
+
+__all__ = ["Options", "Reader"]
+
+
+@dataclass(frozen=True)
+class Options:
+    r"""What is known about a file; what is left out is recognised.
+
+    Parameters
+    ----------
+    time : str, optional
+        Name of the time column.
+    delimiter, decimal : str, optional
+        Of a text file: ``","``, ``";"``, ``"\\t"`` or ``" "`` for any number of blanks; ``"."`` or
+        ``","``.
+    comment : str, optional
+        Mark of comment lines; ``#`` and ``%`` are known.
+    skip_rows : int
+        Lines to leave out at the head of a text file.
+    encoding : str, optional
+        Encoding of a text file.
+    group : str, optional
+        The part that is read where a file holds several: a group of TDMS or HDF5, a topic of ROS.
+    """
+
+    time: str | None = None
+    delimiter: Literal[",", ";", "\t", " "] | None = None
+    decimal: Literal[".", ","] | None = None
+    comment: str | None = None
+    skip_rows: int = 0
+    encoding: str | None = None
+    group: str | None = None
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A kind of file and the function that reads it.
+
+    Parameters
+    ----------
+    kind : str
+        Name of the kind, for messages.
+    read : callable
+        Called as ``read(path, options)``; returns :class:`Columns`, or raises DataError.
+    signatures : tuple of bytes
+        What such files start with.
+    suffixes : tuple of str
+        What their names end with, in lower case.
+    folder_mark : str
+        Name of a file that marks a folder as one recording.
+    """
+
+    kind: str
+    read: Callable[[Path, Options], Columns]
+    signatures: tuple[bytes, ...] = ()
+    suffixes: tuple[str, ...] = ()
+    folder_mark: str = ""

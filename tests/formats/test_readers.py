@@ -1,0 +1,115 @@
+"""How a reader is found and added, and what paths are read."""
+
+import os
+import socket
+import sys
+import types
+
+import numpy as np
+import pytest
+
+from seakeep import files
+from seakeep.campaign import read_campaign, read_table
+from seakeep.errors import DataError, MissingFileError
+from seakeep.formats import READERS, Columns, Reader, read_columns
+
+READER = """
+import numpy as np
+from seakeep.formats import Columns
+
+def read_raw(path, options):
+    time, heave = np.frombuffer(path.read_bytes()[4:]).reshape(-1, 2).T
+    return Columns({"time": time, "heave": heave}, units={"time": "s", "heave": "mm"})
+"""
+
+
+@pytest.fixture
+def raw(monkeypatch):
+    """A reader in a module of its own, and the one line that adds it."""
+    module = types.ModuleType("raw_reader")
+    exec(READER, module.__dict__)
+    monkeypatch.setitem(sys.modules, "raw_reader", module)
+    added = Reader("RAW", module.read_raw, signatures=(b"RAW1",), suffixes=(".raw",))
+    READERS.append(added)
+    yield
+    READERS.remove(added)
+
+
+@pytest.mark.parametrize("name", ["run.raw", "run.dat"])
+def test_a_reader_is_added_without_touching_the_package(tmp_path, raw, name):
+    t = 0.1 * np.arange(50)
+    path = tmp_path / name
+    path.write_bytes(b"RAW1" + np.column_stack([t, np.sin(t)]).tobytes())
+    np.testing.assert_array_equal(read_columns(path).values["heave"], np.sin(t))
+    (tmp_path / "campaign.toml").write_text(f"[channels.heave]\n[runs.a]\nfile = '{name}'\n")
+    run = read_campaign(tmp_path / "campaign.toml").prepare()["a"]
+    np.testing.assert_allclose(run["heave"], 1e-3 * np.sin(t), rtol=1e-15)
+
+
+def test_a_reader_added_refuses_text_under_its_name(tmp_path, raw):
+    (tmp_path / "run.raw").write_text("time,heave\n0,1\n1,2\n")
+    with pytest.raises(DataError, match=r"run\.raw is no RAW file: it holds text and begins with"):
+        read_columns(tmp_path / "run.raw")
+
+
+def test_columns_are_found_by_name_or_header():
+    table = Columns({"heave": np.zeros(2)}, headers={"heave": "heave [mm]"})
+    assert table.find("heave [mm]") == table.find("heave") == "heave"
+    assert table.find("pitch") is None
+
+
+class TestPaths:
+    """Whatever a path names, the error says it with its reason."""
+
+    def refused(self, path, reason):
+        with pytest.raises(MissingFileError, match=reason) as caught:
+            read_table(path)
+        assert len(str(caught.value)) < 1000
+
+    def test_a_name_too_long(self, tmp_path):
+        self.refused(tmp_path / ("x" * 5000), r"…x+ cannot be read: File name too long\. Correct")
+
+    def test_a_loop_of_links(self, tmp_path):
+        (tmp_path / "a").symlink_to(tmp_path / "b")
+        (tmp_path / "b").symlink_to(tmp_path / "a")
+        self.refused(tmp_path / "a", r"a cannot be read: Too many levels of symbolic links\. Corre")
+
+    def test_a_nul_in_a_name(self):
+        self.refused("run\0.csv", r"run\\0\.csv cannot be read: embedded null byte\. Correct")
+
+    def test_a_home_that_is_unknown(self):
+        self.refused("~nobody-of-this-name/run.csv", "cannot be read: Could not determine home")
+
+    def test_a_file_in_the_place_of_a_folder(self, tmp_path):
+        (tmp_path / "run.csv").write_text("t,h\n")
+        self.refused(tmp_path / "run.csv" / "more.csv", "does not exist: there is no folder")
+
+    @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no FIFO")
+    def test_a_pipe_a_device_and_a_socket(self, tmp_path, monkeypatch):
+        os.mkfifo(tmp_path / "pipe.csv")
+        self.refused(tmp_path / "pipe.csv", r"pipe\.csv is a pipe, and only regular files are read")
+        self.refused("/dev/zero", "/dev/zero is a device, and only regular files are read")
+        monkeypatch.chdir(tmp_path)
+        with socket.socket(socket.AF_UNIX) as made:
+            made.bind("s.csv")
+            self.refused("s.csv", r"s\.csv is a socket, and only regular files are read")
+
+    def test_a_disk_that_fails(self, tmp_path, monkeypatch):
+        path = tmp_path / "run.csv"
+        path.write_text("t,h\n0,1\n1,2\n")
+
+        def fails(*_):
+            raise OSError(5, "Input/output error")
+
+        monkeypatch.setattr("seakeep.formats.TEXT", Reader("text", fails))
+        self.refused(
+            path, r"cannot be read: Input/output error\. Copy the file again, or check the"
+        )
+
+    def test_a_file_that_may_not_be_read(self, tmp_path, monkeypatch):
+        def refuses(*_, **__):
+            raise PermissionError(13, "Permission denied")
+
+        monkeypatch.setattr(files.Path, "stat", refuses)
+        with pytest.raises(MissingFileError, match=r"Permission denied\. Change its permissions"):
+            files.existing_file(tmp_path / "run.csv")
