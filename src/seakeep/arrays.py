@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import DataError, RequestError, SeakeepError
 
 __all__ = [
     "BoolArray",
@@ -46,7 +46,7 @@ _REMEDIES = {
 }
 
 
-def as_real(values: object, name: str) -> FloatArray:
+def as_real(values: object, name: str, error: type[SeakeepError] = RequestError) -> FloatArray:
     """Return real numbers as an array of floats.
 
     Parameters
@@ -55,6 +55,8 @@ def as_real(values: object, name: str) -> FloatArray:
         Numbers, of any shape; a masked array without masked values is taken as it is.
     name : str
         What messages call them.
+    error : type, optional
+        What is raised; a DataError where the values come from a file.
 
     Returns
     -------
@@ -74,27 +76,27 @@ def as_real(values: object, name: str) -> FloatArray:
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
     if hasattr(values, "data_vars"):
-        raise RequestError(
+        raise error(
             f"{name} must be an array; received a Dataset. Select one channel: data['heave']."
         )
-    _check_mask(values, name)
+    _check_mask(values, name, error)
     try:
         array = np.asarray(values)
-    except ValueError as error:
-        raise RequestError(
-            f"{name} must be an array of numbers; received rows of unequal length ({error}). "
+    except ValueError as ragged:
+        raise error(
+            f"{name} must be an array of numbers; received rows of unequal length ({ragged}). "
             "Give every row the same number of values."
         ) from None
     if array.dtype.kind not in "fiub":
         remedy = _REMEDIES.get(array.dtype.kind, "Convert every value to a number, gaps to NaN")
-        raise RequestError(
+        raise error(
             f"{name} must be real numbers; received {type(values).__name__} of type "
             f"{array.dtype}. {remedy}."
         )
     return np.asarray(array, dtype=np.float64)
 
 
-def _check_mask(values: object, name: str) -> None:
+def _check_mask(values: object, name: str, error: type[SeakeepError]) -> None:
     """Refuse masked values, in lists of arrays and in DataArrays too."""
     inner = getattr(values, "data", None) if hasattr(values, "dims") else None
     parts = values if isinstance(values, list | tuple) else (values, inner)
@@ -102,7 +104,7 @@ def _check_mask(values: object, name: str) -> None:
         int(np.ma.getmaskarray(part).sum()) for part in parts if isinstance(part, np.ma.MaskedArray)
     )
     if masked:
-        raise RequestError(
+        raise error(
             f"{name} holds {masked} masked value(s), which would be read as if they were "
             "not masked. Fill them with numpy.ma.filled(values, numpy.nan) and treat them as a "
             "gap, or leave them out."

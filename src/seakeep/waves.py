@@ -38,6 +38,17 @@ def _checked_depth(depth: npt.ArrayLike) -> FloatArray:
     return array
 
 
+def _side_by_side(first: FloatArray, depth: FloatArray) -> tuple[FloatArray, FloatArray]:
+    try:
+        one, other = np.broadcast_arrays(first, depth)
+    except ValueError:
+        raise RequestError(
+            f"shapes {first.shape} and {depth.shape} (of the water depth) do not fit together. "
+            "Give one depth, or one per value."
+        ) from None
+    return one, other
+
+
 def wavenumber(
     frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf, gravity: float = GRAVITY
 ) -> FloatArray:
@@ -71,7 +82,7 @@ def wavenumber(
     >>> round(float(2 * np.pi / k), 2)  # wavelength in metres
     2.11
     """
-    omega, h = np.broadcast_arrays(_checked("the frequency", frequency), _checked_depth(depth))
+    omega, h = _side_by_side(_checked("the frequency", frequency), _checked_depth(depth))
     deep = omega**2 / gravity
     k = np.array(deep, dtype=float)
     finite = np.isfinite(h) & (omega > 0)
@@ -112,7 +123,7 @@ def phase_speed(
     RequestError
         As :func:`wavenumber`.
     """
-    omega, h = np.broadcast_arrays(_checked("the frequency", frequency), _checked_depth(depth))
+    omega, h = _side_by_side(_checked("the frequency", frequency), _checked_depth(depth))
     k = wavenumber(omega, h, gravity)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(omega > 0, omega / k, np.sqrt(gravity * h))
@@ -142,7 +153,7 @@ def group_speed(
     RequestError
         As :func:`wavenumber`.
     """
-    omega, h = np.broadcast_arrays(_checked("the frequency", frequency), _checked_depth(depth))
+    omega, h = _side_by_side(_checked("the frequency", frequency), _checked_depth(depth))
     two_kh = np.where(
         omega > 0, 2.0 * wavenumber(omega, h, gravity) * np.where(omega > 0, h, 1.0), 0
     )
@@ -179,5 +190,6 @@ def wavelength_to_frequency(
     length = _checked("the wavelength", wavelength)
     if np.any(length == 0):
         raise RequestError("the wavelength must be positive; received 0. Give it in metres.")
+    length, h = _side_by_side(length, _checked_depth(depth))
     k = 2.0 * np.pi / length
-    return np.sqrt(gravity * k * np.tanh(k * _checked_depth(depth)))
+    return np.sqrt(gravity * k * np.tanh(k * h))

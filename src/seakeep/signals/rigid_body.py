@@ -23,14 +23,17 @@ __all__ = [
 ]
 
 
-def _vectors(name: str, values: npt.ArrayLike) -> FloatArray:
-    array = as_real(values, name)
-    if array.ndim != 2 or array.shape[1] != 3:
+def _vectors(**values: npt.ArrayLike) -> list[FloatArray]:
+    """Vectors of one length in time, or of one instant; names are those of the arguments."""
+    arrays = [as_real(each, name) for name, each in values.items()]
+    lengths = {len(array) for array in arrays if array.ndim == 2} - {1}
+    if any(array.ndim != 2 or array.shape[1] != 3 for array in arrays) or len(lengths) > 1:
+        received = ", ".join(f"{name}: {a.shape}" for name, a in zip(values, arrays, strict=True))
         raise RequestError(
-            f"{name} must have the shape (time, 3), one column for each of x, y and z; received "
-            f"{array.shape}. Put zeros in the place of what was not measured."
+            "vectors have the shape (time, 3), one column for each of x, y and z, and the same "
+            f"length; received {received}. Put zeros in the place of what was not measured."
         )
-    return array
+    return arrays
 
 
 def _offset(offset: npt.ArrayLike) -> FloatArray:
@@ -67,7 +70,7 @@ def rotation_matrix(angles: npt.ArrayLike) -> FloatArray:
     >>> bool(bow[2] > 0)  # a positive pitch lifts the bow, which points against the waves
     True
     """
-    roll, pitch, yaw = _vectors("the angles", angles).T
+    roll, pitch, yaw = _vectors(angles=angles)[0].T
     cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
     cy, sy = np.cos(yaw), np.sin(yaw)
     rows = [
@@ -110,7 +113,8 @@ def transfer_position(
     True
     """
     r = _offset(offset)
-    turned: FloatArray = _vectors("the position", position) + rotation_matrix(angles) @ r - r
+    moved, turn = _vectors(position=position, angles=angles)
+    turned: FloatArray = moved + rotation_matrix(turn) @ r - r
     return turned
 
 
@@ -141,10 +145,9 @@ def transfer_velocity(
     RequestError
         If a shape is wrong.
     """
-    turn = np.cross(_vectors("the rates", rates), _offset(offset))
-    moved: FloatArray = _vectors("the velocity", velocity) + np.einsum(
-        "tij,tj->ti", rotation_matrix(angles), turn
-    )
+    v, turned, omega = _vectors(velocity=velocity, angles=angles, rates=rates)
+    turn = np.cross(omega, _offset(offset))
+    moved: FloatArray = v + np.einsum("tij,tj->ti", rotation_matrix(turned), turn)
     return moved
 
 
@@ -177,12 +180,15 @@ def transfer_acceleration(
     RequestError
         If a shape is wrong.
     """
-    r, omega = _offset(offset), _vectors("the rates", rates)
-    alpha = _vectors("the angular acceleration", angular_acceleration)
-    turn = np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
-    moved: FloatArray = _vectors("the acceleration", acceleration) + np.einsum(
-        "tij,tj->ti", rotation_matrix(angles), turn
+    r = _offset(offset)
+    a, turned, omega, alpha = _vectors(
+        acceleration=acceleration,
+        angles=angles,
+        rates=rates,
+        angular_acceleration=angular_acceleration,
     )
+    turn = np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
+    moved: FloatArray = a + np.einsum("tij,tj->ti", rotation_matrix(turned), turn)
     return moved
 
 
@@ -223,6 +229,7 @@ def remove_gravity(
     True
     """
     upward = np.array([0.0, 0.0, gravity])
-    force = _vectors("the specific force", specific_force) + (upward if zeroed else 0.0)
+    read, angles = _vectors(specific_force=specific_force, angles=angles)
+    force = read + (upward if zeroed else 0.0)
     turned: FloatArray = np.einsum("tij,tj->ti", rotation_matrix(angles), force) - upward
     return turned

@@ -14,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import FloatArray, IntArray
+from seakeep.arrays import FloatArray, IntArray, as_real, number, positive
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import windowed_lags
-from seakeep.signals.time_axis import uniform_step
+from seakeep.signals.time_axis import as_seconds, check_order, uniform_step
 
 __all__ = [
     "Clock",
@@ -78,12 +78,12 @@ class Clock:
 
     def reference(self, readings: npt.ArrayLike) -> FloatArray:
         """Reference time of readings of this clock, s."""
-        out: FloatArray = (np.asarray(readings, dtype=float) - self.offset) / (1.0 + self.drift)
+        out: FloatArray = (as_real(readings, "the readings") - self.offset) / (1.0 + self.drift)
         return out
 
     def reading(self, time: npt.ArrayLike) -> FloatArray:
         """What this clock reads at reference times, s."""
-        out: FloatArray = self.offset + (1.0 + self.drift) * np.asarray(time, dtype=float)
+        out: FloatArray = self.offset + (1.0 + self.drift) * as_real(time, "the times")
         return out
 
     @property
@@ -180,10 +180,9 @@ def clock_from_pulses(
     (0.3, 20.0, 5)
     """
     sides = [
-        (np.asarray(trigger, float), np.asarray(time, float), "the logger's trigger"),
+        (*_record(trigger, time, "the logger", gaps=True), "the logger's trigger"),
         (
-            np.asarray(reference_trigger, float),
-            np.asarray(reference_time, float),
+            *_record(reference_trigger, reference_time, "the reference", gaps=True),
             "the reference's trigger",
         ),
     ]
@@ -247,11 +246,10 @@ def clock_from_correlation(
     RequestError
         If a record is shorter than the window, or a signal and its times differ in length.
     """
-    a, c = np.asarray(series, float), np.asarray(time, float)
-    b, t = np.asarray(reference, float), np.asarray(reference_time, float)
+    a, c = _record(series, time, "the logger")
+    b, t = _record(reference, reference_time, "the reference")
     step = min(uniform_step(c, "the logger"), uniform_step(t, "the reference"))
-    _check_signal(a, c, "the logger")
-    _check_signal(b, t, "the reference")
+    window, largest_lag = positive(window, "window", "s"), number(largest_lag, "largest_lag")
     begin, end = max(c[0], t[0]), min(c[-1], t[-1])
     if end - begin < window + 2 * largest_lag:
         raise RequestError(
@@ -279,20 +277,24 @@ def clock_from_correlation(
     return replace(clock, method="correlation of windows")
 
 
-def _check_signal(series: FloatArray, time: FloatArray, owner: str) -> None:
-    """Refuse a signal that has gaps, or another length than its times."""
-    if series.shape != time.shape:
+def _record(
+    signal: npt.ArrayLike, time: npt.ArrayLike, owner: str, gaps: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """Signal of a logger and the readings of its clock; gaps are NaN where they are allowed."""
+    x, t = as_real(signal, f"the signal of {owner}"), as_seconds(time, owner)
+    if x.ndim != 1 or x.shape != t.shape:
         raise RequestError(
-            f"the signal of {owner} has shape {series.shape} and its times {time.shape}; one value "
-            "an instant is needed."
+            f"the signal of {owner} has shape {x.shape} and its times {t.shape}; one value per "
+            "instant is needed."
         )
-    lost = np.flatnonzero(~np.isfinite(series))
-    if lost.size:
+    lost = np.flatnonzero(~np.isfinite(x))
+    if lost.size > (x.size - 2 if gaps else 0):
         raise DataError(
             f"the signal of {owner} has {lost.size} missing or infinite value(s), the first at "
             f"sample {lost[0]}. Bridge the gap (seakeep.signals.bridge), or use the record before "
             "or after it."
         )
+    return x, check_order(t, owner)
 
 
 def clock_from_shared(
@@ -324,8 +326,8 @@ def clock_from_shared(
         As :func:`clock_from_correlation`.
     """
     first = clock_from_correlation(series, time, reference, reference_time, window, largest_lag)
-    a, c = np.asarray(series, float), np.asarray(time, float)
-    b, t = np.asarray(reference, float), np.asarray(reference_time, float)
+    a, c = _record(series, time, "the logger")
+    b, t = _record(reference, reference_time, "the reference")
     if np.median(np.diff(c)) < np.median(np.diff(t)):  # the spline goes through the faster one
         inverse = _refined(
             b, t, scipy.interpolate.CubicSpline(c, a), (c[0], c[-1]),
@@ -693,7 +695,7 @@ def time_pulses(
     reach = float(template.x[-1])
     instants, errors = np.full(centres.size, np.nan), np.full(centres.size, np.nan)
     slope = template.derivative()
-    for number, centre in enumerate(centres):
+    for pulse, centre in enumerate(centres):
         at = float(centre)
         for _ in range(8):
             near = (np.abs(time - at) < reach) & np.isfinite(trigger)
@@ -713,7 +715,7 @@ def time_pulses(
             continue
         residual = trigger[near] - design @ solution
         variance = float(residual @ residual) / max(near.sum() - 3, 1)
-        instants[number] = at
+        instants[pulse] = at
         covariance = np.linalg.pinv(design.T @ design)[2, 2]
-        errors[number] = np.sqrt(variance * covariance) / abs(solution[0])
+        errors[pulse] = np.sqrt(variance * covariance) / abs(solution[0])
     return instants, errors

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import BoolArray, FloatArray, positive
+from seakeep.arrays import BoolArray, FloatArray, as_real, positive
 from seakeep.errors import DataError, RequestError
 
 __all__ = [
@@ -31,32 +31,8 @@ STEP_TOLERANCE = 0.01
 
 
 def as_seconds(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
-    """Return times as floats; refuse dates, words and what else is not a number of seconds.
-
-    Parameters
-    ----------
-    time : array_like
-        Instants, s.
-    name : str, optional
-        What the message calls the owner of the times.
-
-    Returns
-    -------
-    ndarray
-        The times, of the same shape.
-
-    Raises
-    ------
-    DataError
-        If they are not numbers.
-    """
-    t = np.asarray(time)
-    if t.dtype.kind not in "iuf":
-        raise DataError(
-            f"the times of {name} are of type {t.dtype}; seconds as numbers are expected. "
-            "Subtract the first instant and divide by one second."
-        )
-    return t.astype(float, copy=False)
+    """Return times as floats; refuse dates, text and what else is not a number of seconds."""
+    return as_real(time, f"the times of {name}", DataError)
 
 
 def instant_text(instant: float, dt: float) -> str:
@@ -344,7 +320,12 @@ def onto_uniform(
     array([ 5.,  6., nan,  7.,  8.])
     """
     report = inspect_times(time, name)
-    t, x = np.asarray(time, dtype=float), np.asarray(series, dtype=float)
+    t, x = as_seconds(time, name), as_real(series, f"the series of {name}")
+    if x.shape[:1] != t.shape:
+        raise RequestError(
+            f"the series of {name} has shape {x.shape} and its times {t.shape}; one value per "
+            "instant is needed. Time runs along the first axis."
+        )
     if report.missing > t.size:
         raise DataError(
             f"{name} misses {report.missing} samples and has {t.size}: its times are hardly a "
@@ -358,7 +339,8 @@ def onto_uniform(
         return t.copy(), out
     if report.jittered:
         flat, source = out.reshape(out.shape[0], -1), x.reshape(t.size, -1)
-        for begin_row, end_row in stretches(np.isfinite(source).all(axis=1), place):
+        there = np.asarray(np.isfinite(source).all(axis=1))
+        for begin_row, end_row in stretches(there, place):
             part = slice(begin_row, end_row)
             if end_row - begin_row >= 4:
                 spline = scipy.interpolate.CubicSpline(t[part], source[part])
@@ -450,7 +432,7 @@ def bridge(series: npt.ArrayLike, dt: float, longest: float) -> Bridged:
     >>> bridge([0.0, 1.0, float("nan"), 3.0], 1.0, 2.0).values
     array([0., 1., 2., 3.])
     """
-    x = np.asarray(series, dtype=float)
+    x = as_real(series, "the series")
     positive(dt, "the time step", "s")
     if x.ndim != 1:
         raise RequestError(f"one series at a time is bridged; received shape {x.shape}.")

@@ -446,6 +446,10 @@ def peak_period(
         raise DataError("the record is constant: it has no peak period. Look for a dead probe.")
     options = paper_welch(dt) if preset == "paper" else (None, None, None)
     frequency, density = wave_spectrum(x, dt, *options)
+    if density.size < 3:
+        raise DataError(
+            f"the record has {x.size} samples, too few for the peak of a spectrum. Give more."
+        )
     top = int(np.clip(np.argmax(density), 1, density.size - 2))
     shift = np.clip(parabola_peak(*density[top - 1 : top + 2])[0], -0.5, 0.5)
     return float(1.0 / (frequency[top] + shift * frequency[1]))
