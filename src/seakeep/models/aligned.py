@@ -226,7 +226,13 @@ def prepare_loop(model: Aligning, run: xr.Dataset, window: ForecastWindow) -> Lo
         run=run,
         window=window,
         raw=labelled.channel_matrix(run, model.inputs, window.name, needed),
-        carriers=alignment.carry(run, model.inputs, window.name, stretch, alignment.surge_range),
+        carriers=alignment.carry(
+            run,
+            model.inputs,
+            window.name,
+            labelled.channel_matrix(run, model.inputs, window.name, stretch),
+            alignment.surge_range,
+        ),
         places=alignment.offsets(run, model.inputs),
         first=at - stretch.start,
     )

@@ -218,7 +218,7 @@ class FittedAlignment:
         run: xr.Dataset,
         inputs: Sequence[str],
         name: str,
-        samples: slice,
+        values: FloatArray,
         surges: tuple[float, float],
     ) -> list[CarriedElevation | None]:
         """Prepare the elevations of a stretch of a run; None for inputs that are none.
@@ -231,8 +231,8 @@ class FittedAlignment:
             Inputs of the model.
         name : str
             What messages call the run.
-        samples : slice
-            A stretch without gaps.
+        values : ndarray, shape (time, Q)
+            Inputs over a stretch without gaps.
         surges : (float, float)
             Range of surge that may be asked for, m.
 
@@ -241,7 +241,6 @@ class FittedAlignment:
         list of CarriedElevation or None
             To be read at offset + surge.
         """
-        values = labelled.channel_matrix(run, inputs, name, samples)
         dt = labelled.run_step(run, name)
         out: list[CarriedElevation | None] = []
         for column, offset in enumerate(self.offsets(run, inputs)):
@@ -281,7 +280,8 @@ class FittedAlignment:
         """
         surge = self.surge_of(run, name)[samples]
         stretch = self.stretch(run, inputs, name, samples)
-        carriers = self.carry(run, inputs, name, stretch, (surge.min(), surge.max()))
+        values = labelled.channel_matrix(run, inputs, name, stretch)
+        carriers = self.carry(run, inputs, name, values, (surge.min(), surge.max()))
         out = labelled.channel_matrix(run, inputs, name, samples)
         begin = samples.start - stretch.start
         offsets = self.offsets(run, inputs)

@@ -1,0 +1,331 @@
+"""Observables: functions of the measured inputs that a model takes as further inputs.
+
+An observable is added by one class with the members of :class:`Observable` and one line in
+``OBSERVABLES``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import combinations
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from seakeep.arrays import FloatArray
+from seakeep.core.observables import slow_kernel, slow_squares
+from seakeep.errors import RequestError, did_you_mean
+from seakeep.models.checks import check_choice
+from seakeep.models.labelled import ChannelLabel
+from seakeep.signals import expressions
+
+__all__ = ["OBSERVABLES", "Bound", "Expression", "Observable", "Powers", "SlowSquares"]
+
+HALF_WIDTH = 0.5
+"""Half of the length of the low-pass filter of :class:`SlowSquares`, in periods of its cutoff.
+
+With a cutoff of 1/3 per encounter period that is 1.5 encounter periods: a wave of half the
+encounter period's frequency is damped to a fifth, one at the encounter frequency to a hundredth."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """An observable of certain channels at a certain time step.
+
+    Parameters
+    ----------
+    labels : tuple of ChannelLabel
+        Its columns.
+    delayed : bool
+        Whether the columns take the input delays of the model, or stand as they are.
+    before, ahead : int
+        Samples before and after instant j that row j reads.
+    columns : callable
+        From the inputs, shape (time, Q), to the columns, shape (time, len(labels)); rows are NaN
+        where they need samples that are not there.
+    """
+
+    labels: tuple[ChannelLabel, ...]
+    delayed: bool
+    before: int
+    ahead: int
+    columns: Callable[[FloatArray], FloatArray]
+
+
+class Observable(Protocol):
+    """Functions of the inputs; frozen, with fields that are JSON values."""
+
+    kind: ClassVar[str]
+
+    def bind(self, inputs: Sequence[ChannelLabel], period: float, dt: float) -> Bound:
+        """Make it ready for these inputs.
+
+        `period` is the encounter period in samples, `dt` the time step in s.
+        """
+
+
+def _column(inputs: Sequence[ChannelLabel], name: str, what: str) -> int:
+    names = [label.name for label in inputs]
+    if name not in names:
+        raise RequestError(
+            f"{what} of '{name}': no such input.{did_you_mean(name, names)} Inputs of the model: "
+            f"{', '.join(names) or 'none'}."
+        )
+    return names.index(name)
+
+
+def _names(value: object, what: str) -> tuple[str, ...]:
+    names: tuple[Any, ...] = (value,)
+    if not isinstance(value, str) and isinstance(value, Iterable):
+        names = tuple(value)
+    if not names or not all(isinstance(name, str) for name in names):
+        raise RequestError(
+            f"{what}: of must name one or more inputs; received {value!r}. Write of='eta_fwd'."
+        )
+    return names
+
+
+def _numbers(value: object, what: str, meant: str, fits: Callable[[Any], bool]) -> tuple[Any, ...]:
+    given: tuple[Any, ...] = tuple(value) if isinstance(value, Iterable) else (value,)
+    numbers = tuple(n.item() if isinstance(n, np.generic) else n for n in given)
+    for number in numbers:
+        real = isinstance(number, int | float) and not isinstance(number, bool)
+        if not real or not math.isfinite(number) or not fits(number):
+            raise RequestError(f"{what} must be {meant}; received {number!r}.")
+    if not numbers or len(set(numbers)) < len(numbers):
+        raise RequestError(f"{what} must be {meant}, each once; received {value!r}.")
+    return numbers
+
+
+def _power(unit: str, power: int) -> str:
+    if not unit or unit == "1":
+        return unit
+    return f"({unit})^{power}" if any(sign in unit for sign in "/*· ") else f"{unit}^{power}"
+
+
+@dataclass(frozen=True)
+class SlowSquares:
+    """Slow parts of squares of an elevation and of its derivatives.
+
+    Slow drift and the loads of mooring lines go with them. They stand among the regressors without
+    the delays of the model, at lags of their own.
+
+    Parameters
+    ----------
+    of : str or sequence of str
+        Elevations among the inputs: the one at the vessel, where there is one, else all of them.
+    orders : sequence of {0, 1, 2}, optional
+        Orders of the derivatives. Each weighs the drift force by another power of the frequency.
+    cutoff : float, optional
+        Frequency of half gain of the low-pass filter, per encounter period.
+    lead : float, optional
+        How far ahead of an instant its row reads the elevation, encounter periods.
+    lags : sequence of float, optional
+        Lags of the columns, encounter periods.
+
+    Raises
+    ------
+    RequestError
+        If a setting is out of range.
+    """
+
+    of: tuple[str, ...]
+    orders: tuple[int, ...] = (0, 1, 2)
+    cutoff: float = 1 / 3
+    lead: float = 2.0
+    lags: tuple[float, ...] = (0, 1, 2, 3, 4, 5)
+    kind: ClassVar[str] = "slow_squares"
+
+    def __post_init__(self) -> None:
+        what = "slow_squares"
+        object.__setattr__(self, "of", _names(self.of, what))
+        orders = _numbers(self.orders, f"{what}: orders", "0, 1 or 2", lambda n: n in (0, 1, 2))
+        object.__setattr__(self, "orders", tuple(int(order) for order in orders))
+        lags = _numbers(self.lags, f"{what}: lags", "encounter periods from 0", lambda n: n >= 0)
+        object.__setattr__(self, "lags", lags)
+        meant = "per encounter period, above 0 and at most 1"
+        _numbers(self.cutoff, f"{what}: cutoff", meant, lambda n: 0 < n <= 1)
+        _numbers(self.lead, f"{what}: lead", "encounter periods from 0", lambda n: n >= 0)
+
+    def bind(self, inputs: Sequence[ChannelLabel], period: float, dt: float) -> Bound:
+        """Make it ready; see :class:`Observable`."""
+        places = [_column(inputs, name, self.kind) for name in self.of]
+        kernel = slow_kernel(self.cutoff / period, round(HALF_WIDTH / self.cutoff * period))
+        half, lags = len(kernel) // 2, [round(lag * period) for lag in self.lags]
+        reach = half + (max(self.orders) > 0)
+        ahead = round(self.lead * period)
+        middle = ahead - reach
+        labels = []
+        for place in places:
+            label = inputs[place]
+            for order in self.orders:
+                rate = ("", "/s", "/s^2")[order]
+                unit = label.units and _power(label.units + rate, 2)
+                dots = ("", "_rate", "_acceleration")[order]
+                labels += [
+                    ChannelLabel(
+                        f"slow_{label.name}{dots}_squared_{lag:g}T",
+                        unit,
+                        f"slow part of the square of {label.long_name}{dots.replace('_', ' ')}, "
+                        f"{lag:g} periods before",
+                    )
+                    for lag in self.lags
+                ]
+
+        def columns(values: FloatArray) -> FloatArray:
+            parts = [
+                slow_squares(values[:, place], self.orders, kernel, middle, lags, dt)
+                for place in places
+            ]
+            return np.concatenate(parts, axis=1)
+
+        return Bound(tuple(labels), False, max(0, reach + max(lags) - middle), ahead, columns)
+
+
+@dataclass(frozen=True)
+class Powers:
+    """Powers of inputs, and products of pairs of them, with the input delays of the model.
+
+    Steep waves move a vessel at wave frequency by more than a linear map of the elevation makes.
+
+    Parameters
+    ----------
+    of : str or sequence of str
+        Inputs.
+    powers : sequence of int, optional
+        Exponents, 2 to 5.
+    products : bool, optional
+        Whether the product of each pair of the inputs is taken too.
+
+    Raises
+    ------
+    RequestError
+        If a setting is out of range.
+    """
+
+    of: tuple[str, ...]
+    powers: tuple[int, ...] = (2, 3)
+    products: bool = False
+    kind: ClassVar[str] = "powers"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "of", _names(self.of, "powers"))
+        powers = _numbers(
+            self.powers, "powers: powers", "integers from 2 to 5", lambda n: n in (2, 3, 4, 5)
+        )
+        object.__setattr__(self, "powers", tuple(int(power) for power in powers))
+        if not isinstance(self.products, bool):
+            raise RequestError(
+                f"powers: products must be true or false; received {self.products!r}."
+            )
+
+    def bind(self, inputs: Sequence[ChannelLabel], period: float, dt: float) -> Bound:
+        """Make it ready; see :class:`Observable`."""
+        places = [_column(inputs, name, self.kind) for name in self.of]
+        pairs = list(combinations(places, 2)) if self.products else []
+        labels = [
+            ChannelLabel(
+                f"{inputs[place].name}_power_{power}",
+                _power(inputs[place].units, power),
+                f"{inputs[place].long_name} to the power of {power}",
+            )
+            for power in self.powers
+            for place in places
+        ]
+        labels += [
+            ChannelLabel(
+                f"{inputs[a].name}_times_{inputs[b].name}",
+                f"{inputs[a].units} {inputs[b].units}".strip(),
+                f"product of {inputs[a].long_name} and {inputs[b].long_name}",
+            )
+            for a, b in pairs
+        ]
+
+        def columns(values: FloatArray) -> FloatArray:
+            chosen = values[:, places]
+            parts = [chosen**power for power in self.powers]
+            parts += [values[:, [a]] * values[:, [b]] for a, b in pairs]
+            return np.concatenate(parts, axis=1)
+
+        return Bound(tuple(labels), True, 0, 0, columns)
+
+
+@dataclass(frozen=True)
+class Expression:
+    """An expression of inputs, with the input delays of the model.
+
+    Parameters
+    ----------
+    name : str
+        Name of the column.
+    expression : str
+        Arithmetic of inputs, as in a derived channel of a campaign: ``"wind**2"``. ``mean`` of one
+        value is refused: a row must not depend on the rest of the record.
+
+    Raises
+    ------
+    RequestError
+        If it is no expression.
+    """
+
+    name: str
+    expression: str
+    units: str = ""
+    kind: ClassVar[str] = "expression"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise RequestError(f"expression: name must be a word; received {self.name!r}.")
+        expressions.parse(self.expression)
+
+    def bind(self, inputs: Sequence[ChannelLabel], period: float, dt: float) -> Bound:
+        """Make it ready; see :class:`Observable`."""
+        parsed = expressions.parse(self.expression)
+        places = {name: _column(inputs, name, self.kind) for name in parsed.channels}
+
+        def columns(values: FloatArray) -> FloatArray:
+            sound = np.all(np.isfinite(values[:, list(places.values())]), axis=1)
+            out = np.full((len(values), 1), np.nan)
+            chosen = {name: values[sound, place] for name, place in places.items()}
+            out[sound, 0] = parsed.evaluate(chosen)
+            return out
+
+        label = ChannelLabel(self.name, self.units, self.expression)
+        return Bound((label,), True, 0, 0, columns)
+
+
+OBSERVABLES: dict[str, type[Observable]] = {
+    each.kind: each for each in (SlowSquares, Powers, Expression)
+}
+
+
+def to_json(observable: Observable) -> dict[str, Any]:
+    """Kind and settings as JSON values."""
+    return {"kind": observable.kind, **asdict(observable)}  # type: ignore[call-overload]
+
+
+def from_json(table: Mapping[str, Any]) -> Observable:
+    """Make an observable of its kind and settings, as a file or a TOML table states them.
+
+    Raises
+    ------
+    RequestError
+        If the kind or a key is not known, or a setting is out of range.
+    """
+    settings = dict(table)
+    kind = settings.pop("kind", None)
+    check_choice("observables: kind", kind, list(OBSERVABLES))
+    made = OBSERVABLES[str(kind)]
+    known = list(made.__dataclass_fields__)  # type: ignore[attr-defined]
+    for key in settings:
+        if key not in known:
+            raise RequestError(
+                f"observables: {kind} has no key '{key}'.{did_you_mean(key, known)} Keys: "
+                f"{', '.join(known)}."
+            )
+    try:
+        return made(**settings)
+    except TypeError as error:
+        raise RequestError(f"observables: {kind}: {error}. Keys: {', '.join(known)}.") from None
