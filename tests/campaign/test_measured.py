@@ -66,7 +66,7 @@ column = "ACC_HEAVE_PS"
 [channels.heave_of_the_camera]
 column = "Heave"
 [derived.heave_acceleration]
-expression = "mean(acc_sb, acc_ps)"
+expression = "average(acc_sb, acc_ps)"
 [derived.heave]
 from = "heave_acceleration"
 step = "integrate"

@@ -18,14 +18,14 @@ A, B = np.array([1.0, 2.0, 6.0]), np.array([4.0, -1.0, 0.5])
         ("0.5*(a + b)", 0.5 * (A + B)),
         ("-a - -b", -A + B),
         ("a - b / 2 * 3", A - B / 2 * 3),
-        ("a ** 2 ** 0.5", A ** (2**0.5)),
+        ("a ** 0.5 + b ** -2", A**0.5 + B**-2),
         ("-a**2", -(A**2)),
         ("square(a) + abs(b) + sqrt(a) + sin(a) * cos(b)",
          A**2 + abs(B) + np.sqrt(A) + np.sin(A) * np.cos(B)),
-        ("mean(a, b)", (A + B) / 2),
+        ("average(a, b)", (A + B) / 2),
         ("mean(a)", np.full(3, 3.0)),
         ("a - mean(a)", A - 3.0),
-        ("mean(a, b, a + b)", 2 * (A + B) / 3),
+        ("average(a, b, a + b)", 2 * (A + B) / 3),
         ("\n  1e-3 * a +\n 2\n", 1e-3 * A + 2),
     ],
 )  # fmt: skip
@@ -72,7 +72,20 @@ def test_as_python_would_reckon(x, y, z):
         ("not a", 1, "'not a' is none of the allowed forms"),
         ("a + sqare(b)", 5, "'sqare' is no function known here. Did you mean 'square'?"),
         ("`wave 1` + sqrt(a, b)", 12, "'sqrt' takes one argument(s), not 2"),
-        ("a + mean()", 5, "'mean' takes one or more argument(s), not 0"),
+        ("a + average()", 5, "'average' takes one or more argument(s), not 0"),
+        ("a + mean()", 5, "'mean' takes one argument(s), not 0"),
+        ("a + mean(a, b)", 5, "'mean' is the mean of one channel over time; the average of"),
+        ("9**9**9 * a", 1, "an exponent is a number from -16 to 16"),
+        ("a ** b", 1, "an exponent is a number from -16 to 16"),
+        ("a ** -17", 1, "an exponent is a number from -16 to 16"),
+        ("a * 1e200", 5, "a number is larger than 1e+150"),
+        ("a * 1" + "0" * 400, 5, "a number is larger than 1e+150"),
+        ("-" * 998 + "a", 102, "more than 100 operations are nested or in a row"),
+        ("a" + "+a" * 450, 1, "more than 100 operations are nested or in a row"),
+        ("sin(" * 150 + "a" + ")" * 150, 405, "more than 100 operations are nested or in a row"),
+        ("a + `\x07`", 5, "a name has 1 to 200 printable characters"),
+        ("a + ` `", 5, "a name has 1 to 200 printable characters"),
+        ("a + `" + 201 * "b" + "`", 5, "a name has 1 to 200 printable characters"),
         ("sqrt(a, axis=0)", 1, "'sqrt(a, axis=0)' is none of the allowed forms"),
         ("`wave 1`.x + a", 1, "'`wave 1`.x' is none of the allowed forms"),
         ("a b", 3, "this is not an arithmetic expression"),
@@ -113,7 +126,27 @@ def test_unknown_channel():
         parse("acc_sp + 1").evaluate({"acc_sb": A, "pitch": B})
 
 
-@pytest.mark.parametrize("text", ["1 / (a - 2)", "sqrt(b)", "a * 9**9**9", "b ** 0.5"])
+@pytest.mark.parametrize("text", ["1 / (a - 2)", "sqrt(b)", "a * 1e99**9", "b ** 0.5"])
 def test_values_that_are_none(text):
     with pytest.raises(DataError, match=r"value\(s\) that are not finite, the first at sample"):
         parse(text).evaluate({"a": A, "b": B})
+
+
+def test_channels_of_one_length():
+    with pytest.raises(RequestError, match=r"channels of one length; .* a: \(3,\), b: \(2,\)"):
+        parse("a + b").evaluate({"a": A, "b": B[:2]})
+    with pytest.raises(RequestError, match="'a' holds 1 masked"):
+        parse("a").evaluate({"a": np.ma.MaskedArray(A, [True, False, False])})
+    with pytest.raises(RequestError, match="an expression is text; received int"):
+        parse(3)
+
+
+def test_as_deep_as_is_allowed():
+    """From deep inside a program too."""
+
+    def reckon(levels):
+        if levels:
+            return reckon(levels - 1)
+        return parse("-" * 100 + "a").evaluate({"a": A})
+
+    np.testing.assert_array_equal(reckon(400), A)

@@ -37,7 +37,9 @@ BINS_PER_BANDWIDTH = 64
 REACH = 8.5
 """Bandwidths beyond the grid that are kept; the kernel there is 2e-16 of its peak."""
 MOST_BINS = 2**21
+"""Bins of a density, and points of a grid, that fit into 16 MB; finer ones are summed directly."""
 CHUNK = 4096
+"""Samples summed at once where a density is not binned: 16 MB on a grid of 512 points."""
 COARSE = 1.5
 """Grid steps of more bandwidths than this misstate the mass of a kernel by over 3e-4."""
 
@@ -273,7 +275,8 @@ def density_grid(
     SeakeepWarning
         If its step is over 1.5 bandwidths of a series; a divergence on it is then coarse.
     """
-    whole_number(points, "points", 2)
+    if whole_number(points, "points", 2) > MOST_BINS:
+        raise RequestError(f"a grid has at most {MOST_BINS} points; received points = {points}.")
     if not series or not margin >= 0:
         raise RequestError(
             f"a grid needs at least one series and a margin of zero or more; received "

@@ -7,10 +7,14 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import FloatArray, as_series, positive
+from seakeep.arrays import FloatArray, as_series, number, positive
 from seakeep.errors import RequestError
 
 __all__ = ["band_pass", "complementary_filter", "differentiate", "envelope_squared", "integrate"]
+
+
+SHORTEST_RECORD = 0.05
+"""Part of the slowest period kept that a record must last."""
 
 
 def band_gain(frequency: FloatArray, band: tuple[float, float]) -> FloatArray:
@@ -115,8 +119,11 @@ def predicted_extension(
     return out.reshape((-1, *array.shape[1:]))
 
 
-def _checked_band(band: tuple[float, float], dt: float) -> tuple[float, float]:
-    low, high = band
+def _checked_band(band: tuple[float, float], dt: float, samples: int) -> tuple[float, float]:
+    try:
+        low, high = (number(edge, "an edge of the band") for edge in band)
+    except (TypeError, ValueError) as error:
+        raise RequestError(f"a band is (low, high) in Hz; received {band!r}.") from error
     nyquist = 0.5 / positive(dt, "the time step", "s")
     if not 0 < low < high <= nyquist:
         raise RequestError(
@@ -124,14 +131,25 @@ def _checked_band(band: tuple[float, float], dt: float) -> tuple[float, float]:
             f"Hz); received ({low:g}, {high:g}) Hz. The lower edge keeps drift out: set it below "
             "the slowest wave and above the drift."
         )
+    _check_slowest(low, dt, samples, "the lower edge of the band")
     return float(low), float(high)
+
+
+def _check_slowest(frequency: float, dt: float, samples: int, name: str) -> None:
+    """Refuse a period so long that eight of them, added to the record, take all memory."""
+    if frequency * dt * samples < SHORTEST_RECORD:
+        raise RequestError(
+            f"{name} ({frequency:g} Hz) has a period of {1 / frequency:g} s, and the record lasts "
+            f"{dt * samples:g} s; at least {SHORTEST_RECORD:g} of a period is needed to tell it "
+            "from a drift. Raise it, or give a longer record."
+        )
 
 
 def _integrated(
     series: npt.ArrayLike, dt: float, band: tuple[float, float], times: int
 ) -> FloatArray:
     array = as_series(series, minimum=4, channels=True)
-    low, _ = edges = _checked_band(band, dt)
+    low, _ = edges = _checked_band(band, dt, array.shape[0])
     # Averaged column by column, so that a channel has the same bits alone and beside others.
     columns = np.ascontiguousarray(array.reshape(array.shape[0], -1).T)
     array = (columns - columns.mean(axis=1, keepdims=True)).T.reshape(array.shape)
@@ -373,11 +391,12 @@ def complementary_filter(
             f"{x.shape} and {a.shape}."
         )
     nyquist = 0.5 / positive(dt, "the time step", "s")
-    if not 0 < crossover < 0.8 * nyquist:
+    if not 0 < number(crossover, "the crossover") < 0.8 * nyquist:
         raise RequestError(
             f"the crossover must lie between 0 and {0.8 * nyquist:g} Hz (0.8 of the Nyquist "
             f"frequency); received {crossover:g} Hz. Set it below the slowest wave."
         )
+    _check_slowest(crossover, dt, x.size, "the crossover")
     padding = int(np.ceil(8.0 / (crossover * dt)))
     order = min(int(np.ceil(1.6 / (crossover * dt))), 2000)
     mean, trend = _line(x)

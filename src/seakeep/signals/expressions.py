@@ -1,9 +1,9 @@
 """Arithmetic of channels, written as text and parsed, never evaluated as Python.
 
 An expression knows numbers, channel names, ``+ - * / **``, parentheses, and the functions
-``square``, ``abs``, ``sqrt``, ``sin``, ``cos`` and ``mean``. ``mean(a, b)`` is the average of
-several values instant by instant; ``mean(a)`` of one is its mean over time, so that
-``a - mean(a)`` is the deviation. A name that is no identifier stands between backticks.
+``square``, ``abs``, ``sqrt``, ``sin``, ``cos``, ``mean`` and ``average``. ``mean(a)`` is the mean
+of a channel over time, so that ``a - mean(a)`` is the deviation; ``average(a, b)`` is that of
+several values instant by instant. A name that is no identifier stands between backticks.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import DataError, RequestError, did_you_mean
 
 __all__ = ["Expression", "parse"]
@@ -24,6 +24,19 @@ __all__ = ["Expression", "parse"]
 
 LONGEST = 1000
 """Characters an expression may have: more is a program, and Python's parser recurses."""
+
+DEEPEST = 100
+"""Operations inside one another, or in a row: Python allows some 1000 nested calls, and each takes
+three of them."""
+
+GREATEST = 1e150
+"""Numbers beyond this overflow when squared."""
+
+GREATEST_EXPONENT = 16.0
+"""A physical law has no higher power; 9**9**9 has."""
+
+LONGEST_NAME = 200
+"""Characters a channel's name may have."""
 
 _OPERATORS: dict[type[ast.operator], Callable[[FloatArray, FloatArray], FloatArray]] = {
     ast.Add: np.add,
@@ -41,7 +54,7 @@ _FUNCTIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
 }
 _ALLOWED = (
     "numbers, channel names, + - * / **, parentheses, and the functions "
-    "square, abs, mean, sqrt, sin, cos"
+    "square, abs, sqrt, sin, cos, mean, average"
 )
 _QUOTED = re.compile(r"`([^`]*)`")
 
@@ -94,11 +107,16 @@ class Expression:
                     f"the expression {self.text!r} uses the channel '{name}', which does not "
                     f"exist.{did_you_mean(name, values)} Channels: {', '.join(values)}."
                 )
-        arrays = {name: np.asarray(values[name], dtype=float) for name in self.channels}
+        arrays = {name: as_real(values[name], f"'{name}'") for name in self.channels}
+        shapes = {array.shape for array in arrays.values()}
+        if len(shapes) > 1 or () in shapes:
+            raise RequestError(
+                f"the expression {self.text!r} needs channels of one length; received shapes "
+                f"{', '.join(f'{name}: {array.shape}' for name, array in arrays.items())}."
+            )
         with np.errstate(all="ignore"):
             out = self._value(self._tree, arrays)
-        shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
-        result: FloatArray = np.array(np.broadcast_to(out, shape))
+        result: FloatArray = np.array(np.broadcast_to(out, shapes.pop()))
         if not np.all(np.isfinite(result)):
             bad = np.flatnonzero(~np.isfinite(result))
             raise DataError(
@@ -123,8 +141,8 @@ class Expression:
         assert isinstance(node.func, ast.Name)
         arguments = [self._value(argument, values) for argument in node.args]
         if node.func.id == "mean":
-            if len(arguments) == 1:
-                return np.asarray(np.mean(arguments[0]))
+            return np.asarray(np.mean(arguments[0]))
+        if node.func.id == "average":
             total = arguments[0]
             for argument in arguments[1:]:
                 total = total + argument
@@ -156,6 +174,8 @@ def parse(text: str) -> Expression:
     >>> parse("square(`wave probe 1`) / 2 + heave").channels
     ('wave probe 1', 'heave')
     """
+    if not isinstance(text, str):
+        raise RequestError(f"an expression is text; received {type(text).__name__}.")
     if not text.strip() or len(text) > LONGEST:
         raise RequestError(
             f"an expression has between 1 and {LONGEST} characters; received {len(text)}. "
@@ -201,16 +221,23 @@ def _refusal(text: str, position: int, reason: str) -> RequestError:
 
 
 def _check(
-    node: ast.expr, text: str, plain: str, quoted: Mapping[str, str], channels: dict[str, None]
+    node: ast.expr,
+    text: str,
+    plain: str,
+    quoted: Mapping[str, str],
+    channels: dict[str, None],
+    depth: int = 0,
 ) -> None:
     """Refuse every node that is not on the list; collect the channels."""
     position = len(plain.encode()[: node.col_offset].decode()) + 1
 
     def inner(*nodes: ast.expr) -> None:
         for each in nodes:
-            _check(each, text, plain, quoted, channels)
+            _check(each, text, plain, quoted, channels, depth + 1)
 
-    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+    if reason := _too_large(node, quoted, depth):
+        raise _refusal(text, position, reason)
+    if _size(node) is not None:
         return
     if isinstance(node, ast.Name):
         channels[quoted.get(node.id, node.id)] = None
@@ -228,11 +255,41 @@ def _check(
         raise _refusal(text, position, f"{source!r} is none of the allowed forms")
 
 
+def _size(node: ast.expr) -> float | None:
+    """Size of a plain number; None for all else."""
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        return float(min(abs(node.value), 2 * GREATEST))  # type: ignore[arg-type]
+    return None
+
+
+def _too_large(node: ast.expr, quoted: Mapping[str, str], depth: int) -> str | None:
+    """Why a number, an exponent or a name is beyond what is allowed."""
+    if depth > DEEPEST:
+        return f"more than {DEEPEST} operations are nested or in a row"
+    if (_size(node) or 0.0) > GREATEST:
+        return f"a number is larger than {GREATEST:g}"
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+        signed = isinstance(node.right, ast.UnaryOp) and isinstance(node.right.op, ast.USub)
+        size = _size(node.right.operand if signed else node.right)  # type: ignore[attr-defined]
+        if size is None or size > GREATEST_EXPONENT:
+            return f"an exponent is a number from -{GREATEST_EXPONENT:g} to {GREATEST_EXPONENT:g}"
+    if isinstance(node, ast.Name):
+        name = quoted.get(node.id, node.id)
+        if not name.isprintable() or not 0 < len(name.strip()) <= LONGEST_NAME:
+            return f"a name has 1 to {LONGEST_NAME} printable characters"
+    return None
+
+
 def _check_call(name: str, count: int, text: str, position: int) -> None:
-    known = [*_FUNCTIONS, "mean"]
+    known = [*_FUNCTIONS, "mean", "average"]
     if name not in known:
         near = did_you_mean(name, known)
         raise _refusal(text, position, f"'{name}' is no function known here.{near}".rstrip("."))
-    if count == 0 or (count > 1 and name != "mean"):
-        wanted = "one or more" if name == "mean" else "one"
+    if name == "mean" and count > 1:
+        raise _refusal(
+            text, position, "'mean' is the mean of one channel over time; the average of several "
+            "channels, instant by instant, is 'average'",
+        )  # fmt: skip
+    if count == 0 or (count > 1 and name != "average"):
+        wanted = "one or more" if name == "average" else "one"
         raise _refusal(text, position, f"'{name}' takes {wanted} argument(s), not {count}")

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import scipy
 from scipy import special
 
-from seakeep.arrays import FloatArray, as_series, positive
+from seakeep.arrays import FloatArray, as_series, number, positive
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import as_seconds, span_text, uniform_step
 
@@ -41,7 +41,8 @@ def lowpass_taps(
     Raises
     ------
     RequestError
-        If the band edges are not in the stated order.
+        If the band edges are not in the stated order, or so close that the filter would have more
+        than 100 000 taps.
 
     Notes
     -----
@@ -49,6 +50,8 @@ def lowpass_taps(
     about 2 400 taps.
     """
     positive(sampling_rate, "the sampling rate", "Hz")
+    passband, stopband = number(passband, "passband"), number(stopband, "stopband")
+    positive(attenuation, "the attenuation", "dB")
     if not 0 < passband < stopband < sampling_rate / 2:
         raise RequestError(
             f"a low-pass filter needs 0 < passband < stopband < half the sampling rate; received "
@@ -56,11 +59,25 @@ def lowpass_taps(
             f"{sampling_rate / 2:g} Hz. Lower the edges, or filter before resampling."
         )
     edges = (passband / sampling_rate, stopband / sampling_rate)
+    _check_length(
+        attenuation / (14.36 * (edges[1] - edges[0])),
+        f"a transition from {passband:.10g} to {stopband:.10g} Hz at {sampling_rate:g} Hz",
+        "Move stopband away from passband, or lower the sampling rate first",
+    )
     for extra in range(7):  # Kaiser's formula is a fit, some 3 dB short for short filters
         taps = _kaiser_taps(edges, attenuation + extra)
         if _deviation(taps, edges) <= 10 ** (-attenuation / 20):
             break
     return taps
+
+
+def _check_length(taps: float, what: str, remedy: str) -> None:
+    """Refuse a filter before it takes memory."""
+    if not taps <= MOST_TAPS:
+        raise RequestError(
+            f"{what} with this attenuation needs about {taps:.3g} taps; at most {MOST_TAPS} are "
+            f"allowed. {remedy}."
+        )
 
 
 def _kaiser_taps(edges: tuple[float, float], attenuation: float) -> FloatArray:
@@ -153,6 +170,9 @@ def apply_taps(array: FloatArray, taps: FloatArray) -> FloatArray:
     return filtered
 
 
+MOST_TAPS = 100_000
+"""Forty times the paper's filter; a kernel of this length takes 0.2 GB when it is tabulated."""
+
 PASSBAND = 0.8
 """Part of the lower Nyquist frequency up to which resampling keeps what there is."""
 
@@ -215,6 +235,10 @@ def resample(
             f"the series has {array.shape[0]} samples and the time axis {t.size}; they must agree. "
             "Time runs along the first axis."
         )
+    if not 0 < number(passband, "passband") < 1:
+        raise RequestError(
+            f"passband is a part of the Nyquist frequency, between 0 and 1; received {passband!r}."
+        )
     slack = 1e-6 * dt
     if wanted[0] < t[0] - slack or wanted[-1] > t[-1] + slack:
         raise DataError(
@@ -247,7 +271,13 @@ def _sinc_sums(
     """
     attenuation = max(positive(attenuation, "the attenuation", "dB"), 50.0)
     width = edges[1] - edges[0]
-    half = int(np.ceil((attenuation - 7.95) / (4.57 * np.pi * width) + 1))  # Kaiser's formula
+    length = (attenuation - 7.95) / (4.57 * np.pi * width) + 1  # half of it, by Kaiser's formula
+    _check_length(
+        2 * length,
+        "resampling by this factor and passband",
+        "Resample in two steps, or lower passband",
+    )
+    half = int(np.ceil(length))
     bank = _kernels(half, 0.1102 * (attenuation - 8.7), sum(edges))
     base = np.floor(position).astype(int)
     place = (position - base) * PHASES

@@ -18,7 +18,7 @@ import numpy.typing as npt
 import scipy
 from scipy import fft, special
 
-from seakeep.arrays import ComplexArray, FloatArray, as_real, as_series, positive
+from seakeep.arrays import ComplexArray, FloatArray, as_real, as_series, number, positive
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.calculus import predicted_extension
 from seakeep.signals.lags import as_pair, correlation_peak, parabola_peak
@@ -469,7 +469,7 @@ def probe_separation(
             f"two records of the same length are needed, shape (time,); received {a.shape} and "
             f"{b.shape}. Cut them to their common time."
         )
-    interval, place = positive(dt, "the time step", "s"), float(stated)
+    interval, place = positive(dt, "the time step", "s"), number(stated, "the stated separation")
     if not np.isfinite(place):
         raise RequestError(f"the stated separation must be a number (m); received {stated!r}.")
     for name, each in (("first", a), ("second", b)):
@@ -522,10 +522,10 @@ def _scores(cross: ComplexArray, norm: float, k: FloatArray, distances: FloatArr
     """Parts of the correlation that the groups of frequencies make, shape (group, distance)."""
     group = (np.arange(k.size) // NEIGHBOURS) % GROUPS
     out = np.zeros((GROUPS, distances.size))
-    for number in range(GROUPS):
-        own = group == number
+    for each in range(GROUPS):
+        own = group == each
         turned = np.exp(1j * np.outer(distances, k[own]))
-        out[number] = (turned @ cross[own]).real / norm
+        out[each] = (turned @ cross[own]).real / norm
     return out
 
 
@@ -554,6 +554,10 @@ WAVE_SHARE = 0.999
 """Waves are what lies below the frequency that holds this part of a record's variance."""
 
 MOST_TERMS = 4000
+"""Polynomials in the distance: each takes as much memory as the record."""
+
+MOST_SAMPLES = 10_000_000
+"""Samples by which a record is continued at either end: 80 MB each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -837,7 +841,7 @@ def _carried(
     exp(−ik(d₀ + hξ)) = exp(−ikd₀) Σ (2 − δ_p0) (−i)^p J_p(kh) T_p(ξ)
     """
     step = positive(dt, "the time step", "s")
-    lowest, highest = (float(value) for value in distances)
+    lowest, highest = (number(value, "a distance") for value in distances)
     if not (np.isfinite(lowest) and np.isfinite(highest) and lowest <= highest):
         raise RequestError(
             f"distances must be a range (lowest, highest) in metres; received {distances!r}."
@@ -875,6 +879,11 @@ def _carried(
 
 def _continued(deviations: FloatArray, delay: float, period: float) -> tuple[FloatArray, int]:
     """Lengthen at both ends by predicted waves that fade out once no delay reaches them."""
+    if not delay + period < MOST_SAMPLES:
+        raise RequestError(
+            f"the slowest waves take {delay:.3g} samples over the distance; at most "
+            f"{MOST_SAMPLES} are allowed. Correct the distance (m), or resample to a larger step."
+        )
     kept, fading = int(np.ceil(delay + period)), int(np.ceil(4.0 * period))
     order = min(int(np.ceil(2.0 * period)), 500)
     padding = kept + fading

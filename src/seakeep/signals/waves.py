@@ -52,6 +52,9 @@ class WaveStatistics:
     moment_period: float
 
 
+LONGEST_TRANSFORM = 2**24
+"""Points of a padded transform: 0.3 GB; the paper takes 2**16."""
+
 STILL = 0.2
 """Running standard deviation, as a part of the waves', below which water counts as still."""
 
@@ -374,6 +377,11 @@ def wave_spectrum(
         raise RequestError(
             f"the transform must be at least as long as a segment ({length} samples); received "
             f"{padded}. Lengthen it, or leave it out."
+        )
+    if padded is not None and padded > LONGEST_TRANSFORM:
+        raise RequestError(
+            f"a transform of padded = {padded} points takes too much memory; at most "
+            f"{LONGEST_TRANSFORM} are allowed."
         )
     frequency, density = scipy.signal.welch(
         x, rate, window=window, nperseg=length, noverlap=shared, nfft=padded
