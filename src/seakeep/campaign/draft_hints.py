@@ -43,7 +43,7 @@ def derived_examples(names: Sequence[str], period: float | None, rate: float) ->
         if len(pair) == 2 and motion not in sources:
             sources = {motion: f"{motion}_acceleration", **sources}
             lines += [f"[derived.{motion}_acceleration]"]
-            lines += [f'expression = "mean({pair[0]}, {pair[1]})"']
+            lines += [f'expression = "average({pair[0]}, {pair[1]})"']
     moved = [m for m in _ORDER if m in names and f"{m}_rate" not in names]
     if sources:
         motion, source = next(iter(sources.items()))
