@@ -13,7 +13,7 @@ import pytest
 SOURCE = Path(__file__).parents[1] / "src" / "seakeep"
 
 FLOORS = (
-    ("errors", "interruption"),
+    ("errors",),
     ("arrays",),
     ("files",),
     ("conventions", "waves"),

@@ -140,7 +140,7 @@ writers = {
 }
 (folder / "old").mkdir()
 old = study.write_result(folder / "old", {"words": "old"}, {"prepared": run})
-writers["other words"] = lambda path: study.retell(old, {"words": "new"})
+writers["other words"] = lambda path: study.relabel(old, {"words": "new"})
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
 told = {}

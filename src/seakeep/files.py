@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from seakeep.errors import MissingFileError, RequestError, did_you_mean
+from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,6 +25,7 @@ __all__ = [
     "MARK",
     "check_output",
     "check_place",
+    "check_seal",
     "existing_file",
     "make_folder",
     "read_bytes",
@@ -36,6 +37,8 @@ __all__ = [
 
 MARK = "seakeep_file"
 """Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""
+SEAL = b"seakeep SHA-256 "
+"""Stands behind the content of a NetCDF file, before its checksum; HDF5 reads no further."""
 
 SHOWN = 5
 """Names of a folder that a message lists at most."""
@@ -240,7 +243,7 @@ def write_netcdf(
     packing: Callable[[xr.Dataset], Mapping[Any, Mapping[str, Any]]] | None = None,
     onto: Path | None = None,
 ) -> None:
-    """Write a NetCDF file; a disk that is full is told as by any other write.
+    """Write a NetCDF file with a checksum at its end, which :func:`check_seal` compares.
 
     HDF5 does not survive a write that fails: it raises errors of many kinds, keeps the file open,
     and takes the process with it at its end. The file is therefore made in memory first.
@@ -267,13 +270,41 @@ def write_netcdf(
     import h5netcdf
     from xarray.backends import H5NetCDFStore
 
-    made = io.BytesIO(b"" if onto is None else onto.read_bytes())
+    made = io.BytesIO(b"" if onto is None else _content(onto.read_bytes())[0])
     parts = [(None, dataset), *(groups or {}).items()]
     with h5netcdf.File(made, "w" if onto is None else "r+") as file:
         for name, each in parts:
             encoding = {} if packing is None else packing(each)
             each.dump_to_store(H5NetCDFStore(file, group=name, mode="a"), encoding=encoding)
-    path.write_bytes(made.getvalue())  # shares the memory, and survives what was written into it
+    with path.open("wb") as whole, made.getbuffer() as content:
+        whole.write(content)
+        whole.write(SEAL + hashlib.sha256(content).hexdigest().encode())
+
+
+def check_seal(path: Path) -> None:
+    """Refuse a file of :func:`write_netcdf` that was altered or cut since it was written.
+
+    Raises
+    ------
+    DataError
+        If its checksum is missing or another one.
+    OSError
+        If the file cannot be read.
+    """
+    content, stated = _content(path.read_bytes())
+    if hashlib.sha256(content).hexdigest() != stated:
+        raise DataError(
+            f"{path} was altered or damaged since it was written: its checksum is "
+            f"{'another one' if stated else 'missing'}. Remove it and make it again."
+        )
+
+
+def _content(file: bytes) -> tuple[bytes, str]:
+    """Content of a file, and the checksum behind it; empty where there is none."""
+    length = len(SEAL) + hashlib.sha256().digest_size * 2
+    if file[-length:].startswith(SEAL):
+        return file[:-length], file[len(SEAL) - length :].decode("ascii", "replace")
+    return file, ""
 
 
 def check_place(path: Path, suffix: str | None = None) -> None:

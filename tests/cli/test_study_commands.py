@@ -1,5 +1,6 @@
 """``seakeep study``, ``report`` and ``reproduce`` as a user runs them."""
 
+import io
 import signal
 import subprocess
 import sys
@@ -10,7 +11,8 @@ from started import started
 from tutorial_study import put_tutorial
 
 from seakeep import cli
-from seakeep.models import cluster
+from seakeep.cli.console import results
+from seakeep.models import executor
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
@@ -46,7 +48,7 @@ def test_a_study_ends_with_its_table_and_the_place_of_its_report(folder, capfd):
     told = capfd.readouterr()
     assert "ANRMSE median" in told.out
     assert told.out.rstrip().endswith(f"Report: {out / 'report.html'}")
-    assert "Study 2/6" in told.err
+    assert "Study 2/4" in told.err
     (out / "report.html").unlink()
     assert cli.main(["report", str(out)]) == 0
     assert capfd.readouterr().out.strip() == str(out / "report.html")
@@ -75,7 +77,7 @@ def test_a_wrong_request_is_told_and_ends_with_2(arguments, words, tmp_path, mon
 @pytest.mark.parametrize("verb", ["study", "reproduce"])
 def test_a_scheduler_that_does_not_answer_is_told_before_any_work(verb, folder, monkeypatch, capfd):
     pytest.importorskip("distributed", reason="a Dask cluster needs distributed")
-    monkeypatch.setattr(cluster, "PATIENCE", 0.3)
+    monkeypatch.setattr(executor, "PATIENCE", 0.3)
     out = folder / "out"
     arguments = ["study", str(folder / "study.toml")] if verb == "study" else ["reproduce"]
     assert cli.main([*arguments, "-o", str(out), "--scheduler", "tcp://127.0.0.1:9"]) == 2
@@ -87,12 +89,12 @@ def test_a_scheduler_that_does_not_answer_is_told_before_any_work(verb, folder, 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends Ctrl-C to a console alone")
 def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(folder, ctrl_c):
-    # Minutes of work after its first cell: it is never over before the signal reaches it.
+    # Minutes of work after its first unit: it is never over before the signal reaches it.
     (folder / "study.toml").write_text(STUDY.replace("n_members = 4", "n_members = 20_000"))
     out = folder / "out"
     command = [sys.executable, "-m", "seakeep", "study", "study.toml", "-o", str(out)]
     with started([*command, "--workers", "1"], folder, stderr=subprocess.PIPE) as process:
-        while not list((out / "cells").glob("*.npz")):
+        while not list((out / "units").glob("*.npz")):
             assert process.poll() is None, process.stderr.read()
             time.sleep(0.002)
         process.send_signal(signal.SIGINT)
@@ -100,6 +102,15 @@ def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(folder, ctrl_c):
     assert process.returncode == 130, told
     assert "the same command goes on where it stopped" in told
     assert told.count("kept") == 1
-    assert f"Interrupted. All cells that were finished are kept in {out}" in told
+    assert f"Interrupted. What was finished is kept in {out}" in told
     assert "Traceback" not in told
-    assert list((out / "cells").glob("*.npz"))
+    assert list((out / "units").glob("*.npz"))
+
+
+def test_output_in_a_code_page_without_greek_letters_is_no_error(monkeypatch):
+    stream = io.TextIOWrapper(io.BytesIO(), encoding="cp1252")
+    monkeypatch.setattr(sys, "stdout", stream)
+    assert cli.main(["--version"]) == 0
+    results().print("ε over 15 T̂")
+    stream.flush()
+    assert b"? over 15 T?" in stream.buffer.getvalue()

@@ -69,7 +69,7 @@ n_series = 8
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     put_tutorial(folder, STUDY)
-    return write_report(run_study(read_study(folder / "study.toml"), folder / "out", workers=2))
+    return write_report(run_study(read_study(folder / "study.toml"), folder / "out"))
 
 
 def test_the_page_names_nothing_outside_itself(page):

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from seakeep.study import read_study, run_study
-from seakeep.study.calibration import calibration_arrays
-from seakeep.study.cells import fit_training
 from seakeep.study.plan import make_plan
+from seakeep.study.units import Unit, compute, fit_training
 
 
 def edited(folder, *changes):
@@ -74,13 +73,11 @@ def test_where_runs_are_left_out_each_is_forecast_by_the_others_and_the_test_run
         ("length = 6", "length = 3"),
     )
     plan, runs = make_plan(study)
-    fold = next(each for each in plan.training if each.left_out == ("unseen",))
+    (fold,) = (k for k, each in enumerate(plan.training) if each.left_out == ("unseen",))
 
     def margins(given):
-        def fit(part):
-            return fit_training(plan, given, "bayesian", part)
-
-        return calibration_arrays(plan, given, fold, fit(fold), fit)
+        found = compute(plan, given, Unit("bayesian", fold))
+        return {key: found[f"calibration/{key}"] for key in ("margin", "windows")}
 
     found = margins(runs)
     steps = plan.tests["unseen"][0].steps
@@ -112,3 +109,20 @@ def test_training_data_without_a_window_that_is_not_read_give_no_margin(study_fo
     table = found.groups["statistics/coverage/unseen"]
     assert np.isnan(table["calibrated_inside"]).all()
     assert np.isfinite(table["inside"].sel(channel="average", against="measured")).all()
+
+
+def test_runs_that_are_left_out_and_test_nowhere_have_no_margin(study_folder):
+    study = edited(
+        study_folder,
+        (
+            "windows = 2\n\n[models",
+            'scheme = "leave_out"\nruns = ["first", "second", "unseen"]\n\n[models',
+        ),
+    )
+    found = run_study(study, study_folder / "out")
+    kept = found.groups["calibration/bayesian"]
+    folds = list(kept["training"].values)
+    assert folds == ["without first", "without second", "without unseen"]
+    assert np.isfinite(kept["margin"]).all("channel").values.tolist() == [False, False, True]
+    table = found.groups["statistics/coverage/unseen"].sel(channel="average", against="measured")
+    assert np.isfinite(table["calibrated_inside"]).all()

@@ -1,4 +1,4 @@
-"""The cells of a study on a real Dask cluster, one of whose workers is killed in the middle."""
+"""The units of a study on a real Dask cluster, one of whose workers is killed in the middle."""
 
 import os
 import signal
@@ -6,6 +6,7 @@ import signal
 import pytest
 import xarray as xr
 
+from seakeep.models.executor import make_executor
 from seakeep.study import read_study, run_study
 
 distributed = pytest.importorskip(
@@ -15,7 +16,7 @@ distributed = pytest.importorskip(
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system knows no SIGKILL")
 @pytest.mark.usefixtures("patient_cluster")
-def test_a_worker_that_is_killed_costs_its_cells_alone(study_folder, tmp_path_factory):
+def test_a_worker_that_is_killed_costs_its_units_alone(study_folder, tmp_path_factory):
     from dask_processes import Cluster
 
     path = study_folder / "study.toml"
@@ -42,9 +43,10 @@ def test_a_worker_that_is_killed_costs_its_cells_alone(study_folder, tmp_path_fa
                 process.wait()
                 lost.update(done=done, total=total, other=min(counts.values()))
 
-            found = run_study(
-                study, study_folder / "wide", scheduler=cluster.address, progress=kill_one
-            )
+            with make_executor(1, cluster.address) as executor:
+                found = run_study(
+                    study, study_folder / "wide", executor=executor, progress=kill_one
+                )
             (count,) = executed().values()
     finally:
         cluster.close()

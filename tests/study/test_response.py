@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.study.response import is_regular, regular_response, wave_frequency
+from seakeep.study.judge import is_regular, regular_response, wave_frequency
 from seakeep.waves import phase_speed
 
 DT, FREQUENCY, CELERITY = 0.05, 0.86, 2.8

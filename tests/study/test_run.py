@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,13 +14,13 @@ import xarray as xr
 from started import started
 
 from seakeep.errors import DataError, RequestError
+from seakeep.models.executor import processes
 from seakeep.models.labelled import nearest_sample
 from seakeep.statistics import band_error_over_time
 from seakeep.study import StorageError, read_result, read_study, run, run_study, store
-from seakeep.study.lock import LOCK
+from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
-from seakeep.study.statistics import joined
-from seakeep.study.store import CELLS, CellFolder
+from seakeep.study.store import LOCK, UNITS, UnitFolder
 
 
 def change(folder, old, new):
@@ -35,9 +36,20 @@ def same(first, second):
         xr.testing.assert_identical(group, second.groups[name])
 
 
+@pytest.fixture(scope="module")
+def finished_once(tmp_path_factory, put_study):
+    folder = tmp_path_factory.mktemp("finished")
+    put_study(folder)
+    with processes(2) as pool:
+        run_study(read_study(folder / "study.toml"), folder / "out", executor=pool)
+    return folder
+
+
 @pytest.fixture
-def finished(study_folder):
-    return run_study(read_study(study_folder / "study.toml"), study_folder / "out", workers=2)
+def finished(study_folder, finished_once):
+    """The result, copied so that a test may spoil it."""
+    shutil.copytree(finished_once / "out", study_folder / "out")
+    return read_result(study_folder / "out")
 
 
 def test_cells_are_what_the_models_say(study_folder, finished):
@@ -95,7 +107,7 @@ def test_the_error_over_time_is_kept_in_bands_and_each_is_tested_for_a_trend(fin
 
 def test_arrays_do_not_depend_on_workers(study_folder, finished):
     study = read_study(study_folder / "study.toml")
-    same(finished, run_study(study, study_folder / "alone", workers=1))
+    same(finished, run_study(study, study_folder / "alone"))
 
 
 def test_what_is_read_back_is_what_was_found(study_folder, finished):
@@ -103,11 +115,11 @@ def test_what_is_read_back_is_what_was_found(study_folder, finished):
     same(finished, found)
     assert found.attrs["digest"] == read_study(study_folder / "study.toml").digest
     assert set(json.loads(found.attrs["versions"])) >= {"seakeep", "numpy", "scipy"}
-    assert not (study_folder / "out" / "cells").exists()
+    assert not (study_folder / "out" / "units").exists()
 
 
-WHOLE = 4  # one model of one training set on its three windows, and a cell of the next
-HALF_A_CELL = f"""
+WHOLE = 3  # both models of one training set, and one of the next
+HALF_A_UNIT = f"""
 import sys, time
 import numpy as np
 from seakeep.study import read_study, run_study
@@ -119,26 +131,26 @@ def savez(file, **arrays):
         return whole(file, **arrays)
     file.write(b"PK")
     file.flush()
-    print("half a cell", flush=True)
+    print("half a unit", flush=True)
     time.sleep(3600)
 
 if __name__ == "__main__":
     np.savez = savez
-    run_study(read_study(sys.argv[1]), sys.argv[2], workers=1)
+    run_study(read_study(sys.argv[1]), sys.argv[2])
 """
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system knows no SIGKILL")
 def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished):
     out = study_folder / "killed"
-    (study_folder / "go.py").write_text(HALF_A_CELL, "utf-8")
+    (study_folder / "go.py").write_text(HALF_A_UNIT, "utf-8")
     command = [sys.executable, "go.py", "study.toml", str(out)]
     with started(command, study_folder, stdout=subprocess.PIPE) as process:
-        assert process.stdout.readline() == "half a cell\n", "the study ended before it was killed"
+        assert process.stdout.readline() == "half a unit\n", "the study ended before it was killed"
         process.send_signal(signal.SIGKILL)
         process.wait()
-    assert len(list((out / "cells").glob("*.npz"))) == WHOLE
-    assert len(list((out / "cells").iterdir())) == WHOLE + 1
+    assert len(list((out / "units").glob("*.npz"))) == WHOLE
+    assert len(list((out / "units").iterdir())) == WHOLE + 1
     assert not (out / "study.nc").exists()
     told = []
     again = run_study(
@@ -165,10 +177,10 @@ def test_two_processes_do_not_work_in_one_folder(study_folder, finished, monkeyp
     assert refused
     assert not (out / LOCK).exists()
     (out / "study.nc").unlink()
-    (out / "cells").mkdir()
-    (out / "cells" / "mine").mkdir()  # is not removed, and does not matter
+    (out / "units").mkdir()
+    (out / "units" / "mine").mkdir()  # is not removed, and does not matter
     same(finished, run_study(study, out))
-    assert (out / "cells" / "mine").exists()
+    assert (out / "units" / "mine").exists()
 
 
 def test_who_waited_for_another_process_takes_its_result(study_folder, finished, monkeypatch):
@@ -187,16 +199,16 @@ def test_who_waited_for_another_process_takes_its_result(study_folder, finished,
 
 
 @pytest.mark.parametrize("flag", [0x01, 0x20])
-def test_a_cell_whose_archive_was_damaged_is_computed_again(tmp_path, flag):
-    cells = CellFolder(tmp_path, "digest")
-    cells.open("study")
-    cells.write("one", {"mean": np.arange(3.0)})
-    path = tmp_path / CELLS / "one.npz"
+def test_a_unit_whose_archive_was_damaged_is_computed_again(tmp_path, flag):
+    units = UnitFolder(tmp_path, "digest")
+    units.open("study")
+    units.write("one", {"mean": np.arange(3.0)})
+    path = tmp_path / UNITS / "one.npz"
     content = bytearray(path.read_bytes())
     entry = content.rindex(b"PK\x01\x02")  # flags of the last file: "encrypted", "patched"
     content[entry + 8] |= flag
     path.write_bytes(content)
-    assert not cells.has("one")
+    assert not units.has("one")
 
 
 def test_a_finished_study_is_not_run_again(study_folder, finished):
@@ -238,14 +250,14 @@ def test_a_plan_that_failed_leaves_the_folder_free(study_folder):
     assert run_study(study, study_folder / "out").attrs["digest"] == study.digest
 
 
-def test_a_folder_without_a_finished_cell_belongs_to_no_study(tmp_path):
-    store.CellFolder(tmp_path, "one").open("first")
-    second = store.CellFolder(tmp_path, "two")
+def test_a_folder_without_a_finished_unit_belongs_to_no_study(tmp_path):
+    store.UnitFolder(tmp_path, "one").open("first")
+    second = store.UnitFolder(tmp_path, "two")
     second.open("second")
     assert json.loads((tmp_path / "study.json").read_text("utf-8"))["digest"] == "two"
     second.write("cell", {"mean": np.arange(3.0)})
     with pytest.raises(RequestError, match="holds the results of another study"):
-        store.CellFolder(tmp_path, "one").open("first")
+        store.UnitFolder(tmp_path, "one").open("first")
 
 
 def test_the_smallest_study_tests_runs_that_do_not_state_their_waves(study_folder):
@@ -290,7 +302,7 @@ def test_no_feasible_test_window(study_folder):
 
 def test_a_full_disk_is_told_and_what_is_finished_is_kept(study_folder, monkeypatch):
     study = read_study(study_folder / "study.toml")
-    folder = store.CellFolder(study_folder / "out", study.digest)
+    folder = store.UnitFolder(study_folder / "out", study.digest)
     folder.open("name")
     folder.write("first", {"mean": np.arange(3.0)})
 
@@ -303,22 +315,22 @@ def test_a_full_disk_is_told_and_what_is_finished_is_kept(study_folder, monkeypa
     assert caught.value.exit_status == 1
     assert folder.has("first")
     assert not folder.has("second")
-    assert [path.name for path in (study_folder / "out" / "cells").iterdir()] == ["first.npz"]
+    assert [path.name for path in (study_folder / "out" / "units").iterdir()] == ["first.npz"]
 
 
-def test_a_damaged_cell_is_computed_again(study_folder):
+def test_a_damaged_unit_is_computed_again(study_folder):
     study = read_study(study_folder / "study.toml")
-    folder = store.CellFolder(study_folder / "out", study.digest)
+    folder = store.UnitFolder(study_folder / "out", study.digest)
     folder.open("name")
     folder.write("cell", {"mean": np.arange(3.0)})
-    path = study_folder / "out" / "cells" / "cell.npz"
+    path = study_folder / "out" / "units" / "cell.npz"
     path.write_bytes(path.read_bytes()[:40])
     assert not folder.has("cell")
 
 
 def test_a_result_of_another_format_is_told(finished, monkeypatch):
     monkeypatch.setattr(store, "FORMAT", store.FORMAT + 1)
-    with pytest.raises(RequestError, match=r"written in format 3.*another folder"):
+    with pytest.raises(RequestError, match=r"written in format 4.*another folder"):
         read_result(finished.folder)
 
 
@@ -326,6 +338,16 @@ def test_a_damaged_result_is_told(tmp_path):
     (tmp_path / "study.nc").write_bytes(b"no NetCDF")
     with pytest.raises(DataError, match=r"study.nc is damaged or no NetCDF file.*run the study"):
         read_result(tmp_path)
+
+
+@pytest.mark.parametrize("part", [0.1, 0.3, 0.5, 0.7, 0.9])
+def test_an_altered_result_is_refused(finished, part):
+    path = finished.folder / "study.nc"
+    content = bytearray(path.read_bytes())
+    content[int(part * len(content))] ^= 1
+    path.write_bytes(content)
+    with pytest.raises((DataError, RequestError), match=r"altered|damaged|format"):
+        read_result(finished.folder)
 
 
 def test_a_folder_without_a_study_is_told(tmp_path):

@@ -7,9 +7,8 @@ import pytest
 
 from seakeep import SeakeepWarning, read_campaign
 from seakeep.study import read_study, run_study
-from seakeep.study.plan import make_plan
-from seakeep.study.slow import warn_of_slow_study
-from seakeep.study.workflow import fit_campaign
+from seakeep.study.fit import fit_campaign
+from seakeep.study.plan import make_plan, warn_of_slow_study
 
 DRIFT = 60.0
 """Period of the drift put onto heave, s: the two training runs hold four periods in all."""
@@ -37,7 +36,7 @@ def test_a_study_with_short_windows_is_told_once(drifting_folder, monkeypatch):
         warn_of_slow_study(plan, runs)
     assert len(caught) == 1
     assert "windows of 'bayesian' in" in str(caught[0].message)  # 20 T at most
-    monkeypatch.setattr("seakeep.study.run.units_of", lambda *_: pytest.fail("told before"))
+    monkeypatch.setattr("seakeep.study.run._compute_all", lambda *_: pytest.fail("told before"))
     with pytest.warns(SeakeepWarning, match="slow motion"), pytest.raises(pytest.fail.Exception):
         run_study(study, drifting_folder / "out")
 

@@ -10,9 +10,8 @@ import xarray as xr
 from seakeep import statistics
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.study import read_study, run_study
-from seakeep.study.plan import make_plan
-from seakeep.study.statistics import box_table, coverage_table, joined
-from seakeep.study.windows import random_stream
+from seakeep.study.judge import box_table, coverage_table, joined
+from seakeep.study.plan import make_plan, random_stream
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ import pytest
 
 from seakeep.errors import RequestError
 from seakeep.study import read_study
+from seakeep.study.plan import windows_overlap
 from seakeep.study.settings import StudySettings
-from seakeep.study.windows import windows_overlap
 from seakeep.toml import validated
 
 
@@ -96,3 +96,9 @@ def test_overlap_of_windows_by_hand():
     spans = [("x", 0.0, 10.0), ("x", 5.0, 15.0), ("y", 0.0, 10.0)]
     # 200 cells a window: the share is exact to one cell.
     assert windows_overlap(spans) == pytest.approx(1 / 3, abs=0.005)
+
+
+def test_a_seed_that_no_file_can_hold_is_refused_before_the_work():
+    refused_seed = {"study": {"campaign": "campaign.toml", "seed": 2**64}}
+    with pytest.raises(RequestError, match=r"study.seed: received 18446.* below 2\^64"):
+        validated(StudySettings, refused_seed, "study.toml", "study")

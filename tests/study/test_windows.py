@@ -6,8 +6,8 @@ import xarray as xr
 
 from seakeep.errors import RequestError
 from seakeep.models.settings import periods_to_samples
+from seakeep.study.plan import Needs, choose_tests, choose_training
 from seakeep.study.settings import StudySettings
-from seakeep.study.windows import Needs, choose_tests, choose_training
 from seakeep.toml import validated
 
 DT = 0.1

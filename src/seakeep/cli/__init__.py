@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 import traceback
 from importlib import metadata
@@ -13,7 +14,6 @@ from seakeep.cli import calibrating, campaigns, information, modelling, tank, tr
 from seakeep.cli import study as studying
 from seakeep.cli.console import messages, tell_warnings
 from seakeep.errors import SeakeepError
-from seakeep.interruption import interruptible
 
 __all__ = ["app", "main"]
 
@@ -92,8 +92,11 @@ def main(arguments: list[str] | None = None) -> int:
     debug = "--debug" in received
     received = [each for each in received if each != "--debug"]
     command = typer.main.get_command(app)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a console without Greek letters shows "?"
+            stream.reconfigure(errors="replace")
     try:
-        with tell_warnings(), interruptible():
+        with tell_warnings():
             command.main(args=received, prog_name="seakeep")
     except SystemExit as leaving:
         status = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)

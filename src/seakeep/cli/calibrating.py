@@ -86,7 +86,7 @@ def calibrate(
     from seakeep.models import HankelEnsemble, load_model
     from seakeep.models.forecasting import counted
     from seakeep.signals.time_axis import instant_text, span_text
-    from seakeep.study.lengths import samples_of
+    from seakeep.study.comparison import samples_of
 
     fitted = load_model(ensemble)
     if not isinstance(fitted, HankelEnsemble):
@@ -146,7 +146,7 @@ def _instant(
     if stated is None:
         return None
     from seakeep.signals.time_axis import instant_text, span_text
-    from seakeep.study.lengths import instant_of
+    from seakeep.study.comparison import instant_of
 
     found = instant_of(stated, campaign, runs.values(), name)
     if name == "--stop" and found == math.inf:
@@ -165,7 +165,7 @@ def _instant(
 
 def _part(run: xr.Dataset, start: float | None, stop: float | None) -> xr.Dataset:
     """Part of a run between two instants, by default those of its training span, or its ends."""
-    from seakeep.study.workflow import between
+    from seakeep.study.plan import between
 
     time = run["time"].values
     begin, end = run.attrs.get("train_span", (time[0], time[-1]))

@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from rich.console import Console
 
 from seakeep.errors import SeakeepWarning
-from seakeep.interruption import check_interrupted
 
 __all__ = [
     "Report",
@@ -59,7 +58,6 @@ def progress_bar(what: str) -> Iterator[Report]:
     if not console.is_terminal:
 
         def line(done: int, total: int, name: str) -> None:
-            check_interrupted()
             console.print(f"{what} {done}/{total}: {name}")
 
         yield line
@@ -84,7 +82,6 @@ def progress_bar(what: str) -> Iterator[Report]:
         task = bar.add_task(what, total=None)
 
         def advance(done: int, total: int, name: str) -> None:
-            check_interrupted()
             bar.update(task, total=total, completed=done, description=f"{what}: {name}")
 
         yield advance

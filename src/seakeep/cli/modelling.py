@@ -123,7 +123,7 @@ def forecast(
     from seakeep.report.tables import forecast_header, forecast_words, write_forecast
     from seakeep.signals.time_axis import instant_text
     from seakeep.study import forecast_at_full_scale, with_degrees
-    from seakeep.study.lengths import instant_of, samples_of
+    from seakeep.study.comparison import instant_of, samples_of
 
     identified = load_model(model)
     read = read_campaign(campaign)

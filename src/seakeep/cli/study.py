@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -54,10 +55,11 @@ def study(
 
     asked = read_study(study_file)
     folder = out or study_file.parent / f"{study_file.stem}-results"
-    count = checked_count(workers, scheduler)
     _run(
         folder,
-        lambda tell: run_study(asked, folder, workers=count, scheduler=scheduler, progress=tell),
+        checked_count(workers, scheduler),
+        scheduler,
+        lambda executor, tell: run_study(asked, folder, executor=executor, progress=tell),
     )
 
 
@@ -72,7 +74,7 @@ def reproduce(
         str, typer.Option("--preset", help="paper, or recommended (our choices).")
     ] = "paper",
     seed: Annotated[
-        int, typer.Option("--seed", help="Of waves, noise, windows, draws.", min=0)
+        int, typer.Option("--seed", help="Of waves, noise, windows, draws.", min=0, max=2**64 - 1)
     ] = 0,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -91,18 +93,14 @@ def reproduce(
 
     chosen: Literal["paper", "recommended"] = "paper" if preset == "paper" else "recommended"
     size = Size.quick() if quick else Size()
-    # The few cells of the quick study are done before another process has started.
+    # The few units of the quick study are done before another process has started.
     count = 1 if quick and workers is None else checked_count(workers, scheduler)
     _run(
         out,
-        lambda tell: reproduce_study(
-            out,
-            chosen,
-            size=size,
-            seed=seed,
-            workers=count,
-            scheduler=scheduler,
-            progress=tell,
+        count,
+        scheduler,
+        lambda executor, tell: reproduce_study(
+            out, chosen, size=size, seed=seed, executor=executor, progress=tell
         ),
     )
 
@@ -156,20 +154,25 @@ class _Progress:
         )
 
 
-def _run(folder: Path, work: Callable[[Report], StudyResult]) -> None:
+def _run(
+    folder: Path,
+    workers: int,
+    scheduler: str | None,
+    work: Callable[[Executor | None, Report], StudyResult],
+) -> None:
+    from seakeep.models.executor import make_executor
     from seakeep.report.page import write_report
     from seakeep.report.study_tables import overview_table
     from seakeep.report.study_words import findings
 
     try:
-        with _Progress("Study") as tell:
-            found = work(tell)
+        with make_executor(workers, scheduler) as executor, _Progress("Study") as tell:
+            found = work(executor, tell)
         with _Progress("Report") as tell:
             page = write_report(found, tell)
     except KeyboardInterrupt as stop:
         stop.add_note(
-            f"All cells that were finished are kept in {folder}; the same command goes on where it "
-            "stopped."
+            f"What was finished is kept in {folder}; the same command goes on where it stopped."
         )
         raise
     results().print(_rich(overview_table(found)))

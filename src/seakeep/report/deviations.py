@@ -13,7 +13,7 @@ import numpy as np
 from seakeep.report.figures.common import model_words
 from seakeep.report.study_tables import ReportTable
 from seakeep.study import StudyResult
-from seakeep.study.windows import windows_overlap
+from seakeep.study.plan import windows_overlap
 
 __all__ = [
     "alignment_words",

@@ -46,7 +46,7 @@ from seakeep.report.study_words import (
 )
 from seakeep.report.style import figure_style, save_figure
 from seakeep.study import StudyResult
-from seakeep.study.statistics import VARIANTS
+from seakeep.study.judge import VARIANTS
 from seakeep.study.store import storing
 
 if TYPE_CHECKING:

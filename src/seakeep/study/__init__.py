@@ -1,36 +1,8 @@
-"""From campaign to judgement: which runs train which model, and how forecasts are compared."""
+"""From campaign to judgement: settings, plan, run (one file per unit), judge.
 
-from seakeep.study.comparison import (
-    Comparison,
-    at_full_scale,
-    compare,
-    comparison_table,
-    forecast_at_full_scale,
-    in_degrees,
-    with_degrees,
-)
-from seakeep.study.run import run_study
-from seakeep.study.settings import Study, StudySettings, read_study
-from seakeep.study.specs import build_spec
-from seakeep.study.store import StorageError, StudyResult, read_result
-from seakeep.study.workflow import fit_campaign, training_runs
+The public names are listed in ``__init__.pyi``; a module is imported when a name of it is used.
+"""
 
-__all__ = [
-    "Comparison",
-    "StorageError",
-    "Study",
-    "StudyResult",
-    "StudySettings",
-    "at_full_scale",
-    "build_spec",
-    "compare",
-    "comparison_table",
-    "fit_campaign",
-    "forecast_at_full_scale",
-    "in_degrees",
-    "read_result",
-    "read_study",
-    "run_study",
-    "training_runs",
-    "with_degrees",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,10 +1,16 @@
-"""All that is decided before the first model is fitted: models, windows, what the windows hold."""
+"""All that is decided before the first model is fitted: models, training sets, test windows.
+
+Windows are drawn once and are the same for all models.
+"""
 
 from __future__ import annotations
 
+import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from seakeep.campaign import load_prepared
@@ -12,18 +18,400 @@ from seakeep.campaign.prepare import Progress
 from seakeep.errors import DataError, RequestError
 from seakeep.models import HankelDMDc
 from seakeep.models.settings import periods_to_samples
-from seakeep.study.needs import needs_of
-from seakeep.study.settings import Study
-from seakeep.study.specs import Spec, build_spec, model_settings
-from seakeep.study.windows import (
-    Needs,
-    TestWindow,
-    TrainingSet,
-    choose_tests,
-    choose_training,
-)
+from seakeep.models.slow import warn_of_slow_motions
+from seakeep.study.resolve import ResolvedModel, Spec, resolve_model
+from seakeep.study.settings import Study, StudySettings, TestSetSettings
 
-__all__ = ["Plan", "make_plan"]
+__all__ = [
+    "Needs",
+    "Plan",
+    "TestWindow",
+    "TrainingSet",
+    "between",
+    "choose_tests",
+    "choose_training",
+    "make_plan",
+    "needs_of",
+    "random_stream",
+    "warn_of_slow_study",
+    "windows_overlap",
+]
+
+Runs = Mapping[str, xr.Dataset]
+
+
+@dataclass(frozen=True)
+class Needs:
+    """Samples that the greediest of all models and draws asks for.
+
+    Parameters
+    ----------
+    snapshots : int
+        Training snapshots; 1 where models take all there are.
+    history : int
+        Samples before a snapshot or a start that delays reach back.
+    inside : bool
+        Whether the delay history lies inside the training snapshots.
+    """
+
+    snapshots: int
+    history: int
+    inside: bool = False
+
+    @property
+    def training(self) -> int:
+        """Samples up to and including the stop of a training window."""
+        return max(self.snapshots, self.history + 2) + (0 if self.inside else self.history)
+
+
+@dataclass(frozen=True)
+class TrainingSet:
+    """What one model learns from: the spans of one or several runs, each up to its stop.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``t03``, or the run that is left out.
+    spans : tuple of (str, float, float)
+        Run, first instant that may be read, and stop, s.
+    left_out : tuple of str
+        Runs that only test; empty where training and test lie in different spans.
+    """
+
+    name: str
+    spans: tuple[tuple[str, float, float], ...]
+    left_out: tuple[str, ...] = ()
+
+    def may_test(self, run: str) -> bool:
+        """Whether a run may test what was learnt here."""
+        return not self.left_out or run in self.left_out or run not in self.runs
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """Names of the runs that train."""
+        return tuple(run for run, _, _ in self.spans)
+
+
+@dataclass(frozen=True)
+class TestWindow:
+    """A window that is forecast: a run, its start and its number of instants.
+
+    Parameters
+    ----------
+    run : str
+        The run.
+    start : float
+        Instant of the last measured state, s; a sample of the run.
+    steps : int
+        Instants forecast.
+    """
+
+    __test__ = False  # no class of tests, whatever pytest takes its name for
+
+    run: str
+    start: float
+    steps: int
+
+
+def random_stream(seed: int, purpose: str) -> np.random.Generator:
+    """Generator of one purpose, so that a further test set changes no other draw."""
+    return np.random.default_rng([seed, zlib.crc32(purpose.encode())])
+
+
+def between(run: xr.Dataset, span: tuple[float, float]) -> xr.Dataset:
+    """Part of a run between two of its own instants, both included."""
+    slack = 1e-6 * float(run.attrs.get("dt", 1.0))
+    return run.sel(time=slice(float(span[0]) - slack, float(span[1]) + slack))
+
+
+def _samples(run: xr.Dataset, span: tuple[float, float]) -> tuple[int, int]:
+    """First and last sample of a run inside a span."""
+    time, dt = run["time"].values, float(run.attrs["dt"])
+    first = int(np.searchsorted(time, span[0] - 1e-6 * dt))
+    last = int(np.searchsorted(time, span[1] + 1e-6 * dt)) - 1
+    return first, last
+
+
+def whole_span(run: xr.Dataset) -> tuple[float, float]:
+    """Span of a run that may be used at all: training and test spans together."""
+    spans = [run.attrs[key] for key in ("train_span", "test_span") if key in run.attrs]
+    if not spans:
+        return float(run["time"].values[0]), float(run["time"].values[-1])
+    return min(float(s[0]) for s in spans), max(float(s[1]) for s in spans)
+
+
+def choose_training(
+    settings: StudySettings, runs: Runs, names: Sequence[str], needs: Needs
+) -> tuple[TrainingSet, ...]:
+    """Choose what the models learn from.
+
+    Parameters
+    ----------
+    settings : StudySettings
+        The study.
+    runs : mapping of str to Dataset
+        Prepared runs.
+    names : sequence of str
+        Runs that train.
+    needs : Needs
+        Samples of the greediest model.
+
+    Returns
+    -------
+    tuple of TrainingSet
+        Each is long enough for all models and draws.
+
+    Raises
+    ------
+    RequestError
+        If no window is feasible; the message says what is missing.
+    """
+    training = settings.training
+    if training.scheme == "leave_out":
+        return _folds(settings, runs, names, needs)
+    if missing := [name for name in names if "train_span" not in runs[name].attrs]:
+        raise RequestError(
+            f"training: the run '{missing[0]}' has no training span in the campaign. Give it "
+            "role = 'train' or a span train = [begin, end], or use scheme = 'leave_out'."
+        )
+    spans = {name: _samples(runs[name], runs[name].attrs["train_span"]) for name in names}
+    if training.scheme == "pooled":
+        for name, (first, last) in spans.items():
+            _check_span(name, last - first + 1, needs, runs[name])
+        return (TrainingSet("pooled", tuple(_of_samples(runs, n, *s) for n, s in spans.items())),)
+    rng = random_stream(settings.study.seed, "training")
+    places = _places(spans, needs.training, needs.snapshots, training.placement, rng)
+    if not places:
+        _refuse_training(spans, needs, runs)
+    count = len(places) if training.windows is None else training.windows
+    if count > len(places) and training.placement == "random":
+        raise RequestError(
+            f"training.windows: {count} windows were asked for and {len(places)} are feasible. "
+            "Ask for fewer, or shorten the training length."
+        )
+    chosen = places[:count]
+    return tuple(
+        TrainingSet(f"t{number:02d}", (_of_samples(runs, name, spans[name][0], stop),))
+        for number, (name, stop) in enumerate(chosen)
+    )
+
+
+def _of_samples(runs: Runs, name: str, first: int, last: int) -> tuple[str, float, float]:
+    time = runs[name]["time"].values
+    return name, float(time[first]), float(time[last])
+
+
+def _places(
+    spans: Mapping[str, tuple[int, int]],
+    needed: int,
+    width: int,
+    placement: str,
+    rng: np.random.Generator,
+) -> list[tuple[str, int]]:
+    """Feasible last samples in random order; with 'apart' no two within `width` samples."""
+    if placement == "random":
+        all_of_them = [
+            (name, stop)
+            for name, (first, last) in spans.items()
+            for stop in range(first + needed - 1, last + 1)
+        ]
+    else:
+        all_of_them = [
+            (name, stop)
+            for name, (first, last) in spans.items()
+            for stop in range(last, first + needed - 2, -max(width, 1))
+        ]
+    return [all_of_them[i] for i in rng.permutation(len(all_of_them))]
+
+
+def _check_span(name: str, samples: int, needs: Needs, run: xr.Dataset) -> None:
+    if samples >= needs.training:
+        return
+    dt = float(run.attrs["dt"])
+    raise RequestError(
+        f"training: no window is feasible in '{name}'. Its span holds {samples} samples "
+        f"({samples * dt:g} s), and the largest draw of all models needs {needs.training} "
+        f"({needs.snapshots} snapshots and {needs.history} of delay history, "
+        f"{needs.training * dt:g} s). Shorten train_length or the delays, or give longer runs."
+    )
+
+
+def _refuse_training(spans: Mapping[str, tuple[int, int]], needs: Needs, runs: Runs) -> None:
+    longest = max(spans, key=lambda name: spans[name][1] - spans[name][0])
+    _check_span(longest, spans[longest][1] - spans[longest][0] + 1, needs, runs[longest])
+
+
+def _folds(
+    settings: StudySettings, runs: Runs, names: Sequence[str], needs: Needs
+) -> tuple[TrainingSet, ...]:
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        by_sea = settings.training.leave_out == "sea_state"
+        key = str(runs[name].attrs.get("sea_state") or name) if by_sea else name
+        groups.setdefault(key, []).append(name)
+    if len(groups) < 2:
+        raise RequestError(
+            f"training: leaving out a {settings.training.leave_out.replace('_', ' ')} of "
+            f"{', '.join(names)} leaves no run to learn from. Give more runs, or use scheme = "
+            "'halves'."
+        )
+    spans = {name: whole_span(runs[name]) for name in names}
+    for name in names:
+        first, last = _samples(runs[name], spans[name])
+        _check_span(name, last - first + 1, needs, runs[name])
+    return tuple(
+        TrainingSet(
+            f"without {group[0]}" + (f" (+{len(group) - 1})" if len(group) > 1 else ""),
+            tuple((name, *spans[name]) for name in names if name not in group),
+            tuple(group),
+        )
+        for group in groups.values()
+    )
+
+
+def choose_tests(
+    name: str,
+    test: TestSetSettings,
+    runs: Runs,
+    names: Sequence[str],
+    *,
+    steps: int,
+    needs: Needs,
+    whole: bool,
+    seed: int,
+) -> tuple[TestWindow, ...]:
+    """Choose the windows of a test set.
+
+    Parameters
+    ----------
+    name : str
+        Name of the set.
+    test : TestSetSettings
+        Its settings.
+    runs : mapping of str to Dataset
+        Prepared runs.
+    names : sequence of str
+        Runs that test.
+    steps : int
+        Instants of a window.
+    needs : Needs
+        Samples of the greediest model; the history may lie before the test span.
+    whole : bool
+        Whether the whole of a run tests (leaving runs out), or its test span.
+    seed : int
+        The study's seed.
+
+    Returns
+    -------
+    tuple of TestWindow
+        In the order of runs and instants.
+
+    Raises
+    ------
+    RequestError
+        If no window, or fewer than asked for, are feasible.
+    """
+    spans = {}
+    for each in names:
+        run = runs[each]
+        span = whole_span(run) if whole or "test_span" not in run.attrs else run.attrs["test_span"]
+        first, last = _samples(run, (float(span[0]) + test.startup, float(span[1])))
+        spans[each] = (max(first, needs.history), last)
+    # A window of `steps` instants after its start: steps + 1 samples.
+    places = _places(spans, steps + 1, steps, test.placement, random_stream(seed, f"tests.{name}"))
+    dt = float(runs[names[0]].attrs["dt"])
+    if not places:
+        longest = max(last - first + 1 for first, last in spans.values())
+        raise RequestError(
+            f"tests.{name}: no window is feasible. A window has {steps} instants "
+            f"({steps * dt:g} s), and the longest test span ({', '.join(names)}) holds "
+            f"{max(longest, 0)} samples after {needs.history} of delay history and the start-up. "
+            f"Reduce length or startup{_longest_length(longest, steps, test.length)}, or give "
+            "longer runs."
+        )
+    count = len(places) if test.windows is None else test.windows
+    if count > len(places) and test.placement == "random":
+        raise RequestError(
+            f"tests.{name}.windows: {count} windows were asked for and {len(places)} are feasible. "
+            "Ask for fewer, or reduce length."
+        )
+    order = {each: number for number, each in enumerate(names)}
+    chosen = sorted(places[:count], key=lambda place: (order[place[0]], place[1]))
+    return tuple(
+        TestWindow(each, float(runs[each]["time"].values[last - steps]), steps)
+        for each, last in chosen
+    )
+
+
+def _longest_length(samples: int, steps: int, length: float) -> str:
+    """Words for the longest window, in the periods of ``length``, that so many samples hold."""
+    periods = np.floor(10 * (samples - 1) * length / steps) / 10
+    return f" (length at most {periods:g} periods)" if periods > 0 else ""
+
+
+def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
+    """Mean part of a window that another window of the same run covers too, 0 to 1.
+
+    Parameters
+    ----------
+    spans : sequence of (str, float, float)
+        Run, begin and end of each window.
+
+    Returns
+    -------
+    float
+        0 for windows apart, 1 for windows that all lie in one another.
+
+    Examples
+    --------
+    >>> windows_overlap([("a", 0.0, 10.0), ("a", 5.0, 15.0)])
+    0.5
+    """
+    shares = []
+    for i, (run, begin, end) in enumerate(spans):
+        edges: npt.NDArray[np.float64] = np.linspace(begin, end, 201)
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        covered = np.zeros(middle.size, dtype=bool)
+        for k, (other, first, last) in enumerate(spans):
+            if k != i and other == run:
+                covered |= (middle >= first) & (middle <= last)
+        shares.append(covered.mean())
+    return float(np.mean(shares)) if shares else 0.0
+
+
+def needs_of(specs: Sequence[Spec], dt: float) -> Needs:
+    """Samples of the greediest of several models.
+
+    Parameters
+    ----------
+    specs : sequence of HankelDMDc or BayesianHankelDMDc
+        Models; of an ensemble the upper ends of its priors count.
+    dt : float
+        Time step, s.
+
+    Returns
+    -------
+    Needs
+        The same windows then serve all models and all draws.
+    """
+    windows, histories = [1], [0]
+    for spec in specs:
+        if isinstance(spec, HankelDMDc):
+            windows.append(spec.window or 1)
+            histories.append(spec.history_samples - 1)
+            continue
+
+        def samples(prior: object, period: float = spec.encounter_period) -> int:
+            # The last quantile of a prior without an upper end is its 1 − 1e-6 quantile.
+            top = float(prior.ppf(1.0))  # type: ignore[attr-defined]
+            if top == float("inf"):
+                top = float(prior.ppf(1.0 - 1e-6))  # type: ignore[attr-defined]
+            return periods_to_samples(top, period, dt)
+
+        windows.append(1 if spec.train_length is None else samples(spec.train_length))
+        histories.append(max(samples(spec.state_delay), samples(spec.input_delay)))
+    inside = all(spec.history == "inside" for spec in specs)
+    return Needs(max(windows), max(histories), inside)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +428,8 @@ class Plan:
         s.
     level : float
         Probability of the bands.
-    specs : dict of str to HankelDMDc or BayesianHankelDMDc
-        Models.
+    models : dict of str to ResolvedModel
+        Specs, and where their settings come from.
     training : tuple of TrainingSet
         What they learn from.
     tests : dict of str to tuple of TestWindow
@@ -52,6 +440,8 @@ class Plan:
         Samples of the greediest draw.
     calibrated_on : tuple of str
         Runs that train, if bands are to be calibrated on them.
+    eigenvalues : bool
+        Whether those of every model are kept.
     """
 
     digest: str
@@ -60,16 +450,18 @@ class Plan:
     dt: float
     encounter_period: float
     level: float
-    specs: dict[str, Spec]
+    models: dict[str, ResolvedModel]
     training: tuple[TrainingSet, ...]
     tests: dict[str, tuple[TestWindow, ...]]
     shown: int
     needs: Needs
     calibrated_on: tuple[str, ...] = ()
+    eigenvalues: bool = True
 
-    def is_ensemble(self, model: str) -> bool:
-        """Whether a model is an ensemble."""
-        return not isinstance(self.specs[model], HankelDMDc)
+    @property
+    def specs(self) -> dict[str, Spec]:
+        """Specs of the models."""
+        return {name: each.spec for name, each in self.models.items()}
 
     def is_shown(self, training: int, test: str, window: int) -> bool:
         """Whether the members of a cell are kept for figures."""
@@ -121,8 +513,13 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
         _check_channels(name, run, [*study.states, *study.inputs])
     dt = float(next(iter(runs.values())).attrs["dt"])
     period = settings.study.encounter_period or campaign.encounter_period()
-    specs = {n: build_spec(model_settings(study, n), period, dt) for n in settings.models}
-    needs = needs_of(list(specs.values()), dt)
+    general = settings.study
+    models = {
+        name: resolve_model(each, period, dt, preset=general.preset, seed=general.seed)
+        for name, each in settings.models.items()
+    }
+    specs = [each.spec for each in models.values()]
+    needs = needs_of(specs, dt)
     training = choose_training(settings, runs, training_names, needs)
     tests = {
         name: choose_tests(
@@ -144,12 +541,13 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
         dt=dt,
         encounter_period=period,
         level=settings.statistics.level,
-        specs=specs,
+        models=models,
         training=training,
         tests=tests,
         shown=settings.output.shown_windows,
         needs=needs,
         calibrated_on=tuple(training_names) if settings.calibrates else (),
+        eigenvalues=settings.output.eigenvalues,
     )
     _check_pairs(plan)
     return plan, runs
@@ -206,3 +604,39 @@ def _check_pairs(plan: Plan) -> None:
                     f"tests.{name}: no model may be tested on the run '{window.run}', because all "
                     "learn from it. Leave it out of training.runs, or name other runs."
                 )
+
+
+def warn_of_slow_study(plan: Plan, runs: Mapping[str, xr.Dataset]) -> None:
+    """Warn once for a study, of the model and training set that hold the fewest slow periods.
+
+    Parameters
+    ----------
+    plan : Plan
+        The study.
+    runs : mapping of str to Dataset
+        Prepared runs.
+
+    Warns
+    -----
+    SeakeepWarning
+        As :func:`seakeep.models.slow.warn_of_slow_motions`.
+    """
+    least = None
+    for model, spec in plan.specs.items():
+        snapshots = needs_of([spec], plan.dt).snapshots
+        longest = (snapshots - 1) * plan.dt if snapshots > 1 else float("inf")
+        for training in plan.training if spec.standardize else ():
+            trained = sum(min(stop - begin, longest) for _, begin, stop in training.spans)
+            if least is None or trained < least[0]:
+                least = trained, f"the training windows of '{model}' in '{training.name}'"
+    if least is None:
+        return
+    begins: dict[str, list[float]] = {}
+    for training in plan.training:
+        for name, begin, stop in training.spans:
+            begins.setdefault(name, []).extend((begin, stop))
+    parts = {
+        name: runs[name].sel(time=slice(min(ends) - 1e-6, max(ends) + 1e-6))
+        for name, ends in begins.items()
+    }
+    warn_of_slow_motions(parts, list(plan.states), least[0], plan.encounter_period, least[1])

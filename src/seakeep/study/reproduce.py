@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +14,6 @@ import xarray as xr
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.files import replacing
-from seakeep.models.executor import make_executor
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
 from seakeep.study.store import StudyResult, storing, versions
@@ -63,8 +63,7 @@ def reproduce(
     *,
     size: Size | None = None,
     seed: int = 0,
-    workers: int = 1,
-    scheduler: str | None = None,
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> StudyResult:
     """Play the virtual campaign and run the paper's study on it.
@@ -80,7 +79,7 @@ def reproduce(
         Counts; the default is the paper's.
     seed : int, optional
         Of the waves, the noise, the windows and the draws.
-    workers, scheduler
+    executor
         As in :func:`seakeep.study.run_study`.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
@@ -93,13 +92,10 @@ def reproduce(
     Raises
     ------
     RequestError
-        If the tank's libraries are not installed, the folder holds another study, or the cluster
-        cannot be used.
+        If the tank's libraries are not installed, or the folder holds another study.
     StorageError
         If the disk is full.
     """
-    with make_executor(workers, scheduler):  # refused before the campaign is played
-        pass
     out, counts = Path(out), size or Size()
     with storing(out):
         out.mkdir(parents=True, exist_ok=True)
@@ -109,8 +105,7 @@ def reproduce(
     return run_study(
         read_study(out / "study.toml"),
         out,
-        workers=workers,
-        scheduler=scheduler,
+        executor=executor,
         progress=progress,
         extra={"nominal": nominal},
         notes={"preparation_note": NOTE, "waves_note": WAVES[preset]},

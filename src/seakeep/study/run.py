@@ -1,4 +1,4 @@
-"""Run a study: every (training set x test window x model) cell, resumed where it was stopped."""
+"""Run a study, unit by unit, resumed where it was stopped."""
 
 from __future__ import annotations
 
@@ -7,31 +7,29 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
 
 import xarray as xr
 
 from seakeep.campaign.prepare import Progress
-from seakeep.models.executor import WorkerLostError, as_finished, make_executor
+from seakeep.errors import SeakeepError
+from seakeep.models.executor import WorkerLostError, as_finished
 from seakeep.models.priors import Prior, describe
-from seakeep.study.cells import Unit, cells_of, compute, units_of
-from seakeep.study.description import describe_study
-from seakeep.study.lock import alone_in
-from seakeep.study.merge import merge_cells
-from seakeep.study.plan import Plan, make_plan
+from seakeep.study.describe import describe_study
+from seakeep.study.judge import judge
+from seakeep.study.plan import Plan, make_plan, warn_of_slow_study
+from seakeep.study.resolve import Spec
 from seakeep.study.settings import Study
-from seakeep.study.slow import warn_of_slow_study
-from seakeep.study.specs import Spec
-from seakeep.study.statistics import judge
 from seakeep.study.store import (
     RESULT,
-    CellFolder,
+    Arrays,
     StudyResult,
+    UnitFolder,
     read_result,
-    retell,
+    relabel,
     versions,
     write_result,
 )
+from seakeep.study.units import Unit, collect, compute, units_of
 
 __all__ = ["run_study"]
 
@@ -40,8 +38,7 @@ def run_study(
     study: Study,
     out: Path | str,
     *,
-    workers: int = 1,
-    scheduler: str | None = None,
+    executor: Executor | None = None,
     progress: Progress | None = None,
     extra: Mapping[str, xr.Dataset] | None = None,
     notes: Mapping[str, str] | None = None,
@@ -53,14 +50,11 @@ def run_study(
     study : Study
         From :func:`seakeep.study.read_study`.
     out : Path or str
-        Folder of the results. Finished cells are kept there, one file each, and taken over when
-        the study is run again; at the end all is in ``study.nc``.
-    workers : int, optional
-        Processes side by side, each on one BLAS thread. The arrays do not depend on it.
-    scheduler : str, optional
-        Address of the scheduler of a running Dask cluster, ``tcp://host:8786``, whose workers
-        compute the cells instead (extra ``cluster``). They need no disk in common: cells come back
-        and are written here.
+        Folder of the results. Finished units (a model of a training set) are kept there, one file
+        each, and taken over when the study is run again; at the end all is in ``study.nc``.
+    executor : concurrent.futures.Executor, optional
+        Does units side by side: :func:`seakeep.models.executor.processes`, or ``get_executor()``
+        of a Dask client. Its workers need no disk in common. The arrays do not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
     extra : mapping of str to Dataset, optional
@@ -77,13 +71,13 @@ def run_study(
     ------
     RequestError
         If settings leave no feasible window, a channel is missing, the folder holds another
-        study or cannot be written, another process works there, or the cluster cannot be used.
+        study or cannot be written, or another process works there.
     DataError
         If a run cannot be read or used.
     StorageError
-        If the disk is full; finished cells are kept.
+        If the disk is full; what was finished is kept.
     WorkerLostError
-        If a worker process was stopped from outside; finished cells are kept.
+        If a worker process was stopped from outside; what was finished is kept.
 
     Warns
     -----
@@ -92,38 +86,36 @@ def run_study(
     """
     out = Path(out)
     tell = progress or (lambda done, total, what: None)
-    cells = CellFolder(out, study.digest)
-    cells.check()
+    folder = UnitFolder(out, study.digest)
+    folder.check()
     if (found := _finished(study, out, tell)) is not None:
-        return retell(found, _words_of_study(study))
-    with make_executor(workers, scheduler) as executor:
-        return _run(study, out, cells, executor, tell, extra or {}, notes or {})
-
-
-def _run(
-    study: Study,
-    out: Path,
-    cells: CellFolder,
-    executor: Executor | None,
-    tell: Progress,
-    extra: Mapping[str, xr.Dataset],
-    notes: Mapping[str, str],
-) -> StudyResult:
+        return relabel(found, _labels(study))
     plan, runs = make_plan(study, lambda done, total, name: tell(done, total, f"preparing {name}"))
     warn_of_slow_study(plan, runs)
-    cells.open(study.name)
-    with alone_in(out):
-        if (found := _finished(study, out, tell)) is None:  # by another process, meanwhile
-            units = units_of(plan, study.settings.output.eigenvalues)
-            left = [u for u in units if not all(cells.has(name) for name in cells_of(plan, u))]
-            _compute_all(plan, runs, cells, units, left, executor, tell)
+    folder.open(study.name)
+    with folder.alone():
+        found = _finished(study, out, tell)  # by another process, meanwhile
+        if found is None:
+            units = units_of(plan)
+            _compute_all(plan, runs, folder, units, executor, tell)
             tell(len(units), len(units), "statistics and densities")
-            groups = {**describe_study(study, plan, runs), **merge_cells(study, plan, runs, cells)}
-            groups.update(judge(groups, study.settings, list(plan.states)))
-            groups.update(extra)
-            attributes = {**_attributes(study, plan, groups), **notes}
+            groups = describe_study(study, plan, runs)
+            groups |= collect(study, plan, runs, lambda unit: _arrays(folder, unit))
+            groups |= judge(groups, study.settings, list(plan.states))
+            groups |= extra or {}
+            attributes = {**_attributes(study, plan, groups), **(notes or {})}
             found = write_result(out, attributes, groups)
-        cells.clear()
+        folder.clear()
+    return found
+
+
+def _arrays(folder: UnitFolder, unit: Unit) -> Arrays:
+    found = folder.read(unit.name)
+    if found is None:
+        raise SeakeepError(
+            f"the file {unit.name}.npz in {folder.folder} is missing or damaged. Run the study "
+            "again."
+        )
     return found
 
 
@@ -138,7 +130,7 @@ def _finished(study: Study, out: Path, tell: Progress) -> StudyResult | None:
     return found
 
 
-def _words_of_study(study: Study) -> dict[str, str]:
+def _labels(study: Study) -> dict[str, str]:
     """Attributes in which a study may change without becoming another one: names and labels."""
     general, campaign = study.settings.study, study.campaign.settings.campaign
     return {
@@ -153,7 +145,7 @@ def _attributes(
 ) -> dict[str, str | float | int]:
     general = study.settings.study
     return {
-        **_words_of_study(study),
+        **_labels(study),
         "campaign": study.campaign.name,
         "preset": general.preset,
         "seed": general.seed,
@@ -163,6 +155,7 @@ def _attributes(
         "dt": plan.dt,
         "longest_training": plan.needs.training * plan.dt,
         "preparation": study.campaign.settings.preparation.model_dump_json(),
+        "models": json.dumps({name: each.to_json() for name, each in plan.models.items()}),
         "specs": json.dumps({name: _fields(spec) for name, spec in plan.specs.items()}),
         "conditional_on": _conditional(plan),
         "versions": json.dumps(versions()),
@@ -196,38 +189,28 @@ def _conditional(plan: Plan) -> str:
 def _compute_all(
     plan: Plan,
     runs: Mapping[str, xr.Dataset],
-    cells: CellFolder,
+    folder: UnitFolder,
     units: list[Unit],
-    left: list[Unit],
     executor: Executor | None,
     tell: Progress,
 ) -> None:
+    left = [unit for unit in units if not folder.has(unit.name)]
     done, total = len(units) - len(left), len(units)
     tell(done, total, "fitting and forecasting")
     if not left:
         return
     try:
-        for number, found in as_finished(_work, (plan, dict(runs)), left, executor):
-            for name, arrays in found:
-                cells.write(name, arrays)
+        for number, arrays in as_finished(_work, (plan, dict(runs)), left, executor):
+            unit = left[number]
+            folder.write(unit.name, arrays)
             done += 1
-            tell(done, total, _words(plan, left[number]))
+            tell(done, total, f"{unit.model}, training set {plan.training[unit.training].name}")
     except WorkerLostError as error:
         raise WorkerLostError(
-            f"{error} All cells that were finished are kept: the same command goes on where it "
-            "stopped."
+            f"{error} What was finished is kept: the same command goes on where it stopped."
         ) from None
 
 
-def _words(plan: Plan, unit: Unit) -> str:
-    if unit.kind == "eigenvalues":
-        return f"{unit.model}, eigenvalues from member {unit.first + 1} on"
-    return f"{unit.model}, training set {plan.training[unit.training].name}"
-
-
-def _work(data: tuple[Plan, dict[str, xr.Dataset]], unit: Unit) -> list[tuple[str, dict[str, Any]]]:
-    """Cells of a unit; whoever asked for them writes them, for a worker may have another disk."""
-    plan, runs = data
-    found: list[tuple[str, dict[str, Any]]] = []
-    compute(plan, runs, unit, lambda name, arrays: found.append((name, arrays)))
-    return found
+def _work(data: tuple[Plan, dict[str, xr.Dataset]], unit: Unit) -> Arrays:
+    """Arrays of a unit, which come back to be written: a worker may have another disk."""
+    return compute(*data, unit)

@@ -50,7 +50,9 @@ class GeneralStudySettings(Table):
     preset: Preset = Field(
         default="paper", description="'paper' or 'recommended', for models that state no other"
     )
-    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="an integer, 0 or more")
+    seed: Annotated[int, Field(ge=0, lt=2**64)] = Field(
+        default=0, description="an integer, 0 or more and below 2^64"
+    )
     encounter_period: Positive | None = Field(
         default=None, description="seconds, in which lengths are counted; left out, the campaign's"
     )
@@ -157,8 +159,8 @@ class OutputSettings(Table):
     eigenvalues: bool = Field(default=True, description="true or false")
     paper: bool = Field(
         default=False,
-        description="whether the report puts the paper's choices and published numbers beside "
-        "those of the study",
+        description="whether the report puts the paper's published divergences beside those of "
+        "the study",
     )
 
 

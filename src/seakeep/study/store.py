@@ -1,4 +1,4 @@
-"""Results on disk: one file a finished cell, then one NetCDF file with everything."""
+"""Results on disk: one file per finished unit, then one NetCDF file with everything."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import cached_property
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -17,28 +18,30 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
+from filelock import FileLock, Timeout
 
 from seakeep.errors import DataError, RequestError, SeakeepError
-from seakeep.files import replacing, write_netcdf
-from seakeep.interruption import uninterrupted
+from seakeep.files import check_seal, replacing, write_netcdf
 
 __all__ = [
     "RESULT",
-    "CellFolder",
     "StorageError",
     "StudyResult",
+    "UnitFolder",
     "read_result",
-    "retell",
+    "relabel",
+    "storing",
     "versions",
     "write_result",
 ]
 
-FORMAT = 3
+FORMAT = 4
 """Goes into digest and result: raise it when the same settings begin to give other arrays."""
 
 RESULT = "study.nc"
 HEADER = "study.json"
-CELLS = "cells"
+LOCK = "study.lock"
+UNITS = "units"
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 FORBIDDEN = (errno.EACCES, errno.EPERM, errno.EROFS)
@@ -58,12 +61,7 @@ def versions() -> dict[str, str]:
 
 @contextmanager
 def storing(folder: Path) -> Iterator[None]:
-    """Tell why results could not be written, and what mends it.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the results.
+    """Say why results could not be written, and what mends it.
 
     Raises
     ------
@@ -82,7 +80,7 @@ def storing(folder: Path) -> Iterator[None]:
         if cause.errno in FORBIDDEN:
             raise RequestError(
                 f"{said} Choose a folder that you may write to, or change its permissions; the "
-                "same command goes on with the cells that are there."
+                "same command goes on with what is there."
             ) from error
         if cause.errno in NO_FOLDER:
             raise RequestError(
@@ -90,30 +88,30 @@ def storing(folder: Path) -> Iterator[None]:
             ) from error
         mend = "Free space on the disk" if cause.errno in FULL else "Look after the disk"
         raise StorageError(
-            f"{said} All cells that were finished are kept. {mend}; the same command then goes on "
-            "where it stopped."
+            f"{said} What was finished is kept. {mend}; the same command then goes on where it "
+            "stopped."
         ) from error
 
 
 @dataclass(frozen=True)
-class CellFolder:
-    """Finished cells of a study, one file each.
+class UnitFolder:
+    """Finished units of a study, one file each.
 
     Parameters
     ----------
     folder : Path
         Folder of the results.
     digest : str
-        Of the study; a cell of another one is not taken.
+        Of the study; a unit of another one is not taken.
     """
 
     folder: Path
     digest: str
 
     def check(self) -> None:
-        """Find, before the work, that the folder can be written and holds no other study.
+        """Refuse, before the work, a folder that cannot be written or holds another study.
 
-        A study that was begun and has no finished cell is none: nothing of it is lost.
+        A study that was started and has no finished unit is none: nothing of it is lost.
 
         Raises
         ------
@@ -124,50 +122,58 @@ class CellFolder:
             If the disk fails.
         """
         with storing(self.folder):
-            (self.folder / CELLS).mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=self.folder / CELLS).close()
+            (self.folder / UNITS).mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=self.folder / UNITS).close()
         header = self.folder / HEADER
         if header.exists() and self._holds_results():
             _check_header(self.folder, _read_header(header), self._header())
 
     def open(self, name: str) -> None:
-        """Make the folder this study's, or find that it belongs to it.
-
-        Parameters
-        ----------
-        name : str
-            Name of the study, for people who look into the folder.
-
-        Raises
-        ------
-        RequestError
-            As :meth:`check`.
-        StorageError
-            If the disk is full or fails.
-        """
+        """Make the folder this study's, or find that it belongs to it; errors as :meth:`check`."""
         self.check()
         text = json.dumps({"study": name, **self._header()}, indent=1)
         with storing(self.folder), replacing(self.folder / HEADER) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
 
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Keep other processes out of the folder; the lock ends with this process.
+
+        Raises
+        ------
+        RequestError
+            If another process works there.
+        """
+        path = self.folder / LOCK
+        lock = FileLock(path, timeout=0)
+        try:
+            lock.acquire()
+        except Timeout:
+            raise RequestError(
+                f"another process works on the study in {self.folder}. Wait until it has finished, "
+                "or choose another folder (-o)."
+            ) from None
+        except (OSError, NotImplementedError):  # a file system without locks keeps nobody out
+            yield
+            return
+        try:
+            yield
+        finally:
+            with suppress(OSError):  # Windows does not remove a file that is open
+                path.unlink()
+            lock.release()
+
     def _header(self) -> dict[str, Any]:
         return {"digest": self.digest, "versions": versions()}
 
     def _holds_results(self) -> bool:
-        return (self.folder / RESULT).exists() or any((self.folder / CELLS).glob("*.npz"))
+        return (self.folder / RESULT).exists() or any((self.folder / UNITS).glob("*.npz"))
 
     def _path(self, name: str) -> Path:
-        return self.folder / CELLS / f"{name}.npz"
+        return self.folder / UNITS / f"{name}.npz"
 
     def write(self, name: str, arrays: Mapping[str, npt.ArrayLike]) -> None:
-        """Keep a finished cell; it is there whole or not at all.
-
-        Parameters
-        ----------
-        name : str
-            Name of the cell.
-        arrays : mapping of str to array_like
-            What it found.
+        """Keep the arrays of a finished unit; the file is there whole or not at all.
 
         Raises
         ------
@@ -176,7 +182,6 @@ class CellFolder:
         """
         kept: dict[str, Any] = {key: np.asarray(value) for key, value in arrays.items()}
         with (
-            uninterrupted(),
             storing(self.folder),
             replacing(self._path(name)) as temporary,
             temporary.open("wb") as file,
@@ -184,22 +189,10 @@ class CellFolder:
             np.savez(file, digest=np.array(self.digest), **kept)
 
     def read(self, name: str) -> Arrays | None:
-        """Arrays of a finished cell.
-
-        Parameters
-        ----------
-        name : str
-            Name of the cell.
-
-        Returns
-        -------
-        dict of str to ndarray, or None
-            None where it is not finished, or damaged.
-        """
+        """Arrays of a finished unit; None where it is not finished, or damaged."""
         try:
             # numpy leaves a damaged file open that it opened itself
             with (
-                uninterrupted(),
                 self._path(name).open("rb") as opened,
                 np.load(opened, allow_pickle=False) as file,
             ):
@@ -209,15 +202,15 @@ class CellFolder:
         return arrays if str(arrays.pop("digest", "")) == self.digest else None
 
     def has(self, name: str) -> bool:
-        """Whether a cell is finished."""
+        """Whether a unit is finished."""
         return self._path(name).exists() and self.read(name) is not None
 
     def clear(self) -> None:
-        """Remove the cells; for when all of them are in the result."""
-        for path in (self.folder / CELLS).glob("*.npz*"):
+        """Remove the units; for when all of them are in the result."""
+        for path in (self.folder / UNITS).glob("*.npz*"):
             path.unlink(missing_ok=True)
         with suppress(OSError):  # somebody else's files stay
-            (self.folder / CELLS).rmdir()
+            (self.folder / UNITS).rmdir()
 
 
 def _read_header(path: Path) -> dict[str, Any]:
@@ -244,7 +237,7 @@ def _check_header(folder: Path, found: Mapping[str, Any], expected: Mapping[str,
     changed = [f"{k} {before.get(k)} (now {v})" for k, v in now.items() if before.get(k) != v]
     if changed:
         raise RequestError(
-            f"{folder} was begun with {', '.join(changed)}; arrays of both would be mixed. Give "
+            f"{folder} was started with {', '.join(changed)}; arrays of both would be mixed. Give "
             "another folder with -o, or remove this one."
         )
 
@@ -274,10 +267,20 @@ class StudyResult:
         settings: dict[str, Any] = json.loads(self.attrs["settings"])
         return settings
 
+    @cached_property
+    def model_settings(self) -> dict[str, Any]:
+        """Per model its ``kind``, ``preset``, ``ensemble``, ``n_members`` and ``settings``.
+
+        ``settings`` gives for each key its ``value`` (a JSON value) and its ``source``: "stated",
+        "preset", "study" (the study's seed) or "default".
+        """
+        found: dict[str, Any] = json.loads(self.attrs["models"])
+        return found
+
     @property
     def models(self) -> list[str]:
         """Names of the models, in the order of the study file."""
-        return list(self.settings["models"])
+        return list(self.model_settings)
 
     @property
     def channels(self) -> list[str]:
@@ -308,7 +311,7 @@ class StudyResult:
 
     def is_ensemble(self, model: str) -> bool:
         """Whether a model is an ensemble."""
-        return str(self.settings["models"][model]["kind"]).startswith("bayesian")
+        return bool(self.model_settings[model]["ensemble"])
 
     def label_of(self, test: str) -> str:
         """Words for a test set."""
@@ -322,7 +325,7 @@ class StudyResult:
 def write_result(
     folder: Path, attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]
 ) -> StudyResult:
-    """Write everything into one NetCDF file, renamed into place.
+    """Write everything into one sealed NetCDF file, renamed into place.
 
     Parameters
     ----------
@@ -344,7 +347,7 @@ def write_result(
         If the file cannot be written.
     """
     kept = {**attrs, "format": FORMAT, "created": datetime.now(UTC).isoformat(timespec="seconds")}
-    with uninterrupted(), storing(folder), replacing(folder / RESULT) as temporary:
+    with storing(folder), replacing(folder / RESULT) as temporary:
         write_netcdf(temporary, xr.Dataset(attrs=kept), groups, _packing)
     return StudyResult(folder, kept, dict(groups))
 
@@ -357,20 +360,8 @@ def _packing(group: xr.Dataset) -> dict[str, dict[str, object]]:
     }
 
 
-def retell(result: StudyResult, words: Mapping[str, str]) -> StudyResult:
-    """Write other words into a finished result: attributes on which no array depends.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The result.
-    words : mapping of str to str
-        Attributes.
-
-    Returns
-    -------
-    StudyResult
-        With these words.
+def relabel(result: StudyResult, words: Mapping[str, str]) -> StudyResult:
+    """Write other names and labels into a finished result: attributes on which no array depends.
 
     Raises
     ------
@@ -381,7 +372,7 @@ def retell(result: StudyResult, words: Mapping[str, str]) -> StudyResult:
     if not changed:
         return result
     path = result.folder / RESULT
-    with uninterrupted(), storing(result.folder), replacing(path) as temporary:
+    with storing(result.folder), replacing(path) as temporary:
         write_netcdf(temporary, xr.Dataset(attrs=changed), onto=path)
     return replace(result, attrs={**result.attrs, **changed})
 
@@ -404,38 +395,40 @@ def read_result(folder: Path | str) -> StudyResult:
     RequestError
         If there is no finished study, or one of another format.
     DataError
-        If its file is damaged.
+        If its file is damaged, or was altered since it was written.
     """
     folder = Path(folder)
     path = folder / RESULT
     if not path.exists():
-        begun = (folder / HEADER).exists()
+        started = (folder / HEADER).exists()
         raise RequestError(
             f"{folder} holds no finished study ({RESULT} is missing). "
             + (
-                "One was begun there: run its 'seakeep study' again, it goes on where it stopped."
-                if begun
+                "One was started there: run its 'seakeep study' again, it goes on where it stopped."
+                if started
                 else "Give the folder that 'seakeep study' or 'seakeep reproduce' wrote."
             )
         )
     try:
         with xr.open_dataset(path, engine="h5netcdf") as root:
             attrs = {key: _plain(value) for key, value in root.attrs.items()}
+        if attrs.get("format") != FORMAT and "format" in attrs:
+            raise RequestError(
+                f"{path} was written in format {attrs['format']}, and this version of seakeep "
+                f"reads format {FORMAT}. Run the study again in another folder."
+            )
+        check_seal(path)
         groups = {}
-        names = json.loads(attrs["groups"]) if attrs.get("format") == FORMAT else []
-        for name in names:
+        for name in json.loads(attrs["groups"]):
             with xr.open_dataset(path, engine="h5netcdf", group=name, decode_times=False) as opened:
                 groups[name] = opened.load()
+    except SeakeepError:
+        raise
     except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
         raise DataError(
             f"{path} is damaged or no NetCDF file: {type(error).__name__} while reading it. Remove "
             "it and run the study again."
         ) from error
-    if attrs.get("format") != FORMAT:
-        raise RequestError(
-            f"{path} was written in format {attrs.get('format', 'unknown')}, and this version of "
-            f"seakeep reads format {FORMAT}. Run the study again in another folder."
-        )
     return StudyResult(folder, attrs, groups)
 
 

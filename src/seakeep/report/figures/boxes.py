@@ -18,7 +18,7 @@ from seakeep.report.figures.common import (
 from seakeep.report.style import figure_style, new_figure
 from seakeep.statistics import box_statistics
 from seakeep.study import StudyResult
-from seakeep.study.statistics import average_of
+from seakeep.study.judge import average_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,7 +12,7 @@ import scipy
 from seakeep.report.figures.common import line_of, model_colour, model_words
 from seakeep.report.style import figure_style, new_figure
 from seakeep.study import StudyResult
-from seakeep.study.statistics import average_of
+from seakeep.study.judge import average_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

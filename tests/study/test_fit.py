@@ -1,6 +1,7 @@
 """From a campaign's [model] table to a model, and which samples train and test."""
 
 import dataclasses
+import json
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from seakeep.study import (
     fit_campaign,
     training_runs,
 )
+from seakeep.study.resolve import resolve_model
 
 RATE = 10.0
 
@@ -392,3 +394,46 @@ def test_wrong_alignments_in_the_file_are_named(halves, text, message):
         text, runs = "", text + '\nfile = "run.csv"\n'
     with pytest.raises(RequestError, match=message):
         campaign(halves, EXACT + "\n" + text, runs)
+
+
+def test_a_preset_fills_in_what_is_not_stated_key_by_key_and_says_so():
+    stated = {"state_delays": 4, "input_delays": 20, "ridge": 0.15, "alignment": {"surge": "none"}}
+    settings = ModelSettings(states=("heave",), inputs=("eta_fwd",), **stated)
+    found = resolve_model(settings, 2.0, 0.1, preset="recommended")
+    assert (found.spec.ridge_scale, found.spec.delay_rows) == ("per_snapshot", "exact")
+    assert (found.spec.state_delays, found.spec.ridge) == (4, 0.15)
+    kept = json.loads(json.dumps(found.to_json()))
+    assert (kept["kind"], kept["preset"], kept["ensemble"]) == (
+        "hankel_dmdc",
+        "recommended",
+        False,
+    )
+    sources = {key: each["source"] for key, each in kept["settings"].items()}
+    assert kept["settings"]["ridge_scale"] == {"value": "per_snapshot", "source": "preset"}
+    assert kept["settings"]["alignment.surge"] == {"value": "none", "source": "stated"}
+    assert sources["alignment.mode"] == sources["rank"] == "default"
+    assert sources["ridge"] == "stated"
+
+
+def test_priors_and_seed_of_a_study_are_kept_as_json_values_with_their_source():
+    found = resolve_model(
+        table(ridge={"log_uniform": [0.1, 10]}), 2.0, 0.1, preset="paper", seed=7
+    ).to_json()
+    assert found["n_members"] == 100
+    settings = found["settings"]
+    assert settings["ridge"] == {
+        "value": {"prior": "LogUniform", "low": 0.1, "high": 10.0},
+        "source": "stated",
+    }
+    assert settings["train_length"] == {
+        "value": {"prior": "Uniform", "low": 10.0, "high": 30.0},
+        "source": "preset",
+    }
+    assert settings["seed"] == {"value": 7, "source": "study"}
+
+
+def test_an_unknown_kind_or_key_is_named():
+    with pytest.raises(RequestError, match=r"no kind of model 'hankel'.*Kinds: hankel_dmdc"):
+        build_spec(ModelSettings(states=("heave",), kind="hankel"), 2.0, 0.1)
+    with pytest.raises(RequestError, match=r"has no key 'riddge'.*mean 'ridge'"):
+        build_spec(ModelSettings(states=("heave",), preset="paper", riddge=1.0), 2.0, 0.1)

@@ -14,12 +14,10 @@ from seakeep.errors import RequestError
 from seakeep.models import HankelDMDc, ProbeAlignment
 from seakeep.models.alignment import fit_alignment
 from seakeep.signals import significant_height, wave_spectrum
-from seakeep.study.plan import Plan
-from seakeep.study.response import wave_frequency
+from seakeep.study.judge import wave_frequency
+from seakeep.study.plan import Plan, between, whole_span
+from seakeep.study.resolve import Spec
 from seakeep.study.settings import Study
-from seakeep.study.specs import Spec
-from seakeep.study.windows import whole_span
-from seakeep.study.workflow import between
 
 __all__ = ["describe_study"]
 
@@ -134,15 +132,21 @@ def _training(plan: Plan, runs: Runs) -> xr.Dataset:
         for each in plan.training
     ]
     single = all(len(each.spans) == 1 for each in plan.training)
+    edges = np.full((2, len(plan.training), len(runs)), np.nan)
+    for number, each in enumerate(plan.training):
+        for run, *span in each.spans:
+            edges[:, number, list(runs).index(run)] = span
     out = xr.Dataset(
         {
+            "begin": (("training", "of_run"), edges[0], {"units": "s"}),
+            "end": (("training", "of_run"), edges[1], {"units": "s"}),
             "spans": ("training", np.array(spans, dtype=object)),
             "left_out": (
                 "training",
                 np.array([", ".join(each.left_out) for each in plan.training], dtype=object),
             ),
         },
-        coords={"training": [each.name for each in plan.training]},
+        coords={"training": [each.name for each in plan.training], "of_run": list(runs)},
     )
     if single:
         out["run"] = ("training", np.array([e.spans[0][0] for e in plan.training], dtype=object))
@@ -190,6 +194,15 @@ def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
         key: ("run", np.array([_span(run, key) for run in runs.values()], dtype=object))
         for key in ("train_span", "test_span")
     }
+    nowhere = (np.nan, np.nan)
+    edges = {
+        f"{use}_{end}": (
+            "run",
+            np.array([r.attrs.get(f"{use}_span", nowhere)[k] for r in runs.values()]),
+        )
+        for use in ("train", "test")
+        for k, end in enumerate(("begin", "end"))
+    }
     trained = {run for each in plan.training for run in each.runs}
     depths = [float(run.attrs.get("water_depth", np.nan)) for run in runs.values()]
     return xr.Dataset(
@@ -200,6 +213,7 @@ def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
             **{n: (("run", "name"), values[i]) for i, n in enumerate(numbers)},
             **words,
             **spans,
+            **edges,
             "duration": (
                 "run",
                 np.array(

@@ -1,0 +1,34 @@
+from .comparison import (
+    Comparison,
+    at_full_scale,
+    compare,
+    comparison_table,
+    forecast_at_full_scale,
+    in_degrees,
+    with_degrees,
+)
+from .fit import fit_campaign, training_runs
+from .resolve import build_spec
+from .run import run_study
+from .settings import Study, StudySettings, read_study
+from .store import StorageError, StudyResult, read_result
+
+__all__ = [
+    "Comparison",
+    "StorageError",
+    "Study",
+    "StudyResult",
+    "StudySettings",
+    "at_full_scale",
+    "build_spec",
+    "compare",
+    "comparison_table",
+    "fit_campaign",
+    "forecast_at_full_scale",
+    "in_degrees",
+    "read_result",
+    "read_study",
+    "run_study",
+    "training_runs",
+    "with_degrees",
+]

@@ -1,0 +1,233 @@
+"""A campaign's settings become a model; what its data cannot teach is warned of."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+
+from seakeep.campaign import Campaign, load_prepared
+from seakeep.campaign.prepare import Progress
+from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.models import HankelDMDc, HankelDMDcModel, HankelEnsemble
+from seakeep.models.slow import warn_of_slow_motions
+from seakeep.signals import encounter_period, find_leakage
+from seakeep.study.plan import between, needs_of
+from seakeep.study.resolve import Spec, build_spec, counts_in_periods
+from seakeep.toml import Length
+
+__all__ = ["fit_campaign", "training_runs", "warn_of_repeats"]
+
+NOTHING_TRAINS = (
+    "no run of the campaign trains a model. Give one role = 'train', or a span "
+    "train = [begin, end]."
+)
+
+
+def training_runs(
+    prepared: Mapping[str, xr.Dataset], window: int | None = None
+) -> dict[str, xr.Dataset]:
+    """Parts of prepared runs that train.
+
+    Parameters
+    ----------
+    prepared : mapping of str to Dataset
+        Runs of a campaign, as ``campaign.prepare()`` gives them.
+    window : int, optional
+        Most snapshots that a model takes from the end of the span. Where the span holds them,
+        what lies before the span is kept, so that the delay history may come from there. Without
+        it the whole span is the window, and the history lies inside it.
+
+    Returns
+    -------
+    dict of str to Dataset
+        Each cut at the end of its ``train_span``.
+
+    Raises
+    ------
+    RequestError
+        If no run trains.
+    """
+    runs = {}
+    for name, run in prepared.items():
+        if "train_span" not in run.attrs:
+            continue
+        runs[name] = between(run, run.attrs["train_span"])
+        if window is not None and runs[name].sizes["time"] >= window:
+            begin = float(run["time"][0])
+            runs[name] = between(run, (begin, run.attrs["train_span"][1]))
+    if not runs:
+        raise RequestError(NOTHING_TRAINS)
+    return runs
+
+
+def fit_campaign(
+    campaign: Campaign, model: str | None = None, progress: Progress | None = None
+) -> HankelDMDcModel | HankelEnsemble:
+    """Identify the model, or the ensemble, that a campaign describes from its training runs.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The campaign.
+    model : str, optional
+        Key in ``[models.NAME]``; by default the table ``[model]``.
+    progress : callable, optional
+        Called as ``progress(done, total, run)`` while runs are prepared.
+
+    Returns
+    -------
+    HankelDMDcModel or HankelEnsemble
+        As the table's ``kind`` says.
+
+    Raises
+    ------
+    RequestError
+        If the campaign describes no such model, or no run trains.
+    DataError
+        If a run cannot be read or used.
+
+    Warns
+    -----
+    SeakeepWarning
+        If the test part of a training run repeats the model's training input, or the training
+        windows (of an ensemble the longest) hold fewer than five periods of a slow motion.
+    """
+    settings = campaign.model(model)
+    prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
+    if not prepared:
+        raise RequestError(NOTHING_TRAINS)
+    dt = float(next(iter(prepared.values())).attrs["dt"])
+    period = campaign.encounter_period() if counts_in_periods(settings) else None
+    spec = build_spec(settings, period, dt)
+    runs = training_runs(prepared, _longest_window(spec, dt))
+    stop = settings.stop
+    if isinstance(stop, Length):
+        stop = None if period is None else stop.at(period)
+    identified = spec.fit(runs, list(settings.states), list(settings.inputs), stop=stop)
+    both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
+    warn_of_repeats(identified, campaign, both)
+    if spec.standardize:
+        _warn_of_slow_model(identified, runs)
+    return identified
+
+
+def _longest_window(spec: Spec, dt: float) -> int | None:
+    """Most snapshots before the end of a span, where the history may lie before them."""
+    if spec.history == "inside":
+        return None
+    if isinstance(spec, HankelDMDc):
+        return spec.window
+    if spec.train_length is None or spec.train_on == "windows":
+        return None
+    return needs_of([spec], dt).snapshots
+
+
+def _warn_of_slow_model(
+    model: HankelDMDcModel | HankelEnsemble, runs: Mapping[str, xr.Dataset]
+) -> None:
+    """Warn of slow motions that the training windows of a model hold fewer than five periods of.
+
+    Parameters
+    ----------
+    model : HankelDMDcModel or HankelEnsemble
+        The model; of an ensemble the longest windows count.
+    runs : mapping of str to Dataset
+        Its training runs; the encounter period is taken from their attributes, or where they have
+        none from the first input. Nothing is said of a model that has neither.
+
+    Warns
+    -----
+    SeakeepWarning
+        As :func:`seakeep.models.slow.warn_of_slow_motions`.
+    """
+    spans = model.training_spans
+    first = runs[next(iter(spans))]
+    period = first.attrs.get("encounter_period")
+    if period is None and not model.inputs:
+        return
+    if period is None:
+        wave = first[model.inputs[0]].values
+        period = encounter_period(wave[np.isfinite(wave)], model.dt)
+    parts = {name: runs[name].sel(time=slice(None, end + 1e-6)) for name, (_, end) in spans.items()}
+    trained = sum(last - first for first, last in spans.values())
+    warn_of_slow_motions(parts, model.states, trained, float(period))
+
+
+def warn_of_repeats(
+    model: HankelDMDcModel | HankelEnsemble, campaign: Campaign, tested: Mapping[str, xr.Dataset]
+) -> None:
+    """Warn where a test run's input repeats the model's training input, up to a constant phase.
+
+    Training runs that the campaign marks as regular waves are left out: regular waves repeat by
+    their nature. So are runs that the campaign does not have.
+
+    Parameters
+    ----------
+    model : HankelDMDcModel or HankelEnsemble
+        The model, which knows the runs and spans it was trained on.
+    campaign : Campaign
+        The campaign.
+    tested : mapping of str to Dataset
+        Prepared test runs.
+
+    Warns
+    -----
+    SeakeepWarning
+        One for each test run that repeats.
+    """
+    training = {
+        name: span
+        for name, span in model.training_spans.items()
+        if name in campaign.settings.runs and campaign.settings.runs[name].waves != "regular"
+    }
+    if not (model.inputs and training):
+        return
+    missing = [name for name in training if name not in tested]
+    prepared = dict(tested) | (load_prepared(campaign, names=missing) if missing else {})
+    pieces = {
+        name: prepared[name].sel(time=slice(first - 1e-6, stop + 1e-6))
+        for name, (first, stop) in training.items()
+    }
+    for name, run in tested.items():
+        part = _test_part(run, pieces.get(name))
+        # What a member leaves of a training run is too short to be judged.
+        enough = name not in training or part.sizes["time"] >= model.history_samples
+        if enough and campaign.settings.runs[name].waves != "regular":
+            _warn_of_repeat(model.inputs, pieces, name, part, model.dt)
+
+
+def _test_part(run: xr.Dataset, trained: xr.Dataset | None) -> xr.Dataset:
+    span = run.attrs.get("test_span")
+    if span is not None:
+        return run.sel(time=slice(span[0] - 1e-6, span[1] + 1e-6))
+    if trained is not None:  # whoever tests on the training part knows that it repeats
+        return run.sel(time=slice(float(trained["time"][-1]) + 1e-6, None))
+    return run
+
+
+def _warn_of_repeat(
+    inputs: Sequence[str], pieces: Mapping[str, xr.Dataset], name: str, test: xr.Dataset, dt: float
+) -> None:
+    for channel in inputs:
+        records = {key: piece[channel].values for key, piece in pieces.items() if channel in piece}
+        whole = all(np.all(np.isfinite(each)) for each in (*records.values(), test[channel].values))
+        if not (records and whole) or min(test.sizes["time"], *map(len, records.values())) < 8:
+            continue
+        found = find_leakage(list(records.values()), test[channel].values, dt)
+        if found is None:
+            continue
+        source = list(records)[found.training]
+        begin = float(test["time"][0]) + found.test_start
+        origin = float(pieces[source]["time"][0]) + found.training_start
+        warnings.warn(
+            f"the input '{channel}' of {name} repeats training input: {100 * found.share:.0f} % of "
+            f"it, such as from t = {begin:.4g} s on, is what {source} holds from t = {origin:.4g} "
+            f"s on, turned by {np.degrees(found.phase):.0f} degrees (correlation "
+            f"{found.correlation:.3f}). This test shows memory, not skill: test on another run.",
+            SeakeepWarning,
+            stacklevel=4,
+        )
+        return

@@ -1,0 +1,259 @@
+"""From the table of a model, in a campaign file or a study file, to its spec.
+
+One rule, key by key, for campaigns and studies: what the table states, else what the preset says,
+else the default of the kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, Field, asdict, dataclass, fields, is_dataclass, replace
+from typing import Any, Literal
+
+from seakeep.campaign import ModelSettings, PriorSettings
+from seakeep.errors import RequestError, did_you_mean
+from seakeep.models import HankelDMDc, ProbeAlignment
+from seakeep.models.ensemble import BayesianHankelDMDc
+from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform, describe
+from seakeep.models.settings import periods_to_samples
+from seakeep.toml import Length, lengths
+
+__all__ = ["ResolvedModel", "Spec", "build_spec", "counts_in_periods", "resolve_model"]
+
+Spec = HankelDMDc | BayesianHankelDMDc
+Source = Literal["stated", "preset", "study", "default"]
+
+KINDS: dict[str, type[Spec]] = {
+    "hankel_dmdc": HankelDMDc,
+    "bayesian_hankel_dmdc": BayesianHankelDMDc,
+}
+PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
+OF_THE_DATA = ("dt", "encounter_period")
+"""Arguments of a spec that are measured, not set."""
+
+
+@dataclass(frozen=True)
+class ResolvedModel:
+    """A spec, and where each of its settings comes from.
+
+    Parameters
+    ----------
+    kind : str
+        As in TOML.
+    preset : str or None
+        What filled in the keys that were not stated.
+    spec : HankelDMDc or BayesianHankelDMDc
+        The settings.
+    sources : mapping of str to str
+        Key → "stated", "preset", "study" (its seed) or "default"; keys of an alignment are named
+        ``alignment.KEY``.
+    """
+
+    kind: str
+    preset: str | None
+    spec: Spec
+    sources: Mapping[str, Source]
+
+    @property
+    def is_ensemble(self) -> bool:
+        """Whether the model has members."""
+        return hasattr(self.spec, "n_members")
+
+    @property
+    def n_members(self) -> int:
+        """Number of members, 1 of a single model."""
+        return int(getattr(self.spec, "n_members", 1))
+
+    def to_json(self) -> dict[str, Any]:
+        """Kind, preset, number of members, and value and source of each key, as JSON values."""
+        values = _values(self.spec)
+        return {
+            "kind": self.kind,
+            "preset": self.preset,
+            "ensemble": self.is_ensemble,
+            "n_members": self.n_members,
+            "settings": {
+                key: {"value": value, "source": self.sources[key]} for key, value in values.items()
+            },
+        }
+
+
+def _settable(kind: type[Spec] | Spec) -> list[Field[Any]]:
+    return [each for each in fields(kind) if each.init and each.name not in OF_THE_DATA]
+
+
+def _names(kind: type[Spec]) -> list[str]:
+    return [each.name for each in _settable(kind)]
+
+
+def _values(spec: Spec) -> dict[str, Any]:
+    """Settings of a spec as JSON values; those of an alignment one by one."""
+    out: dict[str, Any] = {}
+    for each in _settable(spec):
+        value = getattr(spec, each.name)
+        if is_dataclass(value) and not isinstance(value, Prior):
+            out |= {f"{each.name}.{k}": v for k, v in asdict(value).items()}  # type: ignore[arg-type]
+        else:
+            out[each.name] = describe(value) if isinstance(value, Prior) else value
+    return out
+
+
+def counts_in_periods(settings: ModelSettings) -> bool:
+    """Whether a model is stated in encounter periods: by a preset, a key, or as an ensemble."""
+    by_kind = "encounter_period" in [each.name for each in fields(_kind_of(settings))]
+    return settings.preset is not None or by_kind or any(lengths(settings))
+
+
+def build_spec(settings: ModelSettings, encounter_period: float | None, dt: float) -> Spec:
+    """Turn the table of a model into the settings of a model, or of an ensemble of them.
+
+    Parameters
+    ----------
+    settings : ModelSettings
+        The table: a preset, keys of the constructor, or a preset with keys that override it.
+    encounter_period : float or None
+        Mean encounter period, s; a preset and an ensemble need it.
+    dt : float
+        Time step of the prepared runs, s.
+
+    Returns
+    -------
+    HankelDMDc or BayesianHankelDMDc
+        The settings.
+
+    Raises
+    ------
+    RequestError
+        If there is no encounter period to count in, or a key that has no default is missing or
+        out of range.
+    """
+    return resolve_model(settings, encounter_period, dt).spec
+
+
+def resolve_model(
+    settings: ModelSettings,
+    encounter_period: float | None,
+    dt: float,
+    *,
+    preset: str | None = None,
+    seed: int | None = None,
+) -> ResolvedModel:
+    """Fill in, key by key, what the table of a model does not state.
+
+    Parameters
+    ----------
+    settings, encounter_period, dt
+        As in :func:`build_spec`.
+    preset, seed : optional
+        A study's, for models that state no other.
+
+    Returns
+    -------
+    ResolvedModel
+
+    Raises
+    ------
+    RequestError
+        As :func:`build_spec`.
+    """
+    kind = _kind_of(settings)
+    ensemble = "n_members" in _names(kind)
+    if settings.preset is not None and not hasattr(kind, settings.preset):
+        raise RequestError(
+            f"kind = '{settings.kind}' has no preset. Remove preset = '{settings.preset}', and "
+            f"state its keys: {', '.join(_names(kind))}."
+        )
+    preset = settings.preset or (preset if preset and hasattr(kind, preset) else None)
+    stated = settings.arguments()
+    stated.pop("stop", None)
+    if unknown := [key for key in stated if key not in _names(kind)]:
+        raise RequestError(
+            f"kind = '{settings.kind}' has no key '{unknown[0]}'."
+            f"{did_you_mean(unknown[0], _names(kind))} Keys: {', '.join(_names(kind))}."
+        )
+    if encounter_period is None and (preset is not None or counts_in_periods(settings)):
+        what = "an ensemble" if ensemble else "the model"
+        what = what if preset is None else f"preset = '{preset}'"
+        raise RequestError(
+            f"{what} counts in encounter periods, and the campaign has none. State "
+            "encounter_period (s) in [campaign]."
+        )
+    for key, value in stated.items():
+        if isinstance(value, Length) and encounter_period is not None:
+            stated[key] = periods_to_samples(value.value, encounter_period, dt)
+        elif ensemble and key in PRIORS:
+            stated[key] = _prior(value)
+    from_study = {"seed": seed} if ensemble and seed is not None and "seed" not in stated else {}
+    filled: Spec | None = None
+    if preset is not None and encounter_period is not None:
+        filled = getattr(kind, preset)(encounter_period, dt)
+    data = {"encounter_period": encounter_period, "dt": dt}
+    spec = _made(kind, filled, {**from_study, **stated}, data)
+    return ResolvedModel(settings.kind, preset, spec, _sources(spec, filled, stated, from_study))
+
+
+def _kind_of(settings: ModelSettings) -> type[Spec]:
+    if settings.kind not in KINDS:
+        raise RequestError(
+            f"there is no kind of model '{settings.kind}'.{did_you_mean(settings.kind, KINDS)} "
+            f"Kinds: {', '.join(KINDS)}."
+        )
+    return KINDS[settings.kind]
+
+
+def _made(
+    kind: type[Spec], filled: Spec | None, given: dict[str, Any], data: Mapping[str, float | None]
+) -> Spec:
+    if isinstance(given.get("alignment"), dict):
+        before = ProbeAlignment() if filled is None else filled.alignment or ProbeAlignment()
+        given = {**given, "alignment": replace(before, **given["alignment"])}
+    if filled is not None:
+        return replace(filled, **given)
+    needed = [each.name for each in _settable(kind) if each.default is MISSING]
+    if "train_length" in needed:
+        given.setdefault("train_length", None)
+    if missing := [key for key in needed if key not in given]:
+        as_priors = " as priors, such as { uniform = [0.5, 1.5] }"
+        raise RequestError(
+            f"the [model] table states no {missing[0]}. Add {', '.join(missing)}"
+            f"{as_priors if 'n_members' in _names(kind) else ''}, or a preset: preset = "
+            "'recommended' or 'paper'."
+        )
+    of_data = {each.name: data[each.name] for each in fields(kind) if each.name in data}
+    return kind(**{**of_data, **given})
+
+
+def _sources(
+    spec: Spec, filled: Spec | None, stated: Mapping[str, Any], from_study: Mapping[str, Any]
+) -> dict[str, Source]:
+    """Where each setting comes from; a preset counts where it differs from the default."""
+    alignment = stated.get("alignment") or {}
+    known = {*stated, *(f"alignment.{key}" for key in alignment)}
+    defaults = {each.name: each.default for each in _settable(spec)}
+    by_preset = {} if filled is None else _values(filled)
+
+    def source(key: str) -> Source:
+        if key in known:
+            return "stated"
+        if key in from_study:
+            return "study"
+        differs = key in by_preset and by_preset[key] != defaults.get(key)
+        return "preset" if differs else "default"
+
+    return {key: source(key) for key in _values(spec)}
+
+
+def _prior(stated: PriorSettings | float) -> Prior:
+    if not isinstance(stated, PriorSettings):
+        return Fixed(float(stated))
+    if stated.uniform is not None:
+        return Uniform(*stated.uniform)
+    if stated.log_uniform is not None:
+        return LogUniform(*stated.log_uniform)
+    if stated.distribution is not None:
+        from scipy import stats
+
+        frozen: Prior = getattr(stats, stated.distribution)(**stated.parameters)
+        return frozen
+    assert stated.fixed is not None
+    return Fixed(stated.fixed)
