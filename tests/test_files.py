@@ -126,7 +126,7 @@ from seakeep.errors import SeakeepError
 from seakeep.models import store as models
 from seakeep.report import tables
 from seakeep.study import store as study
-from seakeep.tank import hydrodynamics, raw_files
+from seakeep.tank import delivery, hydrodynamics
 
 folder, run = Path(sys.argv[1]), xr.Dataset({"heave": ("time", np.random.rand(50_000))})
 writers = {
@@ -134,7 +134,7 @@ writers = {
     "model": lambda path: models.write(run, path, "hankel_dmdc"),
     "forecast": lambda path: tables.write_forecast(run, path),
     "track": lambda path: tracking._write(run, path),
-    "raw file": lambda path: raw_files.write_dataset(run, path),
+    "raw file": lambda path: delivery.write_dataset(run, path),
     "hydrodynamics": lambda path: hydrodynamics.save_hydrodynamics(run, path),
     "study": lambda path: study.write_result(folder, {}, {"prepared": run}),
 }

@@ -112,7 +112,7 @@ def energy(rig, motion):
     kinetic = 0.5 * np.einsum("it,ij,jt->t", motion.velocity, rig.inertia, motion.velocity)
     static = 0.5 * np.einsum("it,ij,jt->t", motion.position, rig.hydro.stiffness, motion.position)
     stored = np.zeros(motion.time.size)
-    for eye_x, eye_z, pole_x, pole_z, stiffness, unstretched, _ in rig.lines:
+    for eye_x, eye_z, pole_x, pole_z, stiffness, unstretched, *_ in rig.lines:
         x, z, pitch = motion.position[:3]
         cosine, sine = np.cos(pitch), np.sin(pitch)
         length = np.hypot(

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from seakeep.errors import RequestError
+from seakeep.tank.hull import hull_mesh, hydrostatics
 from seakeep.tank.hydrodynamics import (
     KERNEL_LENGTH,
     excitation_at,
@@ -18,7 +19,6 @@ from seakeep.tank.hydrodynamics import (
     shipped_hydrodynamics,
 )
 from seakeep.tank.settings import HullSettings
-from seakeep.tank.vessel import hull_mesh, hydrostatics
 from seakeep.waves import GRAVITY, phase_speed, wavelength_to_frequency
 
 
@@ -230,7 +230,7 @@ def test_another_hull_is_built_and_played_from_a_settings_file(tmp_path, capsys)
     pytest.importorskip("numba", reason="needs the extra tank")
     from seakeep.tank.build import main
     from seakeep.tank.play import play_run
-    from seakeep.tank.settings import read_settings
+    from seakeep.tank.settings import read_tank
 
     settings = tmp_path / "hull.toml"
     settings.write_text(
@@ -246,7 +246,7 @@ def test_another_hull_is_built_and_played_from_a_settings_file(tmp_path, capsys)
     made = load_hydrodynamics(out)
     assert made.names == ("surge", "heave", "pitch")
     assert made.attrs["vessel_mass"] == 55.0
-    played = play_run(read_settings(settings), "one")
+    played = play_run(read_tank(settings), "one")
     assert played.motion.names == made.names
     assert 0.01 < played.motion.position[1, -500:].std() < 0.05
     assert main([str(tmp_path / "none.toml")]) == 2

@@ -1,17 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from seakeep.errors import RequestError
 from seakeep.tank.dynamics import tensions
-from seakeep.tank.moorings import line_table, mooring_stiffness, unstretched_length
-from seakeep.tank.settings import LineSettings
+from seakeep.tank.moorings import KINDS, LineSettings, line_table, mooring_stiffness
 
 pytest.importorskip("numba", reason="needs the extra tank")
 
 
-def test_unstretched_lengths_of_the_page(settings):
-    lengths = [unstretched_length(n, line, 52.09) for n, line in settings.moorings.items()]
-    assert lengths == pytest.approx([2.53, 2.90], abs=0.005)  # two decimals are stated
+def test_unstretched_lengths_of_the_page(rig):
+    assert rig.lines[:, 5] == pytest.approx([2.53, 2.90], abs=0.005)  # two decimals are stated
 
 
 def along_surge(rig, offsets):
@@ -59,6 +59,24 @@ def test_a_line_stretched_to_nothing_is_refused():
         RequestError, match=r"moorings\.bow has no length left: .* 5\.000 m\. Lower"
     ):
         line_table({"bow": line}, 52.09, 0.03)
+
+
+def test_another_kind_of_line_is_one_entry(rig, settings, monkeypatch):
+    monkeypatch.setitem(KINDS, "stiffening", lambda line: (line.stiffness, 0.5, 2.0))
+    lines = {
+        name: line.model_copy(update={"kind": "stiffening"})
+        for name, line in settings.moorings.items()
+    }
+    other = replace(rig, lines=line_table(lines, 52.09, 0.03))
+    offsets = np.linspace(-1.0, 2.0, 61)
+    bow, _ = along_surge(other, offsets)
+    rest = lines["bow"].stretch
+    assert 1.89 * rest + 0.5 * rest**2 + 2.0 * rest**3 == pytest.approx(0.8, rel=1e-12)
+    stretch = np.maximum(0.0, rest + offsets)
+    assert bow == pytest.approx(1.89 * stretch + 0.5 * stretch**2 + 2.0 * stretch**3, abs=1e-12)
+    near = along_surge(other, np.array([-1e-6, 1e-6]))
+    slope = (near[0] - near[1])[1] / 2e-6 - (near[0] - near[1])[0] / 2e-6
+    assert mooring_stiffness(other.lines)[0, 0] == pytest.approx(slope, rel=1e-6)
 
 
 @pytest.mark.oracle

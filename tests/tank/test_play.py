@@ -161,6 +161,22 @@ def test_wrong_requests_write_nothing(short, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_nothing_that_the_tank_has_not_written_is_replaced(short, tmp_path):
+    play(short, tmp_path, names=["regular_2"])
+    play(short, tmp_path, names=["regular_2"])  # its own files it replaces
+    record = tmp_path / "raw" / "regular_2" / "mru.csv"
+    kept = record.read_text(encoding="utf-8")
+    record.write_text("time [s],heave [m]\n0.0,0.1\n", encoding="utf-8")
+    with pytest.raises(RequestError, match=r"mru\.csv exists and is no raw file that"):
+        play(short, tmp_path, names=["regular_2"])
+    record.write_text(kept, encoding="utf-8")
+    (tmp_path / "campaign.toml").write_text("[campaign]\nname = 'mine'\n", encoding="utf-8")
+    before = digests(tmp_path)
+    with pytest.raises(RequestError, match=r"campaign\.toml exists and is no campaign"):
+        play(short, tmp_path, names=["regular_2"])
+    assert digests(tmp_path) == before
+
+
 def test_seas_beyond_the_coefficients_are_refused(short):
     facility = short.facility.model_copy(update={"wave_band": (0.01, 5.0)})
     spectrum = SpectrumSettings(height=0.1, peak_period=2.0, band=(0.3, 3.0))

@@ -16,7 +16,7 @@ from seakeep.tank.seas import (
     sea_of_run,
     spectral_density,
 )
-from seakeep.tank.settings import RunSettings, SpectrumSettings
+from seakeep.tank.settings import RunPlan, SpectrumSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber
 
 
@@ -146,4 +146,4 @@ def test_any_sea_has_the_energy_of_its_components(height, period, count, seed):
 )
 def test_waves_beyond_the_wave_maker_are_refused(settings, run, message):
     with pytest.raises(RequestError, match=message):
-        sea_of_run("odd", RunSettings.model_validate(run), settings.facility, rng())
+        sea_of_run("odd", RunPlan.model_validate(run), settings.facility, rng())

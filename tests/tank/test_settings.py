@@ -2,13 +2,13 @@ import pytest
 
 from seakeep.errors import RequestError
 from seakeep.tank.hydrodynamics import load_hydrodynamics
-from seakeep.tank.settings import default_settings, read_settings
+from seakeep.tank.settings import default_settings, read_tank
 
 
 def read(tmp_path, text):
     path = tmp_path / "tank.toml"
     path.write_text(text, encoding="utf-8")
-    return read_settings(path)
+    return read_tank(path)
 
 
 def test_a_file_changes_what_it_states_and_keeps_the_rest(tmp_path):
@@ -24,18 +24,18 @@ def test_a_file_changes_what_it_states_and_keeps_the_rest(tmp_path):
 
 def test_hydrodynamics_file_is_found_beside_the_settings(tmp_path):
     settings = read(tmp_path, '[vessel]\nhydrodynamics = "mine.nc"\n')
-    assert settings.hydrodynamics_path == tmp_path / "mine.nc"
+    assert settings.vessel.hydrodynamics == str(tmp_path / "mine.nc")
     with pytest.raises(RequestError, match=r"mine\.nc does not exist\. Correct vessel"):
-        load_hydrodynamics(settings.hydrodynamics_path)
+        load_hydrodynamics(settings.vessel.hydrodynamics)
 
 
 def test_default_hull_settings_are_those_of_the_default_file():
-    from seakeep.tank.settings import HullSettings, InstrumentSettings
+    from seakeep.tank.settings import HullSettings, InstrumentPlan
 
     settings = default_settings()
     assert settings.hull == HullSettings()
     for name in ("rate_noise", "angle_noise", "heave_noise", "surge_noise", "load_noise"):
-        default = InstrumentSettings.model_fields[name].default
+        default = InstrumentPlan.model_fields[name].default
         assert getattr(settings.instruments, name) == default
 
 
@@ -43,29 +43,43 @@ def test_default_hull_settings_are_those_of_the_default_file():
     ("text", "message"),
     [
         ("[moorings.bow]\nstiffness = -1.0\npretension = 0.8\neye = [0, 0]\npole = [1, 0]",
-         r"moorings\.bow\.stiffness: input should be greater than 0; received -1\.0\. Correct"),
-        ("[facility]\nwater_depth = 0", r"facility\.water_depth: .*greater than 0; received 0"),
-        ("[facility]\nwave_band = [1.4, 0.1]", r"wave_band must be \(low, high\) in Hz"),
-        ("[simulation]\nstepp = 0.1", r"simulation\.stepp is not a setting\. Did you mean 'step'"),
-        ("[vesel]\nposition = 1", r"vesel is not a setting\. Did you mean 'vessel'\?"),
-        ("[runs.a]\nwavelenght = 2", r"runs\.a\.wavelenght .* Did you mean 'wavelength'\?"),
+         r"line 2, moorings\.bow\.stiffness: received -1\.0, which should be greater than 0"),
+        ("[moorings.bow]\nkind = 'sprung'\nstiffness = 1\npretension = 1\neye = [0, 0]\n"
+         "pole = [1, 0]", r"moorings\.bow\.kind: the kinds are spring\. Did you mean 'spring'\?"),
+        ("[facility]\nwater_depth = 0", r"water_depth: received 0, .* Give a depth of 0\.01 to"),
+        ("[facility]\nwater_depth = 1e-308", r"facility\.water_depth: received 1e-308"),
+        ("[facility]\nwater_depth = 1e308", r"facility\.water_depth: received 1e\+308"),
+        ("[facility]\nwave_band = [1.4, 0.1]", r"wave_band must be \[low, high\] in Hz"),
+        ("[simulation]\nstepp = 0.1", r"stepp: unknown key, .* Did you mean 'step'"),
+        ("[vesel]\nposition = 1", r"vesel: unknown key, .* Did you mean 'vessel'\?"),
+        ("[runs.a]\nwavelenght = 2", r"runs\.a\.wavelenght: .* Did you mean 'wavelength'\?"),
         ("[runs.a]\nwavelength = 2.0", r"either a spectrum \(irregular\) or wavelength and height"),
         ("[runs.a]\nwavelength = 2.0\nheight = 0.1\nspectrum = { height = 0.1, peak_period = 2 }",
          r"either a spectrum \(irregular\) or wavelength and height"),
         ("[runs.a]\nspectrum = { kind = 'jonswap', height = 0.1 }",
          r"a jonswap spectrum needs height \(m\) and peak_period \(s\)"),
         ("[runs.a]\nspectrum = { kind = 'table', frequencies = [1.0], densities = [1.0] }",
-         r"as many frequencies .* two at least; received 1 and 1"),
+         r"as many frequencies .* two at least; there are 1 and 1"),
         ("[runs.a]\nspectrum = { kind = 'table', frequencies = [1, 0.5], densities = [1, 1] }",
          "frequencies of a spectrum must increase"),
         ("[runs.a]\nspectrum = { height = 0.1, peak_period = 2, band = [1.0, 0.5] }",
-         r"band must be \(low, high\)"),
+         r"band must be \[low, high\]"),
         ("[instruments]\ntrigger_width = 30.0", "must be shorter than trigger_period"),
-        ("[instruments.probes.a]\nposition = 50", r"probes\.a\.noise is missing\. Add the key"),
+        ("[instruments.probes.a]\nposition = 50", r"probes\.a\.noise: missing\. Add it"),
         ("[hull.pool]\nbottom_length = 0.6", "bottom opening must fit inside its free surface"),
         ("[hull.pool]\nshelf = -0.005", "shelf must lie below its lid"),
         ("seed = ", "is not valid TOML"),
-        ("seed = -1", r"seed: input should be greater than or equal to 0; received -1"),
+        ("seed = -1", r"seed: received -1, .* Give a number from 0 to 2\^64"),
+        ("seed = 18446744073709551616", r"seed: received 18446744073709551616, which should be"),
+        ("[instruments.clocks.mru]\nrate = 1e7",
+         r"line 2, instruments\.clocks\.mru\.rate: 1e\+07 Hz make 2\.7e\+09 samples"),
+        ("[instruments.clocks.mru]\noffset = 1e6", r"clocks\.mru\.offset: received 1000000\.0"),
+        ("[simulation]\nstep = 1e-6", r"simulation\.kernel_length: 12 s are more than 20000 steps"),
+        ("[simulation]\nkernel_length = 1e9", r"simulation\.kernel_length: 1e\+09 s are more"),
+        ("[runs.a]\nwavelength = 2.0\nheight = 0.1\nduration = 1e9",
+         r"runs\.a\.duration: 1e\+09 s with the start-up are more than 10000000 steps"),
+        ("[hull]\npanels_along = 100000", r"hull\.panels_along: received 100000"),
+        ("[channels.a]\ncolumn = 'a'\n[rig]\n", "is a campaign file"),
     ],
 )  # fmt: skip
 def test_bad_settings_say_what_and_how_to_mend(tmp_path, text, message):
@@ -73,9 +87,14 @@ def test_bad_settings_say_what_and_how_to_mend(tmp_path, text, message):
         read(tmp_path, text)
 
 
-def test_missing_file(tmp_path):
-    with pytest.raises(RequestError, match=r"does not exist\. Correct the path"):
-        read_settings(tmp_path / "none.toml")
+def test_what_is_no_settings_file(tmp_path):
+    with pytest.raises(RequestError, match=r"the tank file .*none\.toml does not exist"):
+        read_tank(tmp_path / "none.toml")
+    with pytest.raises(RequestError, match=r"is a folder; give the tank's TOML file"):
+        read_tank(tmp_path)
+    (tmp_path / "latin.toml").write_bytes("name = 'Bassin d’essai é'".encode("cp1252"))
+    with pytest.raises(RequestError, match=r"latin\.toml, line 1: not UTF-8.*Save the file as"):
+        read_tank(tmp_path / "latin.toml")
 
 
 def test_a_measured_spectrum_comes_from_a_file(tmp_path):
@@ -88,5 +107,5 @@ def test_a_measured_spectrum_comes_from_a_file(tmp_path):
     with pytest.raises(RequestError, match=r"runs\.a\.spectrum\.file: .*none\.csv cannot be read"):
         read(tmp_path, '[runs.a]\nspectrum = { file = "none.csv" }\n')
     (tmp_path / "odd.csv").write_text("0.3,0.001\n0.6;0.003\n", encoding="utf-8")
-    with pytest.raises(RequestError, match=r"row 2 of .* is '0\.6;0\.003'; two numbers"):
+    with pytest.raises(RequestError, match=r"runs\.a\.spectrum\.file: .*Two columns of numbers"):
         read(tmp_path, '[runs.a]\nspectrum = { file = "odd.csv" }\n')

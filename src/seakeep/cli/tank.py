@@ -24,7 +24,7 @@ def tank(
         Path | None, typer.Option("-o", "--out", help="Folder for raw files and campaign.toml.")
     ] = None,
     seed: Annotated[
-        int | None, typer.Option("--seed", min=0, help="Seed of waves and noise.")
+        int | None, typer.Option("--seed", min=0, max=2**64 - 1, help="Seed of waves and noise.")
     ] = None,
     settings: Annotated[
         Path | None,
@@ -68,8 +68,10 @@ def tank(
             "realised waves."
         )
     from seakeep.tank.play import check_settings, play
+    from seakeep.tank.settings import default_settings, read_tank, with_waves
 
-    wanted = _settings(settings, seed, spacing)
+    made = default_settings() if settings is None else read_tank(settings)
+    wanted = with_waves(made, seed, spacing)
     names = run or list(wanted.runs)
     rig = check_settings(wanted, names)
     if out is not None:
@@ -86,25 +88,6 @@ def tank(
             _print(wanted, measured)
         if figures and out is not None:
             _draw(wanted, rig, measured, out / "figures")
-
-
-def _settings(path: Path | None, seed: int | None, spacing: str | None) -> TankSettings:
-    from seakeep.tank.settings import default_settings, read_settings
-
-    made = default_settings() if path is None else read_settings(path)
-    if seed is not None:
-        made = made.model_copy(update={"seed": seed})
-    if spacing is not None:
-        runs = {
-            name: run
-            if run.spectrum is None
-            else run.model_copy(
-                update={"spectrum": run.spectrum.model_copy(update={"spacing": spacing})}
-            )
-            for name, run in made.runs.items()
-        }
-        made = made.model_copy(update={"runs": runs})
-    return made
 
 
 def _measured(settings: TankSettings, names: list[str], rig: Rig) -> list[Realised]:

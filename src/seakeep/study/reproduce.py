@@ -117,23 +117,14 @@ def _play(folder: Path, preset: Preset, seed: int, progress: Progress | None) ->
     try:
         from seakeep.tank.play import play
         from seakeep.tank.seas import pierson_moskowitz
-        from seakeep.tank.settings import default_settings
+        from seakeep.tank.settings import default_settings, with_waves
     except ImportError as error:
         raise RequestError(
             f"the virtual tank needs {error.name}, which is not installed. Install it with: pip "
             "install 'seakeep[tank]'"
         ) from error
-    settings = default_settings().model_copy(update={"seed": seed})
     spacing = "equal" if preset == "paper" else "jittered"
-    runs = {
-        name: run
-        if run.spectrum is None
-        else run.model_copy(
-            update={"spectrum": run.spectrum.model_copy(update={"spacing": spacing})}
-        )
-        for name, run in settings.runs.items()
-    }
-    settings = settings.model_copy(update={"runs": runs})
+    settings = with_waves(default_settings(), seed, spacing)
     made = json.dumps({"settings": settings.model_dump(mode="json"), "versions": versions()})
     digest = hashlib.sha256(made.encode()).hexdigest()
     mark = folder / "played.txt"

@@ -27,20 +27,21 @@ def line_tension(
 ) -> tuple[float, float, float, float]:
     """Tension of a line and its force on the vessel.
 
-    `line` holds eye x, eye z, pole x, pole z (from the centre of gravity at rest), stiffness,
-    unstretched length and damping. Returns tension, force along x and z, moment about y.
+    `line` is a row of `moorings.line_table`. Returns tension, force along x and z, moment about y.
     """
     cosine, sine = math.cos(pitch), math.sin(pitch)
     arm_x = line[0] * cosine + line[1] * sine
     arm_z = -line[0] * sine + line[1] * cosine
     dx, dz = line[2] - surge - arm_x, line[3] - heave - arm_z
     length = math.sqrt(dx * dx + dz * dz)
-    if length <= line[5]:
+    stretch = length - line[5]
+    if stretch <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
     speed_x = velocity[0] + velocity[2] * arm_z
     speed_z = velocity[1] - velocity[2] * arm_x
     rate = -(dx * speed_x + dz * speed_z) / length
-    tension = max(0.0, line[4] * (length - line[5]) + line[6] * rate)
+    elastic = ((line[8] * stretch + line[7]) * stretch + line[4]) * stretch
+    tension = max(0.0, elastic + line[6] * rate)
     force_x, force_z = tension * dx / length, tension * dz / length
     return tension, force_x, force_z, arm_z * force_x - arm_x * force_z
 

@@ -17,9 +17,9 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.errors import RequestError, SeakeepError
+from seakeep.tank.hull import HullMesh, Hydrostatics, hull_mesh, hydrostatics
 from seakeep.tank.hydrodynamics import CONVENTIONS, save_hydrodynamics
 from seakeep.tank.settings import HullSettings, PoolGeometry
-from seakeep.tank.vessel import HullMesh, Hydrostatics, hull_mesh, hydrostatics
 from seakeep.waves import GRAVITY
 
 __all__ = ["build_hydrodynamics", "default_frequencies"]
@@ -200,7 +200,7 @@ def _attributes(
 
 def main(arguments: list[str] | None = None) -> int:
     """Build the file of the default hull (or of the ``[hull]`` table of a settings file)."""
-    from seakeep.tank.settings import default_settings, read_settings
+    from seakeep.tank.settings import default_settings, read_tank
 
     parser = argparse.ArgumentParser(prog="python -m seakeep.tank.build", description=__doc__)
     parser.add_argument("settings", nargs="?", type=Path, help="tank settings (TOML)")
@@ -210,9 +210,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     options = parser.parse_args(arguments)
     try:
-        settings = (
-            default_settings() if options.settings is None else read_settings(options.settings)
-        )
+        settings = default_settings() if options.settings is None else read_tank(options.settings)
         data = build_hydrodynamics(
             settings.hull,
             options.frequencies,

@@ -212,7 +212,7 @@ def assemble_rig(settings: TankSettings, hydro: Hydrodynamics | None = None) -> 
         If depth or density differ from the hydrodynamics file's, a line has no length, or the
         step is too large.
     """
-    coefficients = load_hydrodynamics(settings.hydrodynamics_path) if hydro is None else hydro
+    coefficients = hydro or load_hydrodynamics(settings.vessel.hydrodynamics)
     for name, wanted, made in (
         ("water_depth", settings.facility.water_depth, coefficients.water_depth),
         ("density", settings.facility.density, coefficients.density),

@@ -148,7 +148,7 @@ def shipped_hydrodynamics(name: str = "ck14e.nc") -> Path:
     return Path(str(resources.files("seakeep.tank").joinpath("data", name)))
 
 
-def load_hydrodynamics(path: Path | str | None = None) -> Hydrodynamics:
+def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
     """Read and check a file of coefficients.
 
     Parameters
@@ -167,7 +167,7 @@ def load_hydrodynamics(path: Path | str | None = None) -> Hydrodynamics:
         If the file does not exist, misses a variable, has values that are not finite, or was made
         under another convention.
     """
-    source = shipped_hydrodynamics() if path is None else Path(path)
+    source = Path(path) if path else shipped_hydrodynamics()
     if not source.is_file():
         raise RequestError(
             f"the hydrodynamics file {source} does not exist. Correct vessel.hydrodynamics, or "

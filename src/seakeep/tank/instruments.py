@@ -17,7 +17,7 @@ from seakeep.tank.dynamics import Motion, Rig, tensions
 from seakeep.tank.seas import Sea
 from seakeep.tank.settings import (
     ClockSettings,
-    InstrumentSettings,
+    InstrumentPlan,
     Logger,
     SlapSettings,
     TankSettings,
@@ -277,7 +277,7 @@ def _video(played: Played, time: FloatArray, rng: np.random.Generator) -> dict[s
 
 
 def _pulse(
-    settings: InstrumentSettings, name: str, time: FloatArray, rng: np.random.Generator
+    settings: InstrumentPlan, name: str, time: FloatArray, rng: np.random.Generator
 ) -> dict[str, Column]:
     pulse = trigger(time, settings.trigger_period, settings.trigger_width)
     noise = rng.standard_normal(time.size)

@@ -12,12 +12,20 @@ import xarray as xr
 
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.files import make_folder
-from seakeep.tank.campaign_file import campaign_text
+from seakeep.files import MARK, check_output, make_folder
+from seakeep.tank.delivery import (
+    CAMPAIGN,
+    FIRST_LINE,
+    RAW,
+    TRUTH,
+    campaign_text,
+    write_dataset,
+    write_record,
+    write_text,
+)
 from seakeep.tank.dynamics import Rig, assemble_rig, simulate
 from seakeep.tank.hydrodynamics import excitation_at
 from seakeep.tank.instruments import Played, record_run, record_together
-from seakeep.tank.raw_files import write_dataset, write_record, write_text
 from seakeep.tank.seas import Sea, sea_of_run
 from seakeep.tank.settings import TankSettings
 from seakeep.tank.video import SIDE_VIEW, check_video, render_side_view
@@ -26,6 +34,8 @@ __all__ = ["check_settings", "generator", "noisy_truth", "play", "play_run", "tr
 
 Progress = Callable[[int, int, str], None]
 
+CAMPAIGN_FILE = "campaign.toml"
+LOGGERS = ("wave_probes", "mru", "loads", "video", "all")
 SINGLE_RATE = 100.0  # Hz, where all instruments share a logger
 MARGIN = 2.0  # s simulated before and after what any logger records
 STREAMS = {"waves": 0, "instruments": 1, "truth": 2, "video": 3}
@@ -176,6 +186,7 @@ def truth(played: Played, name: str, step: float | None = None) -> xr.Dataset:
 def _attributes(played: Played, name: str) -> dict[str, str | float]:
     settings, run = played.settings, played.settings.runs[name]
     attrs: dict[str, str | float] = {
+        MARK: TRUTH,
         "run": name,
         "seed": settings.seed,
         "startup": run.startup,
@@ -184,7 +195,7 @@ def _attributes(played: Played, name: str) -> dict[str, str | float]:
         "frame": "x downstream, z up, pitch positive bow up; motions of the centre of gravity",
         "hydrodynamics": str(played.rig.hydro.attrs["mesh_sha256"]),
         "versions": ", ".join(f"{n} {metadata.version(n)}" for n in ("numpy", "scipy", "numba")),
-        "settings": settings.model_dump_json(exclude={"folder"}),
+        "settings": settings.model_dump_json(exclude={"vessel": {"hydrodynamics"}}),
     }
     for logger, clock in settings.instruments.clocks.items():
         attrs[f"clock_{logger}_offset"] = clock.offset
@@ -236,6 +247,25 @@ def noisy_truth(
     return data
 
 
+def _check_outputs(folder: Path, names: list[str], kind: str, filmed: list[str]) -> None:
+    """Refuse to write over a campaign file or a record that the tank has not written."""
+    campaign = folder / CAMPAIGN_FILE
+    if campaign.exists():
+        check_output(campaign, CAMPAIGN)
+    for name in names:
+        raw = folder / "raw" / name
+        for path in [raw / f"{logger}.{kind}" for logger in LOGGERS]:
+            if path.exists():
+                check_output(path, RAW, header=FIRST_LINE)
+        if (hidden := folder / "truth" / f"{name}.nc").exists():
+            check_output(hidden, TRUTH)
+        if name in filmed and (raw / f"{SIDE_VIEW}.mp4").exists() and not campaign.exists():
+            raise RequestError(
+                f"{raw / f'{SIDE_VIEW}.mp4'} exists in a folder that is no campaign of the tank; "
+                "it may be a measurement. Choose another folder."
+            )
+
+
 def play(
     settings: TankSettings,
     out: Path | str,
@@ -274,7 +304,8 @@ def play(
     Raises
     ------
     RequestError
-        If a setting is wrong; nothing has been written then.
+        If a setting is wrong, or a file in the folder is not the tank's; nothing has been
+        written then.
     DivergenceError
         If a simulation diverges.
     """
@@ -287,6 +318,7 @@ def play(
     part = settings.model_copy(update={"runs": {n: settings.runs[n] for n in chosen}})
     rig = check_settings(part)
     folder = Path(out)
+    _check_outputs(folder, chosen, kind, filmed)
     files: dict[str, dict[str, Path]] = {}
     for done, name in enumerate(chosen):
         if progress is not None:
@@ -307,7 +339,7 @@ def play(
         run: {key: path.relative_to(folder).as_posix() for key, path in paths.items()}
         for run, paths in files.items()
     }
-    write_text(folder / "campaign.toml", campaign_text(part, relative, kind, one_logger))
+    write_text(folder / CAMPAIGN_FILE, campaign_text(part, relative, kind, one_logger))
     if progress is not None:
         progress(len(chosen), len(chosen), "done")
     return files

@@ -158,7 +158,7 @@ def realise(played: Played, name: str) -> Realised:
     heights = wave_heights(eta, dt)
     return Realised(
         run=name,
-        irregular=run.irregular,
+        irregular=run.spectrum is not None,
         elevation=eta,
         dt=dt,
         significant_height=significant_height(eta),

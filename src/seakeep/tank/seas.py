@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.errors import RequestError
-from seakeep.tank.settings import FacilitySettings, RunSettings, SpectrumSettings
+from seakeep.tank.settings import FacilitySettings, RunPlan, SpectrumSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber
 
 __all__ = [
@@ -268,7 +268,7 @@ def regular_sea(
 
 
 def sea_of_run(
-    name: str, run: RunSettings, facility: FacilitySettings, rng: np.random.Generator
+    name: str, run: RunPlan, facility: FacilitySettings, rng: np.random.Generator
 ) -> Sea:
     """Sea of one run, checked against what the tank can make.
 
@@ -276,7 +276,7 @@ def sea_of_run(
     ----------
     name : str
         Name of the run, for messages.
-    run : RunSettings
+    run : RunPlan
         Its waves.
     facility : FacilitySettings
         Depth, wave band and greatest height.

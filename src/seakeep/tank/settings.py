@@ -1,56 +1,66 @@
-"""Settings of the virtual tank, read from TOML and validated before anything runs."""
+"""Settings of the virtual tank: the tables of its TOML file, SI units and radians."""
 
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
 
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import RequestError
+from seakeep.tank.moorings import LineSettings
+from seakeep.toml import Count, Finite, Mistake, NotNegative, Pair, Positive, Table, validated
+from seakeep.toml import read_toml as read_table
 
 __all__ = [
     "ClockSettings",
     "DriftSettings",
     "FacilitySettings",
     "HullSettings",
-    "InstrumentSettings",
+    "InstrumentPlan",
     "LineSettings",
     "PoolGeometry",
-    "RunSettings",
+    "RunPlan",
     "SimulationSettings",
     "SpectrumSettings",
     "TankSettings",
     "VesselSettings",
     "default_settings",
-    "read_settings",
+    "read_tank",
+    "validate_tank",
+    "with_waves",
 ]
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Pair = tuple[Positive, Positive]
 Logger = Literal["wave_probes", "mru", "loads", "video"]
+Below = Annotated[float, Field(lt=0, ge=-1e4)]
+Panels = Annotated[int, Field(ge=4, le=100)]
+Depth = Annotated[float, Field(ge=0.01, le=1e4, description="a depth of 0.01 to 10 000 m")]
+
+SAMPLES = 10_000_000
+"""Samples per column of a raw file, and steps of a simulated run, at most: 80 MB per column."""
+PRODUCTS = 2e10
+"""Samples times wave components at most: some minutes of work per wave probe."""
+LAGS = 20_000
+"""Steps of the radiation kernel at most."""
 
 
-class _Settings(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class PoolGeometry(_Settings):
+class PoolGeometry(Table):
     """Moon pool: a basin at the free surface above a shelf, a narrower opening below it (m)."""
 
-    centre: float = -0.09
+    centre: Finite = -0.09
     length: Positive = 0.45
     beam: Positive = 0.36
     bottom_length: Positive = 0.36
     bottom_beam: Positive = 0.28
-    shelf: Annotated[float, Field(lt=0)] = -0.035
-    lid: Annotated[float, Field(lt=0)] = -0.01
+    shelf: Below = -0.035
+    lid: Below = -0.01
 
     @model_validator(mode="after")
-    def _nested(self) -> PoolGeometry:
+    def _nested(self) -> Self:
         if self.bottom_length > self.length or self.bottom_beam > self.beam:
             raise ValueError("the pool's bottom opening must fit inside its free surface")
         if self.shelf >= self.lid:
@@ -58,55 +68,53 @@ class PoolGeometry(_Settings):
         return self
 
 
-def _no_pool(value: object) -> object:
-    return None if value is False else value
-
-
-class HullSettings(_Settings):
+class HullSettings(Table):
     """Dimensions of the hull and the panels of its mesh; read by the mesh builder alone.
 
     ``pool = false`` in TOML is a hull without a moon pool.
     """
 
     mass: Positive = 60.7
-    centre_of_gravity: float = 0.03
+    centre_of_gravity: Finite = 0.03
     pitch_gyradius: Positive = 0.36
     length_waterline: Positive = 1.34
     beam_waterline: Positive = 0.86
     waterplane_area: Positive = 0.9035
     bottom_taper: Annotated[float, Field(ge=0, lt=0.6)] = 0.3165
-    pool: Annotated[PoolGeometry | None, BeforeValidator(_no_pool)] = PoolGeometry()
-    internal_lid: Annotated[float, Field(lt=0)] = -0.005
-    panels_along: Annotated[int, Field(ge=4)] = 14
-    panels_across: Annotated[int, Field(ge=4)] = 10
-    panels_down: Annotated[int, Field(ge=2)] = 5
-    panels_bottom: Annotated[int, Field(ge=2)] = 4
+    pool: Annotated[
+        PoolGeometry | None, BeforeValidator(lambda value: None if value is False else value)
+    ] = PoolGeometry()
+    internal_lid: Below = -0.005
+    panels_along: Panels = 14
+    panels_across: Panels = 10
+    panels_down: Annotated[int, Field(ge=2, le=100)] = 5
+    panels_bottom: Annotated[int, Field(ge=2, le=100)] = 4
 
 
-class FacilitySettings(_Settings):
-    """The tank: depth (m), what its wave maker can do, density of the water (kg/m³)."""
+class FacilitySettings(Table):
+    """The tank: depth (m), what its wave maker can do (Hz, m), density of the water (kg/m³)."""
 
-    water_depth: Positive = 3.6
+    water_depth: Depth = 3.6
     density: Positive = 1000.0
-    wave_band: Pair = (0.1, 1.4)  # Hz
-    greatest_height: Positive = 0.45  # m
+    wave_band: Pair = (0.1, 1.4)
+    greatest_height: Positive = 0.45
 
     @model_validator(mode="after")
-    def _ordered(self) -> FacilitySettings:
+    def _ordered(self) -> Self:
         if self.wave_band[0] >= self.wave_band[1]:
-            raise ValueError("wave_band must be (low, high) in Hz with low < high")
+            raise ValueError("wave_band must be [low, high] in Hz with low < high")
         return self
 
 
-class DampingSettings(_Settings):
-    """Damping of the motions, linear or quadratic (SI)."""
+class DampingSettings(Table):
+    """Damping of the motions, linear or quadratic."""
 
     surge: NotNegative
     heave: NotNegative
     pitch: NotNegative
 
 
-class PoolDampingSettings(_Settings):
+class PoolDampingSettings(Table):
     """Losses in the moon pool."""
 
     loss_coefficient: NotNegative = 1.5
@@ -115,7 +123,7 @@ class PoolDampingSettings(_Settings):
     slosh_quadratic: NotNegative = 40.0
 
 
-class VesselSettings(_Settings):
+class VesselSettings(Table):
     """Hydrodynamics file (empty: the one shipped), place in the tank (m), viscous damping."""
 
     hydrodynamics: str = ""
@@ -125,8 +133,8 @@ class VesselSettings(_Settings):
     pool: PoolDampingSettings = PoolDampingSettings()
 
 
-class DriftSettings(_Settings):
-    """Mean drift force ½ρgB·r/(1 + (corner/ω)⁴) a metre² of amplitude, and its damping."""
+class DriftSettings(Table):
+    """Mean drift force ½ρgB·r/(1 + (corner/ω)⁴) per metre² of amplitude, and its damping."""
 
     beam: NotNegative = 0.86
     reflection: NotNegative = 0.75
@@ -134,32 +142,18 @@ class DriftSettings(_Settings):
     damping: bool = True
 
 
-class LineSettings(_Settings):
-    """An elastic mooring line from an eye on the vessel to a pole.
-
-    `eye`: x from the centre of gravity and height above still water (m); `pole`: distance from
-    the wave maker and height above still water (m).
-    """
-
-    stiffness: Positive
-    pretension: NotNegative
-    damping: NotNegative = 0.15
-    eye: tuple[float, float]
-    pole: tuple[float, float]
-
-
-class SimulationSettings(_Settings):
-    """Time integration."""
+class SimulationSettings(Table):
+    """Time integration (s)."""
 
     step: Positive = 0.01
     ramp: Positive = 10.0
     kernel_length: Positive = 12.0
 
 
-class SpectrumSettings(_Settings):
+class SpectrumSettings(Table):
     """A wave spectrum and how it is cut into components.
 
-    `kind = "table"` takes `frequencies` (Hz) and `densities` (m²/Hz), or a `file` of two columns,
+    ``kind = "table"`` takes `frequencies` (Hz) and `densities` (m²/Hz), or a `file` of two columns,
     comma-separated, with or without a line of headings.
     """
 
@@ -167,33 +161,34 @@ class SpectrumSettings(_Settings):
     height: Positive | None = None
     peak_period: Positive | None = None
     peak_enhancement: Annotated[float, Field(ge=1, le=20)] = 3.3
-    frequencies: tuple[Positive, ...] = ()
-    densities: tuple[NotNegative, ...] = ()
+    frequencies: Annotated[tuple[Positive, ...], Field(strict=False)] = ()
+    densities: Annotated[tuple[NotNegative, ...], Field(strict=False)] = ()
     file: str = ""
     band: Pair = (0.28, 1.13)
-    components: Annotated[int, Field(ge=1, le=20000)] = 100
+    components: Annotated[Count, Field(le=20_000)] = 100
     spacing: Literal["equal", "jittered"] = "jittered"
 
     @model_validator(mode="after")
-    def _complete(self) -> SpectrumSettings:
+    def _complete(self) -> Self:
         if self.band[0] >= self.band[1]:
-            raise ValueError("band must be (low, high) in Hz with low < high")
-        if self.kind == "table":
-            if len(self.frequencies) != len(self.densities) or len(self.frequencies) < 2:
-                raise ValueError(
-                    "a spectrum given as a table needs as many frequencies (Hz) as densities "
-                    f"(m²/Hz), two at least; received {len(self.frequencies)} and "
-                    f"{len(self.densities)}"
-                )
-            if any(b <= a for a, b in zip(self.frequencies, self.frequencies[1:], strict=False)):
-                raise ValueError("the frequencies of a spectrum must increase")
-        elif self.height is None or self.peak_period is None:
-            raise ValueError(f"a {self.kind} spectrum needs height (m) and peak_period (s)")
+            raise ValueError("band must be [low, high] in Hz with low < high")
+        if self.kind != "table":
+            if self.height is None or self.peak_period is None:
+                raise ValueError(f"a {self.kind} spectrum needs height (m) and peak_period (s)")
+            return self
+        counts = len(self.frequencies), len(self.densities)
+        if counts[0] != counts[1] or counts[0] < 2:
+            raise ValueError(
+                "a spectrum given as a table needs as many frequencies (Hz) as densities (m²/Hz), "
+                f"two at least; there are {counts[0]} and {counts[1]}"
+            )
+        if np.any(np.diff(self.frequencies) <= 0):
+            raise ValueError("the frequencies of a spectrum must increase")
         return self
 
 
-class RunSettings(_Settings):
-    """One run: an irregular sea (a spectrum) or a regular wave (length and height)."""
+class RunPlan(Table):
+    """One run: an irregular sea (a spectrum) or a regular wave (length and height, m); s."""
 
     spectrum: SpectrumSettings | None = None
     wavelength: Positive | None = None
@@ -206,7 +201,7 @@ class RunSettings(_Settings):
     sea_state: str = ""
 
     @model_validator(mode="after")
-    def _one_kind(self) -> RunSettings:
+    def _one_kind(self) -> Self:
         regular = self.wavelength is not None and self.height is not None
         if (self.spectrum is None) != regular or (self.wavelength is None) != (self.height is None):
             raise ValueError(
@@ -215,20 +210,20 @@ class RunSettings(_Settings):
         return self
 
     @property
-    def irregular(self) -> bool:
-        """Whether the run has a spectrum."""
-        return self.spectrum is not None
+    def length(self) -> float:
+        """Start-up and record, s."""
+        return self.startup + self.duration
 
 
-class ClockSettings(_Settings):
+class ClockSettings(Table):
     """Rate of a logger (Hz), its clock's offset (s) and drift (parts per million)."""
 
     rate: Positive
-    offset: float = 0.0
+    offset: Annotated[float, Field(gt=-1e3, lt=1e3)] = 0.0
     drift: Annotated[float, Field(gt=-1e4, lt=1e4)] = 0.0
 
 
-class ProbeSettings(_Settings):
+class ProbeSettings(Table):
     """A wave probe: distance from the wave maker (m), noise (m), share of time in drop-outs."""
 
     position: Positive
@@ -236,7 +231,7 @@ class ProbeSettings(_Settings):
     dropouts: Annotated[float, Field(ge=0, lt=0.5)] = 0.0
 
 
-class SlapSettings(_Settings):
+class SlapSettings(Table):
     """Pulses on a load cell when its line is immersed or emerges (mean N, Hz, s)."""
 
     mean: NotNegative
@@ -244,11 +239,11 @@ class SlapSettings(_Settings):
     decay: Pair = (0.06, 0.25)
 
 
-class InstrumentSettings(_Settings):
+class InstrumentPlan(Table):
     """Instruments: probes, MRU, load cells, video, their noise (SI, radians) and clocks."""
 
     probes: dict[str, ProbeSettings]
-    slap: dict[str, SlapSettings] = {}
+    slap: dict[str, SlapSettings] = Field(default_factory=dict)
     second_order: bool = True
     acceleration_noise: NotNegative = 0.03
     rate_noise: NotNegative = 0.002618
@@ -261,20 +256,19 @@ class InstrumentSettings(_Settings):
     clocks: dict[Logger, ClockSettings]
 
     @model_validator(mode="after")
-    def _complete(self) -> InstrumentSettings:
-        missing = {"wave_probes", "mru", "loads", "video"} - set(self.clocks)
-        if missing:
+    def _complete(self) -> Self:
+        if missing := {"wave_probes", "mru", "loads", "video"} - set(self.clocks):
             raise ValueError(f"the clocks of {', '.join(sorted(missing))} are missing")
         if self.trigger_width >= self.trigger_period:
             raise ValueError("trigger_width must be shorter than trigger_period")
         return self
 
 
-class TankSettings(_Settings):
+class TankSettings(Table):
     """All settings of a virtual campaign."""
 
     name: str = "virtual towing tank"
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Annotated[int, Field(ge=0, lt=2**64, description="a number from 0 to 2^64 − 1")] = 0
     scale_factor: Positive = 50.0
     facility: FacilitySettings = FacilitySettings()
     hull: HullSettings = HullSettings()
@@ -282,73 +276,63 @@ class TankSettings(_Settings):
     drift: DriftSettings = DriftSettings()
     moorings: dict[str, LineSettings]
     simulation: SimulationSettings = SimulationSettings()
-    instruments: InstrumentSettings
-    runs: dict[str, RunSettings]
-    folder: str = ""
-
-    @property
-    def hydrodynamics_path(self) -> Path | None:
-        """The hydrodynamics file, or None for the one that ships with the package."""
-        if not self.vessel.hydrodynamics:
-            return None
-        return Path(self.folder) / self.vessel.hydrodynamics
+    instruments: InstrumentPlan
+    runs: dict[str, RunPlan]
 
 
-def _known_keys(location: tuple[int | str, ...]) -> list[str]:
-    """Field names of the model at a location of the settings."""
-    model: Any = TankSettings
-    for part in location:
-        if isinstance(model, type) and issubclass(model, BaseModel):
-            field = model.model_fields.get(str(part))
-            model = None if field is None else field.annotation
-        else:
-            model = _value_type(model)
-        model = _model_in(model)
-    if isinstance(model, type) and issubclass(model, BaseModel):
-        return list(model.model_fields)
-    return []
+def _too_large(settings: TankSettings) -> Iterator[Mistake]:
+    """What would take more memory or time than a virtual campaign should."""
+    simulation = settings.simulation
+    if simulation.kernel_length > LAGS * simulation.step:
+        yield Mistake(
+            ("simulation", "kernel_length"),
+            f"{simulation.kernel_length:g} s are more than {LAGS} steps of {simulation.step:g} s. "
+            "Shorten the kernel, or take a larger step.",
+        )
+    for name, run in settings.runs.items():
+        if run.length > SAMPLES * simulation.step:
+            yield Mistake(
+                ("runs", name, "duration"),
+                f"{run.length:g} s with the start-up are more than {SAMPLES} steps of "
+                f"simulation.step = {simulation.step:g} s. Shorten the run, or take a larger step.",
+            )
+        for logger, clock in settings.instruments.clocks.items():
+            if clock.rate * run.length > SAMPLES:
+                yield Mistake(
+                    ("instruments", "clocks", logger, "rate"),
+                    f"{clock.rate:g} Hz make {clock.rate * run.length:.2g} samples of run {name} "
+                    f"({run.length:g} s); {SAMPLES} at most. Lower the rate, or shorten the run.",
+                )
+        count = 3 if run.spectrum is None else run.spectrum.components
+        finest = max(settings.instruments.clocks["wave_probes"].rate, 1.0 / simulation.step)
+        if count * finest * run.length > PRODUCTS:
+            yield Mistake(
+                ("runs", name, "spectrum", "components"),
+                f"{count} components at {finest * run.length:.2g} instants are too many. Take "
+                "fewer components, or shorten the run.",
+            )
 
 
-def _model_in(annotation: Any) -> Any:
-    """The settings class in an optional annotation, or the annotation itself."""
-    for part in getattr(annotation, "__args__", ()):
-        if isinstance(part, type) and issubclass(part, BaseModel) and len(annotation.__args__) == 2:
-            origin = getattr(annotation, "__origin__", None)
-            return annotation if origin is dict else part
-    return annotation
+def validate_tank(table: dict[str, Any], source: Path | str = "the tank settings") -> TankSettings:
+    """Validate a table of settings, as read from TOML.
+
+    Raises
+    ------
+    RequestError
+        With one line per mistake: key, value received, remedy.
+    """
+    return validated(TankSettings, table, source, "tank", _too_large)
 
 
-def _value_type(annotation: Any) -> Any:
-    arguments = getattr(annotation, "__args__", ())
-    return arguments[-1] if arguments else None
-
-
-def _explain(error: ValidationError, source: str) -> RequestError:
-    lines = []
-    for item in error.errors():
-        *parents, last = item["loc"] or ("",)
-        where = ".".join(str(part) for part in item["loc"]) or "the settings"
-        if item["type"] == "extra_forbidden":
-            near = did_you_mean(str(last), _known_keys(tuple(parents)))
-            lines.append(f"{where} is not a setting.{near} Correct or remove the key.")
-        elif item["type"] == "missing":
-            lines.append(f"{where} is missing. Add the key.")
-        else:
-            message = item["msg"].removeprefix("Value error, ")
-            shown = "" if isinstance(item["input"], dict) else f"; received {item['input']!r}"
-            lines.append(f"{where}: {message[0].lower()}{message[1:]}{shown}. Correct the value.")
-    return RequestError(f"{source}: " + "\n".join(lines))
-
-
-def validate_settings(table: dict[str, Any], source: str = "the tank settings") -> TankSettings:
-    """Validate a table of settings.
+def read_tank(path: Path | str) -> TankSettings:
+    """Read settings from a TOML file; tables that it leaves out are the CK-14e's.
 
     Parameters
     ----------
-    table : dict
-        As read from TOML.
-    source : str, optional
-        Name for the messages.
+    path : path
+        TOML file. The table ``[runs]``, ``[moorings]`` or ``[instruments.probes]`` replaces the
+        default one as a whole; other tables are completed key by key. Paths in it start at its
+        folder.
 
     Returns
     -------
@@ -358,86 +342,48 @@ def validate_settings(table: dict[str, Any], source: str = "the tank settings") 
     Raises
     ------
     RequestError
-        If a key is unknown or a value out of range; the message names key, value and mend.
-    """
-    try:
-        return TankSettings.model_validate(table)
-    except ValidationError as error:
-        raise _explain(error, source) from error
-
-
-def read_settings(path: Path | str) -> TankSettings:
-    """Read settings from a TOML file; tables that it leaves out are the CK-14e's.
-
-    Parameters
-    ----------
-    path : path
-        TOML file. The table ``[runs]``, ``[moorings]`` or ``[instruments.probes]`` replaces the
-        default one as a whole; other tables are completed key by key.
-
-    Returns
-    -------
-    TankSettings
-        The settings; relative paths in them start at the file's folder.
-
-    Raises
-    ------
-    RequestError
         If the file does not exist, is not TOML, or holds a wrong setting.
     """
     source = Path(path)
-    try:
-        table = tomllib.loads(source.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise RequestError(
-            f"the settings file {source} does not exist. Correct the path."
-        ) from error
-    except tomllib.TOMLDecodeError as error:
-        raise RequestError(f"{source} is not valid TOML: {error}. Correct that line.") from error
-    merged = _merge(_default_table(), table, ())
-    for name, run in merged["runs"].items():
+    merged = _merge(_default_table(), read_table(source, "tank"), ())
+    for name, run in merged["runs"].items() if isinstance(merged["runs"], dict) else ():
         spectrum = run.get("spectrum") if isinstance(run, dict) else None
         if isinstance(spectrum, dict) and spectrum.get("file"):
-            run["spectrum"] = _with_file(spectrum, source.parent, f"{source}: runs.{name}")
-    merged["folder"] = str(source.parent)
-    return validate_settings(merged, str(source))
+            place = source.parent / str(spectrum["file"])
+            run["spectrum"] = {**spectrum, **_spectrum_of(place, f"{source}: runs.{name}")}
+    vessel = merged["vessel"]
+    if isinstance(vessel, dict) and vessel["hydrodynamics"]:
+        vessel["hydrodynamics"] = str(source.parent / str(vessel["hydrodynamics"]))
+    return validate_tank(merged, source)
 
 
-def _with_file(spectrum: dict[str, Any], folder: Path, where: str) -> dict[str, Any]:
-    """Fill a spectrum's table from its file."""
-    path = folder / str(spectrum["file"])
+def _spectrum_of(path: Path, where: str) -> dict[str, Any]:
+    """Keys of a spectrum from a file of two columns."""
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
-    except OSError as error:
+        rows = [line for line in lines if line.strip() and not line.startswith("#")]
+        heading = bool(rows) and rows[0].partition(",")[0].strip(" +.0123456789eE-") != ""
+        table = np.loadtxt(rows[heading:], delimiter=",", ndmin=2)
+    except (OSError, ValueError) as error:
         raise RequestError(
-            f"{where}.spectrum.file: {path} cannot be read ({error.strerror}). Correct the path, "
+            f"{where}.spectrum.file: {path} cannot be read ({error}). Two columns of numbers are "
+            "needed, frequency (Hz) and density (m²/Hz), with a comma between; the path is "
             "relative to the settings file."
         ) from error
-    rows = [line.split(",") for line in lines if line.strip() and not line.startswith("#")]
-    if rows and not _is_number(rows[0][0]):
-        rows = rows[1:]
-    for number, row in enumerate(rows, 1):
-        if len(row) != 2 or not all(map(_is_number, row)):
-            raise RequestError(
-                f"{where}.spectrum.file: row {number} of {path} is {','.join(row)!r}; two numbers "
-                "are needed, frequency (Hz) and density (m²/Hz), with a comma between."
-            )
-    frequencies, densities = ([float(row[i]) for row in rows] for i in (0, 1))
-    return {"kind": "table", **spectrum, "frequencies": frequencies, "densities": densities}
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    if table.shape[1:] != (2,):
+        raise RequestError(
+            f"{where}.spectrum.file: {path} has {table.shape[1]} columns; two are needed, "
+            "frequency (Hz) and density (m²/Hz)."
+        )
+    frequencies, densities = table.T.tolist()
+    return {"kind": "table", "frequencies": frequencies, "densities": densities}
 
 
 _REPLACED = {("runs",), ("moorings",), ("instruments", "probes"), ("instruments", "slap")}
 
 
 def _merge(base: dict[str, Any], over: dict[str, Any], trail: tuple[str, ...]) -> dict[str, Any]:
+    """Complete a table by the default one."""
     result = dict(base)
     for key, value in over.items():
         here = (*trail, key)
@@ -446,6 +392,19 @@ def _merge(base: dict[str, Any], over: dict[str, Any], trail: tuple[str, ...]) -
         else:
             result[key] = value
     return result
+
+
+def with_waves(
+    settings: TankSettings, seed: int | None = None, spacing: str | None = None
+) -> TankSettings:
+    """Return settings with another seed, or another spacing of the components of all spectra."""
+    table = settings.model_dump()
+    if seed is not None:
+        table["seed"] = seed
+    for run in table["runs"].values():
+        if spacing is not None and run["spectrum"] is not None:
+            run["spectrum"]["spacing"] = spacing
+    return validate_tank(table)
 
 
 def _default_table() -> dict[str, Any]:
@@ -462,4 +421,4 @@ def default_settings() -> TankSettings:
     >>> sorted(settings.runs)[:3]
     ['irregular_1', 'irregular_2', 'irregular_3']
     """
-    return validate_settings(_default_table())
+    return validate_tank(_default_table())
