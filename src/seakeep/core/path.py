@@ -1,0 +1,180 @@
+r"""Many ridge regressions of the same delayed series: folds, delays and λ from one Gram matrix.
+
+The columns of all candidates are built once, standardised once for all runs. A fold is the sum of
+the moments of its runs, with an affine correction for its own means and standard deviations; a
+choice of delays and of columns is a part of the Gram matrix; and with its eigenvalues
+:math:`C = V \Lambda V^T` the coefficients at every λ are
+:math:`H V (\Lambda + \lambda I)^{-1} V^T`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from seakeep.arrays import FloatArray, IntArray
+
+__all__ = ["Moments", "free_runs", "lagged", "ridge_path"]
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """Sums over the snapshot pairs of some runs; they add up.
+
+    Parameters
+    ----------
+    count : int
+        Number of snapshot pairs.
+    gram : ndarray, shape (p, p)
+        Sum of products of the regressors.
+    right : ndarray, shape (N, p)
+        Sum of products of the targets with the regressors.
+    sums : ndarray, shape (p,)
+        Sum of the regressors.
+    targets : ndarray, shape (N,)
+        Sum of the targets.
+    """
+
+    count: int
+    gram: FloatArray
+    right: FloatArray
+    sums: FloatArray
+    targets: FloatArray
+
+    @classmethod
+    def of(cls, regressors: FloatArray, targets: FloatArray) -> Moments:
+        """Moments of regressors, shape (pairs, p), and targets, shape (pairs, N)."""
+        return cls(
+            len(regressors),
+            regressors.T @ regressors,
+            targets.T @ regressors,
+            regressors.sum(axis=0),
+            targets.sum(axis=0),
+        )
+
+    def __add__(self, other: Moments) -> Moments:
+        return Moments(
+            self.count + other.count,
+            self.gram + other.gram,
+            self.right + other.right,
+            self.sums + other.sums,
+            self.targets + other.targets,
+        )
+
+    def chosen(self, columns: IntArray) -> Moments:
+        """Moments of some of the regressors."""
+        return Moments(
+            self.count,
+            self.gram[np.ix_(columns, columns)],
+            self.right[:, columns],
+            self.sums[columns],
+            self.targets,
+        )
+
+    def standardised(
+        self,
+        mean: FloatArray,
+        scale: FloatArray,
+        target_mean: FloatArray,
+        target_scale: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Gram matrix and right-hand side of deviations from means, in units of scales.
+
+        Parameters
+        ----------
+        mean, scale : ndarray, shape (p,)
+            Of the regressors.
+        target_mean, target_scale : ndarray, shape (N,)
+            Of the targets.
+
+        Returns
+        -------
+        gram : ndarray, shape (p, p)
+        right : ndarray, shape (N, p)
+        """
+        crossed = np.outer(mean, self.sums - 0.5 * self.count * mean)
+        gram = (self.gram - crossed - crossed.T) / scale / scale[:, None]
+        right = (
+            self.right
+            - np.outer(target_mean, self.sums)
+            - np.outer(self.targets - self.count * target_mean, mean)
+        )
+        return gram, right / scale / target_scale[:, None]
+
+
+def ridge_path(gram: FloatArray, right: FloatArray, ridges: Sequence[float]) -> FloatArray:
+    """Coefficients of ridge regressions of one problem at several λ.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (p, p)
+        Products of the regressors.
+    right : ndarray, shape (N, p)
+        Products of the targets with the regressors.
+    ridges : sequence of float
+        λ > 0, each.
+
+    Returns
+    -------
+    ndarray, shape (len(ridges), N, p)
+    """
+    values, vectors = np.linalg.eigh(gram)
+    turned = right @ vectors
+    weights = 1.0 / (np.maximum(values, 0.0) + np.asarray(ridges)[:, None])
+    result: FloatArray = (turned * weights[:, None, :]) @ vectors.T
+    return result
+
+
+def lagged(series: FloatArray, first: int, count: int, lags: int) -> FloatArray:
+    """Rows of a series and of its past.
+
+    Parameters
+    ----------
+    series : ndarray, shape (time, channel)
+        Samples.
+    first, count : int
+        First instant of the rows, and how many there are.
+    lags : int
+        Longest lag; ``first`` is at least as large.
+
+    Returns
+    -------
+    ndarray, shape (count, channel (lags + 1))
+        Newest block first.
+    """
+    blocks = [series[first - lag : first - lag + count] for lag in range(lags + 1)]
+    return np.concatenate(blocks, axis=1)
+
+
+def free_runs(top: FloatArray, histories: FloatArray, forcing: FloatArray) -> FloatArray:
+    """Free runs of several models over several windows, side by side.
+
+    Parameters
+    ----------
+    top : ndarray, shape (model, N, N(s+1))
+        Rows of Â for the newest block; the delayed states shift exactly.
+    histories : ndarray, shape (window, N(s+1))
+        Extended states at the starts, newest block first.
+    forcing : ndarray, shape (model, window, steps, N)
+        What the inputs add at each step.
+
+    Returns
+    -------
+    ndarray, shape (model, window, steps, N)
+        States after the starts; not finite from where a run is lost.
+    """
+    models, windows, steps, count = forcing.shape
+    size = histories.shape[1]
+    # Newest first, so that the extended state of each step is a block of one buffer.
+    line = np.empty((models, windows, steps * count + size))
+    line[..., steps * count :] = histories
+    turned = np.ascontiguousarray(top.transpose(0, 2, 1))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for step in range(steps):
+            at = (steps - step) * count
+            state = line[..., at : at + size]
+            line[..., at - count : at] = state @ turned + forcing[:, :, step]
+    out = line[..., : steps * count].reshape(models, windows, steps, count)
+    return out[:, :, ::-1]
