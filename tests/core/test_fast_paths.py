@@ -1,5 +1,7 @@
 """Each trick of the fast core equals the plain formula over random shapes."""
 
+import sys
+from dataclasses import dataclass
 from unittest.mock import patch
 
 import numpy as np
@@ -10,8 +12,17 @@ from hypothesis import strategies as st
 from seakeep.core import gram as gram_module
 from seakeep.core import identify, rollout, snapshot_matrices
 from seakeep.core.embedding import TrainingWindow
-from seakeep.core.gram import Piece, gram_trace, primal_system, snapshot_gram
-from seakeep.core.lagged import lagged_response, lagged_sums
+from seakeep.core.gram import (
+    Piece,
+    gram_trace,
+    lagged_response,
+    lagged_sums,
+    primal_system,
+    snapshot_gram,
+)
+from seakeep.core.rollout import feedback_rollout
+
+ROLLOUT = sys.modules["seakeep.core.rollout"]
 
 # Sums of at most a few hundred products of order one: 1e-12 is a thousand roundings.
 TIGHT = 1e-12
@@ -19,42 +30,75 @@ TIGHT = 1e-12
 RESULT = 1e-10
 
 
+@dataclass(frozen=True)
+class Problem:
+    """Runs with groups of channels: states, delayed and direct inputs, down to none."""
+
+    states: list
+    inputs: list
+    direct: list
+    windows: list
+    s: int
+    z: int
+
+    def matrices(self, all_rows=True):
+        """Plain Hankel matrices."""
+        found = []
+        for x, u, d, window in zip(
+            self.states, self.inputs, self.direct, self.windows, strict=True
+        ):
+            y, target = snapshot_matrices(x, u, window, self.s, self.z, all_rows)
+            beside = d[window.first_column : window.last].T
+            found.append((np.concatenate([y, beside]), target))
+        return tuple(np.concatenate(group, axis=1) for group in zip(*found, strict=True))
+
+    @property
+    def pieces(self):
+        """What the fast paths take, without groups that have no channel."""
+        return [
+            Piece(tuple(g for g in groups if g.shape[1]), window.first_column, window.columns)
+            for *groups, window in zip(
+                self.states, self.inputs, self.direct, self.windows, strict=True
+            )
+        ]
+
+    @property
+    def delays(self):
+        groups = zip((self.states, self.inputs, self.direct), (self.s, self.z, 0), strict=True)
+        return tuple(delay for group, delay in groups if group[0].shape[1])
+
+    def identify(self, **options):
+        return identify(
+            self.states,
+            self.inputs,
+            self.windows,
+            state_delays=self.s,
+            input_delays=self.z,
+            direct=self.direct,
+            **options,
+        ).coefficients
+
+
 @st.composite
 def problems(draw):
-    """Runs, windows and delays: one to three runs, Q, s and z down to zero."""
+    """Runs, windows and delays: one to three runs, Q, D, s and z down to zero."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    N, Q = draw(st.integers(1, 3)), draw(st.integers(0, 3))
+    N, Q, D = draw(st.integers(1, 3)), draw(st.integers(0, 3)), draw(st.integers(0, 3))
     s, z = draw(st.integers(0, 6)), draw(st.integers(0, 6))
-    states, inputs, windows = [], [], []
+    made = Problem([], [], [], [], s, z)
     for _ in range(draw(st.integers(1, 3))):
         count = draw(st.integers(1, 40))
         before, after = draw(st.integers(0, 3)), draw(st.integers(0, 3))
         first = max(s, z) + before
         length = first + count + 1 + after
+        x, u, d = (rng.normal(size=(length, width)) for width in (N, Q, D))
         # A gap where no snapshot reaches is none of our business.
-        x, u = rng.normal(size=(length, N)), rng.normal(size=(length, Q))
-        x[: first - s], u[: first - z] = np.nan, np.nan
-        states.append(x)
-        inputs.append(u)
-        windows.append(TrainingWindow(first, first + count, first))
-    return states, inputs, windows, s, z
-
-
-def built(problem, all_rows=True):
-    states, inputs, windows, s, z = problem
-    pieces = [
-        snapshot_matrices(x, u, window, s, z, all_rows)
-        for x, u, window in zip(states, inputs, windows, strict=True)
-    ]
-    return (np.concatenate(group, axis=1) for group in zip(*pieces, strict=True))
-
-
-def pieces_of(problem):
-    states, inputs, windows, _, _ = problem
-    return [
-        Piece(x, u, window.first_column, window.columns)
-        for x, u, window in zip(states, inputs, windows, strict=True)
-    ]
+        x[: first - s], u[: first - z], d[:first] = np.nan, np.nan, np.nan
+        made.states.append(x)
+        made.inputs.append(u)
+        made.direct.append(d)
+        made.windows.append(TrainingWindow(first, first + count, first))
+    return made
 
 
 # Rows of a panel: these matrices are smaller than the usual height, and must have joints too.
@@ -64,25 +108,21 @@ panels = st.sampled_from([1, 2, 5, gram_module.PANEL])
 @settings(deadline=None)
 @given(problems(), panels)
 def test_the_displaced_gram_is_the_gram(problem, panel):
-    states, _, _, s, z = problem
-    regressors, targets = built(problem)
-    N, extended = states[0].shape[1], states[0].shape[1] * (s + 1)
-    # Inputs stand first.
-    turned = np.concatenate([regressors[extended:], regressors[:extended]])
+    regressors, targets = problem.matrices(all_rows=False)
     with patch.object(gram_module, "PANEL", panel):
-        system = primal_system(pieces_of(problem), s, z)
-    gram, right = system.gram, system.right
-    np.testing.assert_allclose(np.triu(gram), np.triu(turned @ turned.T), atol=TIGHT, rtol=TIGHT)
-    np.testing.assert_allclose(right, targets[:N] @ turned.T, atol=TIGHT, rtol=TIGHT)
+        system = primal_system(problem.pieces, problem.delays)
+    np.testing.assert_allclose(
+        np.triu(system.gram), np.triu(regressors @ regressors.T), atol=TIGHT, rtol=TIGHT
+    )
+    np.testing.assert_allclose(system.right, targets @ regressors.T, atol=TIGHT, rtol=TIGHT)
 
 
 @settings(deadline=None)
 @given(problems(), panels)
 def test_the_diagonal_sums_are_the_gram_of_the_snapshots(problem, panel):
-    *_, s, z = problem
-    regressors, _ = built(problem)
+    regressors, _ = problem.matrices()
     with patch.object(gram_module, "PANEL", panel):
-        gram = snapshot_gram(pieces_of(problem), s, z)
+        gram = snapshot_gram(problem.pieces, problem.delays)
     np.testing.assert_allclose(
         np.triu(gram), np.triu(regressors.T @ regressors), atol=TIGHT, rtol=TIGHT
     )
@@ -91,30 +131,31 @@ def test_the_diagonal_sums_are_the_gram_of_the_snapshots(problem, panel):
 @settings(deadline=None)
 @given(problems())
 def test_the_trace_is_the_sum_of_squares(problem):
-    *_, s, z = problem
-    regressors, _ = built(problem)
-    assert gram_trace(pieces_of(problem), s, z) == pytest.approx(np.sum(regressors**2), rel=TIGHT)
+    regressors, _ = problem.matrices()
+    found = gram_trace(problem.pieces, problem.delays)
+    assert found == pytest.approx(np.sum(regressors**2), rel=TIGHT)
 
 
 @settings(deadline=None)
 @given(problems(), st.floats(0.5, 200.0), st.booleans())
 def test_every_form_gives_the_papers_formula(problem, ridge, all_rows):
-    states, inputs, windows, s, z = problem
-    regressors, targets = built(problem, all_rows)
+    regressors, targets = problem.matrices(all_rows)
     plain = regressors @ regressors.T + ridge * np.eye(len(regressors))
     expected = np.linalg.solve(plain, regressors @ targets.T).T
     for method in ("primal", "dual", "svd", None):
-        found = identify(
-            states,
-            inputs,
-            windows,
-            state_delays=s,
-            input_delays=z,
-            ridge=ridge,
-            all_rows=all_rows,
-            method=method,
-        )
-        np.testing.assert_allclose(found.coefficients, expected, atol=RESULT)
+        found = problem.identify(ridge=ridge, all_rows=all_rows, method=method)
+        np.testing.assert_allclose(found, expected, atol=RESULT)
+
+
+@settings(deadline=None)
+@given(problems(), st.integers(1, 9))
+def test_a_rank_is_that_of_the_truncated_matrix(problem, rank):
+    regressors, targets = problem.matrices()
+    left, values, right = np.linalg.svd(regressors, full_matrices=False)
+    kept = min(rank, int(np.sum(values > values[0] * 1e-12)))
+    expected = targets @ right[:kept].T / values[:kept] @ left[:, :kept].T
+    found = problem.identify(ridge=0.0, rank=rank)
+    np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
 
 
 @settings(deadline=None)
@@ -145,11 +186,13 @@ def test_lagged_sums_are_products_with_a_hankel_matrix(seed, count, channels, la
     )
 
 
-def stepwise(a, b, state, inputs, delays, steps, count):
+def stepwise(a, b, state, inputs, delays, steps, count, direct=None):
     """The loop of the paper over the extended state."""
     out = np.empty((steps, count))
     for k in range(steps):
         extended = inputs[k : k + delays + 1][::-1].ravel()
+        if direct is not None:
+            extended = np.concatenate([extended, direct[k]])
         state = a @ state + b @ extended
         out[k] = state[:count]
     return out
@@ -161,10 +204,10 @@ def free_runs(draw):
     N, Q = draw(st.integers(1, 4)), draw(st.integers(0, 3))
     s, z = draw(st.integers(0, 5)), draw(st.integers(0, 5))
     windows, steps = draw(st.integers(1, 4)), draw(st.integers(1, 90))
-    size = N * (s + 1)
+    size, D = N * (s + 1), draw(st.integers(0, 3))
     kind = draw(st.sampled_from(["full", "shift", "mirrored"]))
     a = rng.normal(size=(size, size)) / (2 * size)
-    b = rng.normal(size=(size, Q * (z + 1)))
+    b = rng.normal(size=(size, Q * (z + 1) + D))
     if kind != "full":
         a[N:] = np.eye(size - N, size)
     if kind == "shift":
@@ -175,21 +218,38 @@ def free_runs(draw):
         a[N:, : size - N] = 0.5 * np.eye(size - N) + half + half.T
     histories = rng.normal(size=(windows, s + 1, N))
     inputs = rng.normal(size=(windows, z + steps, Q))
-    return a, b, histories, inputs, z, steps, N
+    direct = rng.normal(size=(windows, steps, D))
+    rows = N if kind == "shift" and draw(st.booleans()) else size
+    return a, b, rows, histories, inputs, direct, z, steps, N
 
 
 @settings(deadline=None)
-@given(free_runs())
-def test_free_runs_are_the_loop_over_the_extended_state(case):
-    a, b, histories, inputs, z, steps, N = case
+@given(free_runs(), st.sampled_from([200, 10**6]))
+def test_free_runs_are_the_loop_over_the_extended_state(case, piece):
+    a, b, rows, histories, inputs, direct, z, steps, N = case
     expected = [
-        stepwise(a, b, history[::-1].ravel(), series, z, steps, N)
-        for history, series in zip(histories, inputs, strict=True)
+        stepwise(a, b, history[::-1].ravel(), series, z, steps, N, beside)
+        for history, series, beside in zip(histories, inputs, direct, strict=True)
     ]
-    if inputs.shape[2] == 0:
-        inputs = np.zeros((len(histories), steps, 0))
-    found = rollout(a, b, histories, inputs, n_states=N)
+    driving = inputs if inputs.shape[2] else np.zeros((len(histories), steps, 0))
+    options = {"direct": direct} if direct.shape[2] else {}
+    with patch.object(ROLLOUT, "PIECE", piece):
+        found = rollout(a[:rows], b[:rows], histories, driving, n_states=N, **options)
     np.testing.assert_allclose(found, expected, atol=RESULT)
+    followed = [
+        feedback_rollout(
+            a[:rows],
+            b[:rows],
+            history,
+            series[: z + 1],
+            steps,
+            lambda k, _, u=series, d=beside: np.concatenate([u[z + k], d[k]]),
+            beside[0],
+        )
+        for history, series, beside in zip(histories, inputs, direct, strict=True)
+    ]
+    if inputs.shape[2]:
+        np.testing.assert_allclose(followed, expected, atol=RESULT)
 
 
 @pytest.mark.parametrize("windows", [1, 2, 12])
@@ -221,18 +281,3 @@ def test_a_gap_in_the_inputs_does_not_reach_back_beyond_its_block_of_steps():
     # Step 201 is the first to read the instant 200 after the start; no block is longer than 64.
     np.testing.assert_allclose(found[3, :128], whole[3, :128], atol=RESULT)
     assert np.isnan(found[3, 200:]).all()
-
-
-def test_a_long_run_in_pieces_is_the_run_in_one(monkeypatch):
-    import sys
-
-    rng = np.random.default_rng(5)
-    a, b = rng.normal(size=(6, 6)) / 8, rng.normal(size=(6, 4))
-    for rows in (2, 6):
-        histories, inputs = rng.normal(size=(2, 3, 2)), rng.normal(size=(2, 1003, 1))
-        whole = rollout(a[:rows], b[:rows], histories, inputs)
-        monkeypatch.setattr(sys.modules["seakeep.core.rollout"], "PIECE", 5000)
-        np.testing.assert_allclose(
-            rollout(a[:rows], b[:rows], histories, inputs), whole, atol=1e-13
-        )
-        monkeypatch.undo()

@@ -140,6 +140,8 @@ def test_a_window_that_was_given_up_does_not_come_back():
         ({"inputs": np.zeros((3, 4, 2))}, r"inputs of 4 samples do not reach one step: 4 delays"),
         ({"B": np.zeros((2, 0))}, r"inputs with 2 channels .* shape \(window, steps, 0\)"),
         ({"n_states": 3}, r"A of shape \(2, 8\) does not belong to 3 states"),
+        ({"direct": np.zeros((3, 12))}, r"direct inputs of shape \(3, 12\) .* needed, with D"),
+        ({"direct": np.zeros((3, 5, 2))}, r"\(3, 5, 2\) do not stand beside 3 window"),
     ],
 )
 def test_shapes_that_do_not_fit_are_named(change, message):

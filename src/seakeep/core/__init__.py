@@ -1,8 +1,8 @@
 """The mathematics of the method: arrays in, arrays out, numpy and scipy only."""
 
 from seakeep.core.embedding import embed, snapshot_matrices, training_window, unembed
-from seakeep.core.regression import Solution, identify
 from seakeep.core.rollout import rollout
+from seakeep.core.solve import Solution, identify
 
 __all__ = [
     "Solution",

@@ -1,22 +1,28 @@
 r"""Gram matrices of Hankel matrices from their displacement structure.
 
-Let :math:`w_t` be a series, :math:`\hat w_j = [w_j; w_{j-1}; …]`, and let the columns j run from
-a to b. Moving both lags of a block by one moves its sum over time by one sample,
+A regression of delayed series has groups of channels, each with delays of its own. Let :math:`w_t`
+be a group, :math:`\hat w_j = [w_j; w_{j-1}; …]`, and let the columns j run from a to b. Moving both
+lags of a block by one moves its sum over time by one sample,
 
 .. math:: C_{l+1,l'+1} = C_{l,l'} + w_{a-1-l} w_{a-1-l'}^T - w_{b-l} w_{b-l'}^T ,
 
 so the Gram matrix :math:`C = \hat Y \hat Y^T` is its first block row and column, a matrix of rank
 two for each run, and a running sum along block diagonals: O(p²) operations instead of O(p² m). The
-same holds for the blocks between states and inputs, and several runs add up.
+same holds for the blocks between two groups, and several runs add up.
 
 In the other space, :math:`K = \hat Y^T \hat Y`, moving both snapshots by one adds the newest
-samples and drops the oldest,
+samples and drops the oldest; for groups w with delays d,
 
-.. math:: K_{i+1,j+1} = K_{i,j} + x_{i+1}^T x_{j+1} - x_{i-s}^T x_{j-s}
-          + u_{i+1}^T u_{j+1} - u_{i-z}^T u_{j-z} ,
+.. math:: K_{i+1,j+1} = K_{i,j} + \sum_w w_{i+1}^T w_{j+1} - w_{i-d}^T w_{j-d} ,
 
-so K is its first row, a product of rank 2(N+Q), and a running sum along diagonals: O(n² (N+Q))
-instead of O(n² p). Between two runs there is a first column too.
+so K is its first row, a product of rank twice the channels, and a running sum along diagonals:
+O(n²) instead of O(n² p). Between two runs there is a first column too.
+
+First rows are sums over time of one series with another at many lags, :math:`S_l = \sum_i a_i\,
+b_{k+i-l}^T`, which is :math:`a^T H` with the Hankel matrix H of b. Kept newest first in one long
+row, b holds every row of H as a contiguous piece; laying d lags side by side once makes a dense
+block that serves, moved down by q d rows, the lags q d … q d + d − 1. So a few products with d
+times the data replace one with L times the data, and H is never built.
 
 Only upper triangles are made; what stands below the diagonal is not meaningful.
 """
@@ -30,14 +36,26 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.core.lagged import lagged_response, lagged_sums, recent
+from seakeep.arrays import FloatArray
 
-__all__ = ["Piece", "PrimalSystem", "gram_trace", "primal_system", "snapshot_gram"]
-
-FloatArray = npt.NDArray[np.float64]
+__all__ = [
+    "Group",
+    "Piece",
+    "PrimalSystem",
+    "gram_trace",
+    "lagged_response",
+    "lagged_sums",
+    "lay_out",
+    "primal_system",
+    "snapshot_gram",
+]
 
 PANEL = 64
 """Rows, about, in which a Gram matrix is made: few enough to stay in cache."""
+RESPONSES = 24
+"""Instants whose responses are one product with a Toeplitz matrix of the weights."""
+BLOCK_WIDTH = 96
+"""Columns of the block of lags that is laid out: wide enough for BLAS, small enough for cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,203 +64,190 @@ class Piece:
 
     Parameters
     ----------
-    states, inputs : ndarray, shapes (time, N) and (time, Q)
-        Series.
+    series : tuple of ndarray, each (time, channel)
+        Its groups of channels; the first holds the states.
     first : int
         Sample of the first snapshot; its delay history lies before it.
     count : int
         Number of snapshot pairs.
     """
 
-    states: FloatArray
-    inputs: FloatArray
+    series: tuple[FloatArray, ...]
     first: int
     count: int
 
     @property
     def targets(self) -> FloatArray:
         """Newest blocks of the next snapshots, shape (count, N)."""
-        return self.states[self.first + 1 : self.first + 1 + self.count]
+        return self.series[0][self.first + 1 : self.first + 1 + self.count]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Where a group stands among the regressors: from row `start` on, newest lag first.
+
+    `head` is the place of its channels among the newest samples of all groups.
+    """
+
+    start: int
+    channels: int
+    lags: int
+    head: slice
+
+    @property
+    def stop(self) -> int:
+        """Row after the last."""
+        return self.start + self.channels * self.lags
+
+    @property
+    def rows(self) -> slice:
+        """All of its rows."""
+        return slice(self.start, self.stop)
+
+    @property
+    def newest(self) -> slice:
+        """Rows of lag zero."""
+        return slice(self.start, self.start + self.channels)
+
+    @property
+    def older(self) -> slice:
+        """Rows of the other lags."""
+        return slice(self.start + self.channels, self.stop)
+
+    @property
+    def newer(self) -> slice:
+        """Rows of all lags but the last; `older` moved up by one lag."""
+        return slice(self.start, self.stop - self.channels)
+
+
+def lay_out(piece: Piece, delays: Sequence[int]) -> tuple[Group, ...]:
+    """Place the groups of a run, with these delays, below each other."""
+    groups: list[Group] = []
+    start = head = 0
+    for series, delay in zip(piece.series, delays, strict=True):
+        channels = series.shape[1]
+        groups.append(Group(start, channels, delay + 1, slice(head, head + channels)))
+        start, head = groups[-1].stop, head + channels
+    return tuple(groups)
 
 
 @dataclass(frozen=True, eq=False)
 class PrimalSystem:
-    """Normal equations of delayed series; inputs stand before states, newest lags first.
+    """Normal equations of delayed series.
 
     Parameters
     ----------
     gram : ndarray, shape (p + room, p + room)
-        Upper triangle of C in its first p rows and columns, p = Q(z+1) + N(s+1).
+        Upper triangle of C in its first p rows and columns.
     right : ndarray, shape (N, p)
         Products of the next states (the newest block alone) with the regressors.
-    heads : ndarray, shape (Q + N, p)
-        Rows of C of the newest inputs and states.
+    heads : ndarray, shape (channels, p)
+        Rows of C of the newest samples of all groups.
     edges : ndarray, shape (2 runs, p)
-        What enters at the begin (even rows) and leaves at the end (odd rows) of a run where a
+        What enters at the start (even rows) and leaves at the end (odd rows) of a run where a
         block moves by a lag.
-    states, channels, inputs : int
-        N, Q and Q(z+1).
+    groups : tuple of Group
+        Places of the groups; the states are the first.
     """
 
     gram: FloatArray
     right: FloatArray
     heads: FloatArray
     edges: FloatArray
-    states: int
-    channels: int
-    inputs: int
+    groups: tuple[Group, ...]
 
 
-def gram_trace(pieces: Sequence[Piece], state_delays: int, input_delays: int) -> float:
-    """Sum of squares of the Hankel matrix: the trace of its Gram matrix.
-
-    Parameters
-    ----------
-    pieces : sequence of Piece
-        Runs.
-    state_delays, input_delays : int
-        s and z.
-
-    Returns
-    -------
-    float
-        It bounds the largest squared singular value from above.
-    """
+def gram_trace(pieces: Sequence[Piece], delays: Sequence[int]) -> float:
+    """Trace of the Gram matrix, which bounds the largest squared singular value from above."""
     total = 0.0
     for piece in pieces:
-        for series, delays in ((piece.states, state_delays), (piece.inputs, input_delays)):
+        for series, delay in zip(piece.series, delays, strict=True):
             # Only what the snapshots reach: what stands before may be a gap.
-            reached = series[piece.first - delays : piece.first + piece.count]
+            reached = series[piece.first - delay : piece.first + piece.count]
             energy = np.zeros(len(reached) + 1)
             np.cumsum(np.einsum("tc,tc->t", reached, reached), out=energy[1:])
-            total += float(np.sum(energy[piece.count :]) - np.sum(energy[: delays + 1]))
+            total += float(np.sum(energy[piece.count :]) - np.sum(energy[: delay + 1]))
     return total
 
 
-def primal_system(
-    pieces: Sequence[Piece],
-    state_delays: int,
-    input_delays: int,
-    room: int = 0,
-) -> PrimalSystem:
+def primal_system(pieces: Sequence[Piece], delays: Sequence[int], room: int = 0) -> PrimalSystem:
     r"""Gram matrix :math:`\hat Y \hat Y^T` and right-hand side :math:`X' \hat Y^T`.
 
-    Parameters
-    ----------
-    pieces : sequence of Piece
-        Runs.
-    state_delays, input_delays : int
-        s and z.
-    room : int, optional
-        Rows and columns beyond the Gram matrix, for right-hand sides.
-
-    Returns
-    -------
-    PrimalSystem
-        Gram matrix, right-hand side, heads and edges.
+    `delays` holds those of each group; `room` counts rows and columns to leave beyond the Gram
+    matrix.
     """
-    s, z = state_delays, input_delays
-    N, Q = pieces[0].states.shape[1], pieces[0].inputs.shape[1]
-    inputs = Q * (z + 1)
-    size = inputs + N * (s + 1)
-    edges = np.zeros((2 * len(pieces), size))
-    heads = np.zeros((Q + N, size))
-    right = np.zeros((N, size))
-    for number, piece in enumerate(pieces):
-        x, u, start = piece.states, piece.inputs, piece.first
-        end = start + piece.count - 1
-        # One more lag and one column less than the heads need: the sums of the next states are
-        # the same sums one lag later, up to one product at either end.
-        newest = np.concatenate([u[start + 1 : end + 1], x[start + 1 : end + 1]], axis=1)
-        sums_u = lagged_sums(newest, u, start + 1, z + 2)
-        sums_x = lagged_sums(newest, x, start + 1, s + 2)
-        snapshot = np.concatenate([recent(u, start, z + 1), recent(x, start, s + 1)])
-        heads += np.concatenate([u[start], x[start]])[:, None] * snapshot
-        heads[:, :inputs] += sums_u[:, : Q * (z + 1)]
-        heads[:, inputs:] += sums_x[:, : N * (s + 1)]
-        snapshot = np.concatenate([recent(u, end, z + 1), recent(x, end, s + 1)])
-        right += x[end + 1][:, None] * snapshot
-        right[:, :inputs] += sums_u[Q:, Q:]
-        right[:, inputs:] += sums_x[Q:, N:]
-        for row, at in ((edges[2 * number], start - 1), (edges[2 * number + 1], end)):
-            row[Q:inputs] = recent(u, at, z)
-            row[inputs + N :] = recent(x, at, s)
+    groups = lay_out(pieces[0], delays)
+    size, width = groups[-1].stop, groups[-1].head.stop
+    edges, heads = np.zeros((2 * len(pieces), size)), np.zeros((width, size))
+    right = np.zeros((groups[0].channels, size))
+    for piece, entering, leaving in zip(pieces, edges[::2], edges[1::2], strict=True):
+        start, end = piece.first, piece.first + piece.count - 1
+        newest = np.concatenate([x[start + 1 : end + 1] for x in piece.series], axis=1)
+        first = np.concatenate([x[start] for x in piece.series])[:, None]
+        following = piece.series[0][end + 1][:, None]
+        for x, group in zip(piece.series, groups, strict=True):
+            # One more lag and one column less than the heads need: the sums of the next states
+            # are the same sums one lag later, up to one product at either end.
+            sums = lagged_sums(newest, x, start + 1, group.lags + 1)
+            heads[:, group.rows] += first * _recent(x, start, group.lags)
+            heads[:, group.rows] += sums[:, : group.stop - group.start]
+            right[:, group.rows] += following * _recent(x, end, group.lags)
+            right[:, group.rows] += sums[: len(right), group.channels :]
+            entering[group.older] = _recent(x, start - 1, group.lags - 1)
+            leaving[group.older] = _recent(x, end, group.lags - 1)
     gram = np.empty((size + room, size + room))
-    _fill_primal(gram[:size, :size], heads, edges, N, Q, inputs)
-    return PrimalSystem(gram, right, heads, edges, N, Q, inputs)
+    _fill_primal(gram[:size, :size], heads, edges, groups)
+    return PrimalSystem(gram, right, heads, edges, groups)
 
 
 def _fill_primal(
-    gram: FloatArray, heads: FloatArray, edges: FloatArray, N: int, Q: int, inputs: int
+    gram: FloatArray, heads: FloatArray, edges: FloatArray, groups: Sequence[Group]
 ) -> None:
     # Panel by panel: the product of the edges from the panel's diagonal block on, heads over it,
     # then the running sums while it is in cache. Sums take whole blocks, so that of the diagonal
     # blocks the lower halves are made too; what is left of them is memory as it was found, and
     # must never be read.
-    size = len(gram)
     signed = edges.copy()
     signed[1::2] *= -1.0
-    for begin, stop in _panels(0, inputs, Q):
-        np.matmul(edges[:, begin:stop].T, signed[:, begin:], out=gram[begin:stop, begin:])
-        gram[begin:stop, inputs : inputs + N] = heads[Q:, begin:stop].T
-        if begin == 0:
-            gram[:Q] = heads[:Q]
-        for at in range(max(begin, Q), stop, Q):
-            block = gram[at : at + Q, at:inputs]
-            block += gram[at - Q : at, at - Q : inputs - Q]
-    for at in range(inputs + N, size, N):
-        gram[Q:inputs, at : at + N] += gram[: max(inputs - Q, 0), at - N : at]
-    for begin, stop in _panels(inputs, size, N):
-        np.matmul(edges[:, begin:stop].T, signed[:, begin:], out=gram[begin:stop, begin:])
-        if begin == inputs:
-            gram[inputs : inputs + N, inputs:] = heads[Q:, inputs:]
-        for at in range(max(begin, inputs + N), stop, N):
-            gram[at : at + N, at:] += gram[at - N : at, at - N : size - N]
+    for number, group in enumerate(groups):
+        later, N = groups[number + 1 :], group.channels
+        for begin, stop in _panels(group.start, group.stop, N):
+            np.matmul(edges[:, begin:stop].T, signed[:, begin:], out=gram[begin:stop, begin:])
+            for other in later:
+                gram[begin:stop, other.newest] = heads[other.head, begin:stop].T
+            if begin == group.start:
+                gram[group.newest, begin:] = heads[group.head, begin:]
+            for at in range(max(begin, group.start + N), stop, N):
+                above, row = gram[at - N : at], gram[at : at + N]
+                row[:, at : group.stop] += above[:, at - N : group.stop - N]
+                for other in later:
+                    row[:, other.older] += above[:, other.newer]
 
 
-def snapshot_gram(
-    pieces: Sequence[Piece],
-    state_delays: int,
-    input_delays: int,
-    room: int = 0,
-) -> FloatArray:
+def snapshot_gram(pieces: Sequence[Piece], delays: Sequence[int], room: int = 0) -> FloatArray:
     r"""Gram matrix :math:`\hat Y^T \hat Y` of the snapshots of all runs.
 
-    Parameters
-    ----------
-    pieces : sequence of Piece
-        Runs.
-    state_delays, input_delays : int
-        s and z.
-    room : int, optional
-        Rows and columns beyond the Gram matrix, for right-hand sides.
-
-    Returns
-    -------
-    ndarray, shape (n + room, n + room)
-        Its upper triangle in the first n rows and columns, n the number of snapshot pairs of all
-        runs.
+    `room` counts rows and columns to leave beyond it, for right-hand sides.
     """
-    s, z = state_delays, input_delays
-    N, Q = pieces[0].states.shape[1], pieces[0].inputs.shape[1]
+    groups = lay_out(pieces[0], delays)
+    width = groups[-1].head.stop
     ends = np.cumsum([0, *(piece.count for piece in pieces)])
-    steps = np.empty((ends[-1], 2 * (N + Q)))
+    steps = np.zeros((ends[-1], 2 * width))
     for piece, begin, stop in zip(pieces, ends[:-1], ends[1:], strict=True):
         rows, first, count = steps[begin:stop], piece.first, piece.count
-        rows[0] = 0.0
-        rows[1:, :N] = piece.states[first + 1 : first + count]
-        rows[1:, N : N + Q] = piece.inputs[first + 1 : first + count]
-        rows[1:, N + Q : 2 * N + Q] = piece.states[first - s : first - s + count - 1]
-        rows[1:, 2 * N + Q :] = piece.inputs[first - z : first - z + count - 1]
+        for x, delay, group in zip(piece.series, delays, groups, strict=True):
+            rows[1:, group.head] = x[first + 1 : first + count]
+            rows[1:, width:][:, group.head] = x[first - delay : first - delay + count - 1]
     signed = np.ascontiguousarray(steps.T)
-    signed[N + Q :] *= -1.0
-    heads = np.empty((len(pieces), len(steps)))
+    signed[width:] *= -1.0
+    heads = np.zeros((len(pieces), len(steps)))
     for own, head in zip(pieces, heads, strict=True):
-        own_x = recent(own.states, own.first, s + 1)
-        own_u = recent(own.inputs, own.first, z + 1)
+        newest = [
+            _recent(x, own.first, group.lags) for x, group in zip(own.series, groups, strict=True)
+        ]
         for piece, begin, stop in zip(pieces, ends[:-1], ends[1:], strict=True):
-            head[begin:stop] = lagged_response(piece.states, own_x, piece.first, piece.count)
-            head[begin:stop] += lagged_response(piece.inputs, own_u, piece.first, piece.count)
+            for x, weights in zip(piece.series, newest, strict=True):
+                head[begin:stop] += lagged_response(x, weights, piece.first, piece.count)
     size = len(steps)
     gram = np.empty((size + room, size + room))
     _fill_snapshots(gram[:size, :size], heads, steps, signed, ends)
@@ -280,3 +285,73 @@ def _panels(begin: int, end: int, block: int) -> Iterator[tuple[int, int]]:
     height = max(block, PANEL // max(block, 1) * block)
     for at in range(begin, end, max(height, 1)):
         yield at, min(at + height, end)
+
+
+def _recent(series: FloatArray, at: int, lags: int) -> FloatArray:
+    """Sample `at` and those before it, newest first, in one row."""
+    return series[at - lags + 1 : at + 1][::-1].reshape(-1)
+
+
+def lagged_sums(left: FloatArray, series: FloatArray, first: int, lags: int) -> FloatArray:
+    r"""Sums :math:`\sum_i a_i\, b_{k+i-l}^T` for the lags l = 0 … `lags` − 1.
+
+    `left` is a, shape (count, rows), `series` b, and `first` the sample k of the series that
+    stands beside the first row of `left` at lag zero. The sums stand side by side, lag zero first.
+    """
+    count, channels = left.shape[0], series.shape[1]
+    out = np.empty((left.shape[1], lags * channels))
+    if out.size == 0 or count == 0:
+        out[:] = 0.0
+        return out
+    blocks = -(-lags // max(1, BLOCK_WIDTH // channels))
+    depth = -(-lags // blocks)
+    rows = count + (blocks - 1) * depth
+    newest_first = np.zeros((rows + depth - 1, channels))
+    newest_first[: count + lags - 1] = series[first - lags + 1 : first + count][::-1]
+    step = newest_first.strides[0]
+    laid_out = np.ascontiguousarray(
+        np.lib.stride_tricks.as_strided(
+            newest_first,
+            shape=(rows, depth * channels),
+            strides=(step, newest_first.strides[1]),
+            writeable=False,
+        )
+    )
+    turned = np.ascontiguousarray(left[::-1].T)
+    for block in range(blocks):
+        at = block * depth
+        width = min(depth, lags - at) * channels
+        np.matmul(
+            turned,
+            laid_out[at : at + count, :width],
+            out=out[:, at * channels : at * channels + width],
+        )
+    return out
+
+
+def lagged_response(series: FloatArray, weights: FloatArray, first: int, count: int) -> FloatArray:
+    r"""Response :math:`\sum_l g_l^T b_{k+i-l}` for i = 0 … `count` − 1.
+
+    Some instants at a time: the samples that they reach, side by side, times a Toeplitz matrix of
+    the weights.
+
+    `series` is b, `weights` g with lag zero first, and `first` the sample k.
+    """
+    channels = series.shape[1]
+    lags = weights.size // channels if channels else 0
+    if lags == 0:
+        return np.zeros(count)
+    blocks = -(-count // RESPONSES)
+    reached = np.zeros((blocks * RESPONSES + lags - 1, channels))
+    reached[: count + lags - 1] = series[first - lags + 1 : first + count]
+    width = (RESPONSES + lags - 1) * channels
+    step, number = RESPONSES * reached.strides[0], reached.itemsize
+    samples = np.lib.stride_tricks.as_strided(
+        reached, shape=(blocks, width), strides=(step, number), writeable=False
+    )
+    # Rows one sample longer than a block's, end to end: cut at its width, each stands a sample
+    # further right than the one before.
+    shifted = np.zeros((RESPONSES, width + channels))
+    shifted[:, : weights.size] = weights.reshape(lags, channels)[::-1].reshape(-1)
+    toeplitz = shifted.reshape(-1)[: RESPONSES * width].reshape(RESPONSES, width)
+    return np.asarray(samples @ toeplitz.T).reshape(-1)[:count]

@@ -25,21 +25,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import blas
 
+from seakeep.arrays import BoolArray, FloatArray
 from seakeep.errors import RequestError
 
 __all__ = ["feedback_rollout", "rollout"]
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+Arrays = tuple[FloatArray, ...]
 
-PIECE = 4_000_000
-"""Numbers, about, that a piece of a long run holds at once."""
+PIECE = 300_000
+"""Numbers, about, that a piece of a long run holds at once.
+
+Few enough that memory that was used once is used again: fresh pages cost as much as the arithmetic
+on them, a third of the time of forty windows."""
 SYMMETRIC = 1e-8
 """Part of its largest entry by which a symmetric matrix may differ from its mirror image."""
 OUTPUT_ROWS = 192
@@ -51,6 +54,8 @@ GEMM_RATE = 50.0
 """Floating-point operations per nanosecond in products of large matrices (rough)."""
 SKINNY_COST = (4000.0, 0.1, 0.055)
 """Nanoseconds of a product of a square matrix with w rows: fixed, per entry, per entry and row."""
+LINE = 8
+"""Numbers in a line of cache: BLAS is a tenth faster on a mirrored Â of whole lines."""
 MIRRORED_ENTRY = 0.065
 """Nanoseconds per entry of a product of a mirrored matrix with one row."""
 MOST_DOUBLINGS = 6
@@ -63,6 +68,7 @@ def rollout(
     inputs: npt.ArrayLike,
     *,
     n_states: int | None = None,
+    direct: npt.ArrayLike | None = None,
 ) -> FloatArray:
     r"""Free run of one model over several windows side by side.
 
@@ -70,7 +76,7 @@ def rollout(
     ----------
     A : array_like, shape (N(s+1), N(s+1)) or (N, N(s+1))
         State matrix. With N rows alone the delayed states are shifted exactly.
-    B : array_like, shape (rows of A, Q(z+1))
+    B : array_like, shape (rows of A, Q(z+1) + D)
         Input matrix; no columns for a model without input.
     histories : array_like, shape (window, N(s+1)) or (window, s+1, N)
         Extended states :math:`\hat x_0`, newest block first; or the samples themselves, oldest
@@ -83,6 +89,8 @@ def rollout(
         extended states and a square `A` it is the smallest N for which the rows of the delayed
         states are a symmetric matrix but for their last N columns, as an exact shift and
         regressed rows are; without one, the whole state is returned.
+    direct : array_like, shape (window, steps, D), optional
+        Further inputs, without delays, of the last D columns of `B`.
 
     Returns
     -------
@@ -115,11 +123,29 @@ def rollout(
             f"histories {np.shape(histories)} and inputs {driving.shape} do not fit A {a.shape}: "
             f"a history has {a.shape[1]} values, and both have one row a window."
         )
-    channels, steps = _input_steps(b, driving)
+    groups, further = [(b, driving)], () if direct is None else np.shape(direct)
+    if direct is not None:
+        if len(further) != 3 or (len(further) and further[2] > b.shape[1]):
+            raise RequestError(
+                f"direct inputs of shape {further} do not fit B {b.shape}: (window, steps, D) is "
+                "needed, with D of its columns."
+            )
+        split = b.shape[1] - further[2]
+        groups = [(b[:, :split], driving), (b[:, split:], np.asarray(direct, float))]
+    steps = _steps(groups[0][0], driving)
+    if direct is not None and further[:2] != (len(start), steps):
+        raise RequestError(
+            f"direct inputs of shape {further} do not stand beside {len(start)} window(s) of "
+            f"{steps} steps: one row per window and step is needed."
+        )
     if not len(start):
         return np.empty((0, steps, count))
+    groups = [groups[0], *(group for group in groups[1:] if group[1].shape[2])]
+    matrices, series = zip(*groups, strict=True)
+    channels = tuple(values.shape[2] for values in series)
     with np.errstate(over="ignore", invalid="ignore"):
-        out = _run(_propagator(a, b, count, channels, len(start), steps), start, driving, steps)
+        propagator = _propagator(a, matrices, count, channels, len(start), steps)
+        out = _run(propagator, start, series, steps)
     _cut_lost(out)
     return out
 
@@ -131,12 +157,13 @@ def feedback_rollout(
     inputs: FloatArray,
     steps: int,
     next_input: Callable[[int, FloatArray], FloatArray],
+    direct: FloatArray | None = None,
 ) -> FloatArray:
     r"""Run :math:`\hat x_{j+1} = \hat A \hat x_j + \hat B \hat u_j` with :math:`u_j(x_j)`.
 
     Parameters
     ----------
-    a, b : ndarray, shapes (rows, N(s+1)) and (rows, Q(z+1))
+    a, b : ndarray, shapes (rows, N(s+1)) and (rows, Q(z+1) + D)
         Matrices; N rows stand for exact delay rows, else all rows are given.
     states : ndarray, shape (s + 1, N)
         History, oldest first.
@@ -145,8 +172,10 @@ def feedback_rollout(
     steps : int
         Number of instants.
     next_input : callable
-        ``next_input(k, x)`` gives the input, shape (Q,), at the k-th instant after the start
+        ``next_input(k, x)`` gives the input, shape (Q + D,), at the k-th instant after the start
         (from 1), where the state x, shape (N,), was reached. It is not asked at the last one.
+    direct : ndarray, shape (D,), optional
+        Inputs without delays at the start.
 
     Returns
     -------
@@ -155,15 +184,17 @@ def feedback_rollout(
     """
     count, width = states.shape[1], inputs.shape[1]
     x, u = states[::-1].ravel(), inputs[::-1].ravel()
+    now = np.empty(0) if direct is None else direct
     exact = a.shape[0] == count < x.size
     out = np.empty((steps, count))
     for step in range(steps):
         with np.errstate(over="ignore", invalid="ignore"):  # a lost run is cut by the caller
-            reached = a @ x + b @ u
+            reached = a @ x + b @ np.concatenate([u, now])
         x = np.concatenate([reached, x[:-count]]) if exact else reached
         out[step] = x[:count]
         if step < steps - 1:
-            u = np.concatenate([next_input(step + 1, out[step]), u[:-width]])
+            newest = next_input(step + 1, out[step])
+            u, now = np.concatenate([newest[:width], u[:-width]]), newest[width:]
     return out
 
 
@@ -196,11 +227,11 @@ def _delayed_states(a: FloatArray) -> int:
     return size
 
 
-def _input_steps(b: FloatArray, inputs: FloatArray) -> tuple[int, int]:
-    """Channels a sample of the inputs, and steps they drive; extended inputs count as channels."""
+def _steps(b: FloatArray, inputs: FloatArray) -> int:
+    """Steps that the inputs drive; extended inputs count as channels."""
     length, width = inputs.shape[1:]
     if width == b.shape[1]:
-        return width, length
+        return int(length)
     if width == 0 or b.shape[1] == 0 or b.shape[1] % width:
         mend = (
             "Check the number of inputs and their delays."
@@ -217,7 +248,7 @@ def _input_steps(b: FloatArray, inputs: FloatArray) -> tuple[int, int]:
             f"inputs of {length} samples do not reach one step: {delays} delays need at least "
             f"{delays + 1} samples."
         )
-    return width, length - delays
+    return int(length - delays)
 
 
 def _cut_lost(out: FloatArray) -> None:
@@ -238,19 +269,20 @@ def _cut_lost(out: FloatArray) -> None:
 class _Propagator:
     """K steps as one: O, P and, where the outputs are not the state, A_K and B_K.
 
-    Outputs stand newest first. `is_mirrored` is for one step of one window.
+    Outputs stand newest first; P and B_K are one matrix for each group of inputs. `state` is
+    A_K for one window, its transpose for several, and the upper half of a mirrored Â.
     """
 
     steps: int
     output_state: FloatArray
-    output_input: FloatArray
+    output_input: Arrays
     state: FloatArray | None = None
-    state_input: FloatArray | None = None
+    state_input: Arrays = ()
     is_mirrored: bool = False
 
 
 def _propagator(
-    a: FloatArray, b: FloatArray, count: int, channels: int, windows: int, steps: int
+    a: FloatArray, b: Arrays, count: int, channels: tuple[int, ...], windows: int, steps: int
 ) -> _Propagator:
     """The propagator that costs least; of one step where a longer one overflows."""
     if len(a) == count < a.shape[1]:
@@ -258,15 +290,21 @@ def _propagator(
         if np.isfinite(propagator.output_state).all():
             return propagator
         return _shifting_propagator(a, b, channels, 1)
+    width = sum(group.shape[1] for group in b)
     is_mirrored = windows == 1 and _is_mirrored(a[count:, : len(a) - count])
-    times = _doublings(len(a), b.shape[1], windows, steps, is_mirrored)
-    if is_mirrored and not times:
-        return _Propagator(1, a[:count], b[:count], a, b, is_mirrored)
+    times = _doublings(len(a), width, windows, steps, is_mirrored)
     propagator = _square_propagator(a, b, count, channels, times)
     assert propagator.state is not None
-    if np.isfinite(propagator.state).all():
-        return propagator
-    return _square_propagator(a, b, count, channels, 0)
+    if times and not np.isfinite(propagator.state).all():
+        propagator, is_mirrored = _square_propagator(a, b, count, channels, 0), False
+    if is_mirrored and not times:
+        padded = len(a) + (-len(a)) % LINE
+        half = np.zeros((padded, padded))
+        half[: len(a) - count, : len(a)] = a[count:]
+        return replace(propagator, state=half, is_mirrored=True)
+    if windows > 1 and propagator.state is not None:
+        return replace(propagator, state=np.ascontiguousarray(propagator.state.T))
+    return propagator
 
 
 def _shifting_steps(states: int, steps: int) -> int:
@@ -276,16 +314,21 @@ def _shifting_steps(states: int, steps: int) -> int:
     return max(1, min(steps, best, -(-OUTPUT_ROWS // states)))
 
 
-def _shifting_propagator(a: FloatArray, b: FloatArray, channels: int, steps: int) -> _Propagator:
+def _shifting_propagator(
+    a: FloatArray, b: Arrays, channels: tuple[int, ...], steps: int
+) -> _Propagator:
     """Propagator of a model whose delayed states shift exactly."""
     N, size = a.shape
-    width = b.shape[1]
     output_state = np.empty((steps * N, size))
-    output_input = np.zeros((steps * N, width + (steps - 1) * channels))
+    output_input = tuple(
+        np.zeros((steps * N, own.shape[1] + (steps - 1) * q))
+        for own, q in zip(b, channels, strict=True)
+    )
     row, at = a, (steps - 1) * N
     output_state[at:] = a
     # P of step i: û of the i-th instant enters through B̂, older ones through the step before.
-    output_input[at:, (steps - 1) * channels :] = b
+    for out, own, q in zip(output_input, b, channels, strict=True):
+        out[at:, (steps - 1) * q :] = own
     for step in range(1, steps):
         head = row[:, :N]
         moved = head @ a
@@ -293,11 +336,12 @@ def _shifting_propagator(a: FloatArray, b: FloatArray, channels: int, steps: int
         previous, at, row = at, at - N, moved
         output_state[at : at + N] = row
         # Later inputs stand further left: the response of the step before, moved, and one more.
-        begin = (steps - 1 - step) * channels
-        output_input[at : at + N, begin : begin + width + (step - 1) * channels] = output_input[
-            previous : previous + N, begin + channels :
-        ]
-        output_input[at : at + N, begin + step * channels :] += head @ b
+        for out, own, q in zip(output_input, b, channels, strict=True):
+            start, width = (steps - 1 - step) * q, own.shape[1]
+            out[at : at + N, start : start + width + (step - 1) * q] = out[
+                previous : previous + N, start + q :
+            ]
+            out[at : at + N, start + step * q :] += head @ own
     return _Propagator(steps, output_state, output_input)
 
 
@@ -324,32 +368,39 @@ def _doublings(size: int, inputs: int, windows: int, steps: int, is_mirrored: bo
 
 
 def _square_propagator(
-    a: FloatArray, b: FloatArray, count: int, channels: int, times: int
+    a: FloatArray, b: Arrays, count: int, channels: tuple[int, ...], times: int
 ) -> _Propagator:
     """Propagator of a model with a full Â, of two to the power of `times` steps."""
-    output_state, output_input, K = a[:count], b[:count], 1
+    output_state, K = a[:count], 1
+    output_input = tuple(own[:count] for own in b)
     for _ in range(times):
-        pad, (half, width) = K * channels, output_input.shape
         # Newest first: the second half of the steps stands above the first.
-        wider_output = np.zeros((2 * half, width + pad))
-        wider_output[:half, pad:] = output_state @ b
-        wider_output[:half, :width] += output_input
-        wider_output[half:, pad:] = output_input
+        output_input = tuple(
+            np.concatenate([_later(output_state @ own, first, K * q), _wider(first, K * q)])
+            for own, first, q in zip(b, output_input, channels, strict=True)
+        )
         output_state = np.concatenate([output_state @ a, output_state])
-        output_input = wider_output
-        wider = np.empty((len(b), width + pad))
-        wider[:, :pad] = 0.0
-        np.matmul(a, b, out=wider[:, pad:])
-        wider[:, :width] += b
-        a, b, K = a @ a, wider, 2 * K
+        b = tuple(_later(a @ own, own, K * q) for own, q in zip(b, channels, strict=True))
+        a, K = a @ a, 2 * K
     return _Propagator(K, output_state, output_input, a, b)
 
 
-def _run(propagator: _Propagator, start: FloatArray, inputs: FloatArray, steps: int) -> FloatArray:
+def _later(early: FloatArray, late: FloatArray, pad: int) -> FloatArray:
+    """[late 0] + [0 early], apart by `pad` columns."""
+    out = _wider(early, pad)
+    out[:, : late.shape[1]] += late
+    return out
+
+
+def _wider(values: FloatArray, pad: int) -> FloatArray:
+    return np.concatenate([np.zeros((len(values), pad)), values], axis=1)
+
+
+def _run(propagator: _Propagator, start: FloatArray, inputs: Arrays, steps: int) -> FloatArray:
     # In pieces of whole blocks of K steps; the state is handed on.
     windows, size = start.shape
     K, width = propagator.steps, len(propagator.output_state)
-    held = propagator.output_input.shape[1] + width
+    held = width + sum(each.shape[1] for each in propagator.output_input)
     held += 0 if propagator.state is None else 2 * size
     blocks = -(-steps // K)
     most = max(1, PIECE // (held * windows))
@@ -360,21 +411,23 @@ def _run(propagator: _Propagator, start: FloatArray, inputs: FloatArray, steps: 
     state = start
     for first in range(0, blocks, most):
         number = min(most, blocks - first)
-        rows = _input_rows(propagator, inputs, first, number)
+        rows = tuple(
+            _input_rows(each, K, matrix.shape[1], first, number)
+            for each, matrix in zip(inputs, propagator.output_input, strict=True)
+        )
         newest_first, state = advance(propagator, state, rows)
         piece = out[:, first * K : (first + number) * K]
         piece[:] = newest_first.reshape(piece.shape)[:, ::-1]
     return out[:, :steps]
 
 
-def _input_rows(propagator: _Propagator, inputs: FloatArray, first: int, number: int) -> FloatArray:
+def _input_rows(inputs: FloatArray, K: int, width: int, first: int, number: int) -> FloatArray:
     """Inputs of each block, newest first: shape (number * window, Q(z+K)); the last block first.
 
     Zeros stand where the last block reaches beyond the inputs; no output that is asked for sees
     them.
     """
     windows, _, channels = inputs.shape
-    K, width = propagator.steps, propagator.output_input.shape[1]
     if width == 0:
         return np.zeros((number * windows, 0))
     delays = width // channels - K
@@ -392,15 +445,23 @@ def _input_rows(propagator: _Propagator, inputs: FloatArray, first: int, number:
     return blocks.reshape(number * windows, width)
 
 
+def _forced(rows: Arrays, matrices: Arrays) -> FloatArray:
+    """What all groups of inputs add."""
+    out = rows[0] @ matrices[0].T
+    for own, matrix in zip(rows[1:], matrices[1:], strict=True):
+        out += own @ matrix.T
+    return np.asarray(out)
+
+
 def _run_shifting(
-    propagator: _Propagator, start: FloatArray, rows: FloatArray
+    propagator: _Propagator, start: FloatArray, rows: Arrays
 ) -> tuple[FloatArray, FloatArray]:
     # Samples lie newest first in one long row a window, so the extended state of every block is a
     # contiguous piece of it and nothing is ever moved. Rows come with the last block first too.
     windows = len(start)
     width, size = propagator.output_state.shape
-    number = len(rows) // windows
-    forcing = (rows @ propagator.output_input.T).reshape(number, windows, width)
+    number = len(rows[0]) // windows
+    forcing = _forced(rows, propagator.output_input).reshape(number, windows, width)
     samples = np.empty((windows, number * width + size))
     samples[:, number * width :] = start
     if windows == 1:
@@ -419,47 +480,43 @@ def _run_shifting(
 
 
 def _run_square(
-    propagator: _Propagator, start: FloatArray, rows: FloatArray
+    propagator: _Propagator, start: FloatArray, rows: Arrays
 ) -> tuple[FloatArray, FloatArray]:
     windows, size = start.shape
-    number = len(rows) // windows
+    number = len(rows[0]) // windows
     assert propagator.state is not None
-    assert propagator.state_input is not None
     # states[block + 1] starts block; states[0] is what the piece ends with.
     states = np.empty((number + 1, windows, size))
     states[number] = start
-    np.matmul(rows, propagator.state_input.T, out=states[:number].reshape(-1, size))
+    states[:number] = _forced(rows, propagator.state_input).reshape(number, windows, size)
     if windows == 1:
         line = states[:, 0]
         for block in range(number - 1, -1, -1):
             line[block] += propagator.state @ line[block + 1]
     else:
-        transposed = np.ascontiguousarray(propagator.state.T)
         for block in range(number - 1, -1, -1):
-            states[block] += states[block + 1] @ transposed
+            states[block] += states[block + 1] @ propagator.state
     outputs = states[1:].reshape(-1, size) @ propagator.output_state.T
-    outputs += rows @ propagator.output_input.T
+    outputs += _forced(rows, propagator.output_input)
     newest_first = outputs.reshape(number, windows, -1).transpose(1, 0, 2)
     return np.ascontiguousarray(newest_first).reshape(windows, -1), states[0]
 
 
 def _run_mirrored(
-    propagator: _Propagator, start: FloatArray, rows: FloatArray
+    propagator: _Propagator, start: FloatArray, rows: Arrays
 ) -> tuple[FloatArray, FloatArray]:
-    number, size, N = len(rows), start.shape[1], len(propagator.output_state)
+    number, size, N = len(rows[0]), start.shape[1], len(propagator.output_state)
     assert propagator.state is not None
-    assert propagator.state_input is not None
-    half = np.zeros((size, size))
-    half[: size - N] = propagator.state[N:]
     # A row holds a state and, after it, what the symmetric product says beyond the oldest delay.
-    states = np.zeros((number + 1, size + N))
+    padded = len(propagator.state)
+    states = np.zeros((number + 1, padded + N))
     states[number, :size] = start[0]
-    states[:number, :size] = rows @ propagator.state_input.T
-    symmetric, newest = half.T, np.ascontiguousarray(propagator.output_state).T
+    states[:number, :size] = _forced(rows, propagator.state_input)
+    symmetric, newest = propagator.state.T, np.ascontiguousarray(propagator.output_state).T
     before = states[number]
     for row in states[number - 1 :: -1]:
-        state = before[:size]
-        blas.dsymv(1.0, symmetric, state, beta=1.0, y=row[N:], overwrite_y=1, lower=1)
-        blas.dgemv(1.0, newest, state, beta=1.0, y=row[:N], overwrite_y=1, trans=1)
+        y = row[N:]
+        blas.dsymv(1.0, symmetric, before[:padded], beta=1.0, y=y, overwrite_y=1, lower=1)
+        blas.dgemv(1.0, newest, before[:size], beta=1.0, y=row[:N], overwrite_y=1, trans=1)
         before = row
     return states[:number, :N].reshape(1, -1), states[:1, :size]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
-from seakeep.core.regression import identify
+from seakeep.core.solve import identify
 from seakeep.models.aligned import align_training
 from seakeep.models.identification import Stop, check_names, gather, until
 from seakeep.models.labelled import Runs, as_runs

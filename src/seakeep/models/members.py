@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.core.embedding import TrainingWindow, training_window
-from seakeep.core.regression import Solution, identify
+from seakeep.core.solve import Solution, identify
 from seakeep.errors import RequestError
 from seakeep.models.draws import Draw
 from seakeep.models.identification import Scale, moments

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from seakeep.core.regression import Method
+from seakeep.core.solve import Method
 
 __all__ = ["Training"]
 

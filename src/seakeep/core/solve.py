@@ -1,0 +1,400 @@
+r"""Tikhonov-regularised and rank-truncated least squares, :math:`\hat X' \approx G \hat Y`.
+
+Gram matrices of delayed series come from their structure (:mod:`seakeep.core.gram`), and the form
+is chosen by shape and conditioning:
+
+* primal, :math:`G = X' Y^T (Y Y^T + \lambda I)^{-1}` (the paper's formula), or dual,
+  :math:`G = X' (Y^T Y + \lambda I)^{-1} Y^T`, the same matrix, whichever is less work;
+* singular values, where forming a Gram matrix would square away the accuracy: the effective λ is
+  below 1e-6 of the largest squared singular value, or λ = 0 (minimum norm), or a rank is given.
+
+All rows of the next extended state need rows of the inverse of :math:`M = C + \lambda I`. Let Z
+move the lags down by one, newest first, filling with zeros. The recursion of the Gram matrix says
+:math:`M - Z M Z^T = B \Sigma B^T` of low rank: with E selecting the newest lags, α and β the edges
+of each run and :math:`F = M E - \tfrac12 E E^T M E`,
+
+.. math:: B \Sigma B^T = \alpha\alpha^T - \beta\beta^T + E F^T + F E^T .
+
+The inverse :math:`H` has the same structure the other way round. For τ = ±1, multiplying
+:math:`(I-\tau Z) M + M (I-\tau Z)^T - (I-\tau Z) M (I-\tau Z)^T = B \Sigma B^T` from both sides,
+first by :math:`(I-\tau Z)^{-1}` and its transpose, then by H, then by :math:`(I-\tau Z)^T` and
+:math:`(I-\tau Z)`, gives
+
+.. math:: H - Z^T H Z = G \Sigma G^T , \qquad G = (I-\tau Z)^T H (I-\tau Z)^{-1} B ,
+
+which determines H by running sums from the oldest lag. So H costs 2(channels + R) solutions (R
+runs), a product of that rank and one addition an entry, in the place of inverting.
+:math:`(I-\tau Z)^{-1}` sums a series over its lags; τ = −1 sums it with turning signs, which keeps
+a smooth series small, and τ = 1 one that turns its sign at every sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy import linalg
+from scipy.linalg import blas, lapack
+
+from seakeep.arrays import FloatArray
+from seakeep.core.embedding import TrainingWindow, embed
+from seakeep.core.gram import (
+    Piece,
+    PrimalSystem,
+    gram_trace,
+    lagged_sums,
+    lay_out,
+    primal_system,
+    snapshot_gram,
+)
+
+__all__ = ["Method", "Solution", "identify"]
+
+Method = Literal["primal", "dual", "svd"]
+
+GRAM_LIMIT = 1e-6
+"""Least effective λ, as a part of the largest squared singular value, for a Gram matrix.
+
+Its condition number is then below 1e6, and ten digits are left of sixteen."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Coefficients of a linear map and how they were found.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (targets, regressors)
+        G.
+    method : {"primal", "dual", "svd"}
+        The form that was solved.
+    ridge : float
+        Effective λ: what was added to the diagonal.
+    rank : int
+        Number of singular values used; for the primal and dual forms all of them.
+    """
+
+    coefficients: FloatArray
+    method: Method
+    ridge: float
+    rank: int
+
+
+def identify(
+    states: Sequence[FloatArray],
+    inputs: Sequence[FloatArray],
+    windows: Sequence[TrainingWindow],
+    *,
+    state_delays: int,
+    input_delays: int,
+    ridge: float,
+    direct: Sequence[FloatArray] | None = None,
+    per_snapshot: bool = False,
+    rank: int | None = None,
+    all_rows: bool = True,
+    method: Method | None = None,
+) -> Solution:
+    r"""Identify :math:`[\hat A\; \hat B]` from one or several runs.
+
+    Snapshot pairs of the runs stand side by side; none crosses a joint.
+
+    Parameters
+    ----------
+    states : sequence of ndarray, each (time, N)
+        States of the runs, standardised or not.
+    inputs : sequence of ndarray, each (time, Q)
+        Their inputs.
+    windows : sequence of TrainingWindow
+        The samples of each run that train.
+    state_delays, input_delays : int
+        s and z.
+    ridge : float
+        λ, zero or positive. Zero gives the solution of least norm.
+    direct : sequence of ndarray, each (time, D), optional
+        Further inputs of the runs, which enter without delays.
+    per_snapshot : bool, optional
+        Whether λ is multiplied by the number of columns.
+    rank : int, optional
+        Number of singular values kept, instead of λ (truncated-SVD DMD).
+    all_rows : bool, optional
+        Whether the rows of the delayed states are regressed too, as in the paper, or the first N
+        alone.
+    method : {"primal", "dual", "svd"}, optional
+        Forces a form; by default shape and conditioning decide.
+
+    Returns
+    -------
+    Solution
+        Coefficients of shape (N(s+1) or N, N(s+1) + Q(z+1) + D): states, inputs, direct inputs.
+    """
+    groups = [(states, state_delays), (inputs, input_delays)]
+    if direct is not None:
+        groups.append((direct, 0))
+    groups = [groups[0], *(group for group in groups[1:] if group[0][0].shape[1])]
+    pieces = [
+        Piece(tuple(runs[run] for runs, _ in groups), window.first_column, window.columns)
+        for run, window in enumerate(windows)
+    ]
+    problem = _Delayed(pieces, tuple(delays for _, delays in groups), all_rows)
+    effective = ridge * problem.columns if per_snapshot else ridge
+    chosen = "svd" if rank is not None else method or problem.choose(effective)
+    if chosen == "svd":
+        return _by_singular_values(*problem.matrices(), effective, rank)
+    form = problem.primal if chosen == "primal" else problem.dual
+    return Solution(form(effective), chosen, effective, min(problem.rows, problem.columns))
+
+
+@dataclass(frozen=True)
+class _Delayed:
+    """A regression of delayed series: snapshot pairs of several runs, and delays of each group."""
+
+    pieces: Sequence[Piece]
+    delays: tuple[int, ...]
+    all_rows: bool
+
+    @property
+    def states(self) -> int:
+        """Rows of the extended state."""
+        return lay_out(self.pieces[0], self.delays)[0].stop
+
+    @property
+    def rows(self) -> int:
+        """Regressors."""
+        return lay_out(self.pieces[0], self.delays)[-1].stop
+
+    @property
+    def columns(self) -> int:
+        """Snapshot pairs."""
+        return sum(piece.count for piece in self.pieces)
+
+    def form(self) -> Method:
+        """The form that is less work, by its largest terms."""
+        p, n, a = self.rows, self.columns, self.states
+        if not self.all_rows:
+            return "primal" if p <= n else "dual"
+        b = p - a
+        channels = sum(series.shape[1] for series in self.pieces[0].series)
+        rank = 2 * (channels + len(self.pieces))
+        primal = p**3 / 3 + 2 * rank * p * (p + a)
+        dual = n**3 / 3 + n * n * p + n * a * (a + 2 * b)
+        return "primal" if primal <= dual else "dual"
+
+    def choose(self, ridge: float) -> Method:
+        """The form, or singular values where λ is too small for a Gram matrix."""
+        settled = ridge >= GRAM_LIMIT * gram_trace(self.pieces, self.delays)
+        if settled or (ridge > 0 and _gram_suffices(ridge, self.gram())):
+            return self.form()
+        return "svd"
+
+    def gram(self) -> FloatArray:
+        """The smaller Gram matrix, its upper triangle."""
+        if self.rows <= self.columns:
+            return primal_system(self.pieces, self.delays).gram
+        return snapshot_gram(self.pieces, self.delays)
+
+    def matrices(self) -> tuple[FloatArray, FloatArray]:
+        """Hankel matrices of regressors and targets, built."""
+        regressors = np.concatenate(
+            [
+                np.concatenate(
+                    [
+                        embed(series, delay, piece.first, piece.count)
+                        for series, delay in zip(piece.series, self.delays, strict=True)
+                    ]
+                )
+                for piece in self.pieces
+            ],
+            axis=1,
+        )
+        target_delays = self.delays[0] if self.all_rows else 0
+        targets = [
+            embed(piece.series[0], target_delays, piece.first + 1, piece.count)
+            for piece in self.pieces
+        ]
+        return regressors, np.concatenate(targets, axis=1)
+
+    def primal(self, ridge: float) -> FloatArray:
+        r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
+        if self.all_rows:
+            system = primal_system(self.pieces, self.delays)
+            return _all_rows(system, _factor(system.gram, ridge), ridge)
+        room = self.pieces[0].series[0].shape[1]
+        system = primal_system(self.pieces, self.delays, room)
+        return np.ascontiguousarray(_solve_beside(system.gram, system.right, ridge))
+
+    def dual(self, ridge: float) -> FloatArray:
+        r"""Coefficients from :math:`K = \hat Y^T \hat Y`.
+
+        With :math:`K + \lambda I = L L^T` the newest rows are :math:`(K + \lambda I)^{-1} X'^T`
+        summed against the lagged series; all rows are :math:`\hat X' L^{-T} Z` with
+        :math:`Z = L^{-1} \hat Y^T`, and those of the delayed states are :math:`P Z^T Z`.
+        """
+        targets = np.concatenate([piece.targets for piece in self.pieces])
+        N = targets.shape[1]
+        if not self.all_rows:
+            weights = _solve_beside(snapshot_gram(self.pieces, self.delays, N), targets.T, ridge).T
+            groups = lay_out(self.pieces[0], self.delays)
+            top, at = np.zeros((N, self.rows)), 0
+            for piece in self.pieces:
+                own = weights[at : at + piece.count]
+                at += piece.count
+                for series, group in zip(piece.series, groups, strict=True):
+                    top[:, group.rows] += lagged_sums(own, series, piece.first, group.lags)
+            return top
+        factor = _factor(snapshot_gram(self.pieces, self.delays), ridge)
+        stacked = np.concatenate([self.matrices()[0], targets.T])
+        half = blas.dtrsm(1.0, factor, stacked.T, lower=1, overwrite_b=1)
+        regressors, newest = half[:, : self.rows], half[:, self.rows :]
+        out = np.empty((self.states, self.rows))
+        np.matmul(newest.T, regressors, out=out[:N])
+        np.matmul(regressors[:, : self.states - N].T, regressors, out=out[N:])
+        return out
+
+
+def _gram_suffices(ridge: float, gram: FloatArray) -> bool:
+    """Whether λ ≥ 1e-6 σ²_max, from the upper triangle of the Gram matrix."""
+    # A bound of the largest squared singular value from above, then the value itself.
+    upper = np.triu(gram)
+    if ridge >= GRAM_LIMIT * float(np.linalg.norm(upper + np.triu(upper, 1).T)):
+        return True
+    top = len(gram) - 1
+    largest = linalg.eigvalsh(upper, lower=False, subset_by_index=[top, top], check_finite=False)
+    return bool(ridge >= GRAM_LIMIT * largest[0])
+
+
+def _factor(gram: FloatArray, ridge: float, beside: int = 0) -> FloatArray:
+    """Lower Cholesky factor, in Fortran order, of the upper triangle `gram` plus λ; in its place.
+
+    The triangle above the factor keeps what stood there. `beside` counts the last rows that are
+    not of a Gram matrix.
+    """
+    size = len(gram)
+    gram.reshape(-1)[:: size + 1] += ridge
+    factor, failed = lapack.dpotrf(gram.T, lower=1, overwrite_a=1, clean=0)
+    if failed:
+        raise np.linalg.LinAlgError(
+            f"the Gram matrix of {size - beside} rows with ridge {ridge:g} is not positive "
+            "definite. Raise ridge, or use method='svd'."
+        )
+    return np.asarray(factor)
+
+
+def _solve_beside(padded: FloatArray, right: FloatArray, ridge: float) -> FloatArray:
+    """`right` times the inverse of a Gram matrix plus λ, shape of `right`.
+
+    The Gram matrix M − λI stands at the head of `padded`, and the right-hand sides R are put
+    beside it, so that Cholesky does the forward half of the solution on its way: the factor of
+    [M Rᵀ; R κI] begins with that of M, and R L⁻ᵀ stands below. κ is so large that what it is
+    reduced by does not count.
+    """
+    count, size = right.shape
+    padded[:size, size:] = right.T
+    padded[size:, size:] = 0.0
+    np.fill_diagonal(padded[size:, size:], np.finfo(float).max / 4)
+    factor = _factor(padded, ridge, count)
+    half = np.zeros((count, len(padded)))
+    half[:, :size] = padded[:size, size:].T
+    solved = blas.dtrsm(1.0, factor, half.T, lower=1, trans_a=1, overwrite_b=1)
+    return np.asarray(solved).T[:, :size]
+
+
+def _by_singular_values(
+    regressors: FloatArray, targets: FloatArray, ridge: float, rank: int | None
+) -> Solution:
+    # A rank stands in the place of λ.
+    ridge = ridge if rank is None else 0.0
+    left, values, right = linalg.svd(regressors, full_matrices=False, check_finite=False)
+    # Below this, a singular value is rounding (the rule of numpy.linalg.matrix_rank).
+    floor = np.finfo(float).eps * max(regressors.shape) * (values[0] if values.size else 0.0)
+    kept = int(np.count_nonzero(values > floor))
+    if rank is not None:
+        kept = min(kept, rank)
+    values = values[:kept]
+    weights = values / (values**2 + ridge)
+    coefficients = ((targets @ right[:kept].T) * weights) @ left[:, :kept].T
+    return Solution(coefficients, "svd", ridge, kept)
+
+
+def _all_rows(system: PrimalSystem, factor: FloatArray, ridge: float) -> FloatArray:
+    r"""Coefficients of all rows of the next extended state, shape (N(s+1), p).
+
+    The rows that shift the delayed states need no right-hand side: with P the rows of the
+    identity that select the lags 0 … s−1 of the states, their targets are :math:`P \hat Y`, and
+    :math:`P C M^{-1} = P - \lambda P M^{-1}`. `factor` is the lower Cholesky factor of M, in
+    Fortran order; the Gram matrix of `system` is no longer looked at.
+    """
+    states = system.groups[0]
+    N, extended, size = states.channels, states.stop, system.groups[-1].stop
+    edges, width = len(system.edges), len(system.heads)
+    tau = -1.0 if _is_smooth(system) else 1.0
+    rank = edges + 2 * width
+    rows = np.empty((rank + N, size))
+    rows[:edges] = system.edges
+    newest, solving = rows[edges : edges + width], rows[edges + width : rank]
+    newest[...] = 0.0
+    solving[...] = system.heads
+    for group in system.groups:
+        np.fill_diagonal(newest[group.head, group.newest], 1.0)
+        own = np.arange(group.channels)
+        solving[group.head.start + own, group.start + own] += ridge
+        solving[:, group.newest] *= 0.5
+        _sum_over_lags(rows[:rank, group.rows], group.channels, tau)
+    rows[rank:] = system.right
+    solved = np.asarray(lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0]).T
+    plus, minus = _generators(solved[:rank], system, tau)
+    scale = np.sqrt(ridge)
+    plus *= scale
+    minus *= scale
+    # One block of rows more than is returned: the oldest lag starts the running sums.
+    out = np.empty((extended + N, size))
+    out[:N] = solved[rank:]
+    for columns in (slice(extended), slice(extended, None)):
+        # A product of a matrix with its own transpose is symmetric to the last bit.
+        np.matmul(minus[:, :extended].T, minus[:, columns], out=out[N:, columns])
+        out[N:, columns] -= plus[:, :extended].T @ plus[:, columns]
+    for at in range(extended - N, 0, -N):
+        row, older = out[at : at + N], out[at + N : at + 2 * N]
+        for group in system.groups:
+            row[:, group.newer] += older[:, group.older]
+    shifted = extended - N
+    out[N:].reshape(-1)[: shifted * size : size + 1] += 1.0
+    return out[:extended]
+
+
+def _is_smooth(system: PrimalSystem) -> bool:
+    """Whether neighbouring samples are alike: the sign of their products, summed."""
+    total = 0.0
+    for group in system.groups:
+        next_lag = system.heads[group.head, group.older][:, : group.channels]
+        total += float(np.trace(next_lag))
+    return total >= 0
+
+
+def _sum_over_lags(rows: FloatArray, channels: int, tau: float) -> None:
+    """Apply the inverse of I − τ Z to each row, in its place."""
+    lags = rows.reshape(len(rows), -1, channels)  # a view: only the last axis is split
+    if tau < 0:
+        lags[:, 1::2] *= -1.0
+    np.cumsum(lags, axis=1, out=lags)
+    if tau < 0:
+        lags[:, 1::2] *= -1.0
+
+
+def _generators(
+    solved: FloatArray, system: PrimalSystem, tau: float
+) -> tuple[FloatArray, FloatArray]:
+    """Rows g of G with H − Zᵀ H Z = Σ g gᵀ over the first less the same over the second."""
+    edges, width = len(system.edges), len(system.heads)
+    moved = solved.copy()
+    for group in system.groups:
+        moved[:, group.newer] -= tau * solved[:, group.older]
+    newest, heads = moved[edges : edges + width], moved[edges + width :]
+    # E F^T + F E^T as a difference of squares, both parts of one size so that nothing cancels.
+    balance = np.sqrt(np.linalg.norm(heads) / np.linalg.norm(newest))
+    newest *= balance / np.sqrt(2.0)
+    heads *= 1.0 / (balance * np.sqrt(2.0))
+    plus = np.concatenate([moved[0:edges:2], newest + heads])
+    minus = np.concatenate([moved[1:edges:2], newest - heads])
+    return plus, minus
