@@ -78,31 +78,10 @@ def build_hydrodynamics(
     density: float = 1000.0,
     progress: bool = False,
 ) -> xr.Dataset:
-    """Solve the radiation and diffraction problems of a hull.
+    """Solve the radiation and diffraction problems of a hull; see :func:`load_hydrodynamics`.
 
-    Parameters
-    ----------
-    hull : HullSettings
-        Dimensions and panels.
-    frequencies : array_like, optional
-        Angular frequencies, rad/s; the default is :func:`default_frequencies`.
-    water_depth : float, optional
-        Depth, m.
-    density : float, optional
-        Density of the water, kg/m³.
-    progress : bool, optional
-        Show the solver's progress bar.
-
-    Returns
-    -------
-    Dataset
-        Added mass, damping, excitation, mass and restoring matrices, with conventions, versions
-        and the digest of the mesh in the attributes.
-
-    Raises
-    ------
-    RequestError
-        If capytaine is not installed, or the hull cannot be built.
+    Frequencies are angular (rad/s), by default :func:`default_frequencies`; depth in m, density
+    in kg/m³. Raises RequestError if capytaine is not installed or the hull cannot be built.
     """
     cpt = _solver()
     mesh = hull_mesh(hull, density)

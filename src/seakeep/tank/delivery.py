@@ -191,22 +191,8 @@ def campaign_text(
 ) -> str:
     """Text of the campaign file.
 
-    Parameters
-    ----------
-    settings : TankSettings
-        The settings.
-    files : mapping of str to mapping of str to str
-        Run → instrument → file, relative to the campaign file; a video is named in a comment, since
-        it is no table of a logger.
-    kind : {"csv", "nc"}
-        Format of the raw files.
-    one_logger : bool
-        Whether all instruments share a logger (one file per run).
-
-    Returns
-    -------
-    str
-        TOML.
+    `files` holds run → instrument → file, relative to the campaign file; a video is named in a
+    comment, since it is no table of a logger. `kind` is the format of the raw files.
     """
     # A single logger's file is for readers that know no gaps: its probes with drop-outs stay out.
     every = settings.instruments.probes

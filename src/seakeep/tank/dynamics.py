@@ -59,24 +59,9 @@ class DivergenceError(SeakeepError):
 class Rig:
     """Vessel and moorings, ready for the time loop.
 
-    Parameters
-    ----------
-    hydro : Hydrodynamics
-        Frequency-domain coefficients.
-    kernel : Kernel
-        Radiation memory at the step of the simulation.
-    linear, quadratic : ndarray, shape (dof,)
-        Viscous damping of each degree of freedom.
-    pool : ndarray, shape (3,)
-        Centre of the moon pool (m), quadratic and linear loss of the flow through its opening.
-    lines : ndarray, shape (line, 7)
-        Moorings, see ``moorings.COLUMNS``.
-    line_names : tuple of str
-        Their names.
-    drift : DriftSettings
-        Mean drift force and its damping.
-    step, ramp : float
-        s.
+    `linear` and `quadratic` are the viscous damping of each degree of freedom; `pool` the centre
+    of the moon pool (m), quadratic and linear loss of the flow through its opening; `lines` the
+    moorings as in `moorings.line_table`; `step` and `ramp` are in seconds.
     """
 
     hydro: Hydrodynamics
@@ -121,18 +106,8 @@ class Rig:
 class Motion:
     """What a simulation gives: arrays of shape (dof, time), SI and radians.
 
-    Parameters
-    ----------
-    time : ndarray, shape (time,)
-        s.
-    names : tuple of str
-        Degrees of freedom.
-    position, velocity, acceleration : ndarray, shape (dof, time)
-        The motion.
-    memory : ndarray, shape (dof, time)
-        Radiation memory force (on the left-hand side of the equation).
-    slow_surge : ndarray, shape (time,)
-        Surge less its linear wave-frequency part, m.
+    `memory` is the radiation memory force (on the left-hand side of the equation), `slow_surge`
+    surge less its linear wave-frequency part, shape (time,).
     """
 
     time: FloatArray
@@ -192,19 +167,7 @@ def _check_step(rig: Rig) -> None:
 
 
 def assemble_rig(settings: TankSettings, hydro: Hydrodynamics | None = None) -> Rig:
-    """Put vessel, hydrodynamics and moorings together, and check that they fit.
-
-    Parameters
-    ----------
-    settings : TankSettings
-        The settings.
-    hydro : Hydrodynamics, optional
-        Coefficients; the default is the settings' file.
-
-    Returns
-    -------
-    Rig
-        Ready for :func:`simulate`.
+    """Put vessel, hydrodynamics and moorings together.
 
     Raises
     ------
@@ -245,23 +208,10 @@ def assemble_rig(settings: TankSettings, hydro: Hydrodynamics | None = None) -> 
 def drift_coefficient(
     drift: DriftSettings, omega: npt.ArrayLike, density: float = 1000.0
 ) -> tuple[FloatArray, FloatArray]:
-    r"""Mean drift force and wave-drift damping a metre² of amplitude.
+    r"""Mean drift force and wave-drift damping per metre² of amplitude, N/m² and N s/m³.
 
-    Parameters
-    ----------
-    drift : DriftSettings
-        The empirical curve.
-    omega : array_like
-        Angular frequencies, rad/s.
-    density : float, optional
-        kg/m³.
-
-    Returns
-    -------
-    force : ndarray
-        :math:`D = \tfrac12\rho g B\,r / (1 + (\omega_c/\omega)^4)`, N/m².
-    damping : ndarray
-        :math:`(\omega^2/g)\,D' + 4\omega D/g`, N s/m³ (Aranha).
+    The force is the empirical :math:`D = \tfrac12\rho g B\,r / (1 + (\omega_c/\omega)^4)`, the
+    damping Aranha's :math:`(\omega^2/g)\,D' + 4\omega D/g`.
     """
     w = np.asarray(omega, dtype=float)
     scale = 0.5 * density * GRAVITY * drift.beam * drift.reflection
@@ -274,18 +224,8 @@ def drift_coefficient(
 def linear_response(rig: Rig, omega: npt.ArrayLike) -> npt.NDArray[np.complex128]:
     """Linear response of the moored vessel as the time loop sees it, shape (frequency, dof).
 
-    Parameters
-    ----------
-    rig : Rig
-        Vessel and moorings.
-    omega : array_like
-        Angular frequencies, rad/s.
-
-    Returns
-    -------
-    ndarray of complex
-        Response a metre of wave amplitude, with the kernel's coefficients, the linear part of
-        the viscous damping and the taut lines' stiffness.
+    Per metre of wave amplitude, with the kernel's coefficients, the linear part of the viscous
+    damping and the taut lines' stiffness.
     """
     return response(rig.hydro, omega, rig.linear_damping, rig.mooring_stiffness, rig.kernel)
 
@@ -335,11 +275,6 @@ def simulate(
         Position and velocity at the start; the default is rest.
     begin : float, optional
         Time of the first instant, s; the sea's phases refer to time zero.
-
-    Returns
-    -------
-    Motion
-        The motion at every step.
 
     Raises
     ------
@@ -391,19 +326,7 @@ def simulate(
 
 
 def tensions(rig: Rig, position: FloatArray, velocity: FloatArray) -> FloatArray:
-    """Tension of each line along a motion, N.
-
-    Parameters
-    ----------
-    rig : Rig
-        Vessel and moorings.
-    position, velocity : ndarray, shape (dof, time)
-        The motion.
-
-    Returns
-    -------
-    ndarray, shape (line, time)
-    """
+    """Tension of each line along a motion of shape (dof, time), N, shape (line, time)."""
     result: FloatArray = _loop().line_tensions(
         rig.lines, np.ascontiguousarray(position), np.ascontiguousarray(velocity)
     )

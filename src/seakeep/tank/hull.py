@@ -27,21 +27,11 @@ IntArray = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class HullMesh:
-    """Wetted surface of a hull at rest, in metres.
+    """Wetted surface of a hull at rest, in metres: x downstream (the bow points to −x), z up.
 
-    Parameters
-    ----------
-    vertices : ndarray, shape (vertex, 3)
-        Corners; x downstream (the bow points to −x), z up, z = 0 still water.
-    faces : ndarray, shape (face, 4)
-        Corners of each quadrilateral, counter-clockwise seen from the water.
-    pool_lid : ndarray of bool, shape (face,)
-        Faces that close the moon pool just below its free surface.
-    internal_lid : (ndarray, ndarray)
-        Vertices and faces of the surface inside the hull that removes irregular frequencies.
-    draft, midship, exponent : float
-        What was solved for: the draft (m), the x of the midship section (m), and the exponent of
-        the waterline.
+    `faces` are counter-clockwise seen from the water; `pool_lid` marks those that close the moon
+    pool just below its free surface. `internal_lid` (vertices and faces inside the hull) removes
+    irregular frequencies. `draft`, `midship` and the waterline's `exponent` were solved for.
     """
 
     vertices: FloatArray
@@ -64,18 +54,9 @@ class HullMesh:
 
 @dataclass(frozen=True)
 class Hydrostatics:
-    """Hydrostatic quantities of a hull, net of its moon pool.
+    """Volume (m³), centre of buoyancy (m), waterplane (m²) and restoring of surge, heave, pitch.
 
-    Parameters
-    ----------
-    volume : float
-        Displaced volume, m³.
-    buoyancy : ndarray, shape (3,)
-        Centre of buoyancy, m.
-    waterplane : float
-        Area of the waterplane, m².
-    stiffness : ndarray, shape (3, 3)
-        Restoring matrix of surge, heave and pitch, N, N/rad, N m/rad.
+    All net of the moon pool.
     """
 
     volume: float
@@ -254,22 +235,7 @@ def _solve_shape(hull: HullSettings, density: float) -> tuple[float, float, floa
 def hull_mesh(hull: HullSettings, density: float = 1000.0) -> HullMesh:
     """Mesh the hull: solve draft, waterline and trim, then lay the panels.
 
-    Parameters
-    ----------
-    hull : HullSettings
-        Dimensions and panel counts.
-    density : float, optional
-        Density of the water, kg/m³.
-
-    Returns
-    -------
-    HullMesh
-        The mesh and what was solved for.
-
-    Raises
-    ------
-    RequestError
-        If no draft or waterline gives the mass or area asked for.
+    Raises RequestError if no draft or waterline gives the mass or area asked for.
     """
     draft, midship, exponent = _solve_shape(hull, density)
     patches, internal = _patches(hull, draft, midship, exponent)
@@ -290,22 +256,7 @@ def hull_mesh(hull: HullSettings, density: float = 1000.0) -> HullMesh:
 
 
 def hydrostatics(mesh: HullMesh, hull: HullSettings, density: float = 1000.0) -> Hydrostatics:
-    """Integrate volume, centre of buoyancy, waterplane and restoring over a mesh.
-
-    Parameters
-    ----------
-    mesh : HullMesh
-        The wetted surface.
-    hull : HullSettings
-        Its settings (centre of gravity, pool).
-    density : float, optional
-        Density of the water, kg/m³.
-
-    Returns
-    -------
-    Hydrostatics
-        All net of the moon pool.
-    """
+    """Integrate volume, centre of buoyancy, waterplane and restoring over a mesh."""
     normal, point = _quadrature(mesh.vertices, mesh.faces[~mesh.pool_lid])
     nz, x, z = -normal[:, 2], point[:, 0], point[:, 2]
     volume = float(np.sum(nz * -z))

@@ -65,24 +65,11 @@ class Pool:
 
 @dataclass(frozen=True)
 class Hydrodynamics:
-    """Frequency-domain coefficients of a hull.
+    """Frequency-domain coefficients of a hull, as the solver gave them.
 
-    Parameters
-    ----------
-    names : tuple of str
-        Degrees of freedom.
-    omega : ndarray, shape (frequency,)
-        Angular frequencies, rad/s.
-    added_mass, damping : ndarray, shape (frequency, dof, dof)
-        As the solver gave them.
-    excitation : ndarray of complex, shape (frequency, dof)
-        Force a metre of wave amplitude.
-    mass, stiffness : ndarray, shape (dof, dof)
-        Inertia and hydrostatic restoring.
-    pool : Pool or None
-        The moon pool, if there is one.
-    attrs : dict
-        Attributes of the file: conventions, versions, digest of the mesh, dimensions.
+    `added_mass` and `damping` have the shape (frequency, dof, dof), `excitation` (force per metre
+    of wave amplitude) (frequency, dof), `mass` and `stiffness` (dof, dof). `attrs` are those of
+    the file: conventions, versions, digest of the mesh, dimensions.
     """
 
     names: tuple[str, ...]
@@ -108,18 +95,9 @@ class Hydrodynamics:
 
 @dataclass(frozen=True)
 class Kernel:
-    """Radiation memory: K at uniform lags, the added mass at infinite frequency.
+    """Radiation memory: K (kg/s²) at uniform lags (s), the added mass at infinite frequency.
 
-    Parameters
-    ----------
-    lags : ndarray, shape (lag,)
-        s, from 0.
-    values : ndarray, shape (lag, dof, dof)
-        K, kg/s².
-    infinite_mass : ndarray, shape (dof, dof)
-        A∞, kg.
-    omega, damping : ndarray
-        Grid and damping matrices (symmetric, passive) from which K was made.
+    `omega` and `damping` are the grid and the passive matrices from which K was made.
     """
 
     lags: FloatArray
@@ -130,15 +108,7 @@ class Kernel:
 
 
 def save_hydrodynamics(data: xr.Dataset, path: Path | str) -> None:
-    """Write coefficients to NetCDF under a temporary name, then rename.
-
-    Parameters
-    ----------
-    data : Dataset
-        As ``build_hydrodynamics`` returns it.
-    path : path
-        Where to.
-    """
+    """Write coefficients to NetCDF under a temporary name, then rename."""
     with replacing(Path(path)) as temporary:
         write_netcdf(temporary, data)
 
@@ -149,17 +119,7 @@ def shipped_hydrodynamics(name: str = "ck14e.nc") -> Path:
 
 
 def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
-    """Read and check a file of coefficients.
-
-    Parameters
-    ----------
-    path : path, optional
-        NetCDF file; the default is the one that ships with the package (CK-14e-like).
-
-    Returns
-    -------
-    Hydrodynamics
-        The coefficients.
+    """Read and check a file of coefficients, by default the one that ships with the package.
 
     Raises
     ------
@@ -234,18 +194,7 @@ def passive_damping(hydro: Hydrodynamics, step: float = 0.02) -> tuple[FloatArra
 
     Zero at zero frequency, shape-preserving cubics between the solver's frequencies, ω⁻³ beyond
     them; the moon pool's rows are tapered to zero over 9–12 rad/s: the solver is not clean there.
-
-    Parameters
-    ----------
-    hydro : Hydrodynamics
-        The coefficients.
-    step : float, optional
-        Step of the grid, rad/s.
-
-    Returns
-    -------
-    omega : ndarray, shape (grid,)
-    damping : ndarray, shape (grid, dof, dof)
+    Returns a grid of the given step (rad/s) and matrices of shape (grid, dof, dof).
     """
     omega = np.arange(0.0, TAIL_END + 0.5 * step, step)
     last = hydro.omega[-1]
@@ -269,17 +218,7 @@ def radiation_kernel(
 ) -> Kernel:
     r"""Radiation kernel :math:`K(t) = \frac{2}{\pi}\int B(\omega)\cos\omega t\,d\omega` and A∞.
 
-    Parameters
-    ----------
-    hydro : Hydrodynamics
-        The coefficients.
-    step, length : float, optional
-        Step and length of the lags, s.
-
-    Returns
-    -------
-    Kernel
-        The kernel; A∞ by Ogilvie's relation, averaged over 2–9 rad/s.
+    Step and length of the lags are in seconds; A∞ by Ogilvie's relation, averaged over 2–9 rad/s.
     """
     omega, damping = passive_damping(hydro)
     lags = step * np.arange(round(length / step) + 1, dtype=float)
@@ -300,20 +239,7 @@ def radiation_kernel(
 
 
 def kernel_coefficients(kernel: Kernel, omega: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Added mass and damping that a kernel reproduces, each of shape (frequency, dof, dof).
-
-    Parameters
-    ----------
-    kernel : Kernel
-        The kernel.
-    omega : array_like
-        Angular frequencies, rad/s.
-
-    Returns
-    -------
-    added_mass, damping : ndarray
-        From sine and cosine transforms of the kernel over its lags.
-    """
+    """Added mass and damping that a kernel reproduces, each of shape (frequency, dof, dof)."""
     frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
     weights = np.full(kernel.lags.size, kernel.lags[1])
     weights[[0, -1]] *= 0.5
@@ -337,24 +263,9 @@ def _inside(hydro: Hydrodynamics, omega: npt.ArrayLike) -> FloatArray:
 
 
 def excitation_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
-    """Wave excitation between the solver's frequencies, by cubic splines.
+    """Wave excitation per metre of amplitude, shape (frequency, dof), by cubic splines.
 
-    Parameters
-    ----------
-    hydro : Hydrodynamics
-        The coefficients.
-    omega : array_like, shape (frequency,)
-        Angular frequencies, rad/s.
-
-    Returns
-    -------
-    ndarray of complex, shape (frequency, dof)
-        Force a metre of amplitude.
-
-    Raises
-    ------
-    RequestError
-        If a frequency lies outside the file's band.
+    Raises RequestError if a frequency lies outside the file's band.
     """
     wanted = _inside(hydro, omega)
     parts = np.stack([hydro.excitation.real, hydro.excitation.imag], axis=-1)
@@ -370,30 +281,11 @@ def response(
     stiffness: npt.ArrayLike = 0.0,
     kernel: Kernel | None = None,
 ) -> ComplexArray:
-    r"""Linear response a metre of wave amplitude.
+    r"""Linear response per metre of wave amplitude, shape (frequency, dof).
 
-    Solves :math:`[-\omega^2 (M + A) - i\omega (B + C) + K_h + K]\,q = X`.
-
-    Parameters
-    ----------
-    hydro : Hydrodynamics
-        The coefficients.
-    omega : array_like, shape (frequency,)
-        Angular frequencies, rad/s.
-    damping, stiffness : array_like, shape (dof, dof), optional
-        Linear damping C and stiffness K besides the hydrodynamic ones.
-    kernel : Kernel, optional
-        Take A and B from the kernel (what the time domain sees) instead of the file.
-
-    Returns
-    -------
-    ndarray of complex, shape (frequency, dof)
-        Response amplitude operators.
-
-    Raises
-    ------
-    RequestError
-        If a frequency lies outside the file's band.
+    Solves :math:`[-\omega^2 (M + A) - i\omega (B + C) + K_h + K]\,q = X` with linear damping C and
+    stiffness K besides the hydrodynamic ones. With a kernel, A and B are those that the time
+    domain sees. Raises RequestError if a frequency lies outside the file's band.
     """
     wanted = _inside(hydro, omega)
     if kernel is None:

@@ -55,18 +55,7 @@ class Record:
 class Played:
     """A simulated run: the sea, the motion, and functions of time that instruments sample.
 
-    Parameters
-    ----------
-    settings : TankSettings
-        The settings.
-    rig : Rig
-        Vessel and moorings.
-    sea : Sea
-        The waves.
-    motion : Motion
-        The simulated motion; it begins before and ends after the record.
-    length : float
-        Length of the record, s.
+    The motion starts before and ends after the record, whose length is in seconds.
     """
 
     settings: TankSettings
@@ -114,19 +103,7 @@ class Played:
 
 
 def clock_instants(clock: ClockSettings, length: float) -> tuple[FloatArray, FloatArray]:
-    """Readings of a logger's clock, and the reference instants at which it takes them.
-
-    Parameters
-    ----------
-    clock : ClockSettings
-        Rate, offset and drift.
-    length : float
-        Length of the record by the logger's clock, s.
-
-    Returns
-    -------
-    readings, instants : ndarray, shape (time,)
-        s.
+    """Readings of a logger's clock over its record, and the reference instants of them, s.
 
     Examples
     --------
@@ -139,19 +116,7 @@ def clock_instants(clock: ClockSettings, length: float) -> tuple[FloatArray, Flo
 
 
 def trigger(time: FloatArray, period: float, width: float) -> FloatArray:
-    """Trigger that every logger records: smooth pulses of height one.
-
-    Parameters
-    ----------
-    time : ndarray
-        Reference instants, s.
-    period, width : float
-        A raised-cosine pulse of this width every period, the first centred at 10 s.
-
-    Returns
-    -------
-    ndarray
-    """
+    """Trigger that every logger records: raised-cosine pulses of height one, the first at 10 s."""
     phase = (time - FIRST_PULSE + 0.5 * period) % period - 0.5 * period
     return np.where(np.abs(phase) < 0.5 * width, 0.5 + 0.5 * np.cos(2 * np.pi * phase / width), 0.0)
 
@@ -159,23 +124,9 @@ def trigger(time: FloatArray, period: float, width: float) -> FloatArray:
 def slap_pulses(
     time: FloatArray, immersed: npt.NDArray[np.bool_], slap: SlapSettings, rng: np.random.Generator
 ) -> FloatArray:
-    """Decaying pulses at each immersion and emergence of a line.
+    """Decaying pulses (N) at each immersion and emergence of a line, at uniform instants.
 
-    Parameters
-    ----------
-    time : ndarray, shape (time,)
-        Uniform instants, s.
-    immersed : ndarray of bool, shape (time,)
-        Whether the line's middle is under water.
-    slap : SlapSettings
-        Mean height (N, exponential), ranges of frequency (Hz) and decay (s).
-    rng : Generator
-        Source of the pulses.
-
-    Returns
-    -------
-    ndarray, shape (time,)
-        N.
+    `immersed` says when the line's middle is under water.
     """
     out = np.zeros(time.size)
     step = time[1] - time[0]
@@ -287,20 +238,7 @@ def _pulse(
 
 
 def record_run(played: Played, rng: np.random.Generator) -> list[Record]:
-    """Record a run with all instruments, each in its own clock.
-
-    Parameters
-    ----------
-    played : Played
-        The run.
-    rng : Generator
-        Source of all noise; each instrument gets a child of its own.
-
-    Returns
-    -------
-    list of Record
-        ``wave_probes``, ``mru``, ``loads``, ``video``.
-    """
+    """Record a run with all instruments, each in its own clock and with its own noise."""
     settings = played.settings.instruments
     makers: dict[Logger, Callable[[FloatArray, np.random.Generator], dict[str, Column]]] = {
         "wave_probes": lambda t, r: _probes(played, t, settings.clocks["wave_probes"].rate, r),
@@ -317,21 +255,7 @@ def record_run(played: Played, rng: np.random.Generator) -> list[Record]:
 
 
 def record_together(played: Played, rate: float, rng: np.random.Generator) -> Record:
-    """Record a run with all instruments on one logger, one clock and one rate.
-
-    Parameters
-    ----------
-    played : Played
-        The run.
-    rate : float
-        Samples a second, Hz.
-    rng : Generator
-        Source of all noise.
-
-    Returns
-    -------
-    Record
-    """
+    """Record a run with all instruments on one logger of the given rate (Hz)."""
     time, _ = clock_instants(ClockSettings(rate=rate), played.length)
     first, second, third, fourth = rng.spawn(4)
     columns = _probes(played, time, rate, first) | _mru(played, time, second)

@@ -73,21 +73,10 @@ KINDS: dict[str, Callable[[LineSettings], Elasticity]] = {
 def line_table(
     lines: Mapping[str, LineSettings], position: float, centre_of_gravity: float
 ) -> FloatArray:
-    """Lines as rows of numbers for the time loop.
+    """Lines as rows of numbers for the time loop, columns as in ``COLUMNS``.
 
-    Parameters
-    ----------
-    lines : mapping of str to LineSettings
-        The lines.
-    position : float
-        Distance of the centre of gravity from the wave maker at rest, m.
-    centre_of_gravity : float
-        Its height above still water, m.
-
-    Returns
-    -------
-    ndarray, shape (line, 9)
-        Columns as in ``COLUMNS``; positions from the centre of gravity at rest.
+    Lengths count from the centre of gravity at rest: `position` from the wave maker, the other
+    above still water.
 
     Raises
     ------
@@ -112,18 +101,7 @@ def line_table(
 
 
 def mooring_stiffness(table: FloatArray) -> FloatArray:
-    """Stiffness and geometric stiffness of all taut lines at rest.
-
-    Parameters
-    ----------
-    table : ndarray, shape (line, 9)
-        From :func:`line_table`.
-
-    Returns
-    -------
-    ndarray, shape (3, 3)
-        Restoring of surge, heave and pitch.
-    """
+    """Stiffness and geometric stiffness of all taut lines at rest: surge, heave and pitch."""
     total = np.zeros((3, 3))
     for eye_x, eye_z, pole_x, pole_z, linear, unstretched, _, square, cubic in table:
         along = np.array([pole_x - eye_x, pole_z - eye_z])

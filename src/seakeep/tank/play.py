@@ -71,14 +71,7 @@ def _chosen(settings: TankSettings, names: Iterable[str] | None) -> list[str]:
 
 
 def check_settings(settings: TankSettings, names: Iterable[str] | None = None) -> Rig:
-    """Check all that can be refused before a run is simulated.
-
-    Parameters
-    ----------
-    settings : TankSettings
-        The settings.
-    names : iterable of str, optional
-        Runs; the default is all.
+    """Check all that can be refused before the named runs (by default all) are simulated.
 
     Returns
     -------
@@ -97,21 +90,9 @@ def check_settings(settings: TankSettings, names: Iterable[str] | None = None) -
 
 
 def play_run(settings: TankSettings, name: str, rig: Rig | None = None) -> Played:
-    """Simulate one run.
+    """Simulate one run, from a little before to a little after the record.
 
-    Parameters
-    ----------
-    settings : TankSettings
-        The settings.
-    name : str
-        The run.
-    rig : Rig, optional
-        From :func:`check_settings`, to save its making for each run.
-
-    Returns
-    -------
-    Played
-        Sea and motion, from a little before to a little after the record.
+    A rig from :func:`check_settings` saves its making for each run.
     """
     made = assemble_rig(settings) if rig is None else rig
     (name,) = _chosen(settings, [name])

@@ -39,28 +39,11 @@ HULL_LENGTH = 1.40  # m, by which the paper divides wavelengths
 
 @dataclass(frozen=True)
 class Realised:
-    """One run as measured by its forward probe, its start-up left out.
+    """One run as measured by its forward probe (low-passed elevation), its start-up left out.
 
-    Parameters
-    ----------
-    run : str
-        Its name.
-    irregular : bool
-        Kind of its sea.
-    elevation : ndarray, shape (time,)
-        Low-passed forward probe, m.
-    dt : float
-        Its step, s.
-    significant_height, zero_up_period, peak_period : float
-        m, s, s (the last by the paper's Welch settings).
-    height, height_spread : float
-        Mean and standard deviation of the single waves' heights, m.
-    slack : dict of str to float
-        Part of the time for which each line was slack (true loads).
-    spread : dict of str to float
-        Standard deviation of each true motion and load.
-    mean : dict of str to float
-        Mean of the same.
+    The peak period is by the paper's Welch settings; `height` is the mean of the single waves'.
+    `slack` is the part of the time for which each line was slack, `spread` and `mean` the
+    standard deviation and mean of each true motion and load. SI.
     """
 
     run: str
@@ -94,21 +77,9 @@ class Row:
 
 
 def paper_peak(elevation: npt.ArrayLike, dt: float) -> tuple[float, FloatArray, FloatArray]:
-    """Peak period by the paper's Welch settings, with the spectrum.
+    """Peak period by the paper's Welch settings, with the frequencies and the spectrum.
 
-    Parameters
-    ----------
-    elevation : array_like, shape (time,)
-        m.
-    dt : float
-        s. The paper's segments of 2¹² samples at 500 Hz are kept in seconds.
-
-    Returns
-    -------
-    period : float
-        s.
-    frequency, density : ndarray
-        Hz, m²/Hz.
+    The paper's segments of 2¹² samples at 500 Hz are kept in seconds.
     """
     segment = round(2**12 * 0.002 / dt)
     overlap, padded = round(2**7 * 0.002 / dt), round(2**16 * 0.002 / dt)
@@ -124,19 +95,7 @@ def _forward_probe(settings: TankSettings) -> str:
 
 
 def realise(played: Played, name: str) -> Realised:
-    """Measure one run as the paper measures it.
-
-    Parameters
-    ----------
-    played : Played
-        The run.
-    name : str
-        Its name.
-
-    Returns
-    -------
-    Realised
-    """
+    """Measure one run as the paper measures it."""
     settings, run = played.settings, played.settings.runs[name]
     probe = _forward_probe(settings)
     record = record_run(played, generator(settings, name, "instruments"))[0]
@@ -177,18 +136,8 @@ def realise(played: Played, name: str) -> Realised:
 def comparison(settings: TankSettings, realised: list[Realised]) -> list[Row]:
     """Numbers that the paper states, ours beside them.
 
-    Parameters
-    ----------
-    settings : TankSettings
-        The settings.
-    realised : list of Realised
-        From :func:`realise`, one a run.
-
-    Returns
-    -------
-    list of Row
-        Means over the irregular runs; the mean height of each regular run whose wavelength is
-        one of the paper's.
+    Means over the irregular runs; the mean height of each regular run whose wavelength is one of
+    the paper's.
     """
     rows = []
     seas = [r for r in realised if r.irregular]
@@ -209,21 +158,7 @@ def comparison(settings: TankSettings, realised: list[Realised]) -> list[Row]:
 
 
 def matrix_rows(settings: TankSettings, realised: list[Realised]) -> list[dict[str, str]]:
-    """Test matrix as in the paper's first table, with realised heights.
-
-    Parameters
-    ----------
-    settings : TankSettings
-        The settings.
-    realised : list of Realised
-        From :func:`realise`, one a run.
-
-    Returns
-    -------
-    list of dict of str to str
-        One row a sea: nominal height, wavelength over hull length, phase and group speed,
-        realised height ± standard deviation, number of runs.
-    """
+    """Test matrix as in the paper's first table, one row per sea, with realised heights."""
     depth = settings.facility.water_depth
     rows: list[dict[str, str]] = []
     seas: dict[str, list[Realised]] = {}

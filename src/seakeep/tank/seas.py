@@ -34,19 +34,7 @@ BLOCK = 512  # instants evaluated at a time at a fixed place
 
 @dataclass(frozen=True)
 class Sea:
-    """Components of a unidirectional linear sea.
-
-    Parameters
-    ----------
-    omega : ndarray, shape (component,)
-        Angular frequencies, rad/s.
-    amplitude : ndarray, shape (component,)
-        m.
-    phase : ndarray, shape (component,)
-        rad, at x = 0 and t = 0.
-    wavenumber : ndarray, shape (component,)
-        rad/m.
-    """
+    """Components of a unidirectional linear sea, SI; phases (rad) at x = 0 and t = 0."""
 
     omega: FloatArray
     amplitude: FloatArray
@@ -56,16 +44,7 @@ class Sea:
     def analytic(self, x: npt.ArrayLike, time: npt.ArrayLike) -> ComplexArray:
         """Complex elevation: its real part is the elevation, its modulus the envelope.
 
-        Parameters
-        ----------
-        x : array_like
-            Places, m; broadcast against `time`.
-        time : array_like, shape (time,)
-            Instants, s.
-
-        Returns
-        -------
-        ndarray of complex, shape (time,)
+        Places (m) are broadcast against instants (s).
         """
         place, t = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(time, dtype=float))
         if np.ndim(x) == 0 and t.ndim == 1 and t.size > BLOCK:
@@ -90,19 +69,7 @@ class Sea:
         return blocks.ravel()[: time.size]
 
     def elevation(self, x: npt.ArrayLike, time: npt.ArrayLike) -> FloatArray:
-        """Elevation at places and instants, m.
-
-        Parameters
-        ----------
-        x : array_like
-            Places, m; broadcast against `time` (a moving place has one x an instant).
-        time : array_like, shape (time,)
-            Instants, s.
-
-        Returns
-        -------
-        ndarray, shape (time,)
-        """
+        """Elevation at places and instants, m; a moving place has one x per instant."""
         return self.analytic(x, time).real
 
     @property
@@ -116,21 +83,7 @@ class Sea:
 
 
 def pierson_moskowitz(frequency: npt.ArrayLike, height: float, peak_period: float) -> FloatArray:
-    """Pierson–Moskowitz spectrum.
-
-    Parameters
-    ----------
-    frequency : array_like
-        Hz, positive.
-    height : float
-        Significant wave height, m.
-    peak_period : float
-        s.
-
-    Returns
-    -------
-    ndarray
-        m²/Hz (equation eq:pm of the paper).
+    """Pierson–Moskowitz spectrum (m²/Hz; equation eq:pm of the paper) at frequencies in Hz.
 
     Examples
     --------
@@ -147,23 +100,9 @@ def pierson_moskowitz(frequency: npt.ArrayLike, height: float, peak_period: floa
 def jonswap(
     frequency: npt.ArrayLike, height: float, peak_period: float, peak_enhancement: float = 3.3
 ) -> FloatArray:
-    """JONSWAP spectrum, normalised so that its significant height is `height`.
+    """JONSWAP spectrum (m²/Hz), normalised so that its significant height is `height`.
 
-    Parameters
-    ----------
-    frequency : array_like
-        Hz, positive.
-    height : float
-        Significant wave height, m.
-    peak_period : float
-        s.
-    peak_enhancement : float, optional
-        γ; 1 gives Pierson–Moskowitz.
-
-    Returns
-    -------
-    ndarray
-        m²/Hz.
+    A peak enhancement of 1 gives Pierson–Moskowitz.
     """
 
     def shape(f: FloatArray) -> FloatArray:
@@ -179,19 +118,9 @@ def jonswap(
 
 
 def spectral_density(settings: SpectrumSettings, frequency: npt.ArrayLike) -> FloatArray:
-    """Density of a spectrum that settings describe.
+    """Density of a spectrum that settings describe, m²/Hz at frequencies in Hz.
 
-    Parameters
-    ----------
-    settings : SpectrumSettings
-        The spectrum.
-    frequency : array_like
-        Hz.
-
-    Returns
-    -------
-    ndarray
-        m²/Hz; a table is interpolated linearly and is zero outside its span.
+    A table is interpolated linearly and is zero outside its span.
     """
     f = np.asarray(frequency, dtype=float)
     if settings.kind == "table":
@@ -205,22 +134,10 @@ def spectral_density(settings: SpectrumSettings, frequency: npt.ArrayLike) -> Fl
 
 
 def irregular_sea(settings: SpectrumSettings, depth: float, rng: np.random.Generator) -> Sea:
-    """Draw the components of an irregular sea.
+    """Draw the components of an irregular sea, of amplitude √(2 E Δf) and random phase.
 
-    Parameters
-    ----------
-    settings : SpectrumSettings
-        Spectrum, band, number and spacing of components. Equal spacing repeats the sea's envelope
-        after one over the spacing; jittered frequencies (one uniform in each bin) do not.
-    depth : float
-        Water depth, m.
-    rng : Generator
-        Source of the phases and of the jitter.
-
-    Returns
-    -------
-    Sea
-        Components of amplitude √(2 E Δf) with uniform random phases.
+    Equal spacing repeats the sea's envelope after one over the spacing; jittered frequencies (one
+    uniform in each bin) do not.
     """
     count, (low, high) = settings.components, settings.band
     if settings.spacing == "equal":
@@ -238,24 +155,10 @@ def irregular_sea(settings: SpectrumSettings, depth: float, rng: np.random.Gener
 def regular_sea(
     wavelength: float, height: float, unsteadiness: float, depth: float, rng: np.random.Generator
 ) -> Sea:
-    """Draw a regular wave with a sideband at either side.
+    """Draw a regular wave, with a sideband at either side unless it is steady.
 
-    Parameters
-    ----------
-    wavelength, height : float
-        m.
-    unsteadiness : float
-        Amplitude of each sideband as a part of the wave's; the sidebands lie 3–6 % away in
-        frequency and make the height wander as a real wave maker's does.
-    depth : float
-        Water depth, m.
-    rng : Generator
-        Source of phases and sideband frequencies.
-
-    Returns
-    -------
-    Sea
-        One component, or three.
+    The sidebands lie 3–6 % away in frequency, `unsteadiness` of the wave's amplitude each, and
+    make the height wander as a real wave maker's does.
     """
     centre = float(wavelength_to_frequency(wavelength, depth))
     phase = rng.uniform(0.0, 2 * np.pi, 3)
@@ -272,26 +175,7 @@ def sea_of_run(
 ) -> Sea:
     """Sea of one run, checked against what the tank can make.
 
-    Parameters
-    ----------
-    name : str
-        Name of the run, for messages.
-    run : RunPlan
-        Its waves.
-    facility : FacilitySettings
-        Depth, wave band and greatest height.
-    rng : Generator
-        Source of the phases.
-
-    Returns
-    -------
-    Sea
-        The components.
-
-    Raises
-    ------
-    RequestError
-        If a frequency or the height is beyond the wave maker.
+    Raises RequestError if a frequency or the height is beyond the wave maker.
     """
     low, high = facility.wave_band
     if run.spectrum is not None:

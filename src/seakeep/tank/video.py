@@ -66,17 +66,9 @@ def check_video() -> Any:
 
 
 def pixel_of(x: npt.ArrayLike, z: npt.ArrayLike) -> FloatArray:
-    """Place in the picture of a point in the vessel's plane.
+    """Pixels to the right and downwards from the first pixel's centre, of a point in the plane.
 
-    Parameters
-    ----------
-    x, z : array_like
-        m, from the centre of gravity's x at rest, and above still water.
-
-    Returns
-    -------
-    ndarray, shape (…, 2)
-        Pixels to the right and downwards from the centre of the first pixel.
+    `x` from the centre of gravity's at rest, `z` above still water, m.
     """
     points = np.stack([np.asarray(x, dtype=float) - LEFT, TOP - np.asarray(z, dtype=float)], -1)
     return points / METRES_PER_PIXEL
@@ -138,24 +130,10 @@ def frame_of(
     lamp: float,
     centre_of_gravity: float = 0.03,
 ) -> Image:
-    """One frame before lighting and noise.
+    """One frame before lighting and noise, shape (720, 1280, 3).
 
-    Parameters
-    ----------
-    cv2 : module
-        OpenCV, from :func:`check_video`.
-    motion : (float, float, float)
-        Surge (m), heave (m) and pitch (rad).
-    surface : ndarray, shape (point,)
-        Elevation at equidistant points from the left to the right edge, m.
-    lamp : float
-        Brightness of the lamp, 0 to 1.
-    centre_of_gravity : float, optional
-        Its height above still water at rest, m.
-
-    Returns
-    -------
-    ndarray of uint8, shape (720, 1280, 3)
+    `motion` is surge (m), heave (m) and pitch (rad), `surface` the elevation (m) at equidistant
+    points from the left to the right edge, `lamp` a brightness of 0 to 1.
     """
     surge, heave, pitch = motion
     centre = (surge, heave + centre_of_gravity)
@@ -193,26 +171,9 @@ def _noise(cv2: Any, rng: np.random.Generator) -> list[npt.NDArray[np.float32]]:
 
 
 def side_view(played: Played, rng: np.random.Generator, instants: npt.ArrayLike) -> Iterator[Image]:
-    """Frames as the camera at the tank's side would see them.
+    """Frames (blue, green, red) as the camera at the tank's side would see them.
 
-    Parameters
-    ----------
-    played : Played
-        The run.
-    rng : Generator
-        Source of the noise.
-    instants : array_like, shape (frame,)
-        Reference instants, s.
-
-    Yields
-    ------
-    ndarray of uint8, shape (720, 1280, 3)
-        Blue, green, red, as OpenCV wants it.
-
-    Raises
-    ------
-    RequestError
-        If OpenCV is not installed.
+    At the given reference instants. Raises RequestError if OpenCV is not installed.
     """
     cv2 = check_video()
     time = np.asarray(instants, dtype=float)
@@ -237,23 +198,7 @@ def side_view(played: Played, rng: np.random.Generator, instants: npt.ArrayLike)
 def render_side_view(
     played: Played, path: Path, rng: np.random.Generator, length: float | None = None
 ) -> Path:
-    """Render a run to an MP4 file.
-
-    Parameters
-    ----------
-    played : Played
-        The run.
-    path : Path
-        MP4 file to write.
-    rng : Generator
-        Source of the noise.
-    length : float, optional
-        Seconds of the video's clock to render; the default is the whole record.
-
-    Returns
-    -------
-    Path
-        The file.
+    """Render a run, or its first `length` seconds by the video's clock, to an MP4 file.
 
     Raises
     ------
