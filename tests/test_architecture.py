@@ -45,10 +45,7 @@ DRAW = {"report", "plot"}
 CORE_MAY_USE = {"numpy", "scipy", "seakeep"} | set(sys.stdlib_module_names)
 
 EXCEPTIONS = {
-    ("seakeep.signals.agreement", "xarray"),
     ("seakeep.signals.froude", "xarray"),
-    ("seakeep.signals.tracking", "xarray"),
-    ("seakeep.signals.tracking_pictures", "xarray"),
 }
 """(importer, imported) that still break a rule: each goes with its cause."""
 

@@ -37,6 +37,7 @@ CALLS = {
     "signals.complementary_filter": (
         lambda x, a: signals.complementary_filter(x, a, 0.05, 0.1), X, Y,
     ),
+    "signals.compare_motion": (signals.compare_motion, X, T, Y, T),
     "signals.correlation_peak": (
         lambda x, y: signals.correlation_peak(x, y, 0.05, (0.0, 1.0)), X, Y,
     ),
@@ -132,7 +133,7 @@ CALLS = {
 }  # fmt: skip
 # Of no array: settings, a file, Datasets, units, clocks, results of others.
 WITHOUT_ARRAYS = {
-    "signals.compare_motion", "signals.froude_factor", "signals.lowpass_taps",
+    "signals.contact_sheet", "signals.froude_factor", "signals.lowpass_taps",
     "signals.pool_drift", "signals.to_full_scale", "signals.track_video", "metrics.labelled",
 }  # fmt: skip
 ROOMS = {"signals": signals, "statistics": statistics, "metrics": metrics, "waves": waves}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import struct
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -10,15 +12,17 @@ import typer
 
 from seakeep.cli.console import messages, progress_bar
 from seakeep.errors import RequestError
-from seakeep.files import replacing, write_netcdf
+from seakeep.files import MARK, check_output, replacing, write_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from seakeep.signals.agreement import Agreement
+    from seakeep.signals import MotionAgreement, Track
 
 __all__ = ["track"]
 
+TRACK, SHEET = "track", "contact sheet"
+HEADER = r"time \[s\],surge \[m\],heave \[m\],pitch \[deg\],.*"
 DECIMALS = {"s": 6, "m": 6, "deg": 5, "pixel": 3, "pixel^2": 1, "1": 4}
 
 
@@ -31,9 +35,6 @@ def track(
     sheet: Annotated[
         Path | None,
         typer.Option("--contact-sheet", help="PNG: frames with what was tracked, the worst too."),
-    ] = None,
-    overlay: Annotated[
-        Path | None, typer.Option("--overlay", help="MP4: the video with what was tracked.")
     ] = None,
     metres_per_pixel: Annotated[
         float | None,
@@ -123,9 +124,14 @@ def track(
     """
     if out is not None and out.suffix not in (".nc", ".csv"):
         raise RequestError(f"{out} ends in '{out.suffix}'; a track is written as .csv or .nc.")
+    if sheet is not None and sheet.suffix.lower() != ".png":
+        raise RequestError(f"a contact sheet is written as PNG; received {sheet}.")
+    inputs = [each for each in (video, mru) if each is not None]
+    for place, kind in ((out, TRACK), (sheet, SHEET)):
+        if place is not None:
+            check_output(place, kind, inputs, HEADER)
     from seakeep.campaign import read_table
-    from seakeep.signals.tracking import TrackingSettings, track_video
-    from seakeep.signals.tracking_pictures import contact_sheet, overlay_video, write_picture
+    from seakeep.signals import TrackingSettings, contact_sheet, track_video
 
     settings = TrackingSettings(
         metres_per_pixel=metres_per_pixel,
@@ -139,30 +145,52 @@ def track(
         lamp=lamp,
         tolerance=tolerance,
         bridge=bridge,
-        passband=passband or None,
+        passband=passband if passband != 0 else None,
     )
     reference = None if mru is None else read_table(mru, columns=("heave", "pitch"))
     with progress_bar("Tracking") as progress:
-        tracked = track_video(video, settings, progress)
-        if overlay is not None:
-            overlay_video(video, tracked, overlay, progress)
+        track = track_video(video, settings, progress)
     if sheet is not None:
-        write_picture(contact_sheet(video, tracked), sheet)
-    _write(tracked, out)
-    _summary(tracked, [path for path in (out, sheet, overlay) if path is not None])
-    if reference is not None:
-        _agreement(tracked, reference, max_lag)
-
-
-def _write(tracked: xr.Dataset, out: Path | None) -> None:
+        with replacing(sheet) as temporary:
+            temporary.write_bytes(_marked(contact_sheet(video, track)))
+    tracked = _labelled(track)
     if out is None:
         typer.echo(_as_csv(tracked), nl=False)
-        return
-    with replacing(out) as temporary:
-        if out.suffix == ".nc":
-            write_netcdf(temporary, tracked)
-        else:
-            temporary.write_text(_as_csv(tracked), encoding="utf-8", newline="\n")
+    else:
+        with replacing(out) as temporary:
+            if out.suffix == ".nc":
+                write_netcdf(temporary, tracked.assign_attrs({MARK: TRACK}))
+            else:
+                temporary.write_text(_as_csv(tracked), encoding="utf-8", newline="\n")
+    _summary(track, [path for path in (out, sheet) if path is not None])
+    if reference is not None:
+        _compare(track, reference, max_lag)
+
+
+def _labelled(track: Track) -> xr.Dataset:
+    import xarray as xr
+
+    from seakeep.signals.tracking import FLAGS, LABELS
+
+    data = {
+        name: ("time", values, {"units": LABELS[name][0], "long_name": LABELS[name][1]})
+        for name, values in track.channels.items()
+    }
+    time = ("time", track.time, {"units": "s", "long_name": "time"})
+    out = xr.Dataset(data, {"time": time}, dict(track.attributes))
+    flags = out["flag"]
+    flags.attrs |= {
+        "flag_values": list(FLAGS.values()),
+        "flag_meanings": " ".join(FLAGS),
+    }
+    return out
+
+
+def _marked(picture: bytes) -> bytes:
+    """PNG with a comment, before its last chunk of twelve bytes, that says what it is."""
+    text = b"tEXtComment\0" + f"{MARK}: {SHEET}".encode("ascii")
+    chunk = struct.pack(">I", len(text) - 4) + text + struct.pack(">I", zlib.crc32(text))
+    return picture[:-12] + chunk + picture[-12:]
 
 
 def _as_csv(tracked: xr.Dataset) -> str:
@@ -182,41 +210,46 @@ def _as_csv(tracked: xr.Dataset) -> str:
     return text
 
 
-def _summary(tracked: xr.Dataset, written: list[Path]) -> None:
-    from seakeep.signals.sightings import FLAGS
+def _summary(track: Track, written: list[Path]) -> None:
+    from seakeep.signals.tracking import FLAGS
 
-    flag, total = tracked["flag"].to_numpy(), tracked.sizes["time"]
     flagged = [
         f"{count} {name}"
         for name, code in FLAGS.items()
-        if name != "good" and (count := int((flag == code).sum()))
+        if name != "good" and (count := int((track["flag"] == code).sum()))
     ]
-    scale, how = 1e3 * tracked.attrs["metres_per_pixel"], tracked.attrs["calibration"]
-    bridged = int(tracked["bridged"].sum())
+    facts = track.attributes
     messages().print(
-        f"{total} frames at {tracked.attrs['frame_rate']:g} Hz; flagged: "
-        f"{', '.join(flagged) or 'none'} ({bridged} bridged); {scale:.4g} mm a pixel ({how}); "
-        f"{tracked.attrs['camera']}."
+        f"{track.time.size} frames at {facts['frame_rate']:g} Hz; flagged: "
+        f"{', '.join(flagged) or 'none'} ({int(track['bridged'].sum())} bridged); "
+        f"{1e3 * facts['metres_per_pixel']:.4g} mm a pixel ({facts['calibration']}); "
+        f"{facts['camera']}."
     )
     if written:
         messages().print("Wrote " + ", ".join(map(str, written)))
 
 
-def _agreement(tracked: xr.Dataset, reference: xr.Dataset, max_lag: float | None) -> None:
-    from seakeep.signals.agreement import compare_motion
+def _compare(track: Track, reference: xr.Dataset, max_lag: float | None) -> None:
+    from seakeep.conventions import conversion, displayed
+    from seakeep.signals import compare_motion
+    from seakeep.signals.tracking import LABELS
 
-    for name, found in compare_motion(tracked, reference, max_lag=max_lag).items():
-        factor, unit = (math.degrees(1.0), "deg") if found.units == "rad" else (1e3, "mm")
+    for name in ("heave", "pitch"):
+        other, unit = reference[name], LABELS[name][0]
+        factor = conversion(str(other.attrs.get("units", unit)), unit, f"'{name}'")
+        time = reference["time"].to_numpy()
+        found = compare_motion(track[name], track.time, factor * other.to_numpy(), time, max_lag)
+        shown, unit = (1e3, "mm") if unit == "m" else displayed(unit)
         messages().print(
             f"{name} against the MRU: correlation {found.correlation:.4f}, video late by "
-            f"{found.lag:+.3f} s, RMS difference {factor * found.rms:.3g} {unit}, "
+            f"{found.lag:+.3f} s, RMS difference {shown * found.rms:.3g} {unit}, "
             f"{found.samples} samples"
         )
         if doubt := _doubt(found):
             messages().print(f"Note: {name}: {doubt}", style="yellow")
 
 
-def _doubt(found: Agreement) -> str:
+def _doubt(found: MotionAgreement) -> str:
     """Why the lag may be another one; empty where nothing speaks for that."""
     searched = f"the lags searched (within {found.max_lag:g} s)"
     if found.at_limit:

@@ -1,10 +1,9 @@
 """The measurement chain: functions on sampled series, each usable alone.
 
 Series are arrays with time along the first axis; instants and steps are in seconds, frequencies
-in hertz. Nothing here knows of files, the tracking of a video aside.
+in hertz. Only the tracking of a video reads a file.
 """
 
-from seakeep.signals.agreement import compare_motion
 from seakeep.signals.calculus import (
     band_pass,
     complementary_filter,
@@ -14,7 +13,13 @@ from seakeep.signals.calculus import (
 )
 from seakeep.signals.filters import low_pass, lowpass_taps, resample
 from seakeep.signals.froude import froude_factor, to_full_scale
-from seakeep.signals.lags import Lags, correlation_peak, windowed_lags
+from seakeep.signals.lags import (
+    Lags,
+    MotionAgreement,
+    compare_motion,
+    correlation_peak,
+    windowed_lags,
+)
 from seakeep.signals.leakage import find_leakage
 from seakeep.signals.propagation import (
     delay_by_celerity,
@@ -39,7 +44,7 @@ from seakeep.signals.synchronisation import (
     pool_drift,
 )
 from seakeep.signals.time_axis import TimeReport, bridge, inspect_times, onto_uniform, uniform_step
-from seakeep.signals.tracking import TrackingSettings, track_video
+from seakeep.signals.tracking import Track, TrackingSettings, contact_sheet, track_video
 from seakeep.signals.waves import (
     encounter_period,
     peak_period,
@@ -54,7 +59,9 @@ from seakeep.signals.waves import (
 __all__ = [
     "Clock",
     "Lags",
+    "MotionAgreement",
     "TimeReport",
+    "Track",
     "TrackingSettings",
     "band_pass",
     "bridge",
@@ -63,6 +70,7 @@ __all__ = [
     "clock_from_shared",
     "compare_motion",
     "complementary_filter",
+    "contact_sheet",
     "correlation_peak",
     "delay_by_celerity",
     "delay_by_dispersion",

@@ -6,12 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 from scipy import fft
 
-from seakeep.arrays import FloatArray, IntArray, as_series, positive
+from seakeep.arrays import FloatArray, IntArray, as_real, as_series, positive
 from seakeep.errors import DataError, RequestError
+from seakeep.signals.time_axis import check_order
 
-__all__ = ["Lags", "correlation_peak", "parabola_peak", "windowed_lags"]
+__all__ = [
+    "Lags",
+    "MotionAgreement",
+    "compare_motion",
+    "correlation_peak",
+    "parabola_peak",
+    "windowed_lags",
+]
 
 
 @dataclass(frozen=True)
@@ -222,3 +231,173 @@ def as_pair(first: npt.ArrayLike, second: npt.ArrayLike) -> tuple[FloatArray, Fl
                 "Look for a dead probe."
             )
     return a - a.mean(), b - b.mean()
+
+
+SHORTEST = 16
+"""Samples in common below which a correlation says nothing."""
+LONGEST = 10.0
+"""Lag searched by default, s: clocks set by hand, or recordings started by a shout."""
+FINEST = 0.01
+"""Difference, in SD of the motion, below which two sensors are taken to agree."""
+
+
+@dataclass(frozen=True)
+class MotionAgreement:
+    """How well one record of a motion agrees with another.
+
+    Parameters
+    ----------
+    correlation : float
+        Greatest correlation, at `lag`.
+    correlation_at_zero : float
+        Correlation with no lag.
+    lag : float
+        s by which the first record is late behind the second; sub-sample.
+    rms : float
+        Root mean square of the difference at `lag`, means removed.
+    offset : float
+        Mean of the first record less that of the second.
+    samples : int
+        Samples compared.
+    at_limit : bool
+        Whether `lag` is the longest searched, so that the true one may be longer.
+    max_lag : float
+        Longest lag searched, s.
+    period : float
+        Mean zero-crossing period of the motion, s.
+    rival_lag : float
+        Lag of the next highest peak of the correlation, s, commonly a wave period off; NaN where
+        the lags searched hold no other.
+    rival_correlation : float
+        Correlation there; NaN likewise.
+    """
+
+    correlation: float
+    correlation_at_zero: float
+    lag: float
+    rms: float
+    offset: float
+    samples: int
+    at_limit: bool
+    max_lag: float
+    period: float
+    rival_lag: float
+    rival_correlation: float
+
+    @property
+    def enclosed(self) -> bool:
+        """Whether lags one wave period off `lag` were searched too, on either side."""
+        return abs(self.lag) + self.period <= self.max_lag
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether at `rival_lag` the difference is less than twice that at `lag`."""
+        # Root mean square difference of two series of SD 1.
+        misfit, rival = (
+            float(np.sqrt(max(2.0 * (1.0 - each), 0.0)))
+            for each in (self.correlation, self.rival_correlation)
+        )
+        return rival < 2.0 * max(misfit, FINEST)
+
+
+def compare_motion(
+    series: npt.ArrayLike,
+    time: npt.ArrayLike,
+    reference: npt.ArrayLike,
+    reference_time: npt.ArrayLike,
+    max_lag: float | None = None,
+) -> MotionAgreement:
+    """Compare a motion tracked in a video with that of a motion reference unit.
+
+    Parameters
+    ----------
+    series, time : array_like, shape (time,)
+        The motion and its instants, s; samples that are NaN are left out.
+    reference, reference_time : array_like, shape (time,)
+        The same of the reference, in the same unit; interpolated by cubics, so its step should
+        resolve the motion.
+    max_lag : float, optional
+        Longest lag searched, s; by default 10 s, or a quarter of the shorter record. In regular
+        waves a lag is known only up to a whole period: see `MotionAgreement.ambiguous`.
+
+    Returns
+    -------
+    MotionAgreement
+
+    Raises
+    ------
+    DataError
+        If the records have too few samples in common, or one is constant.
+
+    Examples
+    --------
+    >>> t = np.arange(0, 30, 0.02)
+    >>> found = compare_motion(np.sin(4 * (t - 0.1)), t, np.sin(4 * t), t, max_lag=0.5)
+    >>> round(found.lag, 3), round(found.correlation, 3)
+    (0.1, 1.0)
+    """
+    reach = None if max_lag is None else positive(max_lag, "max_lag", "s")
+    t1, y1 = _present(series, time, "the series")
+    t2, y2 = _present(reference, reference_time, "the reference")
+    reach = reach or min(LONGEST, 0.25 * float(min(np.ptp(t1), np.ptp(t2))))
+    # Only instants whose partner lies inside the other record at every lag searched.
+    common = (t1 >= t2[0] + reach) & (t1 <= t2[-1] - reach)
+    t1, y1 = t1[common], y1[common]
+    if t1.size < SHORTEST:
+        raise DataError(
+            f"the records have {t1.size} samples in common once lags of up to {reach:g} s are "
+            f"allowed for, fewer than {SHORTEST}. Bring them onto one clock, or search shorter "
+            "lags."
+        )
+    for name, each in (("series", y1), ("reference", y2)):
+        if np.ptp(each) == 0:
+            raise DataError(f"the {name} is constant: nothing to compare. Check the sensor.")
+    spline = scipy.interpolate.CubicSpline(t2, y2)
+
+    def correlation(lag: float) -> float:
+        return float(np.corrcoef(y1, spline(t1 - lag))[0, 1])
+
+    step = min(float(np.median(np.diff(t1))), float(np.median(np.diff(t2))))
+    lags = np.linspace(-reach, reach, 2 * int(np.ceil(reach / step)) + 1)
+    values = np.array([correlation(lag) for lag in lags])
+    best = int(np.argmax(values))
+    lag, at_limit = float(lags[best]), best in (0, lags.size - 1)
+    if not at_limit:
+        between, options = (lags[best - 1], lags[best + 1]), {"xatol": 1e-4 * step}
+        lag = float(
+            scipy.optimize.minimize_scalar(
+                lambda shift: -correlation(shift), bounds=between, method="bounded", options=options
+            ).x
+        )
+    inner = values[1:-1]
+    peaks = 1 + np.flatnonzero((inner > values[:-2]) & (inner >= values[2:]))
+    others = peaks[np.abs(peaks - best) > 1]
+    rival = int(others[np.argmax(values[others])]) if others.size else None
+    crossings = int(np.count_nonzero(np.diff(y1 > np.mean(y1))))
+    difference = y1 - spline(t1 - lag)
+    return MotionAgreement(
+        correlation=correlation(lag),
+        correlation_at_zero=correlation(0.0),
+        lag=lag,
+        rms=float(np.std(difference)),
+        offset=float(np.mean(difference)),
+        samples=int(t1.size),
+        at_limit=at_limit,
+        max_lag=reach,
+        period=2.0 * float(t1[-1] - t1[0]) / max(crossings, 1),
+        rival_lag=np.nan if rival is None else float(lags[rival]),
+        rival_correlation=np.nan if rival is None else float(values[rival]),
+    )
+
+
+def _present(
+    series: npt.ArrayLike, time: npt.ArrayLike, name: str
+) -> tuple[FloatArray, FloatArray]:
+    """Instants and values of a record where it has values."""
+    y, t = as_real(series, name), as_real(time, f"the times of {name}", DataError)
+    if y.ndim != 1 or y.shape != t.shape:
+        raise RequestError(
+            f"{name} has shape {y.shape} and its times {t.shape}; one value per instant is needed."
+        )
+    there = np.isfinite(y)
+    return check_order(t[there], name), y[there]

@@ -1,21 +1,27 @@
 """The white panel in one frame: segmentation, place, orientation and shape.
 
-Source: the paper's section "Motion measurements". Places are in pixels to the right and downwards
-from the centre of the upper left pixel. Needs OpenCV, the extra ``video``.
+Source: the paper's section "Motion measurements": thresholds in RGB, opening, closing, hole
+filling, the largest component, its centroid and orientation. Places are in pixels to the right and
+downwards from the centre of the upper left pixel. Needs OpenCV, the extra ``video``.
 """
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.signals.frames import opencv
+from seakeep.arrays import positive
+from seakeep.errors import RequestError
 
-__all__ = ["CORNERS", "Segmentation", "Sighting", "binary_mask", "find_panel"]
+__all__ = ["CORNERS", "FIELDS", "TrackingSettings", "find_panel", "opencv"]
 
 Image = npt.NDArray[np.uint8]
+Weights = npt.NDArray[np.float32]
 
 SATURATED = 250
 """A pixel is saturated where red, green and blue are all at least this."""
@@ -26,184 +32,199 @@ MARGIN = 8
 EDGE, CLEAR = 5, 11
 """Sides of the squares by which a component grows to take in its edge, and to leave it behind."""
 CORNERS = ("left_top", "left_bottom", "right_top", "right_bottom")
-"""Fields of a :class:`Sighting` that say how much of each corner is seen."""
+"""Fields that say how much of each corner is seen."""
+FIELDS = ("x", "y", "angle", "length", "height", "area", "fill", "cut", "saturation", "brightness",
+          *CORNERS)  # fmt: skip
+"""What is measured of a frame: centroid, pixels; orientation of the long axis, rad in (−π/2, π/2],
+positive clockwise as seen; sides of the rectangle of the same second moments; pixels, holes
+included; area by that of the smallest rectangle around it; one where it touches the border of the
+region; saturated pixels; mean of the colours; part seen of squares of half the rectangle's height
+at its corners."""
 
 
 @dataclass(frozen=True)
-class Segmentation:
-    """How the panel's pixels are told from the others.
+class TrackingSettings:
+    """How a video is tracked.
 
     Parameters
     ----------
+    metres_per_pixel : float or None
+        Calibration, m; None takes it from the panel's size as seen.
+    panel : (float, float)
+        Length and height of the panel, m.
+    panel_place : (float, float)
+        The panel's centre from the centre of gravity: downstream and up, m. The motions are
+        those of the centre of gravity.
+    downstream : {"right", "left"}
+        Side of the picture to which the waves run.
+    level : float
+        Pitch that the picture shows of a vessel that is level, rad: the camera's own roll.
+    origin : (float, float) or None
+        Pixel of the panel's centre while the vessel is at rest; None makes the means of surge
+        and heave over the first `rest` seconds zero.
+    rest : float
+        s, where `origin` is None.
     lower, upper : (int, int, int)
-        Least and greatest red, green and blue (0 to 255) of the panel.
+        Least and greatest red, green and blue of the panel, 0 to 255.
     opening, closing : int
-        Side of the square, in pixels, of the morphological opening (removes specks) and closing
-        (joins what a thin line divides); 0 leaves the step out.
+        Sides of the squares of opening and closing, pixels; 0 leaves the step out.
+    refine : bool
+        Whether pixels at the panel's edge count by their brightness; False is the paper's binary
+        mask, with about five times the error in pitch.
     region : (int, int, int, int) or None
         Part of the picture that is searched: left, top, width, height in pixels.
-    refine : bool
-        Whether pixels at the edge count by their brightness, from the background's to the
-        panel's, instead of wholly or not at all.
+    lamp : (float, float, float) or None
+        Place and radius of a lamp that shows the trigger: x, y, radius in pixels.
+    tolerance : float
+        Part of the panel's length by which the sides seen may differ from their medians over the
+        run before a frame is flagged. Raise it for a lens that distorts.
+    max_speed : float
+        The panel's greatest speed, m/s; further from its neighbours a frame is flagged.
+    bridge : float
+        Gaps up to this length (s) are bridged by monotone cubics; the default bridges none.
+    passband, stopband : float or None
+        Edges of the low-pass filter, Hz; a `passband` of None filters nothing, a `stopband` of
+        None is 1.5 times the `passband`.
     """
 
-    lower: tuple[int, int, int]
-    upper: tuple[int, int, int]
-    opening: int
-    closing: int
-    region: tuple[int, int, int, int] | None
-    refine: bool
+    metres_per_pixel: float | None = None
+    panel: tuple[float, float] = (0.30, 0.10)
+    panel_place: tuple[float, float] = (0.0, 0.25)
+    downstream: Literal["right", "left"] = "right"
+    level: float = 0.0
+    origin: tuple[float, float] | None = None
+    rest: float = 1.0
+    lower: tuple[int, int, int] = (150, 150, 150)
+    upper: tuple[int, int, int] = (255, 255, 255)
+    opening: int = 5
+    closing: int = 9
+    refine: bool = True
+    region: tuple[int, int, int, int] | None = None
+    lamp: tuple[float, float, float] | None = None
+    tolerance: float = 0.02
+    max_speed: float = 3.0
+    bridge: float = 0.0
+    passband: float | None = 4.0
+    stopband: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, unit in (("rest", "s"), ("tolerance", "a part"), ("max_speed", "m/s")):
+            positive(getattr(self, name), name, unit)
+        for name, unit in (("metres_per_pixel", "m"), ("passband", "Hz"), ("stopband", "Hz")):
+            if getattr(self, name) is not None:
+                positive(getattr(self, name), name, unit)
+        for name in ("panel", "panel_place", "level", "origin", "lamp"):
+            value = getattr(self, name)
+            if value is not None and not np.all(np.isfinite(value)):
+                raise RequestError(f"{name} must be finite; received {value!r}.")
+        for wrong, rule, received in (
+            (
+                len(self.panel) != 2 or not self.panel[0] > 1.2 * self.panel[1] > 0,
+                "panel is (length, height) in metres, the length at least 1.2 times the height, or "
+                "its orientation means nothing",
+                self.panel,
+            ),
+            (
+                self.downstream not in ("right", "left"),
+                "downstream is 'right' or 'left' in the picture",
+                repr(self.downstream),
+            ),
+            (
+                not _are_colours(self.lower, self.upper),
+                "lower (--threshold) and upper are (red, green, blue), each 0 to 255 and lower not "
+                "above upper",
+                f"{self.lower} and {self.upper}",
+            ),
+            (
+                self.opening < 0 or self.closing < 0,
+                "opening and closing are sides in pixels, 0 for none",
+                f"{self.opening} and {self.closing}",
+            ),
+            (
+                self.region is not None and (min(self.region) < 0 or min(self.region[2:]) < 1),
+                "region is (left, top, width, height) in pixels",
+                self.region,
+            ),
+            (not 0 <= self.bridge < np.inf, "bridge is a time in s, 0 for none", self.bridge),
+        ):
+            if wrong:
+                raise RequestError(f"{rule}; received {received}.")
 
 
-@dataclass(frozen=True)
-class Sighting:
-    """The largest component of a frame; NaN where there is none.
-
-    Parameters
-    ----------
-    x, y : float
-        Its centroid, pixels.
-    angle : float
-        Orientation of its long axis, rad in (−π/2, π/2], positive clockwise as seen (the right
-        end lower), from its second moments.
-    length, height : float
-        Sides of the rectangle of the same second moments, pixels.
-    area : float
-        Pixels, holes included.
-    fill : float
-        Its area by that of the smallest rectangle around it: one for a rectangle.
-    cut : float
-        One where it touches the border of the region, else zero.
-    saturation : float
-        Saturated pixels in the region.
-    brightness : float
-        Mean of the region's colours, 0 to 255.
-    left_top, left_bottom, right_top, right_bottom : float
-        Part seen of each end's halves: squares of half the rectangle's height at its corners.
-    """
-
-    x: float = np.nan
-    y: float = np.nan
-    angle: float = np.nan
-    length: float = np.nan
-    height: float = np.nan
-    area: float = 0.0
-    fill: float = np.nan
-    cut: float = 0.0
-    saturation: float = 0.0
-    brightness: float = 0.0
-    left_top: float = np.nan
-    left_bottom: float = np.nan
-    right_top: float = np.nan
-    right_bottom: float = np.nan
-
-    def row(self) -> tuple[float, ...]:
-        """Return the numbers in the order of the fields."""
-        values: tuple[float, ...] = astuple(self)
-        return values
+def _are_colours(lower: Sequence[int], upper: Sequence[int]) -> bool:
+    if not len(lower) == len(upper) == 3:
+        return False
+    return all(0 <= low <= high <= 255 for low, high in zip(lower, upper, strict=True))
 
 
-def binary_mask(frame: Image, how: Segmentation) -> Image:
-    """Pixels of the panel's colour after opening and closing, inside the region.
+def opencv() -> Any:
+    """Return OpenCV's module, its decoder told to be quiet."""
+    # What FFmpeg prints about a damaged file, our own message says in a sentence.
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
+    try:
+        import cv2
+    except ImportError as error:
+        raise RequestError(
+            "reading a video needs OpenCV, which is not installed. "
+            "Install the extra: pip install 'seakeep[video]'."
+        ) from error
+    return cv2
 
-    Parameters
-    ----------
-    frame : ndarray of uint8, shape (row, column, 3)
-        Blue, green, red.
-    how : Segmentation
-        Thresholds and steps.
 
-    Returns
-    -------
-    ndarray of uint8, shape (row, column)
-        0 or 255; of the region's shape.
-    """
+def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
+    """Find the largest component of the panel's colour in a frame (blue, green, red)."""
     cv2 = opencv()
-    part = _part(frame, how)
+    left, top, width, height = how.region or (0, 0, frame.shape[1], frame.shape[0])
+    part = frame[top : top + height, left : left + width]
+    found = dict.fromkeys(FIELDS, np.nan) | {"area": 0.0, "cut": 0.0}
+    found["saturation"] = float(cv2.countNonZero(cv2.inRange(part, (SATURATED,) * 3, (255,) * 3)))
+    found["brightness"] = float(np.mean(cv2.mean(part)[:3]))
     mask = cv2.inRange(part, how.lower[::-1], how.upper[::-1])
     for side, step in ((how.opening, cv2.MORPH_OPEN), (how.closing, cv2.MORPH_CLOSE)):
         if side > 1:
             mask = cv2.morphologyEx(mask, step, np.ones((side, side), np.uint8))
-    return np.asarray(mask, dtype=np.uint8)
-
-
-def _part(frame: Image, how: Segmentation) -> Image:
-    if how.region is None:
-        return frame
-    left, top, width, height = how.region
-    return frame[top : top + height, left : left + width]
-
-
-def find_panel(frame: Image, how: Segmentation) -> Sighting:
-    """Find the largest component of the panel's colour, its holes filled.
-
-    Parameters
-    ----------
-    frame : ndarray of uint8, shape (row, column, 3)
-        Blue, green, red.
-    how : Segmentation
-        Thresholds and steps.
-
-    Returns
-    -------
-    Sighting
-    """
-    cv2 = opencv()
-    part = _part(frame, how)
-    saturation = float(cv2.countNonZero(cv2.inRange(part, (SATURATED,) * 3, (255,) * 3)))
-    brightness = float(np.mean(cv2.mean(part)[:3]))
-    nothing = Sighting(saturation=saturation, brightness=brightness)
-    mask = binary_mask(frame, how)
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
-        return nothing
+        return found
     # A contour without what lies inside it is a component with its holes filled.
     outline = max(contours, key=cv2.contourArea)
-    bounds = cv2.boundingRect(outline)
-    left, top = (max(0, start - MARGIN) for start in bounds[:2])
-    right, bottom = bounds[0] + bounds[2] + MARGIN, bounds[1] + bounds[3] + MARGIN
-    patch = part[top:bottom, left:right]
+    x, y, wide, high = cv2.boundingRect(outline)
+    x0, y0 = max(0, x - MARGIN), max(0, y - MARGIN)
+    patch = part[y0 : y + high + MARGIN, x0 : x + wide + MARGIN]
     filled = np.zeros(patch.shape[:2], np.uint8)
-    cv2.drawContours(filled, [outline], -1, 255, cv2.FILLED, offset=(-left, -top))
+    cv2.drawContours(filled, [outline], -1, 255, cv2.FILLED, offset=(-x0, -y0))
     area = float(cv2.countNonZero(filled))
     if area < SMALLEST:
-        return nothing
+        return found
     weights = _weights(patch, filled) if how.refine else None
     moments = cv2.moments(filled if weights is None else weights, binaryImage=weights is None)
     mass = moments["m00"]
-    angle, long_side, short_side = _axes(
-        moments["mu20"] / mass, moments["mu11"] / mass, moments["mu02"] / mass
-    )
-    seen = (filled > 0).astype(np.float32) if weights is None else weights
     centre = moments["m10"] / mass, moments["m01"] / mass
-    corners = _corners(seen, centre, angle, long_side, short_side)
+    xx, xy, yy = (moments[name] / mass for name in ("mu20", "mu11", "mu02"))
+    angle = float(0.5 * np.arctan2(2 * xy, xx - yy))
+    mean, half = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+    long_side, short_side = (float(np.sqrt(12 * (mean + sign * half))) for sign in (1, -1))
     _, sides, _ = cv2.minAreaRect(outline)  # runs through the centres of the outermost pixels
-    rows, columns = mask.shape
-    cut = min(bounds[:2]) == 0 or bounds[0] + bounds[2] == columns or bounds[1] + bounds[3] == rows
-    origin = (0, 0) if how.region is None else how.region[:2]
-    return Sighting(
-        x=origin[0] + left + centre[0],
-        y=origin[1] + top + centre[1],
-        angle=angle,
-        length=long_side,
-        height=short_side,
-        area=area,
-        fill=area / ((sides[0] + 1.0) * (sides[1] + 1.0)),
-        cut=float(cut),
-        saturation=saturation,
-        brightness=brightness,
-        **dict(zip(CORNERS, corners, strict=True)),
-    )
+    seen = (filled > 0).astype(np.float32) if weights is None else weights
+    cut = min(x, y) == 0 or x + wide == mask.shape[1] or y + high == mask.shape[0]
+    return found | {
+        "x": left + x0 + centre[0],
+        "y": top + y0 + centre[1],
+        "angle": angle,
+        "length": long_side,
+        "height": short_side,
+        "area": area,
+        "fill": area / ((sides[0] + 1.0) * (sides[1] + 1.0)),
+        "cut": float(cut),
+        **_corners(seen, centre, angle, long_side, short_side),
+    }
 
 
 def _corners(
-    seen: npt.NDArray[np.float32],
-    centre: tuple[float, float],
-    angle: float,
-    length: float,
-    height: float,
-) -> list[float]:
-    """Part seen of the corners of a rectangle, in the order of :data:`CORNERS`."""
+    seen: Weights, centre: tuple[float, float], angle: float, length: float, height: float
+) -> dict[str, float]:
+    """Part seen of the corners of a rectangle."""
     rows, columns = np.indices(seen.shape, dtype=np.float32)
     x, y = columns - centre[0], rows - centre[1]
     along, down = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
@@ -215,10 +236,10 @@ def _corners(
         for half in (-1.0, 1.0):
             inside = near * np.clip(half * down + 0.5, 0.0, 1.0)
             out.append(float(np.sum(inside * seen)) / side**2)
-    return out
+    return dict(zip(CORNERS, out, strict=True))
 
 
-def _weights(patch: Image, filled: Image) -> npt.NDArray[np.float32] | None:
+def _weights(patch: Image, filled: Image) -> Weights | None:
     """Part of each pixel that the component covers, from its brightness; None if it has no inside.
 
     A binary mask shows an edge that runs nearly along the rows as one step or none, which turns a
@@ -240,10 +261,3 @@ def _weights(patch: Image, filled: Image) -> npt.NDArray[np.float32] | None:
     weights[inside] = 1.0
     weights[~near] = 0.0
     return np.asarray(weights, dtype=np.float32)
-
-
-def _axes(xx: float, xy: float, yy: float) -> tuple[float, float, float]:
-    """Angle of the long axis, and sides of the rectangle of these second central moments."""
-    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
-    mean, half = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-    return float(angle), float(np.sqrt(12 * (mean + half))), float(np.sqrt(12 * (mean - half)))

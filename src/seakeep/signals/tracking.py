@@ -1,9 +1,9 @@
 """Surge, heave and pitch from a video of a white panel on the vessel.
 
-Source: the paper's section "Motion measurements": thresholds in RGB, opening, closing, hole
-filling, the largest component, its centroid and orientation, frame by frame, then a low-pass
-filter. Every frame carries a quality figure and a flag; a frame that is flagged gives no motion,
-and a gap is bridged only when asked. Needs OpenCV, the extra ``video``.
+Source: the paper's section "Motion measurements": the panel of each frame
+(:mod:`seakeep.signals.panel`), then a low-pass filter. Every frame carries a quality figure and a
+flag; a frame that is flagged gives no motion, and a gap is bridged only when asked. Needs OpenCV,
+the extra ``video``.
 
 Frame: x downstream, z up, pitch positive bow up, the bow pointing upstream. With downstream to
 the right of the picture the camera looks along +y and sees the vessel's port side; with
@@ -14,146 +14,194 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import scipy
-import xarray as xr
 
-from seakeep.arrays import FloatArray, positive
+from seakeep.arrays import BoolArray, FloatArray, IntArray
 from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.files import existing_file
 from seakeep.signals.filters import low_pass
-from seakeep.signals.frames import Video, open_video
-from seakeep.signals.panel import Segmentation, Sighting, find_panel
-from seakeep.signals.sightings import FLAGS, Limits, Reference, judge, reference_panel
+from seakeep.signals.panel import CORNERS, FIELDS, Image, TrackingSettings, find_panel, opencv
 from seakeep.signals.time_axis import stretches
 
-__all__ = ["TrackingSettings", "track_video"]
+__all__ = ["FLAGS", "LABELS", "Track", "TrackingSettings", "contact_sheet", "track_video"]
 
+Seen = Mapping[str, FloatArray]
 Progress = Callable[[int, int, str], None]
+
+FLAGS = {
+    "good": 0,
+    "lost": 1,  # nothing of the panel's colour
+    "occluded": 2,  # too small, a corner hidden, or cut by the border of the picture
+    "overexposed": 3,  # shape off, or much more of the picture saturated than usual
+    "misshapen": 4,  # too large or no rectangle, without saturation
+    "jump": 5,  # further from its neighbours than the vessel can move
+    "dropped": 6,  # not in the file
+}
+"""Flags of a frame."""
+
+LABELS = {
+    "surge": ("m", "surge"),
+    "heave": ("m", "heave"),
+    "pitch": ("rad", "pitch"),
+    "centroid_x": ("pixel", "panel centroid, to the right"),
+    "centroid_y": ("pixel", "panel centroid, downwards"),
+    "panel_angle": ("rad", "panel orientation, clockwise as seen"),
+    "panel_length": ("pixel", "panel length as seen"),
+    "panel_height": ("pixel", "panel height as seen"),
+    "panel_area": ("pixel^2", "panel area as seen"),
+    "panel_fill": ("1", "panel area by that of the rectangle around it"),
+    "saturation": ("1", "saturated part of the picture"),
+    "quality": ("1", "quality of the frame"),
+    "bridged": ("1", "whether the frame is bridged"),
+    "picture": ("1", "count of the frame in the file"),
+    "flag": ("1", "flag of the frame"),
+    "lamp": ("1", "brightness of the lamp"),
+}
+"""Unit and long name of each channel of a track."""
 
 REPORT_EVERY = 150
 """Frames between two reports of progress."""
+SLOWEST, FASTEST = 0.1, 2000.0
+"""Frames a second that a header may state and be believed."""
+ASPECT_BAND = 0.15
+"""Part by which the aspect of what is taken for the panel may differ from the panel's."""
+SIZE_BAND = 0.10
+"""Part by which its length may differ from what a stated calibration makes it."""
+LEAST_FILL = 0.85
+"""Least fill of what is taken for the panel; a turned rectangle of pixels has about 0.97."""
+FILL_DROP = 0.05
+"""Fill below the run's median that is flagged."""
+CORNER_DROP, BINARY_CORNER_DROP = 0.01, 0.035
+"""Part of a corner's square below the run's median that is flagged: a hidden corner that large
+turns a panel three times as long as high by 0.2 degrees, the accuracy asked of the pitch; and by
+0.7 degrees, by which the steps of a binary mask turn a sound one."""
+CORNER_NOISE = 6.0
+"""Robust standard deviations of the corners seen that are never flagged, for panels of few pixels;
+Gaussian noise reaches 4.3 in one of 100 000 frames."""
+GLARE, FLOOD, BRIGHTER = 0.25, 0.10, 1.3
+"""Overexposure: saturated pixels above the run's median, in panel areas, where the shape is off or
+the picture is brighter than its median by the last factor; and as part of the picture whatever the
+shape."""
+NEIGHBOURS = 15
+"""Frames over whose median a jump is measured."""
+FLAGGED_QUALITY = 0.49
+"""Greatest quality of a flagged frame."""
 
 
-@dataclass(frozen=True)
-class TrackingSettings:
-    """How a video is tracked.
+@dataclass(frozen=True, eq=False)
+class Track:
+    """What was tracked, frame by frame.
 
     Parameters
     ----------
-    metres_per_pixel : float or None
-        Calibration, m; None takes it from the panel's size as seen.
-    panel : (float, float)
-        Length and height of the panel, m.
-    panel_place : (float, float)
-        The panel's centre from the centre of gravity: downstream and up, m. The motions are
-        those of the centre of gravity.
-    downstream : {"right", "left"}
-        Side of the picture to which the waves run.
-    level : float
-        Pitch that the picture shows of a vessel that is level, rad: the camera's own roll.
-    origin : (float, float) or None
-        Pixel of the panel's centre while the vessel is at rest; None makes the means of surge
-        and heave over the first `rest` seconds zero.
-    rest : float
-        s, where `origin` is None.
-    lower, upper : (int, int, int)
-        Least and greatest red, green and blue of the panel, 0 to 255.
-    opening, closing : int
-        Sides of the squares of opening and closing, pixels; 0 leaves the step out.
-    refine : bool
-        Whether pixels at the panel's edge count by their brightness; False is the paper's binary
-        mask, with about five times the error in pitch.
-    region : (int, int, int, int) or None
-        Part of the picture that is searched: left, top, width, height in pixels.
-    lamp : (float, float, float) or None
-        Place and radius of a lamp that shows the trigger: x, y, radius in pixels.
-    tolerance : float
-        Part of the panel's length by which the sides seen may differ from their medians over the
-        run before a frame is flagged. Raise it for a lens that distorts.
-    max_speed : float
-        The panel's greatest speed, m/s; further from its neighbours a frame is flagged.
-    bridge : float
-        Gaps up to this length (s) are bridged by monotone cubics; the default bridges none.
-    passband, stopband : float or None
-        Edges of the low-pass filter, Hz; a `passband` of None filters nothing, a `stopband` of
-        None is 1.5 times the `passband`.
+    time : ndarray, shape (frame,)
+        s from the first frame.
+    channels : mapping of str to ndarray, shape (frame,)
+        ``surge``, ``heave`` (m) and ``pitch`` (rad) of the centre of gravity, filtered, NaN where
+        the frame was flagged and not bridged; ``quality`` (1 like the others, below 0.5 flagged, 0
+        lost); ``flag`` (see :data:`FLAGS`); ``bridged`` (0 or 1); ``lamp`` (0 to 1) where asked;
+        ``picture``, the count of the frame in the file; and what was measured, unfiltered, of each
+        frame: ``centroid_x``, ``centroid_y``, ``panel_length``, ``panel_height`` (pixel),
+        ``panel_angle`` (rad, positive clockwise as seen), ``panel_area`` (pixel²), ``panel_fill``
+        and ``saturation`` (saturated part of the picture).
+    attributes : mapping of str to object
+        Calibration and settings.
     """
 
-    metres_per_pixel: float | None = None
-    panel: tuple[float, float] = (0.30, 0.10)
-    panel_place: tuple[float, float] = (0.0, 0.25)
-    downstream: Literal["right", "left"] = "right"
-    level: float = 0.0
-    origin: tuple[float, float] | None = None
-    rest: float = 1.0
-    lower: tuple[int, int, int] = (150, 150, 150)
-    upper: tuple[int, int, int] = (255, 255, 255)
-    opening: int = 5
-    closing: int = 9
-    refine: bool = True
-    region: tuple[int, int, int, int] | None = None
-    lamp: tuple[float, float, float] | None = None
-    tolerance: float = 0.02
-    max_speed: float = 3.0
-    bridge: float = 0.0
-    passband: float | None = 4.0
-    stopband: float | None = None
+    time: FloatArray
+    channels: Mapping[str, npt.NDArray[Any]]
+    attributes: Mapping[str, Any]
 
-    def __post_init__(self) -> None:
-        for name, unit in (("rest", "s"), ("tolerance", "a part"), ("max_speed", "m/s")):
-            positive(getattr(self, name), name, unit)
-        if self.metres_per_pixel is not None:
-            positive(self.metres_per_pixel, "metres_per_pixel", "m")
-        if len(self.panel) != 2 or not self.panel[0] > 1.2 * self.panel[1] > 0:
-            raise RequestError(
-                f"panel is (length, height) in metres, the length at least 1.2 times the height, "
-                f"or its orientation means nothing; received {self.panel}."
-            )
-        if self.downstream not in ("right", "left"):
-            raise RequestError(
-                f"downstream is 'right' or 'left' in the picture; received {self.downstream!r}."
-            )
-        _check_colours(self.lower, self.upper)
-        if self.opening < 0 or self.closing < 0:
-            raise RequestError(
-                f"opening and closing are sides in pixels, 0 for none; received {self.opening} "
-                f"and {self.closing}."
-            )
-        if self.region is not None and (min(self.region) < 0 or min(self.region[2:]) < 1):
-            raise RequestError(
-                f"region is (left, top, width, height) in pixels; received {self.region}."
-            )
-        if not self.bridge >= 0:
-            raise RequestError(f"bridge is a time in s, 0 for none; received {self.bridge!r}.")
-
-    def segmentation(self) -> Segmentation:
-        """Return the part of the settings that one frame needs."""
-        return Segmentation(
-            self.lower, self.upper, self.opening, self.closing, self.region, self.refine
-        )
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        """Channel of a name."""
+        return self.channels[name]
 
 
-def _check_colours(lower: tuple[int, int, int], upper: tuple[int, int, int]) -> None:
-    if not (len(lower) == len(upper) == 3) or not all(
-        0 <= low <= high <= 255 for low, high in zip(lower, upper, strict=True)
-    ):
-        raise RequestError(
-            f"lower (--threshold) and upper are (red, green, blue), each 0 to 255 and lower not "
-            f"above upper; received {lower} and {upper}."
-        )
+@dataclass
+class _Video:
+    """An open video; `announced` is the number of frames its header states, or 0."""
+
+    path: Path
+    rate: float
+    announced: int
+    size: tuple[int, int]
+    capture: Any
+
+    def frames(self) -> Iterator[tuple[int, Image]]:
+        """Yield the frames with their numbers, which skip a step where the time stamps do."""
+        import cv2
+
+        first, previous, count = 0.0, -1, 0
+        while (read := self.capture.read())[0]:
+            stamp = 1e-3 * float(self.capture.get(cv2.CAP_PROP_POS_MSEC))
+            first = stamp if count == 0 else first
+            number = round((stamp - first) * self.rate)
+            if not np.isfinite(stamp) or (count and stamp <= first):
+                number = previous + 1  # a container without time stamps
+            if number <= previous:
+                raise DataError(
+                    f"{self.path}: frames {count - 1} and {count} are less than half a step of "
+                    f"{1 / self.rate:.4g} s apart, so the frame rate varies. Encode the video "
+                    "again with a constant rate."
+                )
+            yield number, np.asarray(read[1], dtype=np.uint8)
+            previous, count = number, count + 1
+        if count == 0:
+            raise DataError(f"{self.path} holds no frame that can be decoded. Export it again.")
+        # Headers of some containers are off by a frame or two.
+        if self.announced - count > max(2, 0.01 * self.announced):
+            warnings.warn(
+                f"{self.path} announces {self.announced} frames and ends after {count}: it was cut "
+                "off or is damaged. What is there was used; copy the file again.",
+                SeakeepWarning,
+                stacklevel=2,
+            )
+
+
+@contextmanager
+def _open_video(path: Path | str) -> Iterator[_Video]:
+    """Open a video that OpenCV reads, such as MP4, AVI or MOV."""
+    cv2, path = opencv(), existing_file(path)
+    if path.stat().st_size == 0:
+        raise DataError(f"{path} is empty (0 bytes). Copy the video again.")
+    capture = cv2.VideoCapture(str(path))
+    try:
+        if not capture.isOpened():
+            raise DataError(
+                f"{path} cannot be opened as a video: it holds no frames, was cut off (an MP4 file "
+                "has its table of frames at the end), or is a file of another kind. Copy or export "
+                "it again."
+            )
+        rate = float(capture.get(cv2.CAP_PROP_FPS))
+        if not SLOWEST <= rate <= FASTEST:
+            raise DataError(
+                f"{path} states {rate:g} frames a second, which cannot be. Encode it again with "
+                "its true, constant rate."
+            )
+        width, height, announced = (
+            capture.get(key)
+            for key in (
+                cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT, cv2.CAP_PROP_FRAME_COUNT,
+            )
+        )  # fmt: skip
+        yield _Video(path, rate, max(int(announced), 0), (int(width), int(height)), capture)
+    finally:
+        capture.release()
 
 
 def track_video(
     path: Path | str,
     settings: TrackingSettings | None = None,
     progress: Progress | None = None,
-) -> xr.Dataset:
+) -> Track:
     """Track the white panel of a video.
 
     Parameters
@@ -167,15 +215,7 @@ def track_video(
 
     Returns
     -------
-    Dataset
-        Over ``time`` (s from the first frame): ``surge``, ``heave`` (m) and ``pitch`` (rad) of
-        the centre of gravity, filtered, NaN where the frame was flagged and not bridged;
-        ``quality`` (1 like the others, below 0.5 flagged, 0 lost); ``flag`` (its attributes
-        ``flag_values`` and ``flag_meanings`` say what); ``bridged`` (0 or 1); ``lamp`` (0 to 1)
-        where asked; and what was measured, unfiltered, of each frame: ``centroid_x``,
-        ``centroid_y``, ``panel_length``, ``panel_height`` (pixel), ``panel_angle`` (rad,
-        positive clockwise as seen), ``panel_area`` (pixel²), ``panel_fill`` and ``saturation``
-        (saturated part of the picture). The attributes hold the calibration and the settings.
+    Track
 
     Raises
     ------
@@ -189,30 +229,49 @@ def track_video(
     >>> tracked = track_video("side_view.mp4")  # doctest: +SKIP
     """
     how = settings or TrackingSettings()
-    with open_video(path) as video:
+    with _open_video(path) as video:
         _check_fit(video, how)
-        frames, rows, lamp = _measure(video, how, progress)
+        frames, seen, lamp = _measure(video, how, progress)
         size, rate = video.size, video.rate
     count = int(frames[-1]) + 1
     if count < 2:
         raise DataError(f"{path} holds one frame; a motion needs at least two. Export it again.")
-    seen = _on_grid(frames, rows, count)
-    reference = reference_panel(seen, how.panel, how.metres_per_pixel, str(path))
-    width, height = size if how.region is None else how.region[2:]
-    limits = Limits(how.tolerance, how.max_speed, 1.0 / rate, width * height, not how.refine)
-    flag, quality = judge(seen, reference, limits)
-    _tell(path, flag)
-    motion, bridged = _motions(seen, flag, reference, how, rate, str(path))
-    out = _dataset(seen, motion, rate, width * height)
-    out = out.assign(_judgement(flag, quality, bridged, frames))
+    usual = _usual_panel(seen, how, str(path))
+    pixels = int(np.prod(size if how.region is None else how.region[2:]))
+    flag, quality = _judge(seen, usual, how, 1.0 / rate, pixels)
+    _warn_of_flags(path, flag)
+    motion, bridged = _motions(seen, flag == FLAGS["good"], usual, how, rate, str(path))
+    picture = np.full(count, -1)
+    picture[frames] = np.arange(frames.size)
+    channels: dict[str, npt.NDArray[Any]] = {
+        **motion,
+        "centroid_x": seen["x"],
+        "centroid_y": seen["y"],
+        **{f"panel_{name}": seen[name] for name in ("angle", "length", "height", "area", "fill")},
+        "saturation": seen["saturation"] / pixels,
+        "quality": quality,
+        "bridged": bridged.astype(np.int8),
+        "picture": picture,
+        "flag": flag.astype(np.int8),
+    }
     if how.lamp is not None:
-        level = np.full(count, np.nan)
-        level[frames] = lamp
-        out["lamp"] = ("time", level, {"units": "1", "long_name": "brightness of the lamp"})
-    return out.assign_attrs(_attributes(path, how, reference, rate))
+        channels["lamp"] = np.full(count, np.nan)
+        channels["lamp"][frames] = lamp
+    attributes = {
+        "source": Path(path).name,
+        "frame": "x downstream, z up, pitch positive bow up; motions of the centre of gravity",
+        "camera": f"downstream to the {how.downstream} of the picture",
+        "frame_rate": rate,
+        "metres_per_pixel": usual["scale"],
+        "calibration": "stated" if how.metres_per_pixel is not None else "size of the panel",
+        "panel_length_seen": usual["length"],
+        "panel_height_seen": usual["height"],
+        "settings": json.dumps(asdict(how)),
+    }
+    return Track(np.arange(count) / rate, channels, attributes)
 
 
-def _check_fit(video: Video, how: TrackingSettings) -> None:
+def _check_fit(video: _Video, how: TrackingSettings) -> None:
     width, height = video.size
     if how.region is not None:
         left, top, wide, high = how.region
@@ -245,83 +304,170 @@ def _stopband(how: TrackingSettings) -> float | None:
 
 
 def _measure(
-    video: Video, how: TrackingSettings, progress: Progress | None
-) -> tuple[npt.NDArray[np.int64], FloatArray, FloatArray]:
-    """Numbers of the frames, what was seen in each (frame, field), and the lamp."""
+    video: _Video, how: TrackingSettings, progress: Progress | None
+) -> tuple[IntArray, dict[str, FloatArray], FloatArray]:
+    """Numbers of the frames, what was seen in each, on the uniform grid, and the lamp."""
     numbers: list[int] = []
-    rows: list[tuple[float, ...]] = []
+    rows: list[list[float]] = []
     lamp: list[float] = []
-    at_rest = how.origin is None
-    segmentation = how.segmentation()
-    disc = None if how.lamp is None else _disc(how.lamp, video.size)
+    at_rest, disc = how.origin is None, None
+    if how.lamp is not None:
+        x, y, radius = how.lamp
+        below, right = np.mgrid[: video.size[1], : video.size[0]]
+        disc = np.nonzero((right - x) ** 2 + (below - y) ** 2 <= radius**2)
     for number, frame in video.frames():
         if at_rest and number >= how.rest * video.rate:
             at_rest = False
-            _check_rest(video, how, np.array(rows))
+            if rows:  # refuse after the first frames what would be refused after the last one
+                where = f"first {how.rest:g} s (unless the origin is stated, zero lies there)"
+                _usual_panel(_on_grid(range(len(rows)), rows), how, f"{video.path}, {where}")
         numbers.append(number)
-        rows.append(find_panel(frame, segmentation).row())
+        rows.append(list(find_panel(frame, how).values()))
         if disc is not None:
             lamp.append(float(np.mean(frame[disc])) / 255.0)
         if progress is not None and len(numbers) % REPORT_EVERY == 0:
             progress(len(numbers), max(video.announced, len(numbers)), "frames")
     if progress is not None:
         progress(len(numbers), len(numbers), "frames")
-    return np.array(numbers), np.array(rows), np.array(lamp)
+    return np.array(numbers), _on_grid(numbers, rows), np.array(lamp)
 
 
-def _check_rest(video: Video, how: TrackingSettings, rows: FloatArray) -> None:
-    """Refuse after the first frames what would be refused after the last one."""
-    if rows.size == 0:
-        return
-    seen = _on_grid(np.arange(len(rows)), rows, len(rows))
-    where = f"{video.path}, first {how.rest:g} s (unless the origin is stated, zero lies there)"
-    reference_panel(seen, how.panel, how.metres_per_pixel, where)
+def _on_grid(frames: list[int] | range, rows: list[list[float]]) -> dict[str, FloatArray]:
+    """What was seen, by name; dropped frames are NaN."""
+    table = np.full((frames[-1] + 1, len(FIELDS)), np.nan)
+    table[list(frames)] = rows
+    return dict(zip(FIELDS, table.T, strict=True))
 
 
-def _disc(
-    lamp: tuple[float, float, float], size: tuple[int, int]
-) -> tuple[npt.NDArray[np.intp], ...]:
-    x, y, radius = lamp
-    rows, columns = np.mgrid[: size[1], : size[0]]
-    return np.nonzero((columns - x) ** 2 + (rows - y) ** 2 <= radius**2)
-
-
-def _on_grid(frames: npt.NDArray[np.int64], rows: FloatArray, count: int) -> dict[str, FloatArray]:
-    """What was seen, by name, on the uniform grid; dropped frames are NaN."""
-    table = np.full((count, rows.shape[1]), np.nan)
-    table[frames] = rows
-    return {field.name: table[:, i] for i, field in enumerate(fields(Sighting))}
-
-
-def _tell(path: Path | str, flag: npt.NDArray[np.int64]) -> None:
+def _warn_of_flags(path: Path | str, flag: IntArray) -> None:
     bad = int(np.sum(flag != FLAGS["good"]))
-    if 2 * bad <= flag.size:
-        return
-    counts = ", ".join(
-        f"{np.sum(flag == code)} {name}" for name, code in FLAGS.items() if np.any(flag == code)
+    if 2 * bad > flag.size:
+        counts = ", ".join(
+            f"{np.sum(flag == code)} {name}" for name, code in FLAGS.items() if np.any(flag == code)
+        )
+        warnings.warn(
+            f"{path}: {bad} of {flag.size} frames are flagged ({counts}). Look at the contact "
+            "sheet; mend the thresholds, state a region, or raise tolerance for a lens that "
+            "distorts.",
+            SeakeepWarning,
+            stacklevel=3,
+        )
+
+
+def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, Any]:
+    """Medians over the frames in which the largest component looks like the panel.
+
+    Of the fields of a frame; `scale` is m per pixel, `corners` an array, `corner_noise` the robust
+    standard deviation of the corner seen least.
+    """
+    panel, known = how.panel, how.metres_per_pixel
+    with np.errstate(invalid="ignore", divide="ignore"):
+        aspect = (seen["length"] / seen["height"]) / (panel[0] / panel[1])
+        like = (np.abs(aspect - 1) < ASPECT_BAND) & (seen["fill"] > LEAST_FILL)
+        like &= seen["cut"] == 0
+        if known is not None:
+            like &= np.abs(seen["length"] / (panel[0] / known) - 1) < SIZE_BAND
+    if not like.any():
+        raise DataError(_not_found(seen, how, name))
+    usual: dict[str, Any] = {
+        field: float(np.median(seen[field][like]))
+        for field in ("length", "height", "fill", "saturation", "brightness")
+    }
+    usual["scale"] = known or float(
+        np.sqrt(panel[0] * panel[1] / (usual["length"] * usual["height"]))
     )
-    warnings.warn(
-        f"{path}: {bad} of {flag.size} frames are flagged ({counts}). Look at the contact sheet; "
-        "mend the thresholds, state a region, or raise tolerance for a lens that distorts.",
-        SeakeepWarning,
-        stacklevel=3,
+    corners = np.stack([seen[corner][like] for corner in CORNERS])
+    usual["corners"] = np.median(corners, axis=1)
+    lowest = np.min(corners - usual["corners"][:, None], axis=0)
+    usual["corner_noise"] = 1.4826 * float(np.median(np.abs(lowest - np.median(lowest))))
+    return usual
+
+
+def _not_found(seen: Seen, how: TrackingSettings, name: str) -> str:
+    there, panel, known = seen["area"] > 0, how.panel, how.metres_per_pixel
+    wanted = f"{panel[0]:g} × {panel[1]:g} m"
+    if known is not None:
+        wanted += f", {panel[0] / known:.0f} × {panel[1] / known:.0f} pixels"
+    start = f"{name}: the panel ({wanted}) was not found in any of {there.size} frames: "
+    if not there.any():
+        return start + (
+            "nothing is as bright as the thresholds ask. Reduce the least red, green and blue "
+            "(lower; --threshold), or correct the region."
+        )
+    length, height = np.median(seen["length"][there]), np.median(seen["height"][there])
+    return start + (
+        f"the largest bright component measures {length:.0f} × {height:.0f} pixels (median of "
+        f"{int(there.sum())} frames), which is not its shape. Raise the least red, green and blue "
+        "(lower; --threshold), state a region that holds no other bright thing, or correct the "
+        "panel's size."
     )
+
+
+def _judge(
+    seen: Seen, usual: Mapping[str, Any], how: TrackingSettings, step: float, pixels: int
+) -> tuple[IntArray, FloatArray]:
+    """Flag frames that cannot be trusted, and give each a quality figure.
+
+    Quality is one less half the largest deviation in units of what is allowed: at 0.5 and above
+    the shape is good; 0 where there is nothing to see. A flagged frame has less than 0.5.
+    """
+    tolerance, panel_area = how.tolerance * usual["length"], usual["length"] * usual["height"]
+    excess = np.nan_to_num(seen["saturation"] - usual["saturation"])
+    corners = usual["corners"][:, None] - np.stack([seen[name] for name in CORNERS])
+    least = CORNER_DROP if how.refine else BINARY_CORNER_DROP
+    drop = max(least, CORNER_NOISE * usual["corner_noise"])
+    hidden = np.max(np.nan_to_num(corners, nan=np.inf), axis=0) / drop
+    deviations = (
+        hidden,
+        np.abs(seen["length"] - usual["length"]) / tolerance,
+        np.abs(seen["height"] - usual["height"]) / tolerance,
+        (usual["fill"] - seen["fill"]) / FILL_DROP,
+    )
+    shape = np.max(np.nan_to_num(np.stack(deviations), nan=np.inf), axis=0)
+    off = (shape > 1) | (seen["cut"] > 0)
+    flag = np.full(shape.size, FLAGS["good"])
+    flag[off] = FLAGS["misshapen"]
+    small = (seen["area"] < panel_area) | (hidden > 1) | (seen["cut"] > 0)
+    flag[off & small] = FLAGS["occluded"]
+    brighter = seen["brightness"] > BRIGHTER * usual["brightness"]
+    flag[(off | brighter) & (excess > GLARE * panel_area)] = FLAGS["overexposed"]
+    flag[excess > FLOOD * pixels] = FLAGS["overexposed"]
+    flag[(seen["area"] == 0) & (excess <= GLARE * panel_area)] = FLAGS["lost"]
+    flag[~np.isfinite(seen["area"])] = FLAGS["dropped"]
+    # From the middle of the neighbours to either end; twice that where some of them are flagged.
+    reach = how.max_speed * step * NEIGHBOURS / usual["scale"] + tolerance
+    flag[_jumps(seen, flag == FLAGS["good"], reach)] = FLAGS["jump"]
+    quality = np.clip(1.0 - 0.5 * shape, 0.0, 1.0)
+    flagged = flag != FLAGS["good"]
+    quality[flagged] = np.minimum(quality[flagged], FLAGGED_QUALITY)
+    return flag, quality
+
+
+def _jumps(seen: Seen, good: BoolArray, reach: float) -> IntArray:
+    """Good frames whose place is further from the median of their neighbours than can be."""
+    at = np.flatnonzero(good)
+    if at.size < NEIGHBOURS:
+        return at[:0]
+    away = np.zeros(at.size)
+    for axis in ("x", "y"):
+        place = seen[axis][at]
+        middle = scipy.ndimage.median_filter(place, NEIGHBOURS, mode="nearest")
+        away = np.hypot(away, place - middle)
+    return at[away > reach]
 
 
 def _motions(
-    seen: dict[str, FloatArray],
-    flag: npt.NDArray[np.int64],
-    reference: Reference,
+    seen: Seen,
+    good: BoolArray,
+    usual: Mapping[str, Any],
     how: TrackingSettings,
     rate: float,
     name: str,
-) -> tuple[dict[str, FloatArray], npt.NDArray[np.int8]]:
+) -> tuple[dict[str, FloatArray], BoolArray]:
     """Surge, heave and pitch of the centre of gravity, filtered, and what was bridged."""
-    good = flag == FLAGS["good"]
     side = 1.0 if how.downstream == "right" else -1.0
     pitch = side * seen["angle"] - how.level
-    along, up = how.panel_place
-    scale = reference.metres_per_pixel
+    (along, up), scale = how.panel_place, usual["scale"]
     # Where the panel's centre would be if the vessel had turned about its centre of gravity alone.
     x = side * scale * seen["x"] - along * np.cos(pitch) - up * np.sin(pitch)
     z = -scale * seen["y"] + along * np.sin(pitch) - up * np.cos(pitch)
@@ -335,104 +481,81 @@ def _motions(
                 "would be made zero. State the origin, or a longer rest."
             )
         at = float(np.mean(x[rest])), float(np.mean(z[rest]))
-    raw = np.stack([x - at[0], z - at[1], pitch], axis=1)
-    raw[~good] = np.nan
-    table, bridged = _bridged(raw, good, how.bridge * rate)
-    stop = _stopband(how)
-    if how.passband is not None and stop is not None:
-        for begin, end in stretches(np.isfinite(table[:, 0])):
-            if end - begin > 1:
-                table[begin:end] = low_pass(table[begin:end], 1.0 / rate, how.passband, stop)
-    motions = dict(zip(("surge", "heave", "pitch"), table.T, strict=True))
-    return motions, bridged.astype(np.int8)
-
-
-def _bridged(
-    table: FloatArray, good: npt.NDArray[np.bool_], longest: float
-) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """Fill inner gaps of at most `longest` frames; say which frames were filled."""
+    table = np.stack([x - at[0], z - at[1], pitch], axis=1)
+    table[~good] = np.nan
     filled = np.zeros(good.size, dtype=bool)
     for begin, end in stretches(~good):
-        if begin > 0 and end < good.size and end - begin <= longest + 1e-9:
+        if begin > 0 and end < good.size and end - begin <= how.bridge * rate + 1e-9:
             filled[begin:end] = True
     if filled.any():
-        at = np.flatnonzero(good)
-        between = scipy.interpolate.PchipInterpolator(at, table[at], axis=0)
-        table = table.copy()
+        there = np.flatnonzero(good)
+        between = scipy.interpolate.PchipInterpolator(there, table[there], axis=0)
         table[filled] = between(np.flatnonzero(filled))
-    return table, filled
+    stop = _stopband(how)
+    if how.passband is not None and stop is not None:
+        for begin, end in stretches(good | filled):
+            if end - begin > 1:
+                table[begin:end] = low_pass(table[begin:end], 1.0 / rate, how.passband, stop)
+    return dict(zip(("surge", "heave", "pitch"), table.T, strict=True)), filled
 
 
-def _dataset(
-    seen: dict[str, FloatArray],
-    motion: dict[str, FloatArray],
-    rate: float,
-    pixels: int,
-) -> xr.Dataset:
-    measured = {
-        "centroid_x": ("x", "pixel", "panel centroid, to the right"),
-        "centroid_y": ("y", "pixel", "panel centroid, downwards"),
-        "panel_angle": ("angle", "rad", "panel orientation, clockwise as seen"),
-        "panel_length": ("length", "pixel", "panel length as seen"),
-        "panel_height": ("height", "pixel", "panel height as seen"),
-        "panel_area": ("area", "pixel^2", "panel area as seen"),
-        "panel_fill": ("fill", "1", "panel area by that of the rectangle around it"),
-        "saturation": ("saturation", "1", "saturated part of the picture"),
-    }
-    units = {"surge": "m", "heave": "m", "pitch": "rad"}
-    data = {
-        key: ("time", value, {"units": units[key], "long_name": key})
-        for key, value in motion.items()
-    }
-    for name, (field, unit, label) in measured.items():
-        values = seen[field] / pixels if name == "saturation" else seen[field]
-        data[name] = ("time", values, {"units": unit, "long_name": label})
-    time = np.arange(seen["x"].size) / rate
-    return xr.Dataset(data, {"time": ("time", time, {"units": "s", "long_name": "time"})})
+def contact_sheet(path: Path | str, track: Track, frames: int = 12, columns: int = 3) -> bytes:
+    """Frames of a video with the tracked panel outlined, the worst ones among them, as PNG.
+
+    Parameters
+    ----------
+    path : path
+        The video.
+    track : Track
+        From :func:`track_video`.
+    frames, columns : int, optional
+        Number of frames, and how many of them stand in a row.
+
+    Returns
+    -------
+    bytes
+        The picture: green frames count, red ones are flagged.
+
+    Raises
+    ------
+    DataError
+        If the video is not the one that was tracked.
+    """
+    cv2 = opencv()
+    there = np.flatnonzero(track["picture"] >= 0)
+    worst = there[np.argsort(track["quality"][there], kind="stable")][: frames // 3]
+    rest = np.setdiff1d(there, worst)
+    spread = rest[np.linspace(0, rest.size - 1, min(frames - worst.size, rest.size)).astype(int)]
+    tiles = []
+    with _open_video(path) as video:
+        for index in np.union1d(worst, spread):
+            video.capture.set(cv2.CAP_PROP_POS_FRAMES, int(track["picture"][index]))
+            read, frame = video.capture.read()
+            if not read:
+                raise DataError(
+                    f"{path} has no frame {int(track['picture'][index])}: it is not the video that "
+                    "was tracked, or was changed since. Track it again."
+                )
+            tiles.append(_tile(cv2, frame, track, int(index)))
+    tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % columns)
+    rows = [np.hstack(tiles[i : i + columns]) for i in range(0, len(tiles), columns)]
+    return bytes(cv2.imencode(".png", np.vstack(rows))[1])
 
 
-def _judgement(
-    flag: npt.NDArray[np.int64],
-    quality: FloatArray,
-    bridged: npt.NDArray[np.int8],
-    frames: npt.NDArray[np.int64],
-) -> dict[str, tuple[str, npt.NDArray[Any], dict[str, object]]]:
-    """Variables that say what a frame is worth, and which picture of the file it is."""
-    picture = np.full(flag.size, -1)
-    picture[frames] = np.arange(frames.size)
-    labels: dict[str, tuple[npt.NDArray[Any], str]] = {
-        "quality": (quality, "quality of the frame"),
-        "bridged": (bridged, "whether the frame is bridged"),
-        "picture": (picture, "count of the frame in the file"),
-    }
-    out: dict[str, tuple[str, npt.NDArray[Any], dict[str, object]]] = {
-        name: ("time", values, {"units": "1", "long_name": label})
-        for name, (values, label) in labels.items()
-    }
-    out["flag"] = ("time", flag.astype(np.int8), _flag_attributes())
-    return out
-
-
-def _flag_attributes() -> dict[str, object]:
-    return {
-        "units": "1",
-        "long_name": "flag of the frame",
-        "flag_values": np.array(list(FLAGS.values()), dtype=np.int8),
-        "flag_meanings": " ".join(FLAGS),
-    }
-
-
-def _attributes(
-    path: Path | str, how: TrackingSettings, reference: Reference, rate: float
-) -> dict[str, object]:
-    return {
-        "source": Path(path).name,
-        "frame": "x downstream, z up, pitch positive bow up; motions of the centre of gravity",
-        "camera": f"downstream to the {how.downstream} of the picture",
-        "frame_rate": rate,
-        "metres_per_pixel": reference.metres_per_pixel,
-        "calibration": "stated" if how.metres_per_pixel is not None else "size of the panel",
-        "panel_length_seen": reference.length,
-        "panel_height_seen": reference.height,
-        "settings": json.dumps(asdict(how)),
-    }
+def _tile(cv2: Any, frame: Image, track: Track, index: int) -> Image:
+    """One frame, small, with the rectangle that was tracked, its instant and its flag."""
+    here = {name: float(values[index]) for name, values in track.channels.items()}
+    colour = (60, 200, 60) if here["flag"] == FLAGS["good"] else (40, 40, 240)
+    if np.isfinite(here["centroid_x"]):
+        box = cv2.boxPoints((
+            (here["centroid_x"], here["centroid_y"]),
+            (here["panel_length"], here["panel_height"]),
+            np.rad2deg(here["panel_angle"]),
+        ))  # fmt: skip
+        cv2.polylines(frame, [np.round(box).astype(np.int32)], True, colour, 2, cv2.LINE_AA)
+    small = cv2.resize(frame, (480, round(480 * frame.shape[0] / frame.shape[1])))
+    name = next(key for key, code in FLAGS.items() if code == here["flag"])
+    text = f"{track.time[index]:.2f} s  {name}  quality {here['quality']:.2f}"
+    cv2.putText(small, text, (6, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
+    cv2.rectangle(small, (0, 0), (small.shape[1] - 1, small.shape[0] - 1), colour, 3)
+    return np.asarray(small, dtype=np.uint8)
