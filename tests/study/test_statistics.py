@@ -10,7 +10,7 @@ import xarray as xr
 from seakeep import statistics
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.study import read_study, run_study
-from seakeep.study.judge import box_table, coverage_table, joined
+from seakeep.study.judge import box_table, coverage_table, joined, skill_table
 from seakeep.study.plan import make_plan, random_stream
 
 
@@ -166,3 +166,50 @@ def test_boxes_are_matplotlibs_of_the_judged_cells():
             assert float(row[ours]) == pytest.approx(float(box[theirs]), rel=1e-12), ours
         assert int(row["count"]) == len(values)
     assert int(table["left_out"].sel(channel="pitch")) == 1
+
+
+WILD = """
+[models.wild]
+state_delays = 30
+input_delays = 0
+ridge = 1e-12
+window = 150
+delay_rows = "ridge"
+ridge_scale = "absolute"
+"""
+
+
+def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study):
+    text = put_study(tmp_path)
+    path = tmp_path / "study.toml"
+    path.write_text(text.replace("length = 6", "length = 20") + WILD, "utf-8")
+    with pytest.warns(SeakeepWarning, match=r"^6 forecast\(s\) diverged and are left out: model "
+        r"'wild', training set 't00', window 0 of 'unseen' \(unseen from .* and 1 more"
+    ):  # fmt: skip
+        found = run_study(read_study(path), tmp_path / "out")
+    lost = found.groups["statistics/lost"]
+    assert set(lost["model"].values) == {"wild"}
+    boxes = found.groups["statistics/boxes/unseen"].sel(channel="average", measure="nrmse")
+    assert boxes["count"].sel(model="wild") == 0
+    assert boxes["count"].sel(model="deterministic") == 6
+    assert np.isfinite(found.groups["statistics/divergence"]["mean"].sel(model="bayesian")).all()
+
+
+def test_skill_is_the_change_of_the_median_error_against_the_baselines():
+    boxes = xr.Dataset(
+        {"median": (("model", "measure", "channel"), [[[0.4]], [[0.5]], [[0.8]], [[1.0]]])},
+        coords={
+            "model": ["mine", "fast", "slow", "still"],
+            "measure": ["nrmse"],
+            "channel": ["average"],
+        },
+    )
+    kinds = {"mine": "hankel_dmdc", "fast": "arx", "slow": "fir", "still": "hold_last"}
+    skill = skill_table(boxes, kinds)
+    assert dict(zip(skill["reference"].values, skill["reference_model"].values, strict=True)) == {
+        "hold_last": "still",
+        "best_linear": "fast",
+    }
+    mine = skill["change"].sel(model="mine", measure="nrmse")
+    np.testing.assert_allclose(mine, [-0.6, -0.2], rtol=1e-12)
+    assert skill_table(boxes, {"mine": "hankel_dmdc"}) is None

@@ -490,29 +490,7 @@ def _band_entries(comparison: Comparison, slack: xr.Dataset) -> dict[str, Any]:
 def instant_of(
     stated: float | str, campaign: Campaign, runs: Iterable[xr.Dataset], name: str
 ) -> float:
-    """Instant in seconds.
-
-    Parameters
-    ----------
-    stated : float or str
-        Seconds, or a text such as ``"20 T"``: encounter periods of the campaign.
-    campaign : Campaign
-        The campaign.
-    runs : iterable of Dataset
-        Prepared runs; where they know the encounter period, no file is read for it.
-    name : str
-        What is stated, for messages.
-
-    Returns
-    -------
-    float
-        Seconds.
-
-    Raises
-    ------
-    RequestError
-        If the text says something else, or the campaign has no encounter period.
-    """
+    """Instant in seconds."""
     if not isinstance(stated, str):
         return float(stated)
     try:
@@ -524,27 +502,7 @@ def instant_of(
 def samples_of(
     stated: float | str, campaign: Campaign, runs: Iterable[xr.Dataset], dt: float, name: str
 ) -> int:
-    """Number of samples; a length in encounter periods is rounded to the nearest one.
-
-    Parameters
-    ----------
-    stated : int or str
-        A number of samples, or a text such as ``"15 T"``: encounter periods of the campaign.
-    campaign, runs, name
-        As in :func:`instant_of`.
-    dt : float
-        Time step, s.
-
-    Returns
-    -------
-    int
-        Samples.
-
-    Raises
-    ------
-    RequestError
-        As :func:`instant_of`.
-    """
+    """Number of samples; a length in encounter periods is rounded to the nearest one."""
     if not isinstance(stated, str):
         return int(stated)
     try:

@@ -40,24 +40,7 @@ PAPER_SEGMENT, PAPER_OVERLAP, PAPER_PADDED = 2**12 / 500, 2**7 / 500, 2**16 / 50
 
 
 def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset]:
-    """Say what went into a study.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    plan : Plan
-        Its windows.
-    runs : mapping of str to Dataset
-        Prepared runs.
-
-    Returns
-    -------
-    dict of str to Dataset
-        ``channels``, ``training``, ``runs``, ``prepared/RUN`` (all channels of a run with the
-        flags and findings of its preparation, single precision) and, where there is a wave
-        elevation among the inputs, ``spectra``.
-    """
+    """Say what went into a study."""
     groups = {
         "channels": _channels(study.campaign, plan, runs),
         "training": _training(plan, runs),

@@ -128,21 +128,7 @@ def _longest_window(spec: Spec, dt: float) -> int | None:
 def _warn_of_slow_model(
     model: HankelDMDcModel | HankelEnsemble, runs: Mapping[str, xr.Dataset]
 ) -> None:
-    """Warn of slow motions that the training windows of a model hold fewer than five periods of.
-
-    Parameters
-    ----------
-    model : HankelDMDcModel or HankelEnsemble
-        The model; of an ensemble the longest windows count.
-    runs : mapping of str to Dataset
-        Its training runs; the encounter period is taken from their attributes, or where they have
-        none from the first input. Nothing is said of a model that has neither.
-
-    Warns
-    -----
-    SeakeepWarning
-        As :func:`seakeep.models.slow.warn_of_slow_motions`.
-    """
+    """Warn of slow motions that the training windows of a model hold fewer than five periods of."""
     spans = model.training_spans
     first = runs[next(iter(spans))]
     period = first.attrs.get("encounter_period")
@@ -163,20 +149,6 @@ def warn_of_repeats(
 
     Training runs that the campaign marks as regular waves are left out: regular waves repeat by
     their nature. So are runs that the campaign does not have.
-
-    Parameters
-    ----------
-    model : HankelDMDcModel or HankelEnsemble
-        The model, which knows the runs and spans it was trained on.
-    campaign : Campaign
-        The campaign.
-    tested : mapping of str to Dataset
-        Prepared test runs.
-
-    Warns
-    -----
-    SeakeepWarning
-        One for each test run that repeats.
     """
     training = {
         name: span

@@ -9,7 +9,7 @@ the block length of Politis and White.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,10 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "paper": {"block_length": "carlstein", "bandwidth": "paper", "joins": True},
     "recommended": {"block_length": "politis_white", "bandwidth": "silverman", "joins": False},
 }
+LINEAR = ("fir", "arx", "subspace")
+"""Kinds of the linear baselines."""
+SHOWN = 5
+"""Lost forecasts that a warning names."""
 TREND_SERIES = 500
 NEAR = 0.1
 """Energy within this part of a frequency counts as energy at it."""
@@ -52,34 +56,18 @@ NEAR = 0.1
 def judge(
     groups: Mapping[str, xr.Dataset], settings: StudySettings, channels: Sequence[str]
 ) -> dict[str, xr.Dataset]:
-    """All statistics of a study.
-
-    Parameters
-    ----------
-    groups : mapping of str to Dataset
-        ``tests/NAME`` with the arrays of every model, ``runs``, ``training``, ``spectra`` and,
-        where bands are calibrated, ``calibration/MODEL``.
-    settings : StudySettings
-        The study.
-    channels : sequence of str
-        Channels that are forecast.
-
-    Returns
-    -------
-    dict of str to Dataset
-        ``statistics/boxes/TEST`` over (model, measure, channel), ``statistics/coverage/TEST``
-        over (model, against, channel), ``statistics/trend/TEST`` over (band, model),
-        ``statistics/response/TEST`` for regular waves (:func:`regular_response`),
-        ``statistics/divergence`` over (model, variant, channel) and ``statistics/densities`` over
-        (model, channel, grid).
-    """
+    """All statistics of a study, as groups ``statistics/…``."""
     models = list(settings.models)
-    ensembles = [m for m in models if settings.models[m].kind == "bayesian_hankel_dmdc"]
+    kinds = {name: each.kind for name, each in settings.models.items()}
     out: dict[str, xr.Dataset] = {}
+    if (lost := lost_forecasts(groups, settings.tests, models)) is not None:
+        out["statistics/lost"] = lost
     for name in settings.tests:
         test = groups[f"tests/{name}"]
-        out[f"statistics/boxes/{name}"] = box_table(test, models)
-        if ensembles:
+        out[f"statistics/boxes/{name}"] = boxes = box_table(test, models)
+        if (skill := skill_table(boxes, kinds)) is not None:
+            out[f"statistics/skill/{name}"] = skill
+        if ensembles := [model for model in models if f"{model}_lower" in test]:
             margins = {
                 m: groups[f"calibration/{m}"]["margin"].values
                 for m in ensembles
@@ -101,22 +89,73 @@ def judge(
     return out
 
 
+def lost_forecasts(
+    groups: Mapping[str, xr.Dataset], tests: Iterable[str], models: Sequence[str]
+) -> xr.Dataset | None:
+    """Cells without a whole forecast, which are left out; of an ensemble all members were lost."""
+    rows = []
+    for name in tests:
+        test = groups[f"tests/{name}"]
+        runs, starts = test["run"].values.astype(str), test["start"].values
+        for model in models:
+            gone = np.isnan(test[f"{model}_mean"].values).any(axis=(2, 3)) & test["judged"].values
+            for k, w in zip(*np.nonzero(gone), strict=True):
+                training = str(test["training"].values[k])
+                rows.append((model, name, training, int(w), runs[w], float(starts[w])))
+    if not rows:
+        return None
+    keys = ("model", "test", "training", "window", "run", "start")
+    columns = dict(zip(keys, map(list, zip(*rows, strict=True)), strict=True))
+    return xr.Dataset({key: ("cell", values) for key, values in columns.items()})
+
+
+def words_of_lost(lost: xr.Dataset) -> str:
+    """One sentence that names model, training set and window of each lost forecast."""
+    cells = [lost.isel(cell=number) for number in range(lost.sizes["cell"])]
+    named = [
+        f"model '{each['model'].item()}', training set '{each['training'].item()}', window "
+        f"{each['window'].item()} of '{each['test'].item()}' ({each['run'].item()} from "
+        f"{each['start'].item():.6g} s)"
+        for each in cells[:SHOWN]
+    ]
+    more = f"; and {len(cells) - SHOWN} more, in statistics/lost" if len(cells) > SHOWN else ""
+    return (
+        f"{len(cells)} forecast(s) diverged and are left out: {'; '.join(named)}{more}. A larger "
+        "ridge, fewer delays or more training data make a model stable."
+    )
+
+
+def skill_table(boxes: xr.Dataset, kinds: Mapping[str, str]) -> xr.Dataset | None:
+    """How much smaller the median error of each model is than that of the baselines in the study.
+
+    ``change`` over (model, reference, measure) is the median error over that of the reference,
+    minus one: −0.2 is better by 20 %. References are ``hold_last``, ``mean`` and
+    ``best_linear``, the linear baseline of least median ANRMSE; None without any.
+    """
+    median = boxes["median"].sel(channel="average", drop=True)
+    named = {kind: model for model, kind in kinds.items() if kind in ("hold_last", "mean")}
+    linear = [model for model, kind in kinds.items() if kind in LINEAR]
+    errors = {model: float(median.sel(model=model, measure="nrmse")) for model in linear}
+    if known := {model: error for model, error in errors.items() if np.isfinite(error)}:
+        named["best_linear"] = min(known, key=known.__getitem__)
+    if not named:
+        return None
+    references = [median.sel(model=model, drop=True) for model in named.values()]
+    change = xr.concat([median / each - 1 for each in references], dim="reference")
+    return xr.Dataset(
+        {
+            "change": change.transpose("model", "reference", "measure"),
+            "reference_model": ("reference", list(named.values())),
+        },
+        coords={"reference": list(named)},
+    )
+
+
 def box_table(test: xr.Dataset, models: Sequence[str]) -> xr.Dataset:
-    """Quartiles of the errors over all cells of a test set.
+    """Quartiles of the errors over all cells of a test set, over (model, measure, channel).
 
-    Parameters
-    ----------
-    test : Dataset
-        The set.
-    models : sequence of str
-        Models.
-
-    Returns
-    -------
-    Dataset
-        Over (model, measure, channel): ``median``, ``lower_quartile``, ``upper_quartile``,
-        whiskers, ``mean``, ``count`` and ``left_out``. The channel ``average`` is the paper's
-        ANRMSE and NAMMAE: the average of each cell over the channels that can be judged.
+    The channel ``average`` is the paper's ANRMSE and NAMMAE: the average of each cell over the
+    channels that can be judged.
     """
     measures = ("nrmse", "nammae")
     numbers = (
@@ -150,18 +189,7 @@ def box_table(test: xr.Dataset, models: Sequence[str]) -> xr.Dataset:
 
 
 def average_of(cells: FloatArray) -> FloatArray:
-    """Average over the channels that are judged; NaN where a forecast diverged.
-
-    Parameters
-    ----------
-    cells : ndarray, shape (cell, channel)
-        Errors; a channel that is not judged (slack) is NaN in single cells, a diverged forecast
-        in all of its channels.
-
-    Returns
-    -------
-    ndarray, shape (cell,)
-    """
+    """Average of cells (cell, channel) over the judged channels; NaN where a forecast diverged."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, as wanted
         out: FloatArray = np.nanmean(cells, axis=-1)
@@ -173,21 +201,8 @@ def coverage_table(
 ) -> xr.Dataset:
     """Part of the instants at which the band holds the measurement, and the truth where known.
 
-    Parameters
-    ----------
-    test : Dataset
-        A test set.
-    ensembles : sequence of str
-        Models with a band.
-    margins : mapping of str to ndarray, each of shape (training, channel), optional
-        By how much the calibrated band of each is wider on either side.
-
-    Returns
-    -------
-    Dataset
-        Over (model, against, channel): ``inside``, ``below``, ``above``, and ``relative_width``
-        in measured standard deviations, averages over all cells; channel ``average`` too. With
-        margins the same of the calibrated band, ``calibrated_inside`` and so on.
+    Over (model, against, channel), averages over all cells. With margins, of shape (training,
+    channel), the same of the calibrated band: ``calibrated_inside`` and so on.
     """
     sides = ["measured", *(["truth"] if "truth" in test else [])]
     numbers = ("inside", "below", "above", "relative_width")
@@ -230,25 +245,7 @@ def _coverage_row(
 
 
 def trend_table(test: xr.Dataset, models: Sequence[str], rng: np.random.Generator) -> xr.Dataset:
-    """Test whether ε(t), averaged over all cells, grows with the age of the forecast.
-
-    Parameters
-    ----------
-    test : Dataset
-        A test set.
-    models : sequence of str
-        Models.
-    rng : numpy.random.Generator
-        Source of the redrawn series.
-
-    Returns
-    -------
-    Dataset
-        Over (band, model): ``slope`` (1/s) with ``lower`` and ``upper``, ``change`` over the
-        window, ``kendall_tau``, ``p_value``; over (band, model, time): ``error_mean``,
-        ``lower_quartile`` and ``upper_quartile`` of ε over the cells. Bands are ``all``, ``low``
-        and ``wave``.
-    """
+    """Test whether ε(t), averaged over all cells, grows with the age of the forecast."""
     numbers = ("slope", "lower", "upper", "change", "kendall_tau", "p_value", "block_length")
     names = ("error_mean", "lower_quartile", "upper_quartile")
     found = np.full((len(numbers), len(BAND_ERRORS), len(models)), np.nan)
@@ -280,23 +277,9 @@ def trend_table(test: xr.Dataset, models: Sequence[str], rng: np.random.Generato
 def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
     """Forecasts of the windows of a test set joined end to end, and the measurement.
 
-    Parameters
-    ----------
-    test : Dataset
-        A test set.
-    model : str
-        The model; of an ensemble the mean counts.
-
-    Returns
-    -------
-    predicted : ndarray, shape (series, time, channel)
-        One series a training set that may test all windows; where none may (runs are left out),
-        the k-th series takes each window's k-th training set. A series in which a forecast
-        diverged is left out.
-    measured : ndarray, shape (time, channel)
-        The same windows.
-    diverged : int
-        Series left out.
+    Forecasts have the shape (series, time, channel): one series per training set that may test all
+    windows; where none may (runs are left out), the k-th series takes each window's k-th training
+    set. A series in which a forecast diverged is left out; their number comes last.
     """
     judged = test["judged"].values
     mean = test[f"{model}_mean"].values
@@ -404,19 +387,7 @@ def wave_frequency(elevation: npt.ArrayLike, dt: float) -> float:
 
 
 def is_regular(groups: Mapping[str, xr.Dataset], test: str) -> bool:
-    """Whether all windows of a test set lie in runs of regular waves of known frequency.
-
-    Parameters
-    ----------
-    groups : mapping of str to Dataset
-        Of a study: ``runs`` and ``tests/NAME``.
-    test : str
-        The set.
-
-    Returns
-    -------
-    bool
-    """
+    """Whether all windows of a test set lie in runs of regular waves of known frequency."""
     names = [str(run) for run in groups[f"tests/{test}"]["run"].values]
     return bool(np.isfinite(groups["runs"]["wave_frequency"].sel(run=names)).all())
 
@@ -426,27 +397,11 @@ def regular_response(
 ) -> xr.Dataset:
     """Take the error of a test set in regular waves apart.
 
-    Parameters
-    ----------
-    groups : mapping of str to Dataset
-        Of a study: ``runs``, ``training``, ``tests/NAME``, and ``spectra`` where there are waves.
-    test : str
-        The set.
-    models : sequence of str
-        Models.
-
-    Returns
-    -------
-    Dataset
-        Over channel: ``sd_ratio`` (measured SD in training SDs) and ``mean_shift`` (measured mean
-        off the training mean, in training SDs), medians over cells. Over (model, channel):
-        ``error_offset``, ``error_wave`` and ``error_rest``, root mean squares over cells in
-        measured SDs, whose squares add up to that of the NRMSE; ``amplitude_ratio`` (median), and
-        ``phase_lead`` (degrees; of the forecast before the measurement, by the mean direction).
-        Over model: ``celerity`` and ``celerity_phase``, the lead that one celerity makes for waves
-        of another speed, where the alignment has one. Attributes: ``frequency`` (Hz),
-        ``phase_speed``, ``height_ratio`` and ``energy_share`` of the training sea, ``surge_shift``
-        (m).
+    ``error_offset``, ``error_wave`` and ``error_rest`` are root mean squares over cells in measured
+    SDs, whose squares add up to that of the NRMSE; ``phase_lead`` is that of the forecast before
+    the measurement, degrees; ``celerity_phase`` is the lead that one celerity makes for waves of
+    another speed. ``sd_ratio`` and ``mean_shift`` compare the measurement with training, in
+    training SDs.
     """
     data, runs = groups[f"tests/{test}"], groups["runs"]
     judged, channels = data["judged"].values, list(data["channel"].values)
@@ -506,7 +461,9 @@ def _parts(
     lost = np.isnan(known).all(axis=(0, 1))
     known[..., lost], answer[..., lost] = 0.0, 1.0
     errors = np.sqrt(np.nanmean(np.maximum(known, 0.0), axis=0))
-    direction = np.nanmean(answer / np.abs(answer), axis=0)
+    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
+        warnings.simplefilter("ignore", RuntimeWarning)  # a constant forecast has no phase
+        direction = np.nanmean(answer / np.abs(answer), axis=0)
     columns_of = [*errors, np.nanmedian(np.abs(answer), axis=0), np.degrees(np.angle(direction))]
     return [np.where(lost, np.nan, each) for each in columns_of]
 

@@ -143,29 +143,7 @@ def whole_span(run: xr.Dataset) -> tuple[float, float]:
 def choose_training(
     settings: StudySettings, runs: Runs, names: Sequence[str], needs: Needs
 ) -> tuple[TrainingSet, ...]:
-    """Choose what the models learn from.
-
-    Parameters
-    ----------
-    settings : StudySettings
-        The study.
-    runs : mapping of str to Dataset
-        Prepared runs.
-    names : sequence of str
-        Runs that train.
-    needs : Needs
-        Samples of the greediest model.
-
-    Returns
-    -------
-    tuple of TrainingSet
-        Each is long enough for all models and draws.
-
-    Raises
-    ------
-    RequestError
-        If no window is feasible; the message says what is missing.
-    """
+    """Choose what the models learn from."""
     training = settings.training
     if training.scheme == "leave_out":
         return _folds(settings, runs, names, needs)
@@ -280,37 +258,7 @@ def choose_tests(
     whole: bool,
     seed: int,
 ) -> tuple[TestWindow, ...]:
-    """Choose the windows of a test set.
-
-    Parameters
-    ----------
-    name : str
-        Name of the set.
-    test : TestSetSettings
-        Its settings.
-    runs : mapping of str to Dataset
-        Prepared runs.
-    names : sequence of str
-        Runs that test.
-    steps : int
-        Instants of a window.
-    needs : Needs
-        Samples of the greediest model; the history may lie before the test span.
-    whole : bool
-        Whether the whole of a run tests (leaving runs out), or its test span.
-    seed : int
-        The study's seed.
-
-    Returns
-    -------
-    tuple of TestWindow
-        In the order of runs and instants.
-
-    Raises
-    ------
-    RequestError
-        If no window, or fewer than asked for, are feasible.
-    """
+    """Choose the windows of a test set."""
     spans = {}
     for each in names:
         run = runs[each]
@@ -380,20 +328,7 @@ def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
 
 
 def needs_of(specs: Sequence[Spec], dt: float) -> Needs:
-    """Samples of the greediest of several models.
-
-    Parameters
-    ----------
-    specs : sequence of HankelDMDc or BayesianHankelDMDc
-        Models; of an ensemble the upper ends of its priors count.
-    dt : float
-        Time step, s.
-
-    Returns
-    -------
-    Needs
-        The same windows then serve all models and all draws.
-    """
+    """Samples of the greediest of several models."""
     windows, histories = [1], [0]
     for spec in specs:
         if isinstance(spec, HankelDMDc):
@@ -481,29 +416,7 @@ class Plan:
 
 
 def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dict[str, xr.Dataset]]:
-    """Prepare the runs of a study and choose its windows.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    progress : callable, optional
-        Called as ``progress(done, total, run)`` while runs are prepared.
-
-    Returns
-    -------
-    plan : Plan
-        What there is to do.
-    runs : dict of str to Dataset
-        Prepared runs with all of their channels.
-
-    Raises
-    ------
-    RequestError
-        If a channel is missing, or settings leave no feasible window.
-    DataError
-        If a run cannot be read or used.
-    """
+    """Prepare the runs of a study and choose its windows."""
     settings, campaign = study.settings, study.campaign
     training_names = list(settings.training.runs) or campaign.training_runs
     testing = {name: _test_runs(study, name) for name in settings.tests}
@@ -607,20 +520,7 @@ def _check_pairs(plan: Plan) -> None:
 
 
 def warn_of_slow_study(plan: Plan, runs: Mapping[str, xr.Dataset]) -> None:
-    """Warn once for a study, of the model and training set that hold the fewest slow periods.
-
-    Parameters
-    ----------
-    plan : Plan
-        The study.
-    runs : mapping of str to Dataset
-        Prepared runs.
-
-    Warns
-    -----
-    SeakeepWarning
-        As :func:`seakeep.models.slow.warn_of_slow_motions`.
-    """
+    """Warn once for a study, of the model and training set that hold the fewest slow periods."""
     least = None
     for model, spec in plan.specs.items():
         snapshots = needs_of([spec], plan.dt).snapshots

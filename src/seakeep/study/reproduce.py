@@ -158,22 +158,7 @@ def _telling(progress: Progress | None) -> Progress | None:
 
 
 def study_text(preset: Preset, size: Size, seed: int) -> str:
-    """Study file of the reproduction.
-
-    Parameters
-    ----------
-    preset : {"paper", "recommended"}
-        Whose choices.
-    size : Size
-        Counts.
-    seed : int
-        Seed.
-
-    Returns
-    -------
-    str
-        TOML.
-    """
+    """Study file of the reproduction."""
     paper = preset == "paper"
     training = (
         ['scheme = "halves"', f"windows = {size.training}", 'placement = "random"']

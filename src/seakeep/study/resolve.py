@@ -138,24 +138,7 @@ def resolve_model(
     preset: str | None = None,
     seed: int | None = None,
 ) -> ResolvedModel:
-    """Fill in, key by key, what the table of a model does not state.
-
-    Parameters
-    ----------
-    settings, encounter_period, dt
-        As in :func:`build_spec`.
-    preset, seed : optional
-        A study's, for models that state no other.
-
-    Returns
-    -------
-    ResolvedModel
-
-    Raises
-    ------
-    RequestError
-        As :func:`build_spec`.
-    """
+    """Fill in, key by key, what the table of a model does not state."""
     kind = _kind_of(settings)
     ensemble = "n_members" in _names(kind)
     if settings.preset is not None and not hasattr(kind, settings.preset):

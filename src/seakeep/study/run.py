@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import fields, is_dataclass
@@ -11,11 +12,11 @@ from pathlib import Path
 import xarray as xr
 
 from seakeep.campaign.prepare import Progress
-from seakeep.errors import SeakeepError
+from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models.executor import WorkerLostError, as_finished
 from seakeep.models.priors import Prior, describe
 from seakeep.study.describe import describe_study
-from seakeep.study.judge import judge
+from seakeep.study.judge import judge, words_of_lost
 from seakeep.study.plan import Plan, make_plan, warn_of_slow_study
 from seakeep.study.resolve import Spec
 from seakeep.study.settings import Study
@@ -82,7 +83,8 @@ def run_study(
     Warns
     -----
     SeakeepWarning
-        If training windows hold fewer than five periods of a slow motion.
+        If training windows hold fewer than five periods of a slow motion, or forecasts diverged:
+        model, training set and window are named, and the result leaves them out.
     """
     out = Path(out)
     tell = progress or (lambda done, total, what: None)
@@ -102,6 +104,9 @@ def run_study(
             groups = describe_study(study, plan, runs)
             groups |= collect(study, plan, runs, lambda unit: _arrays(folder, unit))
             groups |= judge(groups, study.settings, list(plan.states))
+            if "statistics/lost" in groups:
+                words = words_of_lost(groups["statistics/lost"])
+                warnings.warn(words, SeakeepWarning, stacklevel=2)
             groups |= extra or {}
             attributes = {**_attributes(study, plan, groups), **(notes or {})}
             found = write_result(out, attributes, groups)

@@ -61,15 +61,7 @@ def versions() -> dict[str, str]:
 
 @contextmanager
 def storing(folder: Path) -> Iterator[None]:
-    """Say why results could not be written, and what mends it.
-
-    Raises
-    ------
-    RequestError
-        If there can be no such folder, or it may not be written to.
-    StorageError
-        If the disk is full or fails.
-    """
+    """Say why results could not be written, and what mends it."""
     try:
         yield
     except (RequestError, OSError) as error:
@@ -325,27 +317,7 @@ class StudyResult:
 def write_result(
     folder: Path, attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]
 ) -> StudyResult:
-    """Write everything into one sealed NetCDF file, renamed into place.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the results.
-    attrs : mapping
-        Attributes of the whole.
-    groups : mapping of str to Dataset
-        Group by name.
-
-    Returns
-    -------
-    StudyResult
-        The same.
-
-    Raises
-    ------
-    StorageError
-        If the file cannot be written.
-    """
+    """Write everything into one sealed NetCDF file, renamed into place."""
     kept = {**attrs, "format": FORMAT, "created": datetime.now(UTC).isoformat(timespec="seconds")}
     with storing(folder), replacing(folder / RESULT) as temporary:
         write_netcdf(temporary, xr.Dataset(attrs=kept), groups, _packing)
@@ -361,13 +333,7 @@ def _packing(group: xr.Dataset) -> dict[str, dict[str, object]]:
 
 
 def relabel(result: StudyResult, words: Mapping[str, str]) -> StudyResult:
-    """Write other names and labels into a finished result: attributes on which no array depends.
-
-    Raises
-    ------
-    StorageError
-        If the file cannot be written.
-    """
+    """Write other names and labels into a finished result: attributes on which no array depends."""
     changed = {key: value for key, value in words.items() if result.attrs.get(key) != value}
     if not changed:
         return result

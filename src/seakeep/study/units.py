@@ -79,27 +79,7 @@ def tested_windows(plan: Plan, training: int, test: str) -> tuple[int, ...]:
 
 
 def compute(plan: Plan, runs: Runs, unit: Unit) -> Arrays:
-    """Fit a model and forecast all windows.
-
-    Parameters
-    ----------
-    plan : Plan
-        The study.
-    runs : mapping of str to Dataset
-        Prepared runs.
-    unit : Unit
-        What to do.
-
-    Returns
-    -------
-    dict of str to ndarray
-        ``tests/NAME/KEY`` over the windows tested, ``calibration/KEY`` and ``eigenvalues/KEY``.
-
-    Raises
-    ------
-    DataError
-        If the training set cannot be used; the message names it.
-    """
+    """Fit a model and forecast all windows."""
     training = plan.training[unit.training]
     try:
         fitted = fit_training(plan, runs, unit.model, training)
@@ -158,26 +138,7 @@ def window_arrays(
     numbers: tuple[int, ...],
     alignment: FittedAlignment | None = None,
 ) -> Windows:
-    """Cut the windows of a test set out of the runs.
-
-    Parameters
-    ----------
-    plan : Plan
-        The study.
-    runs : mapping of str to Dataset
-        Prepared runs.
-    windows : tuple of TestWindow
-        The set.
-    numbers : tuple of int
-        Those of its windows that are wanted.
-    alignment : FittedAlignment, optional
-        Replaces the inputs by aligned ones; not one by predicted surge, which the forecast makes.
-
-    Returns
-    -------
-    Windows
-        In that order.
-    """
+    """Cut the windows of a test set out of the runs."""
     histories, inputs, measured, places = [], [], [], []
     reach = plan.needs.history
     for number in numbers:
@@ -397,25 +358,7 @@ def _scores_of_others(plan: Plan, runs: Runs, unit: Unit, steps: int) -> list[Fl
 
 
 def collect(study: Study, plan: Plan, runs: Runs, read: Read) -> dict[str, xr.Dataset]:
-    """Put all units together.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    plan : Plan
-        What was to be done.
-    runs : mapping of str to Dataset
-        Prepared runs.
-    read : callable
-        Gives the arrays of a finished unit.
-
-    Returns
-    -------
-    dict of str to Dataset
-        ``tests/NAME`` with the arrays of every model over (training, window, …), and
-        ``draws/MODEL``, ``calibration/MODEL`` and ``eigenvalues/MODEL`` of ensembles.
-    """
+    """Put all units together."""
     units = units_of(plan)
     found = {unit: read(unit) for unit in units}
     groups = {f"tests/{test}": _collect_test(study, plan, runs, found, test) for test in plan.tests}
