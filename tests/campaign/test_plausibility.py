@@ -203,24 +203,6 @@ class TestPeriod:
         # hysteresis leaves out lengthen the period; noise made it a fraction.
         assert 0.9 * sound < run.attrs["encounter_period"] < 1.5 * sound
 
-    def test_the_draft_states_what_noise_must_not_pass(self, tank):
-        sound = read_campaign(tank / "campaign.toml").encounter_period()
-        noisy(tank, 0.06)
-        files = [tank / "first.csv", tank / "second.csv"]
-        text = draft_campaign(files, tank)
-        path = tank / "draft.toml"
-        path.write_text(text, encoding="utf-8")
-        campaign = read_campaign(path)
-        # Four standard deviations of a noise of 0.06, less than a third too high by the waves'
-        # own curvature.
-        assert 0.24 <= campaign.settings.campaign.period_hysteresis <= 0.32
-        assert campaign.encounter_period() == pytest.approx(sound, rel=0.07)  # one wave in 14
-        assert "guessed: what a wave must pass" in text
-
-    def test_one_without_noise_keeps_the_paper_s_count(self, tank):
-        text = draft_campaign([tank / "first.csv", tank / "second.csv"], tank)
-        assert "period_hysteresis" not in text
-
 
 class TestValues:
     def test_degrees_taken_for_radians(self, edited):

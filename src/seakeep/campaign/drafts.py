@@ -1,52 +1,47 @@
-"""A first campaign file, guessed from the headers of the files: what ``seakeep init`` writes."""
+"""A first campaign file, guessed from the files of its runs: what ``seakeep init`` writes."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
 import tomlkit
-from tomlkit.items import Table
 
-from seakeep.campaign.draft_hints import (
-    derived_examples,
-    driving_wave,
-    model_table,
-    preparation_table,
-)
 from seakeep.campaign.guesses import (
-    LONG,
+    MOTIONS,
+    SHORT_GAP,
     File,
     Guess,
+    Sea,
     arranged,
     guess_channels,
-    is_noise,
     is_trigger,
-    noise_of,
     rising_column,
-    suggest_channel,
-    waves_of,
+    sea_of,
+    waves_of_name,
 )
 from seakeep.campaign.readers import time_column, time_step_of, time_unit_of
 from seakeep.campaign.settings import FileSettings
 from seakeep.conventions import canonical_channel
-from seakeep.errors import DataError, RequestError
-from seakeep.formats import read_columns
-from seakeep.formats.columns import Columns, named_unit
-from seakeep.signals import encounter_period
+from seakeep.errors import RequestError
+from seakeep.files import MARK
+from seakeep.formats import Columns, read_columns
+from seakeep.formats.columns import named_unit
 
 __all__ = ["draft_campaign"]
 
-NOISE = 4.0
-"""Standard deviations of a probe's noise that a wave must pass either way to count: one sample in
-16 000 of normal noise lies beyond."""
+STEPS = 32
+"""Samples per period that the paper takes, and a draft proposes."""
 
-REMOVE = "prepare warns of it: remove it"
+STILL = 0.05
+"""Part of the highest run's waves below which a run has none."""
 
-LED = 0.9
-"""Where noise shortens the counted period to less than this part, the draft states a hysteresis."""
+LIKE = 1.25
+"""Factor by which a test's waves may leave the range of the training's, in height and period."""
+
+_REMOVE = "prepare warns of it: remove it"
 
 
 def draft_campaign(
@@ -59,8 +54,9 @@ def draft_campaign(
     Parameters
     ----------
     files : sequence of Path or str
-        Files of one campaign: one a run, all with the same columns; or one a logger and run,
-        named ``RUN/LOGGER.csv`` or ``RUN_LOGGER.csv``. The last run is proposed for testing.
+        Files of one campaign: one per run, all with the same columns; or one per logger and run,
+        named ``RUN/LOGGER.csv`` or ``RUN_LOGGER.csv``. A run whose waves lie within those of the
+        others is proposed for testing.
     folder : Path or str, optional
         Folder in which the campaign file will lie: paths are written relative to it. The default
         is the working folder.
@@ -86,64 +82,39 @@ def draft_campaign(
         )
     paths = [Path(file) for file in files]
     known = {key: value for key, value in (options or {}).items() if value is not None}
-    tables = [read_columns(path, FileSettings.model_validate(known).known()) for path in paths]
+    settings = FileSettings.model_validate(known).known()
+    tables = [read_columns(path, settings) for path in paths]
     read = arranged(paths, tables, _times(tables))
     guesses = guess_channels(read)
     if not any(guess.channel for guess in guesses):
         _refuse(read)
-    loggers = list({file.logger: file for file in reversed(read)}.values())[::-1]
-    rates = {file.logger: _rate(file.table, file.time) for file in loggers}
-    wave = driving_wave(guesses)
-    counted = (
-        [] if wave is None else [_wave_period(f, wave) for f in read if f.logger == wave.logger]
-    )
-    period, hysteresis = counted[0] if counted else (None, 0.0)
-    shortest = min((each for each, _ in counted if each is not None), default=None)
-    document = tomlkit.document()
-    document.add(tomlkit.comment("Draft of a campaign. Read every line that says 'guessed', then"))
-    document.add(tomlkit.comment("run: seakeep prepare THIS-FILE, and look at the sheet it makes"))
-    _general(document, read, period, hysteresis)
-    _files_table(document, read, known)
-    _channels(document, guesses)
-    names = [guess.channel for guess in guesses if guess.channel]
-    document.add(tomlkit.nl())
-    for line in derived_examples(names, period, max((r or 0.0) for r in rates.values())):
-        document.add(tomlkit.comment(line))
-    if read[0].logger:
-        _instruments(document, loggers, guesses, rates)
-    _runs(document, read, folder)
-    kept = [guess for guess in guesses if guess.channel]
-    preparation = preparation_table(kept, rates, period, shortest)
-    document.add("preparation", preparation)
-    holed = [_meant(guess) for guess in guesses if guess.channel is None and guess.gaps]
-    holed = [name for name in holed if name not in names]
-    document.add("model", model_table(kept, _steps(preparation, rates, period), holed))
-    return tomlkit.dumps(document)
+    wave = next(iter(_inputs(guesses)), None)
+    seas = {} if wave is None else _seas(read, wave)
+    lines = [
+        f"# Draft of a campaign ({MARK}: draft). Read every line that says 'guessed', then",
+        "# run: seakeep prepare THIS-FILE, and look at the sheet it makes",
+        *_general(read, seas),
+        *_files(read, known),
+        *_channels(guesses),
+        *(_instruments(read, guesses) if read[0].logger else ()),
+        *_runs(read, seas, folder),
+        *_preparation(read, guesses, seas),
+        *_model(guesses),
+    ]
+    return "\n".join(map(_printable, lines)) + "\n"
 
 
-def _steps(
-    preparation: Table, rates: dict[str, float | None], period: float | None
-) -> float | None:
-    """Samples a period that the drafted preparation makes, where that is known."""
-    if "steps_per_period" in preparation:
-        return float(preparation["steps_per_period"])
-    rate = preparation.get("sampling_rate") or next(iter(rates.values()))
-    return None if rate is None or period is None else float(rate) * period
+def _printable(line: str) -> str:
+    return re.sub(r"[\x00-\x08\x0a-\x1f\x7f]", "?", line)
 
 
-def _refuse(files: Sequence[File]) -> None:
-    first = files[0]
-    for other in files[1:]:
-        if not set(first.table.names) & set(other.table.names) - {first.time}:
-            raise RequestError(
-                f"{first.path} and {other.path} have no column in common. Name files of one "
-                "logger, one a run; or those of several loggers as RUN/LOGGER.csv or "
-                "RUN_LOGGER.csv."
-            )
-    raise RequestError(
-        f"{first.path}: no column has numbers that a channel could be made of (columns: "
-        f"{', '.join(first.table.names)}). Check delimiter and decimal mark of the file."
-    )
+def _value(value: object) -> str:
+    """A value as TOML writes it."""
+    return str(tomlkit.item(value).as_string())
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _value(name)
 
 
 def _times(tables: Sequence[Columns]) -> list[str | None]:
@@ -155,27 +126,193 @@ def _times(tables: Sequence[Columns]) -> list[str | None]:
     ]
 
 
-def _rate(table: Columns, time: str | None) -> float | None:
-    step = None if time is None else time_step_of(table, time)
-    return table.sampling_rate if step is None else 1.0 / step
+def _refuse(files: Sequence[File]) -> None:
+    first = files[0]
+    for other in files[1:]:
+        if not set(first.table.names) & set(other.table.names) - {first.time}:
+            raise RequestError(
+                f"{first.path} and {other.path} have no column in common. Name files of one "
+                "logger, one per run; or those of several loggers as RUN/LOGGER.csv or "
+                "RUN_LOGGER.csv."
+            )
+    raise RequestError(
+        f"{first.path}: no column has numbers that a channel could be made of (columns: "
+        f"{', '.join(first.table.names)}). Check delimiter and decimal mark of the file."
+    )
 
 
-def _wave_period(file: File, wave: Guess) -> tuple[float | None, float]:
-    """Period of a file's waves, s, and the hysteresis that keeps noise from counting."""
-    rate = _rate(file.table, file.time)
-    series = file.table.values.get(wave.column, np.zeros(0))
-    there = np.isfinite(series)
-    if rate is None or there.sum() < LONG or not np.ptp(series[there]) or is_noise(series):
-        return None, 0.0
-    at = np.arange(series.size)
-    series = np.interp(at, at[there], series[there])
-    clear = min(np.ceil(100 * NOISE * noise_of(series) / float(series.std())) / 100, 0.5)
-    try:
-        period = encounter_period(series, 1.0 / rate, clear)
-        counted = encounter_period(series, 1.0 / rate)
-    except DataError:
-        return None, 0.0
-    return (period, float(clear)) if counted < LED * period else (counted, 0.0)
+def _seas(files: Sequence[File], wave: Guess) -> dict[str, Sea]:
+    """Waves of each run in which there are any; still water and decay tests have none."""
+    found = {f.run: sea_of(f, wave.column) for f in files if f.logger == wave.logger}
+    seas = {run: sea for run, sea in found.items() if sea is not None}
+    highest = max((sea.height for sea in seas.values()), default=0.0)
+    return {run: sea for run, sea in seas.items() if sea.height > STILL * highest}
+
+
+def _general(files: Sequence[File], seas: Mapping[str, Sea]) -> Iterator[str]:
+    common = Path(os.path.commonpath([file.path.resolve().parent for file in files]))
+    yield from ("", "[campaign]", f"name = {_value(common.name or 'campaign')}")
+    yield "scale_factor = 1.0 # full-scale length over model length"
+    if seas:
+        run, sea = next(iter(seas.items()))
+        kinds = {_kind(each, seas) for each in seas}
+        which = "the irregular runs" if "irregular" in kinds else "all runs"
+        yield (
+            f"# encounter_period = {sea.period:.3g}  # s; left out, it is measured: the mean of "
+            f"{which} (this is that of {run})"
+        )
+    else:
+        yield "# encounter_period = …  # s; STATE IT: no wave was found"
+    yield from ("", "[rig]")
+    yield "# water_depth = …  # m, or 'inf' for deep water; needed where probes are aligned"
+    yield "# [rig.positions]  # channel = x in m along the waves"
+
+
+def _files(files: Sequence[File], known: Mapping[str, object]) -> Iterator[str]:
+    yield from ("", "[files]", *(f"{key} = {_value(value)}" for key, value in known.items()))
+    times, table = {file.time for file in files}, files[0].table
+    if len(times) == 1 and (time := files[0].time) is not None:
+        yield f"time = {_value(time)} # {_why_time(table, time)}"
+    elif not files[0].logger and None in times and table.sampling_rate is None:
+        yield "sampling_rate = 100.0 # ASSUMED: the files have no time column. Correct it"
+        yield f"sampling_rate_assumed = true # {_REMOVE}"
+
+
+def _why_time(table: Columns, time: str) -> str:
+    if time_column(table) is not None:
+        return "guessed from its name"
+    unit, step = time_unit_of(table, time), time_step_of(table, time)
+    rate = "" if step is None else f": {1 / step:.6g} samples per second"
+    return f"guessed: it rises evenly, as times do, in {unit}{rate}. Check it"
+
+
+def _channels(guesses: Sequence[Guess]) -> Iterator[str]:
+    yield from ("", "# A channel is sign * (reading + offset), converted to SI.")
+    for guess in guesses:
+        if guess.channel is None:
+            continue
+        canonical = canonical_channel(guess.channel)
+        said = f" # guessed: {canonical.long_name}; header '{guess.header}'" if canonical else ""
+        yield from ("", f"[channels.{guess.channel}]", f"column = {_value(guess.column)}{said}")
+        if guess.logger:
+            yield f"instrument = {_value(guess.logger)}"
+        if guess.named_unit:
+            yield f"unit = {_value(guess.unit)} # guessed: its name ends on it. Check it"
+        elif guess.assumed_unit:
+            yield f"unit = {_value(guess.unit)} # ASSUMED: the file states none. Correct it"
+            yield f"unit_assumed = true # {_REMOVE}"
+        if canonical is None:
+            # Without a unit that the campaign converts.
+            bare = named_unit(guess.column)[0] if guess.named_unit else guess.column
+            yield f"long_name = {_value(bare)}"
+        if guess.gaps:
+            yield "# it has gaps: see 'gaps' in [preparation]"
+    skipped = [guess for guess in guesses if guess.channel is None]
+    yield from [""] * bool(skipped)
+    for guess in skipped:
+        yield f"# column '{guess.header}' left out: {guess.why}"
+
+
+def _instruments(files: Sequence[File], guesses: Sequence[Guess]) -> Iterator[str]:
+    """A table per logger; clocks by the trigger, where all loggers have one."""
+    loggers = list({file.logger: file for file in reversed(files)}.values())[::-1]
+    triggers = {file.logger: next(filter(is_trigger, file.table.values), None) for file in loggers}
+    waves = [g.logger for g in guesses if (g.channel or "").startswith("eta_")]
+    reference = (waves or [file.logger for file in loggers])[0]
+    yield from ("", "[instruments]")
+    yield f"reference = {_value(reference)} # guessed: its clock is the time of all"
+    if not all(triggers.values()):
+        yield "# no trigger was found in all files: clocks are taken as they are. If they differ,"
+        yield "# state in [instruments.NAME] shared = ['OWN COLUMN', \"REFERENCE'S\"] of one signal"
+        yield "# that both record, correlated = [...] of two that go together, or offset (s)"
+    stated = len({file.time for file in loggers}) > 1
+    for file in loggers:
+        yield from ("", f"[instruments.{_key(file.logger)}]")
+        if stated and file.time is not None:
+            yield f"time = {_value(file.time)}"
+        if file.rate is not None:
+            yield f"# {file.rate:.6g} samples per second"
+        elif file.time is None:
+            yield "sampling_rate = 100.0 # ASSUMED: the file has no time column. Correct it"
+            yield f"sampling_rate_assumed = true # {_REMOVE}"
+        if all(triggers.values()):
+            name = _value(triggers[file.logger])
+            yield f"trigger = {name} # guessed: pulses that all loggers recorded"
+
+
+def _runs(
+    files: Sequence[File], seas: Mapping[str, Sea], folder: Path | str | None
+) -> Iterator[str]:
+    names = list(dict.fromkeys(file.run for file in files))
+    loggers = {file.logger for file in files}
+    paths = {n: {f.logger: _relative(f.path, folder) for f in files if f.run == n} for n in names}
+    whole = [name for name in names if set(paths[name]) == loggers]
+    roles = _roles(whole, seas)
+    for name in names:
+        own = paths[name]
+        yield from ("", f"[runs.{_key(name)}]")
+        if set(own) == {""}:
+            yield f"file = {_value(own[''])}"
+        if kind := _kind(name, seas):
+            source = "name" if waves_of_name(name) else "spectrum"
+            yield f"waves = {_value(kind)} # guessed from its {source}"
+        if name in roles:
+            role, why = roles[name]
+        else:
+            role, why = "unused", f"it has no file of {', '.join(sorted(loggers - set(own)))}"
+        yield f"role = {_value(role)} # {why}"
+        if len(names) == 1:
+            yield "# train = [0.0, 60.0]  # s; in place of role, with test = [60.0, inf]"
+        yield "# span = [10.0, inf]  # s; cut the start-up of the waves off"
+        if set(own) != {""}:
+            yield from ("", f"[runs.{_key(name)}.files]")
+            yield from (f"{_key(logger)} = {_value(path)}" for logger, path in own.items())
+
+
+def _kind(run: str, seas: Mapping[str, Sea]) -> str | None:
+    """Kind of a run's waves, by its name or else by their spectrum; None if nothing tells."""
+    if (named := waves_of_name(run)) or run not in seas:
+        return named
+    return "regular" if seas[run].regular else "irregular"
+
+
+def _roles(names: Sequence[str], seas: Mapping[str, Sea]) -> dict[str, tuple[str, str]]:
+    """Role of each run, and why: irregular runs train, and one whose waves lie within theirs tests.
+
+    Runs without waves are not used, where others have some.
+    """
+    if len(names) == 1:
+        return {names[0]: ("train", "the only run")}
+    still = [name for name in names if seas and name not in seas]
+    moved = [name for name in names if name not in still]
+    irregular = [name for name in moved if _kind(name, seas) != "regular"]
+    mixed = 0 < len(irregular) < len(moved)
+    order = irregular if mixed else moved
+    test = _test_of(order, seas) if len(order) > 1 else None
+    why = "guessed: one run whose waves lie within those of the others tests, these train"
+    if mixed:
+        why = "guessed: irregular runs train" + (" but one, the rest tests" if test else "")
+    roles = {n: ("test" if n == test or n not in order else "train", why) for n in moved}
+    unused = ("unused", "guessed: no waves were found, as in still water or decay tests")
+    return {name: roles.get(name, unused) for name in names}
+
+
+def _test_of(names: Sequence[str], seas: Mapping[str, Sea]) -> str:
+    """The last run whose waves are no higher, lower, longer or shorter than the others'."""
+
+    def inside(value: float, others: Sequence[float]) -> bool:
+        return min(others) / LIKE <= value <= max(others) * LIKE
+
+    for name in reversed(names):
+        others = [seas[n] for n in names if n != name and n in seas]
+        if name not in seas or not others:
+            continue
+        sea = seas[name]
+        if inside(sea.height, [each.height for each in others]) and inside(
+            sea.period, [each.period for each in others]
+        ):
+            return name
+    return names[-1]
 
 
 def _relative(path: Path, folder: Path | str | None) -> str:
@@ -188,186 +325,105 @@ def _relative(path: Path, folder: Path | str | None) -> str:
     return Path(os.path.relpath(absolute, Path(folder or ".").resolve())).as_posix()
 
 
-def _general(
-    document: tomlkit.TOMLDocument,
-    files: Sequence[File],
-    period: float | None,
-    hysteresis: float,
-) -> None:
-    general = tomlkit.table()
-    common = Path(os.path.commonpath([file.path.resolve().parent for file in files]))
-    general.add("name", common.name or "campaign")
-    general.add("scale_factor", 1.0)
-    general["scale_factor"].comment("full-scale length over model length")
-    if period is None:
-        general.add(tomlkit.comment("encounter_period = 1.64  # s; STATE IT: no wave was found"))
-    else:
-        general.add(
-            tomlkit.comment(
-                f"encounter_period = {period:.3g}  # s; left out, it is measured: the mean of "
-                f"{_period_runs(files)} (this is that of {files[0].run})"
+def _preparation(
+    files: Sequence[File], guesses: Sequence[Guess], seas: Mapping[str, Sea]
+) -> Iterator[str]:
+    """One step for all, no finer than that of the fastest logger, and what to do about gaps."""
+    yield from ("", "[preparation]")
+    rates = {file.logger: file.rate for file in reversed(files)}
+    known = [rate for rate in rates.values() if rate]
+    shortest = min((sea.period for sea in seas.values()), default=None)
+    usual = f"sampling_rate = {min([25.0, *known]):.6g}  # Hz"
+    fine = shortest is not None and STEPS / shortest > max(known, default=float("inf"))
+    if len(rates) > 1:
+        if shortest is not None and not fine:
+            yield f"steps_per_period = {STEPS} # guessed: samples per mean period"
+            yield f"# {usual}; instead of it"
+        else:
+            yield (
+                f"sampling_rate = {min(known, default=25.0):#.6g} # Hz; guessed: that of the "
+                "slowest logger"
             )
-        )
-    if hysteresis:
-        general.add("period_hysteresis", hysteresis)
-        general["period_hysteresis"].comment(
-            "guessed: what a wave must pass, in standard deviations; less, and noise is counted"
-        )
-    document.add("campaign", general)
-    rig = tomlkit.table()
-    rig.add(tomlkit.comment("water_depth = 3.6  # m; 'inf' for deep water"))
-    rig.add(tomlkit.comment("[rig.positions]  # channel = x in m along the waves"))
-    document.add("rig", rig)
-
-
-def _period_runs(files: Sequence[File]) -> str:
-    irregular = any(waves_of(file.run) == "irregular" for file in files)
-    return "the irregular runs" if irregular else "all runs"
-
-
-def _files_table(
-    document: tomlkit.TOMLDocument, files: Sequence[File], known: Mapping[str, object]
-) -> None:
-    table = tomlkit.table()
-    for key, value in known.items():
-        table.add(key, value)
-    times = {file.time for file in files}
-    if len(times) == 1 and (time := files[0].time) is not None:
-        table.add("time", time)
-        table["time"].comment(_why_time(files[0].table, time))
-    elif not files[0].logger and None in times and files[0].table.sampling_rate is None:
-        table.add("sampling_rate", 100.0)
-        table["sampling_rate"].comment("ASSUMED: the files have no time column. Correct it")
-        table.add("sampling_rate_assumed", tomlkit.item(True).comment(REMOVE))
-    document.add("files", table)
-
-
-def _why_time(table: Columns, time: str) -> str:
-    if time_column(table) is not None:
-        return "guessed from its name"
-    unit, step = time_unit_of(table, time), time_step_of(table, time)
-    rate = "" if step is None else f": {1 / step:.6g} samples a second"
-    return f"guessed: it rises evenly, as times do, in {unit}{rate}. Check it"
-
-
-def _channels(document: tomlkit.TOMLDocument, guesses: Sequence[Guess]) -> None:
-    channels = tomlkit.table(is_super_table=True)
-    document.add(tomlkit.nl())
-    document.add(tomlkit.comment("A channel is sign * (reading + offset), converted to SI."))
-    skipped = []
-    for guess in guesses:
-        if guess.channel is None:
-            skipped.append(guess)
-            continue
-        table = tomlkit.table()
-        table.add("column", guess.column)
-        if guess.logger:
-            table.add("instrument", guess.logger)
-        if guess.named_unit:
-            table.add("unit", guess.unit)
-            table["unit"].comment("guessed: its name ends on it. Check it")
-        elif guess.assumed_unit:
-            table.add("unit", guess.unit)
-            table["unit"].comment("ASSUMED: the file states none. Correct it")
-            table.add("unit_assumed", tomlkit.item(True).comment(REMOVE))
-        canonical = canonical_channel(guess.channel)
-        if canonical is None:
-            table.add("long_name", _label(guess))
+    else:
+        rate = known[0] if known else None
+        if rate:
+            yield f"# the files have {rate:.6g} samples per second"
+        every = int(shortest * rate / STEPS) if rate and shortest else 1
+        if rate and shortest and every > 1:
+            yield (
+                f"sampling_rate = {rate / every:#.6g} # Hz; guessed: about "
+                f"{STEPS} samples per wave of {shortest:.3g} s, the shortest"
+            )
         else:
-            table["column"].comment(f"guessed: {canonical.long_name}; header '{guess.header}'")
-        if guess.gaps:
-            table.add(tomlkit.comment("it has gaps: see 'gaps' in [preparation]"))
-        channels.add(guess.channel, table)
-    document.add("channels", channels)
-    if skipped:
-        document.add(tomlkit.nl())
-    for guess in skipped:
-        document.add(tomlkit.comment(f"column '{guess.header}' left out: {guess.why}"))
+            yield f"# {usual}; left out, the files' own"
+        if not fine:
+            yield f"# steps_per_period = {STEPS}  # instead: samples per mean period"
+    if gapped := [str(guess.channel) for guess in guesses if guess.channel and guess.gaps]:
+        short = any(guess.gaps == "short" for guess in guesses if guess.channel)
+        yield (
+            f"gaps = \"{'bridge' if short else 'mask'}\" # {', '.join(gapped)}: 'mask' flags gaps, "
+            f"'bridge' fills those up to {SHORT_GAP} s and says so"
+        )
 
 
-def _meant(guess: Guess) -> str:
-    """Channel that a column would be, were it whole."""
-    name, unit = named_unit(guess.column) if guess.named_unit else (guess.column, guess.unit)
-    return suggest_channel(name, None if guess.assumed_unit else unit, guess.logger)
+def _inputs(guesses: Sequence[Guess]) -> list[Guess]:
+    """Wave probes that drive a model: those without long gaps that are not behind the vessel."""
+    waves = [guess for guess in guesses if (guess.channel or "").startswith("eta_")]
+    before = [guess for guess in waves if not guess.behind] or waves
+    return [guess for guess in before if guess.gaps != "long"] or before
 
 
-def _label(guess: Guess) -> str:
-    """Name of a column for labels, without a unit that the campaign converts."""
-    return named_unit(guess.column)[0] if guess.named_unit else guess.column
+def _model(guesses: Sequence[Guess]) -> Iterator[str]:
+    """Motions as states, waves as inputs, delays in encounter periods."""
+    mapped = {guess.channel: guess for guess in guesses if guess.channel}
+    kinds = [MOTIONS, [f"{m}_rate" for m in MOTIONS], [f"{m}_acceleration" for m in MOTIONS]]
+    usable = [n for n, g in mapped.items() if g.gaps != "long" and not g.at_rest]
+    moved = [[name for name in usable if name in kind] for kind in kinds]
+    rest = [name for name in usable if not name.startswith("eta_")]
+    states = [*moved[0], *moved[1]] or moved[2] or rest or list(mapped)[:1]
+    inputs = [str(guess.channel) for guess in _inputs(guesses) if guess.channel not in states]
+    motions = [name for name in mapped if any(name in kind for kind in kinds)]
+    loads = [n for n in rest if n.startswith("mooring_") and n not in states]
+    yield from ("", "[model]", 'preset = "recommended"')
+    said = "guessed: the motions that the model forecasts" if any(moved) else _no_motion(guesses)
+    yield f"states = {_value(states)} # {said}"
+    if still := [name for name in motions if mapped[name].at_rest]:
+        yield f"# {', '.join(still)} left out: next to no motion beside the others: restrained?"
+    if gapped := [name for name in motions if mapped[name].gaps == "long"]:
+        yield from _left_out(gapped, "states")
+    if loads:
+        yield f"# Loads ({', '.join(loads)}) may be added to the states to have them forecast too."
+        yield "# They are left out because a line that goes slack or snaps is not linear, and the"
+        yield "# model is: judge their extremes, or compute them from the motions forecast."
+    yield f"inputs = {_value(inputs)} # guessed: the waves that drive it"
+    probes = [name for name in mapped if name.startswith("eta_") and name not in inputs]
+    if behind := [name for name in probes if mapped[name].behind]:
+        yield f"# {', '.join(behind)} left out: behind the vessel, by name, where its own waves are"
+    else:
+        yield "# Take probes out that stand behind the vessel: what it makes is no input."
+    if gapped := [n for n in probes if mapped[n].gaps == "long" and n not in behind]:
+        yield from _left_out(gapped, "inputs")
+    yield "# in place of the preset's, in encounter periods T or in samples:"
+    yield '# state_delays = "1 T"'
+    yield '# input_delays = "5 T"'
+    yield "# ridge = 0.15625      # 100/640, with the next line"
+    yield '# ridge_scale = "per_snapshot"'
+    yield '# delay_rows = "exact"'
 
 
-def _instruments(
-    document: tomlkit.TOMLDocument,
-    loggers: Sequence[File],
-    guesses: Sequence[Guess],
-    rates: dict[str, float | None],
-) -> None:
-    """A table a logger; clocks by the trigger, where all have a column that is called like one."""
-    triggers = {file.logger: next(filter(is_trigger, file.table.values), None) for file in loggers}
-    waves = [g.logger for g in guesses if (g.channel or "").startswith("eta_")]
-    reference = (waves or [file.logger for file in loggers])[0]
-    instruments = tomlkit.table()
-    instruments.add("reference", reference)
-    instruments["reference"].comment("guessed: its clock is the time of all")
-    if not all(triggers.values()):
-        for line in (
-            "no trigger was found in all files: clocks are taken as they are. If they are not",
-            "synchronous, state in [instruments.NAME] shared = ['OWN COLUMN', \"REFERENCE'S\"] of",
-            "one signal both record, correlated = [...] of two that go together, or offset (s)",
-        ):
-            instruments.add(tomlkit.comment(line))
-    stated = len({file.time for file in loggers}) > 1
-    for file in loggers:
-        table = tomlkit.table()
-        if stated and file.time is not None:
-            table.add("time", file.time)
-        if file.time is None and file.table.sampling_rate is None:
-            table.add("sampling_rate", 100.0)
-            table["sampling_rate"].comment("ASSUMED: the file has no time column. Correct it")
-            table.add("sampling_rate_assumed", tomlkit.item(True).comment(REMOVE))
-        elif rate := rates[file.logger]:
-            table.add(tomlkit.comment(f"{rate:.6g} samples a second"))
-        if all(triggers.values()):
-            table.add("trigger", triggers[file.logger])
-            table["trigger"].comment("guessed: pulses that all loggers recorded")
-        instruments.add(file.logger, table)
-    document.add("instruments", instruments)
+def _left_out(names: Sequence[str], key: str) -> Iterator[str]:
+    has = "it has" if len(names) == 1 else "they have"
+    yield (
+        f"# {', '.join(names)} left out: {has} gaps, and a model takes none. To be among the "
+        f"{key}, mend them in the files, or bridge them (gaps, longest_gap in [preparation])."
+    )
 
 
-def _runs(document: tomlkit.TOMLDocument, files: Sequence[File], folder: Path | str | None) -> None:
-    runs = tomlkit.table(is_super_table=True)
-    names = list(dict.fromkeys(file.run for file in files))
-    loggers = {file.logger for file in files}
-    irregular = [name for name in names if waves_of(name) != "regular"]
-    order = irregular if len(irregular) > 1 else names
-    which = "irregular runs but the last train, the rest tests"
-    which = which if len(order) < len(names) else "the first runs train, the last one tests"
-    for name in names:
-        table = tomlkit.table()
-        own = {file.logger: _relative(file.path, folder) for file in files if file.run == name}
-        if set(own) == {""}:
-            table.add("file", own[""])
-        if waves := waves_of(name):
-            table.add("waves", waves)
-            table["waves"].comment("guessed from its name; irregular runs give the period")
-        if len(names) == 1:
-            table.add(tomlkit.comment("train = [0.0, 60.0]  # s; with test = [60.0, inf]"))
-        if missing := sorted(loggers - set(own)):
-            table.add("role", "unused")
-            table["role"].comment(f"it has no file of {', '.join(missing)}")
-        else:
-            last = name == order[-1] and len(order) > 1
-            table.add("role", "test" if last or name not in order else "train")
-            table["role"].comment(f"guessed: {which}" if len(names) > 1 else "the only run")
-        table.add(tomlkit.comment("span = [10.0, inf]  # s; cut the start-up of the waves off"))
-        if set(own) != {""}:
-            table.add("files", _file_table(own))
-        runs.add(name, table)
-    document.add("runs", runs)
-
-
-def _file_table(own: dict[str, str]) -> Table:
-    table = tomlkit.table()
-    for logger, path in own.items():
-        table.add(logger, path)
-    return table
+def _no_motion(guesses: Sequence[Guess]) -> str:
+    """What to do where no column is called as a motion is."""
+    if all(guess.column.isdigit() for guess in guesses):
+        return (
+            "CORRECT IT: the files have no header; give [channels.…] their names, such as heave "
+            "or eta_1, and state units"
+        )
+    return "CORRECT IT: no motion was found; name the files of all loggers to init"

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.campaign.checks import Finding
-from seakeep.campaign.guesses import MOTIONS, is_noise
+from seakeep.campaign.guesses import MOTIONS
 from seakeep.campaign.instruments import channels_of
 from seakeep.campaign.settings import CampaignSettings, PreparationSettings, RunSettings
 from seakeep.campaign.survey import used_span
@@ -276,3 +277,13 @@ def warn_of(findings: Iterable[Finding], run: str, told: set[tuple[str, str]]) -
             told.add((each.channel, each.kind))
         mend = _MENDS[each.kind].format(run=run, channel=each.channel)
         warnings.warn(f"{run}: {each.channel} {each.text}. {mend}", SeakeepWarning, 3)
+
+
+def is_noise(series: FloatArray) -> bool:
+    """Whether most of a series' variance has no memory from one sample to the next."""
+    series = series[np.isfinite(series)]
+    if series.size < 64:
+        return False
+    # Second differences of white noise have six times its variance, and know no slope.
+    noise = 1.4826 * float(np.median(np.abs(np.diff(series, 2)))) / float(np.sqrt(6.0))
+    return bool(noise > np.sqrt(0.5) * float(series.std()) > 0)

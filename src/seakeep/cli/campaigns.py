@@ -10,7 +10,7 @@ import typer
 
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.errors import RequestError, SeakeepError
-from seakeep.files import replacing
+from seakeep.files import check_output, replacing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,7 +29,7 @@ def init(
         Path | None,
         typer.Option("-o", "--out", help="File to write; by default standard output."),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier draft.")] = False,
     skip_rows: Annotated[
         int | None, typer.Option("--skip-rows", min=0, help="Lines above the header to leave out.")
     ] = None,
@@ -38,6 +38,9 @@ def init(
     ] = None,
     decimal: Annotated[
         str | None, typer.Option("--decimal", help="Mark of decimals, '.' or ','.")
+    ] = None,
+    group: Annotated[
+        str | None, typer.Option("--group", help="Group of HDF5 or TDMS, topic of ROS.")
     ] = None,
 ) -> None:
     """Draft a campaign file from measured files' headers.
@@ -48,13 +51,16 @@ def init(
     """
     from seakeep.campaign import draft_campaign
 
+    if out is not None:
+        if out.exists() and not force:
+            raise RequestError(f"{out} exists already. Give another name, or --force.")
+        check_output(out, "draft", files)
     folder = Path() if out is None else out.parent
-    text = draft_campaign(files, folder, _file_options(skip_rows, delimiter, decimal))
+    options = {**_file_options(skip_rows, delimiter, decimal), "group": group}
+    text = draft_campaign(files, folder, options)
     if out is None:
         typer.echo(text, nl=False)
         return
-    if out.exists() and not force:
-        raise RequestError(f"{out} exists already. Give another name, or --force to overwrite it.")
     with replacing(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     messages().print(f"Wrote {out}. Read it, then: seakeep prepare {out}")
