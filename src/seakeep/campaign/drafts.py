@@ -10,6 +10,7 @@ from pathlib import Path
 import tomlkit
 
 from seakeep.campaign.guesses import (
+    HYSTERESIS,
     MOTIONS,
     SHORT_GAP,
     File,
@@ -93,7 +94,7 @@ def draft_campaign(
     lines = [
         f"# Draft of a campaign ({MARK}: draft). Read every line that says 'guessed', then",
         "# run: seakeep prepare THIS-FILE, and look at the sheet it makes",
-        *_general(read, seas),
+        *_general(read, seas, wave),
         *_files(read, known),
         *_channels(guesses),
         *(_instruments(read, guesses) if read[0].logger else ()),
@@ -149,7 +150,7 @@ def _seas(files: Sequence[File], wave: Guess) -> dict[str, Sea]:
     return {run: sea for run, sea in seas.items() if sea.height > STILL * highest}
 
 
-def _general(files: Sequence[File], seas: Mapping[str, Sea]) -> Iterator[str]:
+def _general(files: Sequence[File], seas: Mapping[str, Sea], wave: Guess | None) -> Iterator[str]:
     common = Path(os.path.commonpath([file.path.resolve().parent for file in files]))
     yield from ("", "[campaign]", f"name = {_value(common.name or 'campaign')}")
     yield "scale_factor = 1.0 # full-scale length over model length"
@@ -161,6 +162,9 @@ def _general(files: Sequence[File], seas: Mapping[str, Sea]) -> Iterator[str]:
             f"# encounter_period = {sea.period:.3g}  # s; left out, it is measured: the mean of "
             f"{which} (this is that of {run})"
         )
+        if wave is not None and any(sea.noisy for sea in seas.values()):
+            said = f"guessed: without it, noise of {wave.channel} counts as waves"
+            yield f"period_hysteresis = {HYSTERESIS} # {said}"
     else:
         yield "# encounter_period = …  # s; STATE IT: no wave was found"
     yield from ("", "[rig]")
@@ -367,10 +371,13 @@ def _preparation(
 
 
 def _inputs(guesses: Sequence[Guess]) -> list[Guess]:
-    """Wave probes that drive a model: those without long gaps that are not behind the vessel."""
+    """Wave probes that drive a model: none behind the vessel, without gaps where there are such."""
     waves = [guess for guess in guesses if (guess.channel or "").startswith("eta_")]
     before = [guess for guess in waves if not guess.behind] or waves
-    return [guess for guess in before if guess.gaps != "long"] or before
+    for gaps in ("", "short"):
+        if whole := [guess for guess in before if guess.gaps == gaps]:
+            return whole
+    return before
 
 
 def _model(guesses: Sequence[Guess]) -> Iterator[str]:
@@ -401,7 +408,7 @@ def _model(guesses: Sequence[Guess]) -> Iterator[str]:
         yield f"# {', '.join(behind)} left out: behind the vessel, by name, where its own waves are"
     else:
         yield "# Take probes out that stand behind the vessel: what it makes is no input."
-    if gapped := [n for n in probes if mapped[n].gaps == "long" and n not in behind]:
+    if gapped := [n for n in probes if mapped[n].gaps and n not in behind]:
         yield from _left_out(gapped, "inputs")
     yield "# in place of the preset's, in encounter periods T or in samples:"
     yield '# state_delays = "1 T"'

@@ -18,6 +18,7 @@ from seakeep.errors import DataError
 from seakeep.formats import Columns
 from seakeep.formats.columns import is_unit, named_unit
 from seakeep.signals import encounter_period, uniform_step, waves_part
+from seakeep.signals.waves import energy_period
 
 __all__ = [
     "MOTIONS",
@@ -65,6 +66,9 @@ SHORT_GAP = 0.25
 AT_REST = 0.05
 """Part of the largest motion of its unit below which one is restrained; head seas leave 0.02."""
 
+HYSTERESIS = 0.3
+"""Standard deviations that a wave must pass where noise leads the count."""
+
 ONE_WAVE = 0.8
 """Part of the variance near the peak's frequency and its harmonics beyond which waves are regular.
 
@@ -111,11 +115,15 @@ class Guess:
 
 @dataclass(frozen=True)
 class Sea:
-    """Waves of a run: standard deviation (the file's unit), mean period (s), one wave or many."""
+    """Waves of a run: standard deviation in the file's unit, mean period in s, and their kind.
+
+    `noisy` says that noise of the probe leads the count of waves.
+    """
 
     height: float
     period: float
     regular: bool
+    noisy: bool
 
 
 def sea_of(file: File, column: str) -> Sea | None:
@@ -129,6 +137,8 @@ def sea_of(file: File, column: str) -> Sea | None:
     try:
         series = series[waves_part(series, step)]
         period = encounter_period(series, step)
+        if noisy := period < energy_period(series, step) / 2:
+            period = encounter_period(series, step, HYSTERESIS)
     except DataError:
         return None
     power = np.abs(np.fft.rfft((series - series.mean()) * np.hanning(series.size))) ** 2
@@ -137,7 +147,7 @@ def sea_of(file: File, column: str) -> Sea | None:
     off = np.abs(frequency - peak * np.clip(np.round(frequency / peak), 1, 3))
     near = off < max(0.1 * peak, 2.5 * frequency[1])
     regular = bool(power[near].sum() > ONE_WAVE * power[1:].sum())
-    return Sea(float(series.std()), period, regular)
+    return Sea(float(series.std()), period, regular, noisy)
 
 
 def waves_of_name(run: str) -> str | None:
