@@ -44,11 +44,6 @@ DRAWING = {"matplotlib"}
 DRAW = {"report", "plot"}
 CORE_MAY_USE = {"numpy", "scipy", "seakeep"} | set(sys.stdlib_module_names)
 
-EXCEPTIONS = {
-    ("seakeep.signals.froude", "xarray"),
-}
-"""(importer, imported) that still break a rule: each goes with its cause."""
-
 KNOTS = {"models"}
 """Rooms whose modules still import each other in a circle."""
 
@@ -112,7 +107,7 @@ def test_imports_run_downwards():
         (module, target): rule
         for module, targets in GRAPH.items()
         for target in targets
-        if (module, target) not in EXCEPTIONS and (rule := broken_rule(module, target)) is not None
+        if (rule := broken_rule(module, target)) is not None
     } == {}
 
 

@@ -134,7 +134,7 @@ CALLS = {
 # Of no array: settings, a file, Datasets, units, clocks, results of others.
 WITHOUT_ARRAYS = {
     "signals.contact_sheet", "signals.froude_factor", "signals.lowpass_taps",
-    "signals.pool_drift", "signals.to_full_scale", "signals.track_video", "metrics.labelled",
+    "signals.pool_drift", "signals.track_video", "metrics.labelled",
 }  # fmt: skip
 ROOMS = {"signals": signals, "statistics": statistics, "metrics": metrics, "waves": waves}
 

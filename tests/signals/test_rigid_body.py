@@ -11,11 +11,11 @@ from seakeep.signals import (
     froude_factor,
     remove_gravity,
     rotation_matrix,
-    to_full_scale,
     transfer_acceleration,
     transfer_position,
     transfer_velocity,
 )
+from seakeep.study import to_full_scale
 
 DT = 0.005
 T = DT * np.arange(4000)

@@ -12,7 +12,7 @@ from seakeep.signals.calculus import (
     integrate,
 )
 from seakeep.signals.filters import low_pass, lowpass_taps, resample
-from seakeep.signals.froude import froude_factor, to_full_scale
+from seakeep.signals.froude import froude_factor
 from seakeep.signals.lags import (
     Lags,
     MotionAgreement,
@@ -94,7 +94,6 @@ __all__ = [
     "resample",
     "rotation_matrix",
     "significant_height",
-    "to_full_scale",
     "track_video",
     "transfer_acceleration",
     "transfer_position",

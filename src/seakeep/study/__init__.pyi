@@ -8,6 +8,7 @@ from .comparison import (
     with_degrees,
 )
 from .fit import fit_campaign, training_runs
+from .full_scale import to_full_scale
 from .resolve import build_spec
 from .run import run_study
 from .settings import Study, StudySettings, read_study
@@ -29,6 +30,7 @@ __all__ = [
     "read_result",
     "read_study",
     "run_study",
+    "to_full_scale",
     "training_runs",
     "with_degrees",
 ]

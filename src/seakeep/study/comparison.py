@@ -20,9 +20,10 @@ from seakeep.models import HankelDMDcModel, HankelEnsemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasting import status_at_clock
 from seakeep.models.identification import is_constant
-from seakeep.signals import froude_factor, to_full_scale
+from seakeep.signals import froude_factor
 from seakeep.signals.time_axis import span_text
 from seakeep.study.fit import warn_of_repeats
+from seakeep.study.full_scale import to_full_scale
 from seakeep.toml import parse_length
 
 __all__ = [
