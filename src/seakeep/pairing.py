@@ -38,27 +38,7 @@ class Paired:
 
 
 def channel_names(data: xr.Dataset, name: str) -> list[str]:
-    """Variables that hold numbers; words, such as the status of a forecast, are no channels.
-
-    Parameters
-    ----------
-    data : Dataset
-        Channels over ``time``.
-    name : str
-        What messages call it.
-
-    Returns
-    -------
-    list of str
-        At least one.
-
-    Raises
-    ------
-    RequestError
-        If there is none.
-    DataError
-        If one has no dimension ``time``.
-    """
+    """Variables that hold numbers; words, such as the status of a forecast, are no channels."""
     names = [str(key) for key, each in data.data_vars.items() if each.dtype.kind not in "OUST"]
     if not names:
         raise RequestError(f"{name} holds no channel; there is nothing to judge.")
@@ -82,23 +62,6 @@ def pair(**sides: xr.Dataset) -> Paired:
 
     Instants are matched within a hundredth of a step; samples are matched one by one where a
     Dataset states no instants.
-
-    Parameters
-    ----------
-    **sides : Dataset
-        Two or more, under the names that messages use.
-
-    Returns
-    -------
-    Paired
-        Names and arrays.
-
-    Raises
-    ------
-    RequestError
-        If a channel is missing, or dimensions or lengths do not fit.
-    DataError
-        If units or instants differ, or times are not seconds in rising order.
     """
     (first, reference), *others = sides.items()
     names = channel_names(reference, first)

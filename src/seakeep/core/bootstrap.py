@@ -284,19 +284,7 @@ def block_length(
 
 
 def too_long(choice: BlockChoice, samples: int) -> str:
-    """Word the warning of a rule that asked for longer blocks than a series allows.
-
-    Parameters
-    ----------
-    choice : BlockChoice
-        What the rule asked for, and what is used.
-    samples : int
-        Length of the series.
-
-    Returns
-    -------
-    str
-    """
+    """Word the warning of a rule that asked for longer blocks than a series allows."""
     return (
         f"the rule '{choice.rule}' asks for blocks of {choice.optimum:.0f} samples; cut to "
         f"{choice.cap}, the longest that a series of {samples} samples allows. So few blocks make "
@@ -307,27 +295,7 @@ def too_long(choice: BlockChoice, samples: int) -> str:
 def resolve_block_length(
     series: npt.ArrayLike, block: int | BlockRule, segments: Sequence[int] | None = None
 ) -> int:
-    """Return a block length as it is, or by the rule that it names.
-
-    Parameters
-    ----------
-    series : array_like, shape (time,)
-        The series to which a rule is applied.
-    block : int, "carlstein" or "politis_white"
-        Samples, or a rule.
-    segments : sequence of int, optional
-        Lengths of the joined pieces.
-
-    Returns
-    -------
-    int
-        Samples.
-
-    Raises
-    ------
-    RequestError, DataError
-        As :func:`block_length`.
-    """
+    """Return a block length as it is, or by the rule that it names."""
     if isinstance(block, str):
         return block_length(series, block, segments=segments)
     return whole_number(block, "block_length")
@@ -340,31 +308,7 @@ def bootstrap_indices(
     rng: np.random.Generator,
     segments: Sequence[int] | None = None,
 ) -> IntArray:
-    """Positions that redraw a series; the same for every series that must keep step with it.
-
-    Parameters
-    ----------
-    n_samples : int
-        Length of the series.
-    n_series : int
-        Number of redrawn series.
-    block_length : int
-        Samples of a block.
-    rng : numpy.random.Generator
-        Source of the block starts.
-    segments : sequence of int, optional
-        Lengths of the joined pieces; by default blocks may cross a join, as in the paper.
-
-    Returns
-    -------
-    ndarray of int, shape (n_series, n_samples)
-        ceil(n_samples / block_length) blocks in the order drawn, cut to the length.
-
-    Raises
-    ------
-    RequestError
-        If a number is out of range, or a block is longer than the shortest segment.
-    """
+    """Positions that redraw a series; the same for every series that must keep step with it."""
     whole_number(n_samples, "n_samples")
     whole_number(n_series, "n_series")
     whole_number(block_length, "block_length")

@@ -303,26 +303,7 @@ def density_grid(
 def checked_grid(
     grid: npt.ArrayLike | None, series: Sequence[FloatArray], bandwidth: Bandwidth
 ) -> FloatArray:
-    """Return the grid as given if it covers all series evenly, or a new one.
-
-    Parameters
-    ----------
-    grid : array_like, shape (grid,), or None
-        None makes one by :func:`density_grid`.
-    series : sequence of ndarray
-        All that it must cover.
-    bandwidth : {"paper", "silverman"} or float
-        As for :func:`kernel_bandwidth`.
-
-    Returns
-    -------
-    ndarray, shape (grid,)
-
-    Raises
-    ------
-    RequestError
-        If a sample lies outside, or the grid is not evenly spaced.
-    """
+    """Return the grid as given if it covers all series evenly, or a new one."""
     if grid is None:
         return density_grid(*series, bandwidth=bandwidth)
     points = _as_grid(grid)
@@ -342,23 +323,7 @@ def checked_grid(
 def bootstrapped_densities(
     series: FloatArray, positions: IntArray, grid: FloatArray, bandwidth: Bandwidth
 ) -> FloatArray:
-    """Densities of one series redrawn at the given positions.
-
-    Parameters
-    ----------
-    series : ndarray, shape (time,)
-        Samples, not all equal.
-    positions : ndarray of int, shape (draw, time)
-        From :func:`seakeep.core.bootstrap.bootstrap_indices`.
-    grid : ndarray, shape (grid,)
-        Values.
-    bandwidth : {"paper", "silverman"} or float
-        By rule, each draw has its own; a draw that happens to be constant takes the series'.
-
-    Returns
-    -------
-    ndarray, shape (draw, grid)
-    """
+    """Densities of one series redrawn at the given positions."""
     own = _positive(_bandwidths(series[None], bandwidth), series[None])
     drawn = series[positions]
     h = _bandwidths(drawn, bandwidth)

@@ -39,18 +39,6 @@ def _filtered(extended: FloatArray, transfer: FloatArray, padding: int) -> Float
 def linear_prediction(series: FloatArray, order: int) -> FloatArray:
     """Coefficients of an autoregressive model by Burg's method.
 
-    Parameters
-    ----------
-    series : ndarray, shape (time,)
-        Series with zero mean.
-    order : int
-        Order p, less than the number of samples.
-
-    Returns
-    -------
-    ndarray, shape (order,)
-        a with x[t] ≈ a[0] x[t−1] + … + a[p−1] x[t−p]. All poles lie inside the unit circle.
-
     Notes
     -----
     J. P. Burg, Maximum entropy spectral analysis (1975): each reflection coefficient minimises
@@ -82,24 +70,6 @@ def predicted_extension(
 
     A record that stops in the middle of a wave is continued by waves, so that a filter with a
     long response is not fed a jump. The continuation fades out as a half cosine.
-
-    Parameters
-    ----------
-    array : ndarray, shape (time, …)
-        Series with zero mean.
-    count : int
-        Samples added at each end.
-    fitted : int
-        Samples from which each end's prediction is identified.
-    order : int
-        Order of the prediction.
-    fade : bool, optional
-        Whether the continuation fades out.
-
-    Returns
-    -------
-    ndarray, shape (time + 2 count, …)
-        The lengthened series.
     """
     flat = array.reshape(array.shape[0], -1)
     fitted = min(fitted, flat.shape[0])

@@ -152,18 +152,7 @@ def _analytic(series: FloatArray) -> ComplexArray:
 
 
 def is_regular(series: npt.ArrayLike) -> bool:
-    """Whether a record's envelope is as even as that of regular waves.
-
-    Parameters
-    ----------
-    series : array_like, shape (time,)
-        Elevation, uniformly sampled, without gaps.
-
-    Returns
-    -------
-    bool
-        True where the envelope varies by less than a fifth of its mean.
-    """
+    """Whether a record's envelope is as even as that of regular waves."""
     return _even(_analytic(as_series(series, minimum=8)))
 
 

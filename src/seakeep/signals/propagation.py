@@ -577,21 +577,7 @@ class CarriedElevation:
     terms: FloatArray = field(repr=False)
 
     def at(self, distance: npt.ArrayLike, sample: int | slice = slice(None)) -> FloatArray:
-        """Elevation at a distance from where it was measured.
-
-        Parameters
-        ----------
-        distance : array_like, scalar or shape (samples,)
-            Distance at each of the samples, m; taken to the nearest end where it lies outside the
-            range.
-        sample : int or slice, optional
-            Samples wanted.
-
-        Returns
-        -------
-        ndarray, shape (channel,) for one sample, else (samples, channel)
-            The elevation, in the unit of the record.
-        """
+        """Elevation at a distance from where it was measured."""
         chosen = self.terms[:, sample]
         half = 0.5 * (self.highest - self.lowest)
         place = np.asarray(distance, dtype=float) - 0.5 * (self.highest + self.lowest)
@@ -610,27 +596,7 @@ class CarriedElevation:
 
 
 def band_limit(series: npt.ArrayLike, dt: float, share: float = WAVE_SHARE) -> float:
-    """Frequency below which a given part of a record's variance lies.
-
-    Parameters
-    ----------
-    series : array_like, shape (time,) or (time, channel)
-        Uniformly sampled series without gaps; channels are judged together.
-    dt : float
-        Time step, s.
-    share : float, optional
-        Part of the variance.
-
-    Returns
-    -------
-    float
-        The frequency, Hz.
-
-    Raises
-    ------
-    DataError
-        If the series is constant.
-    """
+    """Frequency below which a given part of a record's variance lies."""
     array = as_series(series, channels=True)
     flat = array.reshape(array.shape[0], -1)
     # Tapered, since a wave that the record's end cuts would leak into all frequencies.
@@ -652,34 +618,10 @@ def carry_by_dispersion(
     depth: float,
     highest_frequency: float | None = None,
 ) -> CarriedElevation:
-    """Prepare a record to be carried frequency by frequency, by linear dispersion.
+    """Prepare a record to be carried over a range of distances (m) by linear dispersion.
 
-    Parameters
-    ----------
-    series : array_like, shape (time,) or (time, channel)
-        Elevation, uniformly sampled, without gaps.
-    dt : float
-        Time step, s.
-    distances : (float, float)
-        Range of distances that may be asked for, m, positive downstream.
-    depth : float
-        Water depth, m; ``numpy.inf`` for deep water.
-    highest_frequency : float, optional
-        Highest frequency that obeys the dispersion relation, Hz; above it lie noise and bound
-        crests, whose wavenumber goes on along the tangent. By default :func:`band_limit` of the
-        series.
-
-    Returns
-    -------
-    CarriedElevation
-        To be read at any distance in the range.
-
-    Raises
-    ------
-    RequestError
-        If an argument is out of range.
-    DataError
-        If the series is constant or has gaps.
+    Above `highest_frequency` (Hz), by default :func:`band_limit`, lie noise and bound crests, whose
+    wavenumber goes on along the tangent.
     """
     array = as_series(series, minimum=4, channels=True)
     limit = band_limit(array, dt) if highest_frequency is None else highest_frequency
@@ -696,31 +638,7 @@ def carry_by_dispersion(
 def carry_by_celerity(
     series: npt.ArrayLike, dt: float, distances: tuple[float, float], celerity: float
 ) -> CarriedElevation:
-    """Prepare a record to be carried at one celerity.
-
-    Parameters
-    ----------
-    series : array_like, shape (time,) or (time, channel)
-        Elevation, uniformly sampled, without gaps.
-    dt : float
-        Time step, s.
-    distances : (float, float)
-        Range of distances that may be asked for, m, positive downstream.
-    celerity : float
-        Speed of the waves, m/s.
-
-    Returns
-    -------
-    CarriedElevation
-        To be read at any distance in the range.
-
-    Raises
-    ------
-    RequestError
-        If an argument is out of range.
-    DataError
-        If the series has gaps.
-    """
+    """Prepare a record to be carried over a range of distances (m) at one celerity (m/s)."""
     speed = positive(celerity, "the celerity", "m/s")
     return _carried(
         as_series(series, minimum=4, channels=True), dt, distances, lambda omega: omega / speed

@@ -17,6 +17,7 @@ from seakeep.errors import RequestError
 from seakeep.signals.filters import odd_extension
 from seakeep.signals.lags import Lags, windowed_lags
 from seakeep.signals.time_axis import stretches
+from seakeep.signals.waves import tapered_power
 
 __all__ = [
     "Agreement",
@@ -283,7 +284,7 @@ def dominant_period(series: npt.ArrayLike, dt: float) -> float:
     x = as_series(series)
     if x.size < 8:
         return float("nan")
-    power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size))) ** 2
+    power = tapered_power(x)
     power = np.convolve(power, [0.25, 0.5, 0.25], mode="same")
     power[:3] = 0.0
     return float(1.0 / np.fft.rfftfreq(x.size, dt)[int(np.argmax(power))])
@@ -483,22 +484,6 @@ def reading_step(series: npt.ArrayLike) -> float:
     A camera's readings that were interpolated to a faster rate are straight between its frames;
     a change then counts from frame to frame.
 
-    Parameters
-    ----------
-    series : array_like, shape (time,)
-        Uniformly sampled, as it was recorded: no filter, no other resampling.
-
-    Returns
-    -------
-    float
-        The step, in the unit of the series; NaN where fewer than ten changes out of or into a held
-        reading are seen, as in the record of a sensor that resolves its own noise.
-
-    Raises
-    ------
-    DataError
-        If the series has gaps.
-
     Examples
     --------
     >>> import numpy as np
@@ -542,28 +527,6 @@ def energy_above(series: npt.ArrayLike, dt: float, edge: float) -> tuple[float, 
     Noise and ringing above three times the peak's frequency do not count: to lose them does no
     harm.
 
-    Parameters
-    ----------
-    series : array_like, shape (time,)
-        Uniformly sampled series without gaps.
-    dt : float
-        Time step, s.
-    edge : float
-        The frequency, Hz.
-
-    Returns
-    -------
-    (float, float)
-        The part, 0 to 1, and the period of the spectrum's peak, s; NaN where nothing moves or the
-        series has fewer than eight samples.
-
-    Raises
-    ------
-    RequestError
-        If the step is not positive.
-    DataError
-        If the series has gaps.
-
     Examples
     --------
     >>> import numpy as np
@@ -577,7 +540,7 @@ def energy_above(series: npt.ArrayLike, dt: float, edge: float) -> tuple[float, 
     period = dominant_period(x, dt) if np.ptp(x) else float("nan")
     if not np.isfinite(period):
         return float("nan"), float("nan")
-    power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size))) ** 2
+    power = tapered_power(x)
     lines = np.fft.rfftfreq(x.size, dt)
     waves = (lines >= WAVES[0] / period) & (lines <= WAVES[1] / period)
     return float(power[waves & (lines > edge)].sum() / power[waves].sum()), period

@@ -328,36 +328,24 @@ def clock_from_shared(
     first = clock_from_correlation(series, time, reference, reference_time, window, largest_lag)
     a, c = _record(series, time, "the logger")
     b, t = _record(reference, reference_time, "the reference")
-    if np.median(np.diff(c)) < np.median(np.diff(t)):  # the spline goes through the faster one
-        inverse = _refined(
-            b, t, scipy.interpolate.CubicSpline(c, a), (c[0], c[-1]),
-            (-first.offset / (1 + first.drift), 1 / (1 + first.drift) - 1),
-        )  # fmt: skip
-        (level, drift), (level_error, drift_error), rms, count = inverse
-        offset, slope = -level / (1 + drift), 1 / (1 + drift) - 1
-        return Clock(
-            offset,
-            slope,
-            level_error,
-            drift_error,
-            "shared channel",
-            count,
-            rms,
-            centre=float(t.mean()),
-        )
+    offset, drift = first.offset, first.drift
+    turned = np.median(np.diff(c)) < np.median(np.diff(t))  # the spline is of the faster one
+    if turned:
+        (a, c), (b, t) = (b, t), (a, c)
+        offset, drift = _inverse(offset, drift)
     (offset, drift), (offset_error, drift_error), rms, count = _refined(
-        a, c, scipy.interpolate.CubicSpline(t, b), (t[0], t[-1]), (first.offset, first.drift)
+        a, c, scipy.interpolate.CubicSpline(t, b), (t[0], t[-1]), (offset, drift)
     )
-    return Clock(
-        offset,
-        drift,
-        offset_error,
-        drift_error,
-        "shared channel",
-        count,
-        rms,
-        centre=float(c.mean()),
-    )
+    if turned:
+        offset, drift = _inverse(offset, drift)
+    errors = offset_error, drift_error
+    centre = float(c.mean())
+    return Clock(offset, drift, *errors, "shared channel", count, rms, centre=centre)
+
+
+def _inverse(offset: float, drift: float) -> tuple[float, float]:
+    """Offset and drift of the reference's clock against this one."""
+    return -offset / (1 + drift), 1 / (1 + drift) - 1
 
 
 def _refined(
@@ -455,17 +443,6 @@ def without_doubtful_drift(clock: Clock) -> Clock:
     a doubtful one would put a larger error into the ends of a record than it takes out. Without
     it the clock reads as before in the middle of what it was found from.
 
-    Parameters
-    ----------
-    clock : Clock
-        As it was found, or pooled over runs.
-
-    Returns
-    -------
-    Clock
-        The same where its drift is certain or stated; else with a drift of zero, and what was found
-        told in `method`. `drift_error` stays: that is how well the drift is known to be zero.
-
     Examples
     --------
     >>> found = Clock(0.1, 20e-6, 1e-3, 30e-6, "trigger pulses", 3, 1e-3, centre=30.0)
@@ -511,25 +488,9 @@ class Pulses:
 
 
 def find_pulses(trigger: FloatArray, time: FloatArray, name: str = "the trigger") -> Pulses:
-    """Find the pulses of a trigger at half their height.
+    """Find the whole pulses of a trigger at half their height; NaN is taken for rest.
 
-    Parameters
-    ----------
-    trigger, time : ndarray, shape (time,)
-        Trigger in any unit, and the instants, s.
-    name : str, optional
-        What a message calls it.
-
-    Returns
-    -------
-    Pulses
-        Whole pulses only. Those of less than half or more than twice the median height or width
-        are left out.
-
-    Raises
-    ------
-    DataError
-        If there is no pulse that stands out of the noise.
+    Pulses of less than half or more than twice the median height or width are left out.
 
     Examples
     --------
@@ -593,27 +554,10 @@ def _weighted_median(values: FloatArray, weights: IntArray) -> float:
 def match_pulses(
     own: FloatArray, reference: FloatArray, expected_offset: float, largest_drift: float
 ) -> tuple[IntArray, IntArray, float]:
-    """Find which pulse of one record is which of another.
+    """Indices of the pulses that match in two records (instants, s).
 
-    Parameters
-    ----------
-    own, reference : ndarray, shape (pulse,)
-        Instants in either clock, s.
-    expected_offset : float
-        Offset that is preferred among those that fit equally well, s.
-    largest_drift : float
-        Drift allowed for, a pure number.
-
-    Returns
-    -------
-    (ndarray, ndarray, float)
-        Indices of matched pulses in either record, and the distance to the next offset that
-        would fit nearly as well (``inf`` if none does).
-
-    Raises
-    ------
-    DataError
-        If no offset brings pulses together.
+    Also the distance to the next offset that would fit nearly as well, ``inf`` if none does. Of
+    offsets that fit equally well, the one nearest to `expected_offset` is taken.
     """
     spacing = min((float(np.diff(each).min()) for each in (own, reference) if each.size > 1),
                   default=1.0)  # fmt: skip
@@ -643,22 +587,7 @@ def _pairs(own: FloatArray, reference: FloatArray, reach: float) -> tuple[IntArr
 def pulse_template(
     trigger: FloatArray, time: FloatArray, pulses: Pulses, centres: FloatArray
 ) -> scipy.interpolate.CubicSpline:
-    """Mean pulse of a record, as a function of the time from its centre.
-
-    Parameters
-    ----------
-    trigger, time : ndarray, shape (time,)
-        The record.
-    pulses : Pulses
-        Its pulses.
-    centres : ndarray
-        Those to be averaged, s.
-
-    Returns
-    -------
-    scipy.interpolate.CubicSpline
-        Over 1.5 widths to either side of the centre.
-    """
+    """Mean pulse of a record over the time from its centre, 1.5 widths to each side."""
     step = float(np.median(np.diff(time)))
     count = int(np.ceil(1.5 * pulses.width / step)) + 2
     away = step * np.arange(-count, count + 1)
@@ -676,21 +605,9 @@ def time_pulses(
     centres: FloatArray,
     template: scipy.interpolate.CubicSpline,
 ) -> tuple[FloatArray, FloatArray]:
-    """Instants of pulses by least squares of height, level and instant of a template.
+    """Instants of pulses and their standard errors, s; NaN where the fit fails.
 
-    Parameters
-    ----------
-    trigger, time : ndarray, shape (time,)
-        The record.
-    centres : ndarray, shape (pulse,)
-        First values, s.
-    template : scipy.interpolate.CubicSpline
-        From :func:`pulse_template`.
-
-    Returns
-    -------
-    instants, errors : ndarray, shape (pulse,)
-        s; NaN where the fit fails.
+    By least squares of height, level and instant of a template.
     """
     reach = float(template.x[-1])
     instants, errors = np.full(centres.size, np.nan), np.full(centres.size, np.nan)

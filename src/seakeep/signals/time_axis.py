@@ -38,18 +38,6 @@ def as_seconds(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
 def instant_text(instant: float, dt: float) -> str:
     """Write an instant to a thousandth of a time step, whatever it is counted from.
 
-    Parameters
-    ----------
-    instant : float
-        s.
-    dt : float
-        Time step, s; 0 asks for all digits of the instant.
-
-    Returns
-    -------
-    str
-        Without the unit, and without zeros at its end.
-
     Examples
     --------
     >>> instant_text(1700000034.35, 0.05), instant_text(2.0, 0.05)
@@ -72,25 +60,7 @@ def fixed(value: float, decimals: int) -> str:
 
 
 def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
-    """Return the times as floats; refuse values that are not finite, repeated or unsorted.
-
-    Parameters
-    ----------
-    time : array_like, shape (time,)
-        Instants, s.
-    name : str, optional
-        What the message calls the owner of the times.
-
-    Returns
-    -------
-    ndarray
-        The times.
-
-    Raises
-    ------
-    DataError
-        If a time is no number, not finite, repeated, or smaller than the one before.
-    """
+    """Return the times as floats; refuse values that are not finite, repeated or unsorted."""
     t = as_seconds(time, name)
     if t.ndim != 1 or t.size < 2:
         raise DataError(f"{name} has {t.size} instant(s); a time axis needs at least two.")
@@ -353,17 +323,6 @@ def stretches(
     wanted: BoolArray, place: npt.NDArray[np.int64] | None = None
 ) -> list[tuple[int, int]]:
     """Begin and end (not included) of each stretch of true values.
-
-    Parameters
-    ----------
-    wanted : ndarray of bool
-        The values.
-    place : ndarray of int, optional
-        Positions on a grid; a stretch ends where they jump.
-
-    Returns
-    -------
-    list of (int, int)
 
     Examples
     --------

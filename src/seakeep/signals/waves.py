@@ -109,9 +109,15 @@ def waves_part(series: npt.ArrayLike, dt: float, still: float = STILL) -> slice:
     return slice(begin, end)
 
 
+def tapered_power(x: FloatArray) -> FloatArray:
+    """Squared modulus of the spectrum of a series, its mean removed, under a Hann window."""
+    power: FloatArray = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size))) ** 2
+    return power
+
+
 def _dominant_period(x: FloatArray) -> float:
     """Period at the highest line of the spectrum, in samples; half the record at most."""
-    power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size))) ** 2
+    power = tapered_power(x)
     power[:2] = 0.0
     return float(x.size / max(int(np.argmax(power)), 2))
 
@@ -230,20 +236,9 @@ def encounter_period(
 
 
 def energy_period(series: npt.ArrayLike, dt: float) -> float:
-    r"""Energy period :math:`T_{-1,0} = m_{-1} / m_0` of a record's spectrum.
+    r"""Energy period :math:`T_{-1,0} = m_{-1} / m_0` of a record's spectrum, s.
 
-    Parameters
-    ----------
-    series : array_like, shape (time,)
-        Uniformly sampled series without gaps.
-    dt : float
-        Time step, s.
-
-    Returns
-    -------
-    float
-        Mean of the periods of its lines, weighed with their energy, s; what is slower than a
-        quarter of the record is left out as drift. NaN where nothing is left.
+    What is slower than a quarter of the record is left out as drift; NaN where nothing is left.
 
     Examples
     --------
@@ -252,7 +247,7 @@ def energy_period(series: npt.ArrayLike, dt: float) -> float:
     1.6
     """
     x = as_series(series)
-    power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size)))[4:] ** 2
+    power = tapered_power(x)[4:]
     lines = np.fft.rfftfreq(x.size, positive(dt, "the time step", "s"))[4:]
     return float((power / lines).sum() / power.sum()) if power.any() else float("nan")
 
@@ -392,15 +387,7 @@ def wave_spectrum(
 def paper_welch(dt: float) -> tuple[int, int, int]:
     """Welch settings of the paper at another rate: segment, overlap and transform, in samples.
 
-    Parameters
-    ----------
-    dt : float
-        Time step, s.
-
-    Returns
-    -------
-    segment, overlap, padded : int
-        2¹², 2⁷ and 2¹⁶ samples at 500 Hz, kept in seconds (8.2, 0.26 and 131 s).
+    2¹², 2⁷ and 2¹⁶ samples at 500 Hz, kept in seconds (8.2, 0.26 and 131 s).
 
     Examples
     --------
