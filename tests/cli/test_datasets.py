@@ -23,6 +23,16 @@ def upstream(tmp_path):
         def log_message(self, *_):
             pass
 
+        def do_GET(self):
+            if self.path.startswith("/cut/"):
+                self.send_response(200)
+                self.send_header("Content-Length", "1000000")
+                self.end_headers()
+                self.wfile.write(b"Time [s],x [m]\n0,")
+                self.close_connection = True
+            else:
+                super().do_GET()
+
     handler = functools.partial(Quiet, directory=str(folder))
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
     thread = threading.Thread(target=server.serve_forever, daemon=True)
@@ -66,7 +76,7 @@ def test_fetch_resumes_and_repairs(upstream, tmp_path):
 def test_an_altered_file_upstream_is_refused_and_nothing_is_written(upstream, tmp_path):
     folder, dataset = upstream
     (folder / "a.csv").write_bytes(b"something else")
-    with pytest.raises(DataError, match=r"a\.csv was received with SHA-256 .* upstream changed it"):
+    with pytest.raises(DataError, match=r"a\.csv was received with another SHA-256 .* upstream ch"):
         datasets.fetch(dataset, tmp_path)
     assert list((tmp_path / "toy").iterdir()) == []
 
@@ -77,6 +87,16 @@ def test_no_network_names_the_addresses_tried(upstream, tmp_path):
         RequestError, match=r"could not be fetched\. Tried: http.*Check the network"
     ):
         datasets.fetch(dataset, tmp_path, sources=["http://127.0.0.1:9/nothing"])
+
+
+def test_a_cut_download_is_no_file_and_the_next_source_is_tried(upstream, tmp_path):
+    _, dataset = upstream
+    whole = dataset.sources[-1]
+    with pytest.raises(RequestError, match=r"a\.csv could not be fetched\. Tried: .*Incomplete"):
+        datasets.fetch(dataset, tmp_path, sources=[f"{whole}/cut"])
+    assert list((tmp_path / "toy").iterdir()) == []
+    datasets.fetch(dataset, tmp_path, sources=[f"{whole}/cut", whole])
+    assert datasets.state_of(dataset, tmp_path) == "complete"
 
 
 def test_pickles_are_never_fetched(tmp_path):

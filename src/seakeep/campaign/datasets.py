@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
-import urllib.error
-import urllib.request
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from seakeep.errors import DataError, RequestError, did_you_mean
-from seakeep.files import make_folder, replacing, sha256_of
+from seakeep.files import make_folder, sha256_of
 
 __all__ = ["DATASETS", "PublicDataset", "data_folder", "fetch", "find_dataset", "state_of"]
 
@@ -97,30 +94,13 @@ DATASETS = (
 
 
 def find_dataset(name: str) -> PublicDataset:
-    """Look a data set up.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-
-    Returns
-    -------
-    PublicDataset
-        The data set.
-
-    Raises
-    ------
-    RequestError
-        If there is none of this name.
-    """
-    for dataset in DATASETS:
-        if dataset.name == name:
-            return dataset
-    known = [dataset.name for dataset in DATASETS]
-    raise RequestError(
-        f"there is no data set '{name}'.{did_you_mean(name, known)} Known: {', '.join(known)}."
-    )
+    """Data set of a name; a RequestError where there is none."""
+    known = {dataset.name: dataset for dataset in DATASETS}
+    if name not in known:
+        raise RequestError(
+            f"there is no data set '{name}'.{did_you_mean(name, known)} Known: {', '.join(known)}."
+        )
+    return known[name]
 
 
 def data_folder() -> Path | None:
@@ -130,31 +110,19 @@ def data_folder() -> Path | None:
 
 
 def state_of(dataset: PublicDataset, folder: Path | None) -> str:
-    """Say how much of a data set is in a folder, by checksum.
-
-    Parameters
-    ----------
-    dataset : PublicDataset
-        The data set.
-    folder : Path or None
-        The data folder.
-
-    Returns
-    -------
-    str
-        "complete", "absent", or how many files are there, missing or altered.
-    """
+    """Say how much of a data set is in a folder, by checksum: complete, absent, or how many."""
     if folder is None:
         return "unknown: SEAKEEP_DATA_DIR is not set"
-    sums = [_checksum(folder / dataset.name / name) for name, _ in dataset.files]
-    right = sum(found == wanted for found, (_, wanted) in zip(sums, dataset.files, strict=True))
-    missing = sums.count(None)
-    if right == len(sums):
+    places = [(folder / dataset.name / name, wanted) for name, wanted in dataset.files]
+    there = [(place, wanted) for place, wanted in places if place.is_file()]
+    right = sum(sha256_of(place) == wanted for place, wanted in there)
+    if right == len(places):
         return "complete"
-    if missing == len(sums):
+    if not there:
         return "absent"
-    return f"{right} of {len(sums)} files as published, {missing} missing, " + (
-        f"{len(sums) - right - missing} altered"
+    return (
+        f"{right} of {len(places)} files as published, {len(places) - len(there)} missing, "
+        f"{len(there) - right} altered"
     )
 
 
@@ -194,40 +162,41 @@ def fetch(
         raise RequestError(f"'{dataset.name}' cannot be fetched; {dataset.note}.")
     target = make_folder(folder / dataset.name)
     for done, (name, wanted) in enumerate(dataset.files, start=1):
-        if _checksum(target / name) != wanted:
-            content = _download(name, wanted, addresses)
-            with replacing(target / name) as temporary:
-                temporary.write_bytes(content)
+        _fetch_file(name, wanted, target, addresses)
         if progress is not None:
             progress(done, len(dataset.files), name)
     return target
 
 
-def _download(name: str, wanted: str, addresses: Sequence[str]) -> bytes:
-    failures = []
-    received = None
+def _fetch_file(name: str, wanted: str, target: Path, addresses: Sequence[str]) -> None:
+    """Fetch a file from the first address that has it whole; it is written once it is checked."""
+    import pooch
+
+    pooch.get_logger().setLevel("ERROR")
+    failures, altered = [], False
     for address in addresses:
-        url = f"{address}/{name}"
         try:
-            with urllib.request.urlopen(url, timeout=TIMEOUT) as answer:
-                content: bytes = answer.read()
-        except (urllib.error.URLError, OSError) as error:
-            failures.append(f"{url}: {getattr(error, 'reason', error)}")
-            continue
-        received = hashlib.sha256(content).hexdigest()
-        if received == wanted:
-            return content
-    if received is not None:
+            pooch.retrieve(
+                f"{address}/{name}",
+                known_hash=f"sha256:{wanted}",
+                fname=name,
+                path=target,
+                downloader=pooch.HTTPDownloader(timeout=TIMEOUT),
+            )
+        except ValueError:  # another checksum
+            altered = True
+            failures.append(f"{address}/{name}: another file")
+        except OSError as error:  # all errors of the network are such
+            failures.append(f"{address}/{name}: {error}")
+        else:
+            return
+    if altered:
         raise DataError(
-            f"{name} was received with SHA-256 {received[:12]}…, and the published file has "
-            f"{wanted[:12]}…: upstream changed it, or the download was cut short. Try again, or "
-            "look at the origin."
+            f"{name} was received with another SHA-256 than the published file's {wanted[:12]}…: "
+            "upstream changed it, or the download was cut short. Try again, or look at the "
+            f"origin. Tried: {'; '.join(failures)}."
         )
     raise RequestError(
         f"{name} could not be fetched. Tried: {'; '.join(failures)}. Check the network, or copy "
         "the files by hand and set SEAKEEP_DATA_DIR."
     )
-
-
-def _checksum(path: Path) -> str | None:
-    return sha256_of(path) if path.is_file() else None
