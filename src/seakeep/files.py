@@ -293,9 +293,10 @@ def check_seal(path: Path) -> None:
     """
     content, stated = _content(path.read_bytes())
     if hashlib.sha256(content).hexdigest() != stated:
+        why = "its checksum is another one" if stated else "it has no checksum at its end"
         raise DataError(
-            f"{path} was altered or damaged since it was written: its checksum is "
-            f"{'another one' if stated else 'missing'}. Remove it and make it again."
+            f"{path} was altered, damaged, or written by another version of seakeep: {why}. Remove "
+            "it and make it again."
         )
 
 

@@ -376,14 +376,14 @@ def read_result(folder: Path | str) -> StudyResult:
             )
         )
     try:
+        check_seal(path)  # before HDF5 reads it, which altered bytes may bring to a crash
         with xr.open_dataset(path, engine="h5netcdf") as root:
             attrs = {key: _plain(value) for key, value in root.attrs.items()}
-        if attrs.get("format") != FORMAT and "format" in attrs:
+        if attrs["format"] != FORMAT:
             raise RequestError(
                 f"{path} was written in format {attrs['format']}, and this version of seakeep "
                 f"reads format {FORMAT}. Run the study again in another folder."
             )
-        check_seal(path)
         groups = {}
         for name in json.loads(attrs["groups"]):
             with xr.open_dataset(path, engine="h5netcdf", group=name, decode_times=False) as opened:
