@@ -2,7 +2,7 @@
 
 Every public function passes its arrays through :func:`as_real` or :func:`as_series`, which refuse
 what is not an array of real numbers: masked values, complex numbers, dates, text, Datasets and rows
-of unequal length. The message says what was received and how to mend it.
+of unequal length. The message says what was received and how to correct it.
 """
 
 from __future__ import annotations

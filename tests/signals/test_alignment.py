@@ -126,7 +126,7 @@ def test_band_limit_is_where_the_waves_end():
         (
             lambda: delay_by_dispersion(sea(0.0), DT, np.zeros(5), DEPTH),
             RequestError,
-            r"the distance has shape \(5,\); expected one number, or one a sample: \(2048,\)",
+            r"the distance has shape \(5,\); expected one number, or one per sample: \(2048,\)",
         ),
         (
             lambda: delay_by_celerity(sea(0.0), DT, np.full(2048, np.nan), 2.0),

@@ -500,7 +500,7 @@ def test_wrong_settings(settings, message):
         ({"lamp": (2000.0, 0.0, 5.0)}, r"the lamp .* lies outside the picture"),
         (
             {"passband": 12.0},
-            r"has 30 frames a second, so the low-pass filter cannot stop at 18 Hz",
+            r"has 30 frames per second, so the low-pass filter cannot stop at 18 Hz",
         ),
     ],
 )

@@ -222,7 +222,7 @@ def _summary(track: Track, written: list[Path]) -> None:
     messages().print(
         f"{track.time.size} frames at {facts['frame_rate']:g} Hz; flagged: "
         f"{', '.join(flagged) or 'none'} ({int(track['bridged'].sum())} bridged); "
-        f"{1e3 * facts['metres_per_pixel']:.4g} mm a pixel ({facts['calibration']}); "
+        f"{1e3 * facts['metres_per_pixel']:.4g} mm per pixel ({facts['calibration']}); "
         f"{facts['camera']}."
     )
     if written:
@@ -250,7 +250,7 @@ def _compare(track: Track, reference: xr.Dataset, max_lag: float | None) -> None
 
 
 def _doubt(found: MotionAgreement) -> str:
-    """Why the lag may be another one; empty where nothing speaks for that."""
+    """Why the lag may be another one; empty where there is no reason."""
     searched = f"the lags searched (within {found.max_lag:g} s)"
     if found.at_limit:
         return f"the lag is at the end of {searched}; the true one may be longer. Raise --max-lag."

@@ -154,7 +154,7 @@ def jsd_interval(
     The paper leaves the pairing open. Here the b-th prediction and the b-th measurement are
     redrawn from the same block starts, so that a perfect prediction has a divergence of exactly
     zero. The floor draws a second, independent set of the measurement: a divergence near it is
-    one that a record of this length cannot tell from none. It is not a lower bound, because
+    one that a record of this length cannot distinguish from none. It is not a lower bound, because
     paired draws share their sampling error and the floor's do not.
     """
     m = as_series(measured, "measured")

@@ -78,7 +78,7 @@ def is_slack(
     measured: npt.ArrayLike,
     training_std: npt.ArrayLike | None = None,
 ) -> BoolArray:
-    """Say which channels are not judged, because the measurement hardly moves.
+    """Say which channels are not judged, because the measurement barely moves.
 
     Parameters
     ----------

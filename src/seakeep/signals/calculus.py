@@ -110,8 +110,8 @@ def _check_slowest(frequency: float, dt: float, samples: int, name: str) -> None
     if frequency * dt * samples < SHORTEST_RECORD:
         raise RequestError(
             f"{name} ({frequency:g} Hz) has a period of {1 / frequency:g} s, and the record lasts "
-            f"{dt * samples:g} s; at least {SHORTEST_RECORD:g} of a period is needed to tell it "
-            "from a drift. Raise it, or give a longer record."
+            f"{dt * samples:g} s; at least {SHORTEST_RECORD:g} of a period is needed to separate "
+            "it from a drift. Raise it, or give a longer record."
         )
 
 
@@ -124,7 +124,7 @@ def _integrated(
     columns = np.ascontiguousarray(array.reshape(array.shape[0], -1).T)
     array = (columns - columns.mean(axis=1, keepdims=True)).T.reshape(array.shape)
     # Eight periods of the lower edge outlast the ringing of its flank; a prediction needs to
-    # look back one and a half of them to tell the slowest wave from a trend.
+    # look back one and a half of them to separate the slowest wave from a trend.
     padding = int(np.ceil(8.0 / (low * dt)))
     order = min(int(np.ceil(1.6 / (low * dt))), 2000)
     extended = predicted_extension(array, padding, fitted=padding, order=order)

@@ -205,7 +205,7 @@ def _unquoted(text: str) -> tuple[str, dict[str, str]]:
     quoted: dict[str, str] = {}
 
     def stand_in(match: re.Match[str]) -> str:
-        # A click letter, which may be part of an identifier and which nobody calls a channel.
+        # A click letter, which may be part of an identifier and which no channel is called.
         name = f"\u01c3{len(quoted)}".ljust(len(match[0]), "_")
         quoted[name] = match[1]
         return name

@@ -26,7 +26,7 @@ def lowpass_taps(
     Parameters
     ----------
     sampling_rate : float
-        Samples a second, Hz.
+        Samples per second, Hz.
     passband, stopband : float
         Edges of the pass and stop bands, Hz, ``0 < passband < stopband < sampling_rate / 2``.
     attenuation : float, optional
@@ -211,7 +211,7 @@ def resample(
     -------
     ndarray, shape (new_time,) or (new_time, channel)
         The series at the new instants. Where the instants coincide and the step is the same, the
-        samples are handed on untouched.
+        samples are returned untouched.
 
     Raises
     ------

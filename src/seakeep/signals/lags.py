@@ -74,7 +74,7 @@ def windowed_lags(
     Returns
     -------
     Lags
-        One value a window.
+        One value per window.
 
     Raises
     ------
@@ -236,7 +236,7 @@ def as_pair(first: npt.ArrayLike, second: npt.ArrayLike) -> tuple[FloatArray, Fl
 SHORTEST = 16
 """Samples in common below which a correlation says nothing."""
 LONGEST = 10.0
-"""Lag searched by default, s: clocks set by hand, or recordings started by a shout."""
+"""Lag searched by default, s: clocks set by hand, or recordings started by hand."""
 FINEST = 0.01
 """Difference, in SD of the motion, below which two sensors are taken to agree."""
 

@@ -35,7 +35,7 @@ class Leakage:
     training : int
         Index of the training record.
     training_start, test_start : float
-        Where the best matching stretch begins in each record, s from its first sample.
+        Where the best matching stretch starts in each record, s from its first sample.
     phase : float
         Constant phase by which the repetition is turned, rad; zero is a plain repetition.
     """

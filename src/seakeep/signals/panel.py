@@ -158,7 +158,7 @@ def _are_colours(lower: Sequence[int], upper: Sequence[int]) -> bool:
 
 
 def opencv() -> Any:
-    """Return OpenCV's module, its decoder told to be quiet."""
+    """Return OpenCV's module with a quiet decoder."""
     # What FFmpeg prints about a damaged file, our own message says in a sentence.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")

@@ -119,7 +119,7 @@ def phase_celerity(
     depth : float
         Water depth, m; ``numpy.inf`` for deep water.
     segment : int, optional
-        Samples a segment of Welch's method; by default 60 s, or half the record if it is shorter
+        Samples per segment of Welch's method; by default 60 s, or half the record if it is shorter
         than two such segments. Segments overlap by half.
 
     Returns
@@ -239,7 +239,7 @@ ENERGY = 0.01
 PLACES, FINER = 16, 20
 """Places tried in a shortest wavelength, and again between two of them around the best."""
 LEAST_WAVES = 20
-"""Fewer waves in a record tell too little of the sea's frequencies."""
+"""Fewer waves in a record cover too few of the sea's frequencies."""
 LEAST_CORRELATION = 0.8
 """Below it, six tenths of the second record are not the first one carried to it."""
 BEYOND_THEORY = 0.01
@@ -286,15 +286,15 @@ class ProbeSeparation:
         return replace(self, separation=-self.separation, stated=-self.stated)
 
     @property
-    def told(self) -> bool:
-        """Whether the records match well enough to tell a separation."""
+    def known(self) -> bool:
+        """Whether the records match well enough to determine a separation."""
         return self.correlation >= LEAST_CORRELATION
 
     @property
     def disagrees(self) -> bool:
         """Whether the stated separation is surely wrong, and by as much as matters to a model."""
         doubt = SURELY * self.spread + BEYOND_THEORY * abs(self.separation)
-        return self.told and abs(self.excess) > doubt and self.input_error > MATTERS
+        return self.known and abs(self.excess) > doubt and self.input_error > MATTERS
 
 
 @dataclass(frozen=True)
@@ -372,7 +372,7 @@ def misplaced_probes(
     -----
     On three probes in seas of the paper's band (Tp 2.05 s, depth 3.6 m, 20 seeds each of 210 s
     with 2 % noise, with reflections of 10 and of 20 %, with noise of 20 %, and of 60 s) no right
-    position and none wrong by 0.05 m was doubted, and 0.18 m was told with the right probe in all.
+    position and none wrong by 0.05 m was doubted, and 0.18 m was found with the right probe in all.
     Regular waves before a model are left out for a reason: on the measured ship section their
     phases move by up to a fifth of a wavelength with what the model reflects.
     """
@@ -390,7 +390,7 @@ def misplaced_probes(
         for a, b in pairs
     }
     against = [pair for pair, each in found.items() if each.disagrees]
-    backed = {end for pair, each in found.items() if each.told and pair not in against
+    backed = {end for pair, each in found.items() if each.known and pair not in against
               for end in pair}  # fmt: skip
     out: dict[tuple[str, ...], Misplaced] = {}
     for a, b in sorted(against, key=lambda pair: found[pair].spread):
@@ -424,8 +424,8 @@ def probe_separation(
     is greatest. It is sought as far as the waves' groups get in a quarter of the record, upstream
     too. In a narrow band neighbouring maxima, a wavelength apart, are nearly as high: of those
     within a tenth of the highest, and not lower by three standard errors of the difference, the
-    one nearest to the stated separation is taken. So regular waves tell a separation within half
-    a wavelength only.
+    one nearest to the stated separation is taken. So regular waves determine a separation within
+    half a wavelength only.
 
     Parameters
     ----------
@@ -737,7 +737,7 @@ def _distances(distance: npt.ArrayLike, samples: int) -> FloatArray:
     places = as_real(distance, "the distance")
     if places.shape not in ((), (samples,)):
         raise RequestError(
-            f"the distance has shape {places.shape}; expected one number, or one a sample: "
+            f"the distance has shape {places.shape}; expected one number, or one per sample: "
             f"({samples},)."
         )
     if not np.all(np.isfinite(places)):
@@ -783,7 +783,7 @@ def _carried(
         raise RequestError(
             f"distances from {lowest:g} to {highest:g} m span {reach / np.pi:.0f} of the shortest "
             f"wavelengths that a step of {step:g} s resolves. Resample the elevation to some 30 "
-            "samples a wave period first."
+            "samples per wave period first."
         )
     turned = spectrum * np.exp(-1j * k * centre)[:, None]
     terms = np.empty((count, *flat.shape))

@@ -1,6 +1,6 @@
 """Quality of measured series: what is missing, wrong, frozen, late, and what was done about it.
 
-The checks look and tell; none of them changes a value. Thresholds are stated in units of the
+The checks report; none of them changes a value. Thresholds are stated in units of the
 series' own noise, spread or period, not of any one data set.
 """
 
@@ -55,7 +55,7 @@ FEWEST_STEPS = 5.0
 for five distinct categories (AIAG, MSA, 4th edition)."""
 
 LARGEST_GAIN = 2.0
-"""Factor between the motions that two sensors tell beyond which one of them has another unit or
+"""Factor between the motions of two sensors beyond which one of them has another unit or
 calibration: a correlation of 0.8 leaves room for 1.25 by what the sensor adds of its own, and a
 wrong unit makes 10 or more."""
 
@@ -248,7 +248,7 @@ def level_drift(series: npt.ArrayLike, dt: float, period: float) -> tuple[float,
     Returns
     -------
     (float, float)
-        End minus begin of the straight line through the means of windows of four periods, and
+        End minus start of the straight line through the means of windows of four periods, and
         that change in standard errors of the line.
 
     Examples
@@ -333,11 +333,11 @@ class Agreement:
     lags: FloatArray
 
     def faults(self) -> list[str]:
-        """What speaks against the sensor, in words; empty if nothing does.
+        """Reasons to doubt the sensor, in words; empty if there is none.
 
         A lag or its growth is a fault where it alone would bring the correlation below the least
         one; a motion that spans fewer than five of the sensor's steps is below its resolution; a
-        sensor that goes along, and tells more than twice the motion or less than half, has
+        sensor that follows the motion, and shows more than twice or less than half of it, has
         another scale.
         """
         if not np.isfinite(self.correlation):
@@ -439,7 +439,7 @@ def compare_sensors(
 def _windows(
     x: FloatArray, y: FloatArray, dt: float, length: float, period: float, stuck: BoolArray
 ) -> tuple[Lags, float, float]:
-    """Lags in windows of a length that tell something; the trusted SD and the gain in them."""
+    """Lags in windows with enough motion; the trusted SD and the gain in them."""
     found = windowed_lags(x, y, dt, length, 0.5 * period)
     begin = np.clip(((found.centre - 0.5 * length) / dt).astype(int), 0, None)
     end = ((found.centre + 0.5 * length) / dt).astype(int)
@@ -449,11 +449,11 @@ def _windows(
     free = np.array([not stuck[i : j + 1].any() for i, j in zip(begin, end, strict=True)])
     kept = (motion > 0.3 * motion.max()) & np.isfinite(found.lag)
     kept &= free | ~np.any(kept & free)  # a sensor that sticks all the time is judged all the same
-    told = Lags(found.centre[kept], found.lag[kept], found.correlation[kept], found.at_zero[kept])
+    clear = Lags(found.centre[kept], found.lag[kept], found.correlation[kept], found.at_zero[kept])
     if not kept.any():
-        return told, float("nan"), float("nan")
+        return clear, float("nan"), float("nan")
     mean = float(np.sqrt(np.mean(motion[kept] ** 2)))
-    return told, mean, float(np.median(own[kept] / motion[kept]))
+    return clear, mean, float(np.median(own[kept] / motion[kept]))
 
 
 def _together(found: Lags) -> BoolArray:

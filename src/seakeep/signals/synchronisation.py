@@ -46,7 +46,7 @@ class Clock:
     drift : float
         How much faster than the reference it runs, a pure number (25e-6 is 25 ppm).
     offset_error, drift_error : float
-        Standard errors of the two; NaN where the data cannot tell.
+        Standard errors of the two; NaN where the data do not determine them.
     method : str
         How it was found.
     count : int
@@ -87,13 +87,13 @@ class Clock:
         return out
 
     @property
-    def told(self) -> bool:
+    def known(self) -> bool:
         """Whether offset and drift were found or stated; else they are zero because none was."""
         return self.method not in (Clock.method, ASSUMED)
 
     def describe(self) -> str:
         """One line for people: offset and drift with their errors, and where they come from."""
-        if not self.told:
+        if not self.known:
             return self.method
         found = (
             f"{1e3 * self.offset:+z.2f}{_error(1e3 * self.offset_error, 2)} ms, "
@@ -418,7 +418,7 @@ def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
         return list(clocks)
     pooled = []
     for clock in clocks:
-        if not clock.told:
+        if not clock.known:
             pooled.append(clock)
             continue
         own = clock.drift_error if np.isfinite(clock.drift_error) else 0.0
@@ -437,7 +437,7 @@ def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
 
 
 def without_doubtful_drift(clock: Clock) -> Clock:
-    """Clock with its offset alone where the data do not tell its drift.
+    """Clock with its offset alone where the data do not determine its drift.
 
     A drift is applied only if it exceeds its expanded uncertainty (twice the standard error, 95 %):
     a doubtful one would put a larger error into the ends of a record than it takes out. Without
@@ -453,12 +453,12 @@ def without_doubtful_drift(clock: Clock) -> Clock:
     doubtful = 0 < abs(clock.drift) <= 2.0 * clock.drift_error
     if not doubtful:
         return clock
-    told = f"offset only: a drift of {1e6 * clock.drift:+z.1f} ppm is not certain"
+    doubt = f"offset only: a drift of {1e6 * clock.drift:+z.1f} ppm is not certain"
     return replace(
         clock,
         offset=clock.offset + clock.drift * clock.centre,
         drift=0.0,
-        method=f"{clock.method}, {told}",
+        method=f"{clock.method}, {doubt}",
     )
 
 

@@ -72,21 +72,21 @@ def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
         )
     steps = np.diff(t)
 
-    def told(sample: int) -> str:
+    def instant(sample: int) -> str:
         return f"{instant_text(t[sample], float(np.median(np.abs(steps))))} s"
 
     if np.any(steps == 0):
         at = int(np.flatnonzero(steps == 0)[0])
         raise DataError(
-            f"the times of {name} repeat: {told(at)} stands at samples {at} and {at + 1} "
+            f"the times of {name} repeat: {instant(at)} stands at samples {at} and {at + 1} "
             f"({int(np.sum(steps == 0))} repetitions in all). Remove the double rows, or raise the "
             "number of decimals the logger writes."
         )
     if np.any(steps < 0):
         at = int(np.flatnonzero(steps < 0)[0])
         raise DataError(
-            f"the times of {name} are not sorted: {told(at + 1)} follows {told(at)} at sample "
-            f"{at + 1}. Sort the rows by time, or split the file where the clock was restarted."
+            f"the times of {name} are not sorted: {instant(at + 1)} follows {instant(at)} at "
+            f"sample {at + 1}. Sort the rows by time, or split the file where the clock was restarted."
         )
     return t
 
@@ -148,7 +148,7 @@ def _irregularity(t: FloatArray, name: str) -> str:
     steps = np.diff(t)
     usual = float(np.median(steps))
 
-    def told(sample: int) -> str:
+    def instant(sample: int) -> str:
         return f"{instant_text(t[sample], usual)} s"
 
     counts = steps / usual
@@ -156,15 +156,15 @@ def _irregularity(t: FloatArray, name: str) -> str:
     if gaps.size and np.max(np.abs(counts - np.rint(counts))) < 0.1:
         longest = gaps[np.argmax(steps[gaps])]
         return (
-            f"the times of {name} have {gaps.size} gap(s): after t = {told(int(gaps[0]))}, "
+            f"the times of {name} have {gaps.size} gap(s): after t = {instant(int(gaps[0]))}, "
             f"{int(np.rint(counts[gaps[0]])) - 1} sample(s) of {usual:g} s are missing; the "
-            f"longest gap, after t = {told(int(longest))}, lasts {steps[longest]:g} s. Fill the "
+            f"longest gap, after t = {instant(int(longest))}, lasts {steps[longest]:g} s. Fill the "
             "gap, or use the record before or after it."
         )
     at = int(np.argmax(np.abs(steps - usual)))
     return (
         f"the times of {name} are not uniform: steps run from {steps.min():g} to {steps.max():g} s "
-        f"(median {usual:g} s), the oddest after t = {told(at)}. Interpolate the series onto a "
+        f"(median {usual:g} s), the oddest after t = {instant(at)}. Interpolate the series onto a "
         "uniform step before reading it, or split it where the clock changed."
     )
 
@@ -245,7 +245,7 @@ def inspect_times(time: npt.ArrayLike, name: str = "the run") -> TimeReport:
 
 
 def _grid(t: FloatArray) -> tuple[npt.NDArray[np.int64], float, float]:
-    """Whole number of steps from the first instant to each, the step, and the grid's begin."""
+    """Whole number of steps from the first instant to each, the step, and the grid's start."""
     usual = float(np.median(np.diff(t)))
     place = np.concatenate([[0], np.cumsum(np.maximum(np.rint(np.diff(t) / usual), 1))])
     for _ in range(2):  # a usual step that is off by rounding adds up over a long gap
@@ -262,8 +262,8 @@ def onto_uniform(
 ) -> tuple[FloatArray, FloatArray]:
     """Put series onto a uniform axis, NaN where samples are missing.
 
-    Samples of an axis that only has gaps are handed on untouched. On an axis with jitter they are
-    interpolated by cubic splines between gaps, which asks for several samples a wave.
+    Samples of an axis that only has gaps are returned untouched. On an axis with jitter they are
+    interpolated by cubic splines between gaps, which needs several samples per wave.
 
     Parameters
     ----------
@@ -298,7 +298,7 @@ def onto_uniform(
         )
     if report.missing > t.size:
         raise DataError(
-            f"{name} misses {report.missing} samples and has {t.size}: its times are hardly a "
+            f"{name} misses {report.missing} samples and has {t.size}: its times do not make a "
             "record. Split the file where the logger paused, or state its sampling rate."
         )
     place, step, begin = _grid(t)
@@ -402,7 +402,7 @@ def bridge(series: npt.ArrayLike, dt: float, longest: float) -> Bridged:
     there = np.flatnonzero(~missing)
     if there.size < 2:
         raise DataError(
-            f"the series has {there.size} value(s) in {x.size} samples: there is nothing to go by. "
+            f"the series has {there.size} value(s) in {x.size} samples: too few to bridge a gap. "
             "Leave the channel out."
         )
     filled = x.copy()

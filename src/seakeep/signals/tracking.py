@@ -70,7 +70,7 @@ LABELS = {
 REPORT_EVERY = 150
 """Frames between two reports of progress."""
 SLOWEST, FASTEST = 0.1, 2000.0
-"""Frames a second that a header may state and be believed."""
+"""Frames per second that a header may state and be believed."""
 ASPECT_BAND = 0.15
 """Part by which the aspect of what is taken for the panel may differ from the panel's."""
 SIZE_BAND = 0.10
@@ -183,8 +183,8 @@ def _open_video(path: Path | str) -> Iterator[_Video]:
         rate = float(capture.get(cv2.CAP_PROP_FPS))
         if not SLOWEST <= rate <= FASTEST:
             raise DataError(
-                f"{path} states {rate:g} frames a second, which cannot be. Encode it again with "
-                "its true, constant rate."
+                f"{path} states {rate:g} frames per second, which is impossible. Encode it again "
+                "with its true, constant rate."
             )
         width, height, announced = (
             capture.get(key)
@@ -290,8 +290,8 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
     stop = _stopband(how)
     if stop is not None and stop >= 0.5 * video.rate:
         raise RequestError(
-            f"{video.path} has {video.rate:g} frames a second, so the low-pass filter cannot stop "
-            f"at {stop:g} Hz. Lower the passband (--passband) so that the stopband, 1.5 times as "
+            f"{video.path} has {video.rate:g} frames per second, so the low-pass filter cannot "
+            f"stop at {stop:g} Hz. Lower the passband (--passband) so that the stopband, 1.5 times as "
             f"high unless stated, lies below {0.5 * video.rate:g} Hz, or filter nothing "
             "(passband None; --passband 0)."
         )
@@ -347,7 +347,7 @@ def _warn_of_flags(path: Path | str, flag: IntArray) -> None:
         )
         warnings.warn(
             f"{path}: {bad} of {flag.size} frames are flagged ({counts}). Look at the contact "
-            "sheet; mend the thresholds, state a region, or raise tolerance for a lens that "
+            "sheet; correct the thresholds, state a region, or raise tolerance for a lens that "
             "distorts.",
             SeakeepWarning,
             stacklevel=3,

@@ -99,7 +99,7 @@ def waves_part(series: npt.ArrayLike, dt: float, still: float = STILL) -> slice:
         moving = np.flatnonzero(spread > still * x[begin:end].std())
         if not moving.size:
             break
-        # The first window that moves holds the waves at its end, the last one at its begin.
+        # The first window that moves holds the waves at its end, the last one at its start.
         first, last = int(moving[0]) + length - 1, int(moving[-1]) + 1
         before = first if first >= 2.5 * length else 0
         after = last if x.size - last >= 2.5 * length else x.size
@@ -139,7 +139,7 @@ def zero_up_crossings(
         slow wave is not counted. 0 counts every change of sign, as the paper does.
     still : float, optional
         Still water before and after the waves is left out (:func:`waves_part`); 0 counts in the
-        whole record. A record without a still begin or end gives the same either way.
+        whole record. A record without a still start or end gives the same either way.
 
     Returns
     -------
@@ -334,7 +334,7 @@ def wave_spectrum(
     dt : float
         Time step, s.
     segment : int, optional
-        Samples a segment; the default covers 60 s, or the whole series if it is shorter.
+        Samples per segment; the default covers 60 s, or the whole series if it is shorter.
     overlap : int, optional
         Samples shared by successive segments; the default is half a segment.
     padded : int, optional
@@ -345,7 +345,7 @@ def wave_spectrum(
     Returns
     -------
     frequency, density : ndarray
-        Hz, and the square of the series' unit a hertz.
+        Hz, and the square of the series' unit per hertz.
 
     Raises
     ------
