@@ -121,7 +121,6 @@ import json, resource, signal, sys
 from pathlib import Path
 import numpy as np, xarray as xr
 from seakeep.campaign import store as campaign
-from seakeep.cli import tracking
 from seakeep.errors import SeakeepError
 from seakeep.models import store as models
 from seakeep.report import tables
@@ -133,7 +132,6 @@ writers = {
     "campaign": lambda path: campaign._write(run, path),
     "model": lambda path: models.write(run, path, "hankel_dmdc"),
     "forecast": lambda path: tables.write_forecast(run, path),
-    "track": lambda path: tracking._write(run, path),
     "raw file": lambda path: delivery.write_dataset(run, path),
     "hydrodynamics": lambda path: hydrodynamics.save_hydrodynamics(run, path),
     "study": lambda path: study.write_result(folder, {}, {"prepared": run}),
@@ -167,7 +165,7 @@ def test_whatever_is_written_as_netcdf_survives_a_disk_that_is_full(tmp_path):
         assert kind == "StorageError"
         assert "File too large" in words
         assert "Free space on the disk; the same command then goes on" in words
-    assert len(told) == 6
+    assert len(told) == 5
     for kind, words in told.values():
         assert kind == "RequestError"
         assert "file.nc: File too large" in words
