@@ -86,7 +86,8 @@ def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
         at = int(np.flatnonzero(steps < 0)[0])
         raise DataError(
             f"the times of {name} are not sorted: {instant(at + 1)} follows {instant(at)} at "
-            f"sample {at + 1}. Sort the rows by time, or split the file where the clock was restarted."
+            f"sample {at + 1}. Sort the rows by time, or split the file where the clock was "
+            "restarted."
         )
     return t
 

@@ -291,8 +291,8 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
     if stop is not None and stop >= 0.5 * video.rate:
         raise RequestError(
             f"{video.path} has {video.rate:g} frames per second, so the low-pass filter cannot "
-            f"stop at {stop:g} Hz. Lower the passband (--passband) so that the stopband, 1.5 times as "
-            f"high unless stated, lies below {0.5 * video.rate:g} Hz, or filter nothing "
+            f"stop at {stop:g} Hz. Lower the passband (--passband) so that the stopband, 1.5 times "
+            f"as high unless stated, lies below {0.5 * video.rate:g} Hz, or filter nothing "
             "(passband None; --passband 0)."
         )
 
