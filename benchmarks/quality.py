@@ -19,9 +19,10 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from seakeep.campaign.channels import Group
-from seakeep.campaign.checks import check_levels, check_pairs, check_samples, told_samples
-from seakeep.campaign.settings import CampaignSettings, RedundantSettings
+from seakeep.campaign.pipeline import flag_samples
+from seakeep.quality.record import Record, Redundant
+from seakeep.quality.samples import constant, flagged, levels
+from seakeep.quality.sensors import held, redundant
 from seakeep.signals import bridge, integrate
 from seakeep.signals.quality import (
     FEWEST_STEPS,
@@ -108,8 +109,9 @@ FAULTS: dict[str, tuple[Fault, str, Range, str]] = {
     "saturation": (clipped, "saturated", (0.4, 0.9), "of the range"),
     "drop-outs": (dropped, "missing", (0.02, 0.4), "s, eight of them"),
 }
-TABLE = RedundantSettings(channels=("trusted", "heave"))
-SETTINGS = CampaignSettings.model_construct(redundant={"heave": TABLE})
+PAIRS = (Redundant(("trusted", "heave")),)
+SAME = {"lag grows": "lag", "difference": "lag", "agreement": "lag", "held": "stuck"}
+"""Kinds of findings that count as one here."""
 
 
 def kinds(x: np.ndarray, trusted: np.ndarray, dt: float) -> set[str]:
@@ -120,10 +122,12 @@ def kinds(x: np.ndarray, trusted: np.ndarray, dt: float) -> set[str]:
     if filled.long.any():
         flags = (MISSING * filled.long).astype(np.int16)
         group.coords["heave_flags"] = ("time", flags, flag_attributes("heave"))
-    group = check_samples(group, replace=False)
+    group = flag_samples(group, replaced=False)
     both = group.assign(trusted=("time", trusted, {"units": "m"}))[["trusted", "heave"]]
-    found = told_samples(Group({"": group})) + check_levels(both[["heave"]])
-    return {each.kind for each in found + check_pairs(both, SETTINGS)[0]}
+    record = Record("run", both, {"": group}, redundant=PAIRS)
+    checks = (flagged, constant, levels, redundant, held)
+    found = {each.kind.word for one in checks for each in one(record) if each.channel == "heave"}
+    return {SAME.get(word, word) for word in found}
 
 
 def heaves(settings, rig, name: str) -> tuple[np.ndarray, np.ndarray, float]:

@@ -265,7 +265,8 @@ def tank():
 
 def chain():
     """A part of the data-quality sheet, by the example of the measurement chain's page."""
-    from seakeep.campaign.checks import check_pairs
+    from seakeep.campaign.pipeline import redundant_pairs
+    from seakeep.quality import compared
     from seakeep.report.quality_sheet import quality_figure
     from seakeep.tank.play import play
     from seakeep.tank.settings import default_settings
@@ -278,7 +279,8 @@ def chain():
         exec(compile(faults, "measurement_chain.md", "exec"), {"Path": Path})  # the page is ours
         campaign = seakeep.read_campaign("virtual/campaign.toml")
         run = campaign.prepare(["irregular_1"])["irregular_1"]
-        _, agreements = check_pairs(run, campaign.settings)
+        pairs = compared(run, redundant_pairs(campaign.settings, None))
+        agreements = {channel: each for (channel, _), each in pairs.items()}
     shown = run[["eta_us_fwd", "heave", "heave_of_acceleration"]].assign_attrs(run.attrs)
     with figure_style():  # all colours, unlike `save`: a palette would take those of single marks
         quality_figure(shown, agreements).savefig(HERE / "quality_sheet.png", dpi=90)

@@ -27,7 +27,8 @@ from pydantic import (
     ValidationError,
 )
 
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import MissingFileError, RequestError, did_you_mean
+from seakeep.files import read_bytes
 
 __all__ = [
     "Count",
@@ -331,27 +332,10 @@ def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
 
 
 def _text_of(path: Path, what: str, mend: str) -> str:
-    """Text of a file; only a regular file is opened."""
     try:
-        if path.is_dir():
-            raise RequestError(f"{path} is a folder; give the {what}'s TOML file in it.")
-        if path.exists() and not path.is_file():
-            raise RequestError(f"{path} is not a regular file; give the {what}'s TOML file.")
-        content = path.read_bytes()
-    except FileNotFoundError:
-        beside = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
-        raise RequestError(
-            f"the {what} file {path} does not exist.{did_you_mean(path.name, beside)}{mend}"
-        ) from None
-    except OSError as error:
-        raise RequestError(
-            f"the {what} file {path} cannot be read: {error.strerror or error}. Check its name and "
-            "its permissions."
-        ) from None
-    except ValueError as error:  # a NUL in the name; not a RequestError of our own
-        if isinstance(error, RequestError):
-            raise
-        raise RequestError(f"the {what} file {str(path)!r} cannot be read: {error}.") from None
+        content = read_bytes(path)
+    except MissingFileError as error:
+        raise MissingFileError(f"{error} A {what} file is expected here.{mend}") from None
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -325,8 +325,9 @@ def test_another_kind_of_file_is_told_by_what_it_holds(tank):
 
 def test_file_that_is_not_there(tank):
     message = refusal(tank / "campain.toml")
-    assert "campain.toml does not exist. Did you mean 'campaign.toml'? Draft one with" in message
-    assert "is a folder; give the campaign's TOML file in it" in refusal(tank)
+    assert "campain.toml does not exist. Did you mean 'campaign.toml'?" in message
+    assert "A campaign file is expected here. Draft one with 'seakeep init FILE…'." in message
+    assert "is a folder, and only regular files are read" in refusal(tank)
     assert "does not exist" in refusal(tank / "no" / "campaign.toml")
 
 

@@ -6,8 +6,8 @@ from small_tank import DT, tank_columns, write_csv
 
 from seakeep import cli
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
-from seakeep.campaign.checks import findings_of
 from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.quality import findings_of
 from seakeep.signals import encounter_period
 
 POOLED = ("sampling_rate = 10", "steps_per_period = 12")
@@ -39,8 +39,8 @@ class TestPeriod:
         alone = encounter_period(1e-3 * tank_columns(0)["WP fwd [mm]"], DT)
         assert run.attrs["encounter_period"] == pytest.approx(alone, rel=1e-12)  # unit conversion
         assert abs(alone / both - 1) > 1e-3
-        told = [each for each in findings_of(run) if each.kind == "left out"]
-        assert [each.channel for each in told] == ["other runs"]
+        told = [each for each in findings_of(run) if each.kind.word == "left out"]
+        assert [each.channel for each in told] == ["run second"]
         assert "run 'second' is left out of the encounter period" in told[0].text
 
     def test_asked_for_it_is_an_error_still(self, edited, tank, how):
@@ -66,7 +66,7 @@ class TestPeriod:
         write_prepared(campaign)
         assert kept.stat().st_mtime_ns > written
         assert not [
-            e for e in findings_of(load_prepared(campaign)["first"]) if e.kind == "left out"
+            e for e in findings_of(load_prepared(campaign)["first"]) if e.kind.word == "left out"
         ]
 
 

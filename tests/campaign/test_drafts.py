@@ -12,13 +12,13 @@ from small_tank import tank_columns, write_csv
 
 from seakeep import cli
 from seakeep.campaign import read_campaign
-from seakeep.campaign.checks import findings_of
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
 from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.quality import findings_of
 from seakeep.signals.quality import BRIDGED
 
-ASSUMED = "no file states the unit of {}, and the campaign's is assumed"
+ASSUMED = "{} is taken as .*, which is assumed: no file states its unit"
 
 
 def drafted(folder, files):
@@ -181,11 +181,11 @@ def test_files_without_time_or_with_odd_names(tmp_path):
     text, campaign = drafted(tmp_path, sorted(tmp_path.glob("*.csv")))
     assert "sampling_rate = 100.0 # ASSUMED: the files have no time column. Correct it" in text
     assert campaign.runs == ["1", "1_2"]
-    rated = pytest.warns(SeakeepWarning, match="1: sampled at 100 Hz, which is assumed: no file")
-    with rated, pytest.warns(SeakeepWarning, match=ASSUMED.format("heave_2, surge")):
+    rated = pytest.warns(SeakeepWarning, match="1: time is sampled at 100 Hz, which is assumed")
+    with rated, pytest.warns(SeakeepWarning, match=ASSUMED.format("heave_2")):
         runs = campaign.prepare()
     assert len(runs) == 2
-    assert ("time", "rate") in {(each.channel, each.kind) for each in findings_of(runs["1"])}
+    assert ("time", "rate") in {(each.channel, each.kind.word) for each in findings_of(runs["1"])}
     confirmed = re.sub("(unit|sampling_rate)_assumed = true", "", text)
     (tmp_path / "campaign.toml").write_text(confirmed)
     assert read_campaign(tmp_path / "campaign.toml").prepare()

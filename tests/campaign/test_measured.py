@@ -38,7 +38,7 @@ def test_draft(tmp_path, name):
     # The position of the flume's wavemaker is the one column whose header says no unit.
     bare = [n for n, each in campaign.settings.channels.items() if each.unit_assumed]
     assert bare == (["wm_position"] if name == FLUME else [])
-    told = pytest.warns(SeakeepWarning, match="the unit of wm_position, and")
+    told = pytest.warns(SeakeepWarning, match="wm_position is taken as")
     with told if bare else contextlib.nullcontext():
         runs = campaign.prepare()
     assert len(runs) == len(files)

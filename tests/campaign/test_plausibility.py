@@ -9,8 +9,9 @@ from small_tank import tank_columns, write_csv
 
 from seakeep import cli
 from seakeep.campaign import draft_campaign, read_campaign
-from seakeep.campaign.checks import findings_of
 from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.quality import findings_of
+from seakeep.quality.clocks import ClocksKind
 
 LOGGERS = """
 [instruments]
@@ -68,7 +69,7 @@ class TestClocksAndRates:
     def test_clocks_of_which_nothing_is_said_are_assumed_the_same(self, loggers, tmp_path):
         found = clocks(loggers().prepare()["first"])
         assert [channel for channel, _ in found] == ["mru"]
-        assert found[0][1].startswith("assumed the same as the reference's: state trigger, shared")
+        assert found[0][1].startswith("clock assumed the same as the reference's: state trigger")
         path = tmp_path / "campaign.toml"
         one = path.read_text().replace("[instruments.mru]", "[instruments.mru]\noffset = 0")
         path.write_text(one, encoding="utf-8")
@@ -118,15 +119,20 @@ class TestSteps:
 
 
 def step_findings(run):
-    return {each.channel: each.text for each in findings_of(run) if each.kind == "step"}
+    return {each.channel: each.text for each in findings_of(run) if "STEP" in each.kind.name}
 
 
 def clocks(run):
-    return [(each.channel, each.text) for each in findings_of(run) if each.kind == "clock"]
+    timed = ("ASSUMED_CLOCK", "TIMES_ASIDE", "OTHER_RATE")
+    return [(each.channel, each.text) for each in findings_of(run) if each.kind.name in timed]
 
 
 def records(run):
-    return [(each.channel, each.text) for each in findings_of(run) if each.kind == "record"]
+    return [
+        (each.channel, each.text)
+        for each in findings_of(run)
+        if each.kind.name in ("STARTS_LATE", "ENDS_EARLY")
+    ]
 
 
 class TestRecords:
@@ -187,11 +193,11 @@ class TestPeriod:
         sound = read_campaign(edited(COUNTED)).encounter_period()
         noisy(tank, 0.3)
         message = r"first: eta_fwd counts waves of .* energy period of its spectrum is 1\.\d+ s "
-        rest = r"\(and 1 more run.*period_hysteresis"
+        rest = r"\(second likewise\)\. .*period_hysteresis"
         with pytest.warns(SeakeepWarning, match=message + rest):
             run = read_campaign(edited(COUNTED)).prepare()["first"]
         assert run.attrs["encounter_period"] < sound / 1.5
-        told = [each.channel for each in findings_of(run) if each.kind == "period"]
+        told = [each.channel for each in findings_of(run) if each.kind is ClocksKind.PERIOD]
         assert told == ["eta_fwd"]
 
     def test_its_mend_keeps_the_period(self, edited, tank):
@@ -211,7 +217,7 @@ class TestValues:
 
     @pytest.mark.parametrize(
         ("stem", "header", "message"),
-        [("Pitch (deg)", "Pitch (rad)", r"pitch reaches \d.* rad, more than a right angle"),
+        [("Pitch (deg)", "Pitch (rad)", r"pitch reaches \d.* deg, more than 90 deg"),
          ("Heave [mm]", "Heave [m]", r"heave leaves its mean by .* m in water of 3\.6 m"),
          ("WP fwd [mm]", "WP fwd [m]", r"eta_fwd leaves its mean by .* m in water of 3\.6 m")],
     )  # fmt: skip
@@ -220,8 +226,8 @@ class TestValues:
         write_csv(tank / "first.csv", {header if n == stem else n: x for n, x in columns.items()})
         with pytest.warns(SeakeepWarning, match=message + r"\. Check unit and column in \[channe"):
             runs = read_campaign(edited()).prepare()
-        assert "impossible" in kinds(runs["first"])
-        assert "impossible" not in kinds(runs["second"])
+        assert kinds(runs["first"]) & {"impossible", "out of water"}
+        assert not kinds(runs["second"])
 
     def test_a_spike_is_an_outlier_and_no_wrong_unit(self, edited, tank):
         columns = tank_columns(0)
@@ -238,7 +244,7 @@ class TestValues:
         path = tank / "draft.toml"
         text = draft_campaign([tank / "bare.csv"], tank)
         path.write_text(text, encoding="utf-8")
-        with pytest.warns(SeakeepWarning, match="the unit of pitch, and .*remove unit_as"):
+        with pytest.warns(SeakeepWarning, match="pitch is taken as rad, .*remove unit_as"):
             run = read_campaign(path).prepare()["bare"]
         assert "unit" in kinds(run)
         path.write_text(text.replace("unit_assumed = true", ""), encoding="utf-8")
@@ -270,14 +276,14 @@ def test_why_a_gap_is_not_bridged(edited, tank, begin, why):
     write_csv(tank / "first.csv", columns)
     path = edited(("[preparation]", '[preparation]\ngaps = "bridge"'))
     said = findings_of(read_campaign(path).prepare(["first"])["first"])
-    missing, bridged = (each.text for each in said if each.kind == "missing")
+    missing, bridged = (each.text for each in said)
     assert missing.startswith("missing: 100 samples in 1 place(s)")
     assert missing.endswith(f"; not bridged: {why}")
     assert bridged.startswith("bridged: 5 samples in 1 place(s)")
 
 
 def kinds(run):
-    return {each.kind for each in findings_of(run)}
+    return {each.kind.word for each in findings_of(run)}
 
 
 def test_the_commands_show_step_and_period(edited, tank, capsys):
@@ -300,4 +306,4 @@ def test_the_command_tells_what_was_found(loggers, tmp_path, capsys):
     assert cli.main(["prepare", str(tmp_path / "campaign.toml")]) == 0
     said = " ".join(capsys.readouterr().err.split())
     assert "Found in first: pitch: constant at 3.2 deg Found" in said
-    assert "Found in first: clock of mru: assumed the same as the reference's: state" in said
+    assert "Found in first: mru: clock assumed the same as the reference's: state" in said

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import seakeep
-from seakeep.campaign.checks import findings_of
+from seakeep.quality import findings_of
 from seakeep.report.quality_sheet import write_quality_sheet
 from seakeep.waves import wavenumber
 
@@ -64,7 +64,9 @@ def test_a_wrong_position_is_warned_of_once_and_stands_on_every_sheet(campaign, 
     assert "-1.7" in text  # as the waves have it
     assert "Check [rig.positions]" in text
     for run in runs.values():
-        assert [(each.channel, each.kind) for each in findings_of(run)] == [("eta_fwd", "position")]
+        assert [(each.channel, each.kind.word) for each in findings_of(run)] == [
+            ("eta_fwd", "position")
+        ]
     pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
     write_quality_sheet(runs, stated.settings, "positions", tmp_path)
     page = (tmp_path / "quality.html").read_text(encoding="utf-8")

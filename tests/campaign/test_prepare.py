@@ -2,15 +2,18 @@
 
 import json
 from dataclasses import FrozenInstanceError
-from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from small_tank import DT, tank_columns, write_csv
 
+from seakeep import cli
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
 from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.files import write_netcdf
+from seakeep.formats import read_columns
+from seakeep.quality import findings_of
 from seakeep.signals import (
     band_pass,
     differentiate,
@@ -483,7 +486,7 @@ class TestFiles:
         with xr.open_dataset(path) as opened:
             run = opened.load()
         run["heave"][:] = 0.0  # to be seen if it were used
-        run.to_netcdf(path, engine="h5netcdf")
+        write_netcdf(path, run)
         assert float(load_prepared(campaign)["second"]["heave"].std()) == 0.0
         if change == "settings":
             campaign = read_campaign(edited(("sampling_rate = 10", "sampling_rate = 12")))
@@ -499,20 +502,97 @@ class TestFiles:
         path = write_prepared(campaign)["second"]
         path.write_bytes(path.read_bytes()[:500])
         with pytest.warns(
-            SeakeepWarning, match=r"second\.nc cannot be read; the run is prepared an"
+            SeakeepWarning, match=r"second\.nc was altered since .* the run is prepared anew"
         ):
             run = load_prepared(campaign)["second"]
         xr.testing.assert_identical(run, campaign.prepare(["second"])["second"])
+
+    def test_a_byte_that_was_altered_is_noticed(self, campaign):
+        """84 of 100 such files were used, with other numbers."""
+        path = write_prepared(campaign, names=["second"])["second"]
+        content = path.read_bytes()
+        expected = load_prepared(campaign, names=["second"])["second"]
+        for at in np.random.default_rng(0).integers(0, len(content), 20):
+            path.write_bytes(content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :])
+            with pytest.warns(SeakeepWarning, match=r"second\.nc was altered"):
+                run = load_prepared(campaign, names=["second"])["second"]
+            xr.testing.assert_identical(run, expected)
+
+    def test_a_measurement_is_never_overwritten(self, tank, edited):
+        """`prepare -o .` replaced the raw run1.nc by the prepared run of that name."""
+        columns = tank_columns(0)
+        names = {"WP fwd [mm]": "fwd", "Heave [mm]": "z", "Pitch (deg)": "p", "acc [g]": "a"}
+        raw = xr.Dataset({new: ("t", columns[old]) for old, new in names.items()})
+        raw = raw.assign_coords(t=("t", columns["Time [s]"], {"units": "s"}))
+        raw.to_netcdf(tank / "first.nc", engine="h5netcdf")
+        before = (tank / "first.nc").read_bytes()
+        campaign = read_campaign(
+            edited(
+                ('file = "first.csv"', 'file = "first.nc"'),
+                ('column = "WP fwd"', 'column = "fwd"\nunit = "mm"'),
+                ('column = "Heave"', 'column = "z"\nunit = "mm"'),
+                ('column = "Pitch"', 'column = "p"\nunit = "deg"'),
+                ('column = "acc [g]"', 'column = "a"\nunit = "g"'),
+            )
+        )
+        with pytest.raises(RequestError, match=r"first\.nc is read by this command and would be"):
+            write_prepared(campaign, tank, ["first"])
+        (tank / "other").mkdir()
+        (tank / "other" / "first.nc").write_bytes(before)
+        with pytest.raises(RequestError, match=r"first\.nc exists and is no prepared run that"):
+            write_prepared(campaign, tank / "other", ["first"])
+        assert (tank / "first.nc").read_bytes() == before
+        assert (tank / "other" / "first.nc").read_bytes() == before
+
+    def test_each_raw_file_is_read_once(self, edited, monkeypatch):
+        """Twice, where the period is measured first."""
+        path = edited(("sampling_rate = 10", "steps_per_period = 16"))
+        read = []
+
+        def noted(file, options):
+            read.append(file.name)
+            return read_columns(file, options)
+
+        monkeypatch.setattr("seakeep.campaign.prepare.read_columns", noted)
+        read_campaign(path).prepare()
+        assert sorted(read) == ["first.csv", "second.csv"]
 
     def test_nothing_is_left_behind_by_a_failure(self, campaign, tank, monkeypatch):
         def fail(*_, **__):
             (tank / "prepared" / "half").write_text("")
             raise OSError("disk full")
 
-        monkeypatch.setattr(Path, "write_bytes", fail)
+        monkeypatch.setattr("seakeep.campaign.store.write_netcdf", fail)
         with pytest.raises(RequestError, match=r"cannot write .*first\.nc: disk full"):
             write_prepared(campaign)
         assert [p.name for p in (tank / "prepared").iterdir()] == ["half"]
+
+
+def test_a_span_to_the_end_of_the_record(tank, edited):
+    """60 s at 50 Hz end at 59.98 s: the last sample stands for its own step."""
+    columns = {name: x[:-1] for name, x in tank_columns(0).items()}
+    write_csv(tank / "first.csv", columns)
+    for rate in ("10", "50", "200"):
+        pairs = [
+            ("test = [10, inf]", "test = [10, 20]"),
+            ("sampling_rate = 10", f"sampling_rate = {rate}"),
+        ]
+        run = read_campaign(edited(*pairs)).prepare(["first"])["first"]
+        assert run.attrs["test_span"][1] == pytest.approx(float(run["time"][-1]))
+    with pytest.raises(RequestError, match=r"first\.test: received \[10, 20\.1\] s, and"):
+        read_campaign(edited(("test = [10, inf]", "test = [10, 20.1]"))).prepare(["first"])
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_windows_of_redundant_sensors_in_periods(edited, stated, capsys):
+    """`window = "6 T"` is documented, and was a fault of seakeep."""
+    period = [("scale_factor = 30.0", "encounter_period = 1.6")] if stated else []
+    table = "[redundant.heave]\nchannels = ['heave', 'eta_fwd']\nwindow = '3 T'\n[preparation]"
+    path = edited(*period, ("[preparation]", table))
+    assert cli.main(["prepare", str(path)]) == 0
+    assert "fault of seakeep" not in capsys.readouterr().err
+    found = findings_of(read_campaign(path).prepare(["first"])["first"])
+    assert {each.channel for each in found} <= {"eta_fwd"}
 
 
 def test_frozen(campaign):

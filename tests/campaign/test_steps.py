@@ -7,8 +7,8 @@ import pytest
 from small_tank import CAMPAIGN, tank_columns, write_csv
 
 from seakeep.campaign import read_campaign
-from seakeep.campaign.checks import findings_of
 from seakeep.errors import DataError
+from seakeep.quality import findings_of
 from seakeep.signals import rotation_matrix
 
 G = 9.81

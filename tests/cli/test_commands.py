@@ -417,7 +417,7 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
 @pytest.mark.parametrize(
     ("command", "status", "message"),
     [
-        ("fit missing.toml -o m.nc", 2, r"missing\.toml does not exist\. Draft one with"),
+        ("fit missing.toml -o m.nc", 2, r"missing\.toml does not exist\..* Draft one with"),
         (f"fit {CAMPAIGN} -o no/such/m.nc", 2, r"the folder no/such does not exist"),
         (f"fit {CAMPAIGN} -o m.nc --model sway", 2, r"no table \[models\.sway\]"),
         (f"compare missing.nc {CAMPAIGN}", 2, r"no model file missing\.nc"),
@@ -728,3 +728,23 @@ def test_full_scale_by_froudes_law(run, place):
             elif key in ("nrmse", "fit", "nammae", "sd_ratio", "anrmse"):
                 assert float(large[key]) == pytest.approx(float(model[key]), rel=1e-9)
         assert float(large["start"]) == pytest.approx(5 * float(model["start"]), rel=1e-9)
+
+
+def test_fit_forecast_and_compare_report_what_prepare_finds(run, place, tmp_path):
+    """One -9999 in heave took NRMSE from 0.028 to 3.03 without a word."""
+    folder = tmp_path / "spoilt"
+    shutil.copytree(place / "docs" / "tutorial", folder)
+    for name in ("run1.csv", "run2.csv", "run3.csv"):
+        lines = (folder / name).read_text(encoding="utf-8").splitlines()
+        fields = lines[900].split(";")
+        lines[900] = ";".join([fields[0], *("-9999" for _ in fields[1:])])
+        (folder / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    campaign = folder / "campaign.toml"
+    found = "Note: first: heave outlier: 1 samples in 1 place(s)"
+    _, _, err = run(f"fit {campaign} -o {folder}/m.nc")
+    assert found in err
+    _, _, err = run(f"compare {folder}/m.nc {campaign}")
+    assert "unseen: heave outlier: 1 samples in 1 place(s)" in err
+    rest = f"--run unseen --start 20 --steps 50 -o {folder}/f.nc"
+    _, _, err = run(f"forecast {folder}/m.nc {campaign} {rest}")
+    assert "unseen: heave outlier: 1 samples in 1 place(s)" in err

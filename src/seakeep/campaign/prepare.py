@@ -5,23 +5,33 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from seakeep.campaign.channels import Group, read_groups
-from seakeep.campaign.finish import Told, finished, reference_time
-from seakeep.campaign.instruments import open_loggers
 from seakeep.campaign.labels import attributes_of, role_of
+from seakeep.campaign.pipeline import (
+    Run,
+    checked,
+    cleaned,
+    cropped,
+    derived,
+    mapped,
+    read,
+    resampled,
+    strays,
+    sync,
+)
 from seakeep.campaign.readers import checksum, expand
-from seakeep.campaign.resampling import on_one_axis, strays
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
 from seakeep.campaign.survey import Failures, Survey, spare, survey
 from seakeep.campaign.validation import read_settings
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
+from seakeep.formats import Columns, Options, read_columns
+from seakeep.quality import as_json, warn_of
 from seakeep.signals import Clock, uniform_step
 from seakeep.toml import in_seconds, lengths, parse_length
 
@@ -33,7 +43,11 @@ Progress = Callable[[int, int, str], None]
 SHOWN_RUNS = 6
 """Runs that a campaign's representation names."""
 
-FORMAT = 6
+KEPT = 2**30
+"""Bytes of columns that are kept from the survey of all runs until each is prepared: campaigns of
+model tests fit; what is beyond is read again."""
+
+FORMAT = 7
 """Goes into the digest: raise it when the same settings begin to give other arrays or findings."""
 
 
@@ -226,16 +240,20 @@ class Campaign:
             If the file is damaged, has gaps, or its times are not uniform.
         """
         self._run(name)
-        found, settings, _, _ = self._whole([name], None, steps=False)
-        groups = self._groups(name, found, settings)
-        dt = uniform_step(reference_time(groups), f"run '{name}'")
-        dataset = on_one_axis(groups, dt, settings, name)
-        attributes = self._attributes(name, dataset, dt, found, settings)
-        return dataset.assign_attrs(attributes)
+        reader = _ReadOnce()
+        found, settings, _, _ = self._whole([name], None, reader, steps=False)
+        run = self._channels(name, found, settings, reader)
+        dt = uniform_step(run.reference_time, f"run '{name}'")
+        data = resampled(run, dt).data
+        assert data is not None
+        return data.assign_attrs(self._attributes(name, data, dt, found, settings))
 
-    def _groups(self, name: str, found: Survey, settings: CampaignSettings) -> Group:
-        loggers = open_loggers(self.files_of(name), settings)
-        return read_groups(loggers, found.clocks[name], settings, name)
+    def _channels(
+        self, name: str, found: Survey, settings: CampaignSettings, reader: _ReadOnce
+    ) -> Run:
+        """Steps 1 to 5: the channels of a run by logger, at their own rates."""
+        run = sync(read(name, settings, self.files_of(name), reader), found.clocks[name])
+        return derived(cleaned(mapped(run)))
 
     def clocks(self, names: Iterable[str] | None = None) -> dict[str, dict[str, Clock]]:
         """Clocks of the loggers of each run against the reference.
@@ -258,13 +276,14 @@ class Campaign:
             read are left out of the pooled drifts, with a warning.
         """
         wanted = list(self.runs if names is None else names)
-        found = self._survey(wanted, periods=False)
+        found = self._survey(wanted, False, _ReadOnce())
         return {name: dict(found.clocks[name]) for name in wanted}
 
     def _survey(
         self,
         wanted: list[str],
         periods: bool,
+        reader: _ReadOnce,
         progress: Progress | None = None,
         failures: Failures | None = None,
     ) -> Survey:
@@ -275,7 +294,13 @@ class Campaign:
         waves = self.settings.period_runs if periods else ()
         channel = self.period_channel() if periods else ""
         settings = self._in_seconds(self.settings.campaign.encounter_period)
-        found = survey(settings, self.files_of, timed, waves, channel, progress, wanted, failures)
+        both = dict.fromkeys([*timed, *waves]) if wanted else {}
+        again = [self.files_of(name) for name in both if name in wanted]
+        reader.again = frozenset(path for files in again for path in files.values())
+        found = survey(
+            settings, self.files_of, timed, waves, channel, reader, progress, wanted, failures
+        )
+        reader.again = frozenset()
         one = {n: {"": Clock()} for n in wanted if n not in several}
         return replace(found, clocks={**one, **found.clocks})
 
@@ -322,7 +347,7 @@ class Campaign:
         stated = self.settings.campaign.encounter_period
         if stated is not None:
             return stated
-        return self._mean_period(self._survey([], periods=True))
+        return self._mean_period(self._survey([], True, _ReadOnce()))
 
     def seconds(self, stated: float | str) -> float:
         """Seconds of a length or an instant that may be stated in encounter periods.
@@ -414,39 +439,44 @@ class Campaign:
         wanted = list(self.runs if names is None else names)
         for name in wanted:
             self._run(name)
-        found, settings, period, dt = self._whole(wanted, progress, failures=failures)
+        reader = _ReadOnce()
+        found, settings, period, dt = self._whole(wanted, progress, reader, failures=failures)
         stated, first = dt is not None, ""
-        told = Told()
+        told = {(str(settings.wave_channel), "PERIOD")}  # the survey has warned of it
         for done, name in enumerate(wanted, 1):
             try:
                 if failures is not None and name in failures:
                     raise failures[name]
-                groups = self._groups(name, found, settings)
-                reference = reference_time(groups)
-                own = uniform_step(reference, f"run '{name}'")
+                run = self._channels(name, found, settings, reader)
+                own = uniform_step(run.reference_time, f"run '{name}'")
                 dt, first = own if dt is None else dt, first or name
-                if not stated and strays(own, reference.size, dt):
+                if not stated and strays(own, run.reference_time.size, dt):
                     raise RequestError(
                         f"the runs differ in rate: '{first}' has a step of {dt:g} s and '{name}' "
                         f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                     )
-                run = finished(name, groups, dt, found, settings, told)
-                run.attrs.update(self._attributes(name, run, dt, found, settings))
+                run = checked(resampled(run, dt), found.doubts.get(name), found.left_out)
+                warn_of(run.findings, told)
+                data = cropped(run).data
+                assert data is not None
+                data.attrs["quality"] = as_json(run.findings)
+                data.attrs.update(self._attributes(name, data, dt, found, settings))
             except SeakeepError as error:
                 spare(failures, name, error)
                 if progress is not None:
                     progress(done, len(wanted), f"{name} cannot be prepared")
                 continue
             if period is not None:
-                run.attrs["encounter_period"] = period
+                data.attrs["encounter_period"] = period
             if progress is not None:
                 progress(done, len(wanted), name)
-            yield name, run
+            yield name, data
 
     def _whole(
         self,
         wanted: list[str],
         progress: Progress | None,
+        reader: _ReadOnce,
         steps: bool = True,
         failures: Failures | None = None,
     ) -> tuple[Survey, CampaignSettings, float | None, float | None]:
@@ -454,7 +484,7 @@ class Campaign:
         preparation, period = self.settings.preparation, self.settings.campaign.encounter_period
         counting = steps and preparation.steps_per_period is not None
         needed = counting or self._counts_in_periods
-        found = self._survey(wanted, needed and period is None, progress, failures)
+        found = self._survey(wanted, needed and period is None, reader, progress, failures)
         if needed and period is None:
             period = self._mean_period(found)
         dt = preparation.dt
@@ -474,6 +504,30 @@ class Campaign:
             "basis_sha256": self.basis_of(name),
         }
         return {**own, **attributes_of(name, run, dt, found.clocks[name], settings)}
+
+
+@dataclass
+class _ReadOnce:
+    """Reads files, and keeps those that are wanted again as long as they fit.
+
+    Parameters
+    ----------
+    again : frozenset of Path
+        Files that are read a second time, after the survey of all runs.
+    """
+
+    again: frozenset[Path] = frozenset()
+    kept: dict[tuple[Path, Options], Columns] = field(default_factory=dict)
+
+    def __call__(self, path: Path, options: Options) -> Columns:
+        """Columns of a file."""
+        if (known := self.kept.pop((path, options), None)) is not None:
+            return known
+        columns = read_columns(path, options)
+        held = sum(x.nbytes for each in self.kept.values() for x in each.values.values())
+        if path in self.again and held < KEPT:
+            self.kept[path, options] = columns
+        return columns
 
 
 def read_campaign(path: Path | str) -> Campaign:

@@ -1,4 +1,4 @@
-"""Prepared runs on disk: one NetCDF file a run, used again while it is fresh."""
+"""Prepared runs on disk: one NetCDF file a run, used again while it is fresh and unaltered."""
 
 from __future__ import annotations
 
@@ -13,10 +13,20 @@ import xarray as xr
 from seakeep.campaign.labels import version
 from seakeep.campaign.prepare import Campaign, Progress
 from seakeep.campaign.survey import Failures, as_one
-from seakeep.errors import SeakeepWarning
-from seakeep.files import MARK, make_folder, replacing, write_netcdf
+from seakeep.errors import SeakeepError, SeakeepWarning
+from seakeep.files import (
+    MARK,
+    check_output,
+    check_seal,
+    make_folder,
+    replacing,
+    write_netcdf,
+)
 
 __all__ = ["load_prepared", "prepared_folder", "write_prepared"]
+
+PREPARED = "prepared run"
+"""Kind of these files, by which they are told from measurements."""
 
 
 def write_prepared(
@@ -58,9 +68,12 @@ def write_prepared(
     """
     failed: Failures = {} if failures is None else failures
     folder = prepared_folder(campaign, out_dir)
-    make_folder(folder)
     wanted = list(campaign.runs if names is None else names)
     files = {name: folder / f"{name}.nc" for name in wanted}
+    make_folder(folder)
+    inputs = [path for name in campaign.runs for path in campaign.files_of(name).values()]
+    for file in files.values():
+        check_output(file, PREPARED, [campaign.path, *inputs])
     fresh = {name: _fresh_step(campaign, name, files[name]) for name in wanted}
     missing = [name for name in wanted if fresh[name] is None or anew]
     steps = {step for name, step in fresh.items() if step is not None and name not in missing}
@@ -83,7 +96,7 @@ def write_prepared(
 
 def _write(run: xr.Dataset, path: Path) -> None:
     with replacing(path) as temporary:
-        write_netcdf(temporary, run.assign_attrs({MARK: "prepared run"}))
+        write_netcdf(temporary, run.assign_attrs({MARK: PREPARED}))
 
 
 def _fresh_step(campaign: Campaign, name: str, file: Path) -> float | None:
@@ -111,7 +124,8 @@ def load_prepared(
     Returns
     -------
     dict of str to xarray.Dataset
-        As :meth:`Campaign.prepare` gives them. A file is fresh if the campaign's name and digest,
+        As :meth:`Campaign.prepare` gives them. A file that was altered is not used, with a
+        warning. A file is fresh if the campaign's name and digest,
         the checksums of the raw files on which the run depends (through period and clocks too) and
         the version of seakeep are those it was written with.
 
@@ -141,15 +155,18 @@ def _fresh(campaign: Campaign, name: str, file: Path) -> xr.Dataset | None:
     if not file.exists():
         return None
     try:
+        check_seal(file)
         with xr.open_dataset(file, engine="h5netcdf", decode_times=False) as opened:
             run = opened.load()
-    except (OSError, ValueError, KeyError, RuntimeError):
+    except (SeakeepError, OSError, ValueError, KeyError, RuntimeError):
         warnings.warn(
-            f"{file} cannot be read; the run is prepared anew. Write it again with 'seakeep "
-            "prepare'.",
+            f"{file} was altered since it was written, or cannot be read; the run is prepared "
+            "anew. Write it again with 'seakeep prepare'.",
             SeakeepWarning,
             stacklevel=3,
         )
+        return None
+    if MARK not in run.attrs:
         return None
     expected: Mapping[str, object] = {
         "campaign_digest": campaign.digest,

@@ -7,18 +7,27 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
 import xarray as xr
 
-from seakeep.campaign.channels import read_groups
-from seakeep.campaign.instruments import Logger, clocks_of, open_loggers
-from seakeep.campaign.resampling import inside, on_one_axis
-from seakeep.campaign.settings import CampaignSettings, RunSettings
+from seakeep.campaign.pipeline import (
+    Reader,
+    Run,
+    cleaned,
+    derived,
+    inside,
+    mapped,
+    read,
+    resampled,
+    sync,
+    used_span,
+)
+from seakeep.campaign.settings import CampaignSettings
 from seakeep.errors import DataError, MissingFileError, SeakeepError, SeakeepWarning
+from seakeep.quality import Finding, warn_of
+from seakeep.quality.clocks import ClocksKind
 from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step, waves_part
 from seakeep.signals.synchronisation import without_doubtful_drift
 from seakeep.signals.waves import energy_period
-from seakeep.toml import number
 
 __all__ = ["Failures", "Survey", "as_one", "spare", "survey"]
 
@@ -48,14 +57,14 @@ class Survey:
         Zero-up-crossing period of the wave channel by run, s.
     left_out : dict of str to str
         By run, of what it is no part because it cannot be read, and why.
-    doubts : dict of str to str
-        By run, what speaks against its period.
+    doubts : dict of str to (float, float)
+        By run, its counted period and the energy period of its waves, s, where they disagree.
     """
 
     clocks: Mapping[str, Mapping[str, Clock]]
     periods: Mapping[str, float]
     left_out: Mapping[str, str] = field(default_factory=dict)
-    doubts: Mapping[str, str] = field(default_factory=dict)
+    doubts: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 def spare(failures: Failures | None, run: str, error: SeakeepError) -> None:
@@ -96,11 +105,12 @@ def survey(
     clock_runs: Sequence[str],
     period_runs: Sequence[str],
     channel: str,
+    reader: Reader,
     progress: Callable[[int, int, str], None] | None = None,
     asked: Collection[str] = (),
     failures: Failures | None = None,
 ) -> Survey:
-    """Read each run once for its clocks and its period; only one is held at a time.
+    """Read each run once for its clocks and its period.
 
     Parameters
     ----------
@@ -112,6 +122,8 @@ def survey(
         Runs whose clocks, and whose periods, are wanted.
     channel : str
         The wave channel.
+    reader : callable
+        Gives the columns of a file.
     progress : callable, optional
         Called as ``progress(0, total, words)`` before each run.
     asked : collection of str, optional
@@ -134,30 +146,29 @@ def survey(
     """
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
     clocks: dict[str, dict[str, Clock]] = {}
-    periods: dict[str, float] = {}
-    doubts: dict[str, str] = {}
+    found: dict[str, tuple[float, float]] = {}
     bad: Failures = {}
-    for count, run in enumerate(runs, 1):
+    for count, name in enumerate(runs, 1):
         if progress is not None:
-            progress(0, len(runs), f"clocks and waves of {run} ({count} of {len(runs)})")
+            progress(0, len(runs), f"clocks and waves of {name} ({count} of {len(runs)})")
         try:
-            loggers = open_loggers(files_of(run), settings)
-            clocks[run] = clocks_of(loggers, settings.instruments, run)
-            if run in period_runs:
-                waves = _waves_of(run, loggers, clocks[run], settings, channel)
-                periods[run], doubts[run] = _period(waves, channel, settings, run)
+            run = sync(read(name, settings, files_of(name), reader))
+            clocks[name] = dict(run.clocks)
+            if name in period_runs:
+                found[name] = _period(run, channel)
         except SeakeepError as error:
-            if run in asked:
-                spare(failures, run, error)
-            bad[run] = error
+            if name in asked:
+                spare(failures, name, error)
+            bad[name] = error
+    periods = {name: counted for name, (counted, _) in found.items()}
+    doubts = {name: pair for name, pair in found.items() if not 1 / LED <= pair[1] / pair[0] <= LED}
     if bad and (not clocks or (period_runs and not periods)):
         raise as_one(bad)
     left_out = {
-        run: _left_out(run, error, run in period_runs, run in clock_runs and run not in clocks)
-        for run, error in bad.items()
+        name: _left_out(name, error, name in period_runs, name in clock_runs and name not in clocks)
+        for name, error in bad.items()
     }
-    doubts = {run: doubt for run, doubt in doubts.items() if doubt}
-    _warn({run: words for run, words in left_out.items() if run not in asked}, doubts, channel)
+    _warn({name: words for name, words in left_out.items() if name not in asked}, doubts, channel)
     if settings.instruments.pool_drift:
         _pool(clocks)
     for each in clocks.values():
@@ -165,12 +176,13 @@ def survey(
     return Survey(clocks, periods, left_out, doubts)
 
 
-def _warn(left_out: Mapping[str, str], doubts: Mapping[str, str], channel: str) -> None:
+def _warn(
+    left_out: Mapping[str, str], doubts: Mapping[str, tuple[float, float]], channel: str
+) -> None:
     for words in left_out.values():
         warnings.warn(words, SeakeepWarning, stacklevel=4)
-    for run, doubt in list(doubts.items())[:1]:
-        others = f" (and {len(doubts) - 1} more runs alike)" if len(doubts) > 1 else ""
-        warnings.warn(f"{run}: {channel} {doubt}{others}. {_PERIOD_MEND}", SeakeepWarning, 4)
+    found = [Finding(ClocksKind.PERIOD, run, channel, *two, "s") for run, two in doubts.items()]
+    warn_of(found, set())
 
 
 def _pool(clocks: Mapping[str, dict[str, Clock]]) -> None:
@@ -190,52 +202,26 @@ def _left_out(run: str, error: SeakeepError, period: bool, drift: bool) -> str:
     )
 
 
-def _waves_of(
-    run: str,
-    loggers: Mapping[str, Logger],
-    clocks: Mapping[str, Clock],
-    settings: CampaignSettings,
-    channel: str,
-) -> xr.Dataset:
-    groups = read_groups(loggers, clocks, settings, run, [channel])
-    holder = [each for each in groups.values() if channel in each]
-    if holder:
-        return holder[0]
-    dt = uniform_step(next(iter(groups.values()))["time"].to_numpy())
-    return on_one_axis(groups, dt, settings, run)
+def _waves_of(run: Run, channel: str) -> xr.Dataset:
+    """The wave channel of a run, at its own rate."""
+    run = derived(cleaned(mapped(run, [channel])), [channel])
+    for group in run.groups.values():
+        if channel in group:
+            return group
+    data = resampled(run, uniform_step(run.reference_time)).data
+    assert data is not None
+    return data
 
 
-_PERIOD_MEND = (
-    "Noise or a slow drift of the probe leads the count, or waves too low for period_hysteresis "
-    "are left out, and all that is stated in encounter periods is wrong with it. In [campaign], "
-    "state period_hysteresis (0.2 passes noise of a twentieth of the waves), another "
-    "period_channel, or encounter_period in seconds."
-)
-
-
-def _period(
-    waves: xr.Dataset, channel: str, settings: CampaignSettings, run: str
-) -> tuple[float, str]:
-    """Counted period of a run, s, and what speaks against it."""
+def _period(run: Run, channel: str) -> tuple[float, float]:
+    """Counted period and energy period of the waves of a run, s."""
+    waves = _waves_of(run, channel)
     time, series = waves["time"].to_numpy(), waves[channel].to_numpy()
-    step = uniform_step(time, f"run '{run}'")
-    kept = inside(time, used_span(settings.runs[run]), step)
+    step = uniform_step(time, f"run '{run.name}'")
+    kept = inside(time, used_span(run.own), step)
     series = series[kept] if kept.sum() > 2 else series
     try:
-        counted = encounter_period(series, step, settings.campaign.period_hysteresis)
+        counted = encounter_period(series, step, run.settings.campaign.period_hysteresis)
     except DataError as error:
-        raise DataError(f"run '{run}', channel '{channel}': {error}") from None
-    energy = energy_period(series[waves_part(series, step)], step)
-    if energy / LED <= counted <= energy * LED:
-        return counted, ""
-    return counted, (
-        f"counts waves of {counted:.3g} s, and the energy period of its spectrum is {energy:.3g} s"
-    )
-
-
-def used_span(settings: RunSettings) -> tuple[float, float]:
-    """First and last instant of a run that is used at all, s."""
-    stated = (settings.span,) if settings.span else (settings.train, settings.test)
-    spans = [(number(each[0]), number(each[1])) for each in stated if each is not None]
-    starts, ends = zip(*spans, strict=True) if spans else ((-np.inf,), (np.inf,))
-    return min(starts), max(ends)
+        raise DataError(f"run '{run.name}', channel '{channel}': {error}") from None
+    return counted, energy_period(series[waves_part(series, step)], step)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -119,8 +119,8 @@ def prepare(
         files = write_prepared(read, out, progress=progress, anew=anew, failures=failures)
     for path in files.values():
         typer.echo(str(path))
-    if sheet and files:
-        _write_sheet(read, files, failures)
+    if files:
+        _report_runs(read, files, failures, sheet)
     if out is not None and out.resolve() != prepared_folder(read).resolve():
         messages().print(
             f"Note: fit, forecast and compare look for prepared runs in {prepared_folder(read)} "
@@ -131,9 +131,10 @@ def prepare(
         raise as_one(failures)
 
 
-def _write_sheet(
-    read: Campaign, files: Mapping[str, Path], failures: Mapping[str, SeakeepError]
+def _report_runs(
+    read: Campaign, files: Mapping[str, Path], failures: Mapping[str, SeakeepError], sheet: bool
 ) -> None:
+    """Print steps and findings of prepared runs, and write their sheet unless it is fresh."""
     from seakeep.campaign import load_prepared
     from seakeep.report.quality_sheet import steps_of, write_quality_sheet
 
@@ -141,34 +142,46 @@ def _write_sheet(
     runs = load_prepared(read, folder, list(files))
     words = steps_of(next(iter(runs.values())))
     messages().print(f"{words[0].upper()}{words[1:]}.")
-    _tell_findings(runs)
+    _print_findings(runs)
+    page = folder / "quality.html"
+    if not sheet or (not failures and _is_fresh(page, files.values())):
+        return
     unread = {name: str(error) for name, error in failures.items()}
     try:
-        pages = write_quality_sheet(runs, read.settings, read.name, folder, unread)
+        write_quality_sheet(runs, read.settings, read.name, folder, unread)
     except RequestError as error:
         messages().print(f"Note: no data-quality sheet: {error}", style="yellow")
         return
-    messages().print(f"Wrote {pages[0]}: look at it before you use the runs.")
+    messages().print(f"Wrote {page}: look at it before you use the runs.")
 
 
-def _tell_findings(runs: Mapping[str, xr.Dataset]) -> None:
-    """Tell what the checks found and no warning said: a line a channel and kind of fault."""
-    from seakeep.campaign.checks import findings_of
-    from seakeep.campaign.plausibility import WARNED
+def _is_fresh(page: Path, files: Iterable[Path]) -> bool:
+    """Whether a sheet was written after all prepared runs, of exactly these runs."""
+    if not page.exists():
+        return False
+    runs = list(files)
+    pictures = {path.stem.removeprefix("quality_") for path in page.parent.glob("quality_*.png")}
+    written = page.stat().st_mtime_ns
+    return pictures == {file.stem for file in runs} and all(
+        file.stat().st_mtime_ns <= written for file in runs
+    )
 
-    found: dict[tuple[str, str, str], list[tuple[str, str]]] = {}
-    for name, run in runs.items():
-        for each in (each for each in findings_of(run) if each.kind not in WARNED):
-            found.setdefault((each.channel, each.kind, each.text.split()[0]), []).append(
-                (name, each.text)
-            )
-    for (channel, kind, _), said in list(found.items())[:SHOWN]:
-        whose = f"clock of {channel}" if kind == "clock" and channel != "time" else channel
-        others = len({run for run, _ in said}) - 1
+
+def _print_findings(runs: Mapping[str, xr.Dataset]) -> None:
+    """Print what the checks found and no warning said: one line per channel and kind."""
+    from seakeep.quality import Finding, findings_of
+
+    found: dict[tuple[str, str], list[Finding]] = {}
+    for run in runs.values():
+        for each in findings_of(run):
+            if not each.kind.remedy:
+                found.setdefault((each.channel, each.kind.name), []).append(each)
+    for same in list(found.values())[:SHOWN]:
+        others = len({each.run for each in same}) - 1
         alike = f" (and in {others} more run{'s' * (others > 1)})" if others else ""
-        messages().print(f"Found in {said[0][0]}: {whose}: {said[0][1]}{alike}")
+        messages().print(f"Found in {same[0].run}: {same[0].channel}: {same[0].text}{alike}")
     if len(found) > SHOWN:
-        messages().print(f"Found {len(found) - SHOWN} things more: the sheet lists them.")
+        messages().print(f"Found {len(found) - SHOWN} more: the sheet lists them.")
 
 
 datasets = typer.Typer(

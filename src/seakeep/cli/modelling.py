@@ -120,6 +120,7 @@ def forecast(
     check_place(out)
     from seakeep.campaign import read_campaign
     from seakeep.models import HankelDMDcModel, HankelEnsemble, load_model
+    from seakeep.quality import warn_of_runs
     from seakeep.report.tables import forecast_header, forecast_words, write_forecast
     from seakeep.signals.time_axis import instant_text
     from seakeep.study import forecast_at_full_scale, with_degrees
@@ -137,6 +138,7 @@ def forecast(
             "the members without it. Leave one of them out."
         )
     prepared = _prepared(read, run)
+    warn_of_runs([prepared], [*identified.states, *identified.inputs])
     first = instant_of(start, read, [prepared], "--start")
     count = None if steps is None else samples_of(steps, read, [prepared], identified.dt, "--steps")
     if isinstance(identified, HankelEnsemble):

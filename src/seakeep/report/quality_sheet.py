@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from seakeep.campaign.checks import Finding, check_pairs, findings_of
+from seakeep.campaign.pipeline import redundant_pairs
 from seakeep.campaign.settings import CampaignSettings, long_name_of
 from seakeep.conventions import displayed
 from seakeep.files import replacing
+from seakeep.quality import Finding, compared, findings_of
 from seakeep.report.style import COLOURS, axis_label, figure_style, new_figure, shown_unit
 from seakeep.signals.quality import FLAGS, LATE, Agreement
 
@@ -204,7 +205,8 @@ def write_quality_sheet(
     """
     parts, written = [], []
     for name, run in runs.items():
-        _, agreements = check_pairs(run, settings)
+        pairs = compared(run, redundant_pairs(settings, run.attrs.get("encounter_period")))
+        agreements = {channel: each for (channel, _), each in pairs.items()}
         picture = _png(quality_figure(run, agreements))
         path = folder / f"quality_{name}.png"
         with replacing(path) as temporary:
@@ -233,7 +235,7 @@ def _page(
     lines = []
     for name, run in runs.items():
         found = findings_of(run)
-        words = ", ".join(dict.fromkeys(f"{each.channel} ({each.kind})" for each in found))
+        words = ", ".join(dict.fromkeys(f"{each.channel} ({each.kind.word})" for each in found))
         mark = "bad" if found else "ok"
         lines.append(
             f'<tr class="{mark}"><td><a href="#{html.escape(name)}">{html.escape(name)}</a></td>'

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from seakeep.campaign.checks import findings_of
+from seakeep.quality import findings_of
 from seakeep.report.deviations import unequal_training, whole_readers
 from seakeep.report.figures.common import HEADING, model_words
 from seakeep.report.quality_sheet import channel_rows
@@ -221,7 +221,9 @@ def run_table(result: StudyResult) -> ReportTable:
         others = [
             f"{each.channel}: {each.text}" for each in found if each.channel not in run.data_vars
         ]
-        words = dict.fromkeys(f"{each.channel.replace('_', ' ')} ({each.kind})" for each in found)
+        words = dict.fromkeys(
+            f"{each.channel.replace('_', ' ')} ({each.kind.word})" for each in found
+        )
         rows.append(
             (
                 name,

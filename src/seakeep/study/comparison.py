@@ -20,6 +20,7 @@ from seakeep.models import HankelDMDcModel, HankelEnsemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasting import status_at_clock
 from seakeep.models.identification import is_constant
+from seakeep.quality import warn_of_runs
 from seakeep.signals import froude_factor
 from seakeep.signals.time_axis import span_text
 from seakeep.study.fit import warn_of_repeats
@@ -270,6 +271,7 @@ def compare(
             "role = 'test' or a span test = [begin, end]."
         )
     prepared = load_prepared(campaign, names=wanted, progress=progress)
+    warn_of_runs(prepared.values(), [*model.states, *model.inputs])
     warn_of_repeats(model, campaign, prepared)
     known_runs = list(prepared.values())
     first = None if start is None else instant_of(start, campaign, known_runs, "start")

@@ -13,6 +13,7 @@ from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import HankelDMDc, HankelDMDcModel, HankelEnsemble
 from seakeep.models.slow import warn_of_slow_motions
+from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, find_leakage
 from seakeep.study.plan import between, needs_of
 from seakeep.study.resolve import Spec, build_spec, counts_in_periods
@@ -93,12 +94,14 @@ def fit_campaign(
     -----
     SeakeepWarning
         If the test part of a training run repeats the model's training input, or the training
-        windows (of an ensemble the longest) hold fewer than five periods of a slow motion.
+        windows (of an ensemble the longest) hold fewer than five periods of a slow motion; also of
+        what the quality checks found in the model's channels.
     """
     settings = campaign.model(model)
     prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
     if not prepared:
         raise RequestError(NOTHING_TRAINS)
+    warn_of_runs(prepared.values(), [*settings.states, *settings.inputs])
     dt = float(next(iter(prepared.values())).attrs["dt"])
     period = campaign.encounter_period() if counts_in_periods(settings) else None
     spec = build_spec(settings, period, dt)

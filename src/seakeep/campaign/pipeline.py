@@ -1,0 +1,751 @@
+"""A run from its raw files to what a model takes: eight steps, each Run to Run.
+
+========== =====================================================================================
+step       what it does
+========== =====================================================================================
+`read`     opens the files of the run's loggers
+`sync`     finds each logger's clock against the reference's
+`mapped`   turns columns into channels: names, SI units, signs, the reference's time
+`cleaned`  treats gaps and jitter as the campaign says, and flags samples
+`derived`  makes channels from others of one logger
+`resampled` puts all loggers on one axis, and makes the channels that need several of them
+`checked`  looks for faults
+`cropped`  cuts the run to the part that is used
+========== =====================================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from seakeep.arrays import BoolArray, FloatArray
+from seakeep.campaign.derivation import derive
+from seakeep.campaign.readers import (
+    find_column,
+    labelled_table,
+    time_column,
+    time_step_of,
+    times_of,
+)
+from seakeep.campaign.settings import (
+    CampaignSettings,
+    ChannelSettings,
+    FileSettings,
+    InstrumentSettings,
+    InstrumentsSettings,
+    PreparationSettings,
+    RunSettings,
+    long_name_of,
+)
+from seakeep.campaign.validation import derivation_order, needed_channels, sources_of
+from seakeep.conventions import canonical_channel, conversion, si_unit
+from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
+from seakeep.formats import Columns, Options
+from seakeep.formats.columns import is_unit, meant_column
+from seakeep.quality import Finding, Rate, Record, Redundant, check
+from seakeep.signals import (
+    Clock,
+    bridge,
+    clock_from_correlation,
+    clock_from_pulses,
+    clock_from_shared,
+    inspect_times,
+    low_pass,
+    onto_uniform,
+    resample,
+    uniform_step,
+)
+from seakeep.signals.quality import (
+    BRIDGED,
+    MISSING,
+    OUTLIER,
+    REPLACED,
+    SATURATED,
+    STUCK,
+    dominant_period,
+    find_outliers,
+    find_saturation,
+    find_stuck,
+    flag_attributes,
+    reading_step,
+)
+from seakeep.signals.synchronisation import ASSUMED
+from seakeep.signals.time_axis import instant_text, span_text, stretches
+from seakeep.toml import Length, number
+
+__all__ = ["Run", "checked", "cleaned", "cropped", "derived", "mapped", "read", "resampled", "sync"]
+
+Reader = Callable[[Path, Options], Columns]
+COMMON = "the common step"
+"""Place of derived channels whose sources come from several loggers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Logger:
+    """One logger's file of one run; its name is empty where the run is one file."""
+
+    name: str
+    path: Path
+    columns: Columns
+    options: FileSettings
+
+    @cached_property
+    def time(self) -> FloatArray:
+        """Readings of its clock, s, checked for their order."""
+        return times_of(self.path, self.columns, self.options)[1]
+
+    def column(self, wanted: str) -> FloatArray:
+        """Values of a column, by name or full header, in the file's unit."""
+        return self.columns.values[find_column(self.path, self.columns, wanted)]
+
+    def uniform(self, wanted: str) -> tuple[FloatArray, FloatArray]:
+        """Times and values of a column on a uniform axis, gaps bridged: for clocks only."""
+        time, values = onto_uniform(self.time, self.column(wanted), str(self.path))
+        return time, bridge(values, float(np.median(np.diff(time))), np.inf).values
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run on its way through the pipeline.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    settings : CampaignSettings
+        The campaign, lengths in seconds.
+    loggers : mapping of str to Logger
+        Its files, the reference first.
+    clocks : mapping of str to Clock
+        Clock of each logger.
+    groups : mapping of str to Dataset
+        Channels by logger, each at its own rate.
+    late : tuple of str
+        Derived channels that need several loggers.
+    data : Dataset or None
+        All channels on one axis.
+    findings : tuple of Finding
+        What the checks found.
+    """
+
+    name: str
+    settings: CampaignSettings
+    loggers: Mapping[str, Logger]
+    clocks: Mapping[str, Clock] = field(default_factory=dict)
+    groups: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    late: tuple[str, ...] = ()
+    data: xr.Dataset | None = None
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def own(self) -> RunSettings:
+        """Table of the run in the campaign file."""
+        return self.settings.runs[self.name]
+
+    @property
+    def reference_time(self) -> FloatArray:
+        """Instants of the reference logger, s."""
+        time: FloatArray = next(iter(self.groups.values()))["time"].to_numpy()
+        return time
+
+
+def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reader: Reader) -> Run:
+    """Step 1: open the files of a run.
+
+    Parameters
+    ----------
+    name : str
+        The run.
+    settings : CampaignSettings
+        The campaign.
+    paths : mapping of str to Path
+        File by logger; one file alone has the name "".
+    reader : callable
+        Gives the columns of a file.
+    """
+    loggers = {}
+    for key, path in paths.items():
+        options = settings.files
+        if key:
+            own = settings.instruments[key]
+            keys = ("time", "time_unit", "sampling_rate")
+            stated = {k: getattr(own, k) for k in keys if getattr(own, k) is not None}
+            options = options.model_copy(update=stated)
+        columns = reader(path, options.known())
+        if key and time_column(columns, options.time) is not None:
+            options = options.model_copy(update={"sampling_rate": None})
+        loggers[key] = Logger(key, path, columns, options)
+    reference = settings.instruments.reference
+    if reference not in loggers:
+        known = (each for each in settings.instruments.loggers if each in loggers)
+        reference = next(known, next(iter(loggers)))
+    assert reference is not None
+    return Run(name, settings, {reference: loggers.pop(reference), **loggers})
+
+
+def sync(run: Run, clocks: Mapping[str, Clock] | None = None) -> Run:
+    """Step 2: find each logger's clock against the reference's, or take those that are known."""
+    if clocks is not None:
+        return replace(run, clocks=clocks)
+    reference, *others = run.loggers.values()
+    found = {reference.name: Clock()}
+    instruments = run.settings.instruments
+    for each in others:
+        try:
+            found[each.name] = _clock(each, reference, instruments[each.name], instruments)
+        except SeakeepError as error:
+            place = f"run '{run.name}', clock of '{each.name}' ({each.path})"
+            raise type(error)(f"{place}: {error}") from None
+    return replace(run, clocks=found)
+
+
+def _clock(
+    logger: Logger, reference: Logger, own: InstrumentSettings, every: InstrumentsSettings
+) -> Clock:
+    if own.trigger is not None:
+        theirs = every[reference.name].trigger
+        if theirs is None:
+            raise RequestError(
+                f"'{logger.name}' states a trigger and the reference '{reference.name}' none. Add "
+                f"trigger = 'COLUMN' to [instruments.{reference.name}]."
+            )
+        return clock_from_pulses(
+            logger.column(own.trigger), logger.time, reference.column(theirs), reference.time,
+            own.offset or 0.0,
+        )  # fmt: skip
+    pair = own.shared or own.correlated
+    if pair is None:
+        stated = own.offset is not None or own.drift is not None
+        clock = Clock(own.offset or 0.0, 1e-6 * (own.drift or 0.0))
+        return replace(clock, method="as stated" if stated else ASSUMED)
+    time, series = logger.uniform(pair[0])
+    instants, other = reference.uniform(pair[1])
+    if not np.ptp(series) or not np.ptp(other):
+        raise DataError(f"'{pair[0]}' or '{pair[1]}' is constant. Choose signals that move.")
+    find = clock_from_shared if own.shared else clock_from_correlation
+    return find(series, time, other, instants, number(own.window), number(own.largest_lag))
+
+
+def channels_of(settings: CampaignSettings, run: RunSettings) -> dict[str, ChannelSettings]:
+    """Channel map of a run: the campaign's, with the keys that the run states in their place."""
+    chosen = dict(settings.channels)
+    for name, own in run.channels.items():
+        stated = {key: getattr(own, key) for key in own.model_fields_set}
+        chosen[name] = chosen[name].model_copy(update=stated)
+    return chosen
+
+
+def mapped(run: Run, wanted: Collection[str] | None = None) -> Run:
+    """Step 3: columns become channels with names, SI units and signs, on the reference's time.
+
+    Parameters
+    ----------
+    run : Run
+        The run, its clocks known.
+    wanted : collection of str, optional
+        The channels wanted, with what they need; the default is all.
+    """
+    needed = needed_channels(run.settings, run.settings.channel_names if wanted is None else wanted)
+    every = channels_of(run.settings, run.own)
+    chosen = {name: each for name, each in every.items() if name in needed}
+    homes = _homes(run, chosen)
+    groups = {}
+    for key, logger in run.loggers.items():
+        own = {name: each for name, each in chosen.items() if homes[name] == key}
+        if own:
+            groups[key] = _channels(run, logger, own)
+    return replace(run, groups=groups)
+
+
+def _homes(run: Run, channels: Mapping[str, ChannelSettings]) -> dict[str, str]:
+    """Logger that holds each channel."""
+    if len(run.loggers) == 1:
+        return dict.fromkeys(channels, next(iter(run.loggers)))
+    found = {}
+    for name, each in channels.items():
+        if each.instrument is not None:
+            if each.instrument not in run.loggers:
+                near = did_you_mean(each.instrument, run.loggers)
+                raise RequestError(
+                    f"channels.{name}.instrument: run '{run.name}' has no file of "
+                    f"'{each.instrument}'.{near} Its files: {', '.join(run.loggers)}."
+                )
+            found[name] = each.instrument
+            continue
+        column, tables = each.column or name, [one.columns for one in run.loggers.values()]
+        having = [key for key, one in run.loggers.items() if one.columns.find(column) is not None]
+        if not having:
+            listed = ", ".join(dict.fromkeys(c for table in tables for c in table.names))
+            raise RequestError(
+                f"run '{run.name}': none of its {len(tables)} files has a column '{column}' for "
+                f"channel '{name}'.{meant_column(column, tables)} Correct [channels.{name}]. "
+                f"Their columns: {listed}."
+            )
+        if len(having) > 1:
+            raise RequestError(
+                f"run '{run.name}': the column '{column}' of channel '{name}' stands in the files "
+                f"of {' and '.join(having)}. State instrument = '{having[0]}' in [channels.{name}]."
+            )
+        found[name] = having[0]
+    return found
+
+
+def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings]) -> xr.Dataset:
+    """Channels of one logger, gaps and jitter as they are."""
+    path = logger.path
+    columns = [each.column or name for name, each in channels.items()]
+    table = labelled_table(path, logger.columns, logger.options, columns)
+    instants = run.clocks[logger.name].reference(table["time"].to_numpy())
+    table = _recorded(table.assign_coords(time=table["time"].copy(data=instants)), run)
+    changed = run.own.channels
+    variables = {}
+    for name, each in channels.items():
+        if not (name in changed and "unit" in changed[name].model_fields_set):
+            _refuse_other_unit(table, name, each, run.name, path)
+        variables[name] = ("time", *_converted(table, name, each, path))
+    out = xr.Dataset(variables, {"time": table["time"]})
+    for name, position in run.settings.rig.positions.items():
+        if name in out:
+            out[name].attrs["x_position"] = float(position)
+    return out
+
+
+def _recorded(table: xr.Dataset, run: Run) -> xr.Dataset:
+    """Part of a file that `record` asks for."""
+    if run.own.record is None:
+        return table
+    start, end = (number(edge) for edge in run.own.record)
+    time = table["time"].to_numpy()
+    kept = (time >= start) & (time <= end)
+    if kept.sum() < 2:
+        step = float(np.median(np.diff(time)))
+        raise RequestError(
+            f"runs.{run.name}.record: received [{start:g}, {end:g}] s, and the file runs from "
+            f"{span_text(time[0], time[-1], step)}: nothing is left. Correct the two times."
+        )
+    return table.isel(time=kept)
+
+
+def _column(table: xr.Dataset, name: str, settings: ChannelSettings) -> xr.DataArray:
+    """Column of a channel, by name or full header."""
+    wanted = settings.column or name
+    found = table.get(wanted)
+    if found is None:
+        found = next(c for c in table.data_vars.values() if c.attrs["long_name"] == wanted)
+    return found
+
+
+def _refuse_other_unit(
+    table: xr.Dataset, name: str, settings: ChannelSettings, run: str, path: Path
+) -> None:
+    """Refuse a unit that is stated for all runs where this run's file says another one."""
+    stated = settings.unit
+    said = str(_column(table, name, settings).attrs.get("units", "")).strip()
+    if stated is None or said in ("", "-", "1") or not is_unit(said):
+        return
+    same = si_unit(said) == si_unit(stated)
+    if same and conversion(said, si_unit(said)) == conversion(stated, si_unit(stated)):
+        return
+    raise RequestError(
+        f"channels.{name}: the unit '{stated}' is stated, and run '{run}' ({path}) says "
+        f"'{said}' of the column '{settings.column or name}'. Leave unit out where the files say "
+        f"it; or, if this file is wrong, state the unit in [runs.{run}.channels.{name}]."
+    )
+
+
+def _converted(
+    table: xr.Dataset, name: str, settings: ChannelSettings, path: Path
+) -> tuple[FloatArray, dict[str, str]]:
+    """Values and attributes of a channel."""
+    wanted = settings.column or name
+    column = _column(table, name, settings)
+    unit = settings.unit if settings.unit is not None else column.attrs.get("units")
+    if unit is None:
+        raise RequestError(
+            f"channels.{name}: the column '{wanted}' of {path} states no unit. Add unit = '…' to "
+            f"[channels.{name}] ('-' for none)."
+        )
+    canonical = canonical_channel(name)
+    target = canonical.units if canonical else si_unit(unit)
+    factor = conversion(unit, target, f"channel '{name}' (column '{wanted}' of {path})")
+    values = settings.sign * factor * (column.to_numpy().astype(float) + settings.offset)
+    return values, {"units": target, "long_name": long_name_of(name, settings.long_name)}
+
+
+def cleaned(run: Run) -> Run:
+    """Step 4: gaps and jitter treated as the campaign says; samples that look wrong are flagged."""
+    preparation = run.settings.preparation
+    groups = {}
+    for key, data in run.groups.items():
+        logger = run.loggers[key]
+        if preparation.gaps == "refuse":
+            _refuse_gaps(data, run.name, logger.path)
+        data = _regular(data, preparation, f"run '{run.name}' ({logger.path})")
+        data = flag_samples(_bridged(data, preparation), preparation.outliers == "replace")
+        if logger.options.sampling_rate is not None and logger.options.time is None:
+            aside = time_column(logger.columns)
+            step = None if aside is None else time_step_of(logger.columns, aside)
+            if step is not None:  # what the file's times tell, where a stated rate counts
+                data.attrs["time_column_step"] = step
+        groups[key] = data
+    return replace(run, groups=groups)
+
+
+def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
+    gapped = [str(n) for n, each in data.items() if not np.isfinite(each.to_numpy()).all()]
+    if not gapped:
+        return
+    time = data["time"].to_numpy()
+    missing = ~np.isfinite(data[gapped[0]].to_numpy())
+    starts, ends = np.array(stretches(missing)).T
+    step = float(np.median(np.diff(time)))
+    lengths = ends - starts
+    longest = int(np.argmax(lengths))
+    first, worst = (instant_text(time[starts[at]], step) for at in (0, longest))
+    others = f" (also in {', '.join(gapped[1:])})" if gapped[1:] else ""
+    raise DataError(
+        f"run '{run}' ({path}): channel '{gapped[0]}' has {int(missing.sum())} missing values of "
+        f"{missing.size} in {starts.size} gap(s), the first at t = {first} s ({lengths[0]} "
+        f"samples, {lengths[0] * step:.4g} s), the longest at t = {worst} s "
+        f"({lengths[longest]} samples, {lengths[longest] * step:.4g} s)"
+        f"{others}. Repair the file, leave the channel out, or cut the gap off with record = "
+        f"[begin, end] in [runs.{run}]; or state gaps = 'mask' or 'bridge' in [preparation]."
+    )
+
+
+def _regular(data: xr.Dataset, preparation: PreparationSettings, name: str) -> xr.Dataset:
+    """Put the channels on a uniform axis, where that is allowed."""
+    time = data["time"].to_numpy()
+    try:
+        uniform_step(time, name)
+        return data
+    except DataError as error:
+        report = inspect_times(time, name)
+        if report.gaps and preparation.gaps == "refuse":
+            raise DataError(
+                f"{error} Or state gaps = 'mask' or 'bridge' in [preparation]."
+            ) from None
+        if report.jittered and preparation.jitter == "refuse":
+            raise DataError(f"{error} Or state jitter = 'interpolate' in [preparation].") from None
+    series = np.column_stack([each.to_numpy() for each in data.values()])
+    new, values = onto_uniform(time, series, name)
+    variables = {
+        str(n): ("time", values[:, i], each.attrs) for i, (n, each) in enumerate(data.items())
+    }
+    done = {
+        "time_gaps": len(report.gaps),
+        "time_missing": report.missing,
+        "time_jitter_rms": report.jitter_rms if report.jittered else 0.0,
+    }
+    return xr.Dataset(variables, {"time": ("time", new, data["time"].attrs)}, done)
+
+
+def _bridged(data: xr.Dataset, preparation: PreparationSettings) -> xr.Dataset:
+    """Fill gaps so that filters can run, and flag each sample that was filled."""
+    step = float(np.median(np.diff(data["time"].to_numpy())))
+    longest = preparation.longest_gap if preparation.gaps == "bridge" else 0.0
+    for name in list(data.data_vars):
+        values = data[name].to_numpy()
+        if np.isfinite(values).all():
+            continue
+        filled = bridge(values, step, longest)
+        flags = (MISSING * filled.long + BRIDGED * filled.short).astype(np.int16)
+        data[name] = data[name].copy(data=filled.values)
+        data.coords[f"{name}_flags"] = ("time", flags, flag_attributes(str(name)))
+        if filled.short.any():
+            data[name].attrs["repaired"] = (
+                f"{int(filled.short.sum())} samples "
+                f"({filled.short.sum() * step:.3g} s of {filled.short.size * step:.4g} s) "
+                "bridged by monotone cubics"
+            )
+    return data
+
+
+def flag_samples(data: xr.Dataset, replaced: bool) -> xr.Dataset:
+    """Flag outliers, plateaus and stuck samples; outliers are replaced where that is asked for."""
+    time = data["time"].to_numpy()
+    dt = float(time[1] - time[0])
+    for name in list(data.data_vars):
+        x, key = data[name].to_numpy(), f"{name}_flags"
+        if x.size < 16 or not np.ptp(x):
+            continue
+        known = key in data.coords
+        flags = data[key].to_numpy().copy() if known else np.zeros(x.size, dtype=np.int16)
+        there = (flags & (MISSING | BRIDGED)) == 0
+        if np.isfinite(step := reading_step(x)):
+            data[name].attrs["reading_step"] = step
+        outlier = find_outliers(x) & there
+        stuck = find_stuck(x, dt, max(dominant_period(x, dt), 5 * dt)) & there
+        for start, end in stretches(stuck):  # what stands before a gap that was filled
+            stuck[start:end] = end - start > 2
+        flags[outlier] |= OUTLIER
+        flags[find_saturation(x) & there & ~stuck] |= SATURATED
+        flags[stuck] |= STUCK
+        if replaced and outlier.any():
+            filled = bridge(np.where(outlier, np.nan, x), dt, np.inf).values
+            data[name] = data[name].copy(data=filled)
+            flags[outlier] |= REPLACED
+            done = [data[name].attrs["repaired"]] if "repaired" in data[name].attrs else []
+            done.append(f"{int(outlier.sum())} outliers replaced by monotone cubics")
+            data[name].attrs["repaired"] = "; ".join(done)
+        if flags.any():
+            data.coords[key] = ("time", flags, flag_attributes(str(name)))
+    return data
+
+
+def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
+    """Step 5: channels made from others of one logger, at its own rate; others are noted as late.
+
+    `wanted` is as in :func:`mapped`.
+    """
+    settings, groups, late = run.settings, dict(run.groups), []
+    needed = needed_channels(settings, settings.channel_names if wanted is None else wanted)
+    home = {str(name): key for key, data in groups.items() for name in data.data_vars}
+    for name in derivation_order(settings.derived, settings.channel_names):
+        if name not in needed:
+            continue
+        sources = sources_of(name, settings.derived[name], settings.channel_names)
+        places = {home[source] for source in sources}
+        home[name] = places.pop() if len(places) == 1 else COMMON
+        if home[name] == COMMON:
+            late.append(name)
+            continue
+        data = groups[home[name]]
+        step = uniform_step(data["time"].to_numpy(), f"run '{run.name}'")
+        groups[home[name]] = derive(data, name, settings, step, run.name)
+    return replace(run, groups=groups, late=tuple(late))
+
+
+def resampled(run: Run, dt: float) -> Run:
+    """Step 6: all channels on one axis of step `dt` (s), and those that need several loggers.
+
+    The axis holds multiples of the step from the reference's first instant, where every logger
+    recorded; samples that are missing become NaN.
+    """
+    time = _axis(run, dt)
+    out = xr.Dataset(coords={"time": ("time", time, next(iter(run.groups.values()))["time"].attrs)})
+    for group in run.groups.values():
+        out = out.assign(_on_axis(group, time, dt, run.settings.preparation, run.name))
+        for name in group.coords:
+            if str(name).endswith("_flags"):
+                flags = _flags_at(group[name].to_numpy(), group["time"].to_numpy(), time, dt)
+                out.coords[str(name)] = ("time", flags, group[name].attrs)
+    for name in run.late:
+        out = derive(out, name, run.settings, dt, run.name)
+    for name in list(out.data_vars):
+        if f"{name}_flags" in out.coords:
+            lost = (out[f"{name}_flags"].to_numpy() & MISSING) > 0
+            out[name] = out[name].copy(data=np.where(lost, np.nan, out[name].to_numpy()))
+    return replace(run, data=out[[name for name in run.settings.channel_names if name in out]])
+
+
+def _axis(run: Run, dt: float) -> FloatArray:
+    begin = max(float(each["time"][0]) for each in run.groups.values())
+    end = min(float(each["time"][-1]) for each in run.groups.values())
+    if end <= begin:
+        spans = ", ".join(
+            f"{name} {_instant(each, 0)} to {_instant(each, -1)} s"
+            for name, each in run.groups.items()
+        )
+        raise DataError(
+            f"run '{run.name}': its instruments never recorded together ({spans}, on the "
+            "reference's clock). Check the files of the run and the clocks."
+        )
+    origin = float(run.reference_time[0])
+    first = int(np.ceil((begin - origin) / dt - 1e-6))
+    last = int(np.floor((end - origin) / dt * (1 + 1e-9) + 1e-6))
+    if last - first < 1:
+        raise RequestError(
+            f"run '{run.name}' of {end - begin:g} s is shorter than two steps of {dt:g} s. Correct "
+            "[preparation]."
+        )
+    instants: FloatArray = origin + dt * np.arange(first, last + 1, dtype=float)
+    return instants
+
+
+def _instant(group: xr.Dataset, at: int) -> str:
+    time = group["time"].to_numpy()
+    return instant_text(float(time[at]), float(np.median(np.diff(time))))
+
+
+def _on_axis(
+    group: xr.Dataset, wanted: FloatArray, dt: float, settings: PreparationSettings, run: str
+) -> dict[str, tuple[str, FloatArray, dict[str, object]]]:
+    time = group["time"].to_numpy()
+    own = uniform_step(time, f"run '{run}'")
+    names = list(group.data_vars)
+    series = np.column_stack([group[name].to_numpy() for name in names])
+    filtered = settings.low_pass is not None and settings.low_pass[1] < 0.5 / own
+    if filtered and settings.low_pass is not None:
+        series = low_pass(series, own, *settings.low_pass)
+    if strays(own, time.size, dt) or abs(wanted[0] - time[0]) > 0.05 * own:
+        # The last instant may lie a rounding beyond the record.
+        clipped = np.clip(wanted, time[0], time[-1])
+        fine = not settings.anti_alias and dt > own
+        series = resample(series, time, clipped, settings.attenuation, anti_alias=not fine)
+    else:
+        series = series[: wanted.size]
+    out = {}
+    for i, name in enumerate(names):
+        attributes = dict(group[name].attrs)
+        if filtered and settings.low_pass is not None:
+            attributes["low_pass"] = tuple(settings.low_pass)
+        out[str(name)] = ("time", series[:, i].copy(), attributes)
+    return out
+
+
+def _flags_at(flags: Any, time: FloatArray, wanted: FloatArray, dt: float) -> Any:
+    """Flags at new instants: what any sample within half a new step of them carries."""
+    half = 0.5 * max(dt, float(time[1] - time[0])) * (1 + 1e-9)
+    begin = np.searchsorted(time, wanted - half)
+    end = np.searchsorted(time, wanted + half, side="right")
+    out = np.zeros(wanted.size, dtype=np.int16)
+    for bit in range(8):
+        seen = np.concatenate([[0], np.cumsum((flags >> bit) & 1)])
+        out |= ((seen[end] > seen[begin]).astype(np.int16) << bit).astype(np.int16)
+    return out
+
+
+def strays(own: float, samples: int, dt: float) -> bool:
+    """Whether a record's own step leads it away from a grid of `dt` by more than rounding.
+
+    Times written with few decimals give a step that is off by a part of a sample over the record.
+    """
+    return bool(abs(own - dt) * samples > 0.05 * dt)
+
+
+def redundant_pairs(settings: CampaignSettings, period: float | None) -> tuple[Redundant, ...]:
+    """Groups of ``[redundant]``, windows in seconds, for an encounter period (s)."""
+    out = []
+    for each in settings.redundant.values():
+        window = each.window
+        if isinstance(window, Length):
+            window = None if period is None else window.at(period)
+        out.append(Redundant(each.channels, window))
+    return tuple(out)
+
+
+def checked(
+    run: Run,
+    period: tuple[float, float] | None = None,
+    left_out: Mapping[str, str] | None = None,
+) -> Run:
+    """Step 7: look for faults.
+
+    Parameters
+    ----------
+    run : Run
+        The run, on one axis.
+    period : (float, float), optional
+        Counted period and energy period of its waves, s, where they disagree.
+    left_out : mapping of str to str, optional
+        Runs that are no part of what is pooled, and why.
+    """
+    assert run.data is not None
+    settings, preparation = run.settings, run.settings.preparation
+    rates = {}
+    for name in run.groups:
+        own = settings.instruments[name] if name else settings.files
+        if own.sampling_rate is not None:
+            rates[name] = Rate(own.sampling_rate, own.time is None, own.sampling_rate_assumed)
+    units = {
+        name: each.unit or "-"
+        for name, each in channels_of(settings, run.own).items()
+        if each.unit_assumed
+    }
+    record = Record(
+        run=run.name,
+        whole=run.data,
+        groups=run.groups,
+        clocks=run.clocks,
+        span=used_span(run.own),
+        waves=run.own.waves,
+        water_depth=settings.rig.water_depth,
+        wave_channel=settings.wave_channel,
+        period=period,
+        redundant=redundant_pairs(settings, None),
+        rates=rates,
+        assumed_units=units,
+        bridged=preparation.longest_gap if preparation.gaps == "bridge" else None,
+        anti_alias=preparation.anti_alias,
+        left_out=left_out or {},
+    )
+    return replace(run, findings=tuple(check(record)))
+
+
+def used_span(settings: RunSettings) -> tuple[float, float]:
+    """First and last instant of a run that is used at all, s."""
+    stated = (settings.span,) if settings.span else (settings.train, settings.test)
+    spans = [(number(each[0]), number(each[1])) for each in stated if each is not None]
+    starts, ends = zip(*spans, strict=True) if spans else ((-np.inf,), (np.inf,))
+    return min(starts), max(ends)
+
+
+def cropped(run: Run) -> Run:
+    """Step 8: cut the run to its span; spans that lie outside the record are refused."""
+    assert run.data is not None
+    time = run.data["time"].to_numpy()
+    dt = float(np.median(np.diff(time)))
+    reference = run.reference_time
+    record = float(reference[0]), float(reference[-1])
+    # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
+    slack = max(dt, (record[1] - record[0]) / (reference.size - 1)) * (1 + 1e-6)
+    spans = {
+        key: (number(span[0]), number(span[1]))
+        for key in ("span", "train", "test")
+        if (span := getattr(run.own, key)) is not None
+    }
+    for key, span in spans.items():
+        finite = [edge for edge in span if np.isfinite(edge)]
+        if any(not record[0] - slack <= edge <= record[1] + slack for edge in finite):
+            begin, end = _texts(record, dt)
+            raise RequestError(
+                f"runs.{run.name}.{key}: received [{', '.join(_texts(span, dt))}] s, and the "
+                f"record runs from {begin} to {end} s. Correct the span; 'inf' stands for the end."
+            )
+        _refuse_empty(f"runs.{run.name}.{key}", span, time, dt, record)
+    if "span" not in spans:
+        return run
+    data = run.data.isel(time=inside(time, spans.pop("span"), dt))
+    time = data["time"].to_numpy()
+    for key, span in spans.items():
+        _refuse_empty(f"runs.{run.name}.{key}", span, time, dt, (float(time[0]), float(time[-1])))
+    return replace(run, data=data)
+
+
+def inside(time: FloatArray, span: tuple[float, float], dt: float) -> BoolArray:
+    """Instants in a span, both ends included."""
+    slack = 1e-6 * dt
+    return (time >= span[0] - slack) & (time <= span[1] + slack)
+
+
+def _refuse_empty(
+    key: str, span: tuple[float, float], time: FloatArray, dt: float, record: tuple[float, float]
+) -> None:
+    """Refuse a span that holds too few of a run's instants, whose record is the reference's."""
+    if (count := int(inside(time, span, dt).sum())) > 1:
+        return
+    stretch = ", ".join(_texts(span, dt))
+    stated = f"{key}: [{stretch}] s holds {count} sample(s) at a step of {dt:.4g} s"
+    begin, end = _texts((float(time[0]), float(time[-1])), dt)
+    if time[0] > record[0] + 2 * dt or time[-1] < record[1] - 2 * dt:
+        first, last = _texts(record, dt)
+        raise DataError(
+            f"{stated}, since all loggers recorded together only from {begin} to {end} s; the "
+            f"reference runs from {first} to {last} s. Check whether the files of the other "
+            "loggers are whole, or correct the span."
+        )
+    raise RequestError(
+        f"{stated}. Lengthen the span, or move it into the run's {begin} to {end} s."
+    )
+
+
+def _texts(span: tuple[float, float], dt: float) -> tuple[str, str]:
+    return instant_text(span[0], dt), instant_text(span[1], dt)

@@ -1,0 +1,68 @@
+"""The quality room: checks look at a run and report findings; none of them changes a value."""
+
+from collections.abc import Callable, Collection, Iterable
+
+import xarray as xr
+
+from seakeep.quality import clocks, samples, sensors
+from seakeep.quality.findings import Finding, Kind, as_json, findings_of, warn_of
+from seakeep.quality.record import Rate, Record, Redundant
+from seakeep.quality.sensors import compared
+
+__all__ = [
+    "CHECKS",
+    "Finding",
+    "Kind",
+    "Rate",
+    "Record",
+    "Redundant",
+    "as_json",
+    "check",
+    "compared",
+    "findings_of",
+    "warn_of",
+    "warn_of_runs",
+]
+
+CHECKS: list[Callable[[Record], Iterable[Finding]]] = [
+    samples.constant,
+    samples.flagged,
+    samples.levels,
+    sensors.redundant,
+    sensors.held,
+    sensors.positions,
+    clocks.clocks,
+    clocks.others,
+    clocks.records,
+    samples.impossible,
+    samples.units,
+    clocks.rates,
+    clocks.steps,
+    clocks.periods,
+]
+"""All checks, in the order in which findings are listed."""
+
+
+def check(record: Record) -> list[Finding]:
+    """Findings of all checks of a run."""
+    return [finding for each in CHECKS for finding in each(record)]
+
+
+def warn_of_runs(runs: Iterable[xr.Dataset], channels: Collection[str]) -> None:
+    """Warn of what was found in the channels of a model, in the prepared runs that it reads.
+
+    Parameters
+    ----------
+    runs : iterable of Dataset
+        Prepared runs.
+    channels : collection of str
+        States and inputs of the model.
+
+    Warns
+    -----
+    SeakeepWarning
+        One per channel and kind of finding; gaps that were bridged do no harm.
+    """
+    found = (each for run in runs for each in findings_of(run))
+    harmful = (each for each in found if each.kind is not samples.SamplesKind.BRIDGED)
+    warn_of(harmful, set(), channels)

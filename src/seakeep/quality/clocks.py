@@ -1,0 +1,202 @@
+"""Checks of time: clocks, rates and records of the loggers, the common step, the period."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from statistics import median_high, median_low
+from typing import Any
+
+import numpy as np
+
+from seakeep.arrays import FloatArray
+from seakeep.quality.findings import Finding, Kind
+from seakeep.quality.record import Record, step_of
+from seakeep.quality.samples import is_elevation
+from seakeep.signals.filters import PASSBAND
+from seakeep.signals.quality import energy_above, noise_level
+from seakeep.signals.synchronisation import ASSUMED
+
+__all__ = ["ClocksKind", "clocks", "others", "periods", "rates", "records", "steps"]
+
+RATE_TOLERANCE = 0.01
+"""Part by which a stated rate may differ from the times: rates are written with two digits or more,
+and quartzes keep theirs a thousand times better."""
+
+LARGEST_DRIFT = 2e-4
+"""Drift of a clock that is reported: ten times that of a poor quartz."""
+
+LOST = 0.05
+"""Part of a run's used span that a logger may miss: they are started and stopped by hand, seconds
+apart, and runs last minutes."""
+
+LOST_ENERGY = 0.05
+"""Part of the waves' energy that a step may cost: 2.5 % of their standard deviation, more than a
+calibrated probe leaves open (1 to 2 %)."""
+
+FINER = 2.0
+"""Times finer than the fastest logger that a step may be: one of 32 to a period is so where the
+loggers take 16, the fewest that show a wave's shape."""
+
+MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+_FILE = (
+    "Check whether its file is whole; if it is, state span = [begin, end] in [runs.{run}] to say "
+    "which part is meant."
+)
+
+
+class ClocksKind(Kind):
+    """What is wrong with time."""
+
+    TIME_GAPS = "time has {gaps} gap(s): {missing} samples are missing"
+    JITTER = "time has a jitter of {jitter:.3g} ms RMS; interpolated onto a uniform step"
+    TIMES_ASIDE = (
+        "counted at the {limit:g} stated; the file's own times, which are left aside, tell "
+        "{value:.5g}. Leave sampling_rate out, or correct it"
+    )
+    OTHER_RATE = "samples at {value:.5g}, as its times tell; {limit:g} are stated"
+    ASSUMED_CLOCK = (
+        "clock assumed the same as the reference's: state trigger, shared, correlated or offset (0 "
+        "where the two run on one clock) in [instruments.{channel}]"
+    )
+    UNCERTAIN_CLOCK = "clock poorly known: {described}"
+    CLOCK_DRIFT = "clock drifts by {value:+.0f} ppm"
+    STARTS_LATE = (
+        "begins at {value:.4g}, the other loggers at {limit:.4g}: the run is cut to what all "
+        "recorded",
+        _FILE,
+    )
+    ENDS_EARLY = (
+        "ends at {value:.4g}, the other loggers at {limit:.4g}: the run is cut to what all "
+        "recorded",
+        _FILE,
+    )
+    RATE = (
+        "is sampled at {value:g}, which is assumed: no file tells its rate",
+        "All periods and rates follow from it. Correct sampling_rate in [{table}], and remove "
+        "sampling_rate_assumed there.",
+    )
+    FINE_STEP = (
+        "put on {value:.4g}, and no logger records more than {limit:.4g}: nothing is gained, and "
+        "models take longer"
+    )
+    COARSE_STEP = (
+        "loses {share:.2g} % of the energy of its waves (peak at {period:.3g} s): it lies above "
+        "{limit:.3g} and {fate} at {value:.4g}; take a finer step"
+    )
+    PERIOD = (
+        "counts waves of {value:.3g}, and the energy period of its spectrum is {limit:.3g}",
+        "Noise or a slow drift of the probe leads the count, or waves too low for "
+        "period_hysteresis are left out, and all that is stated in encounter periods is wrong with "
+        "it. In [campaign], state period_hysteresis (0.2 passes noise of a twentieth of the "
+        "waves), another period_channel, or encounter_period in seconds.",
+        True,
+    )
+    LEFT_OUT = "{words}"
+
+
+def clocks(record: Record) -> Iterator[Finding]:
+    """Gaps, jitter, rates that differ from the stated one, clocks that are not certain."""
+    for name, group in record.groups.items():
+        label, clock, step = name or "time", record.clocks[name], step_of(group)
+        run = record.run
+        details: dict[str, Any] = {}
+        if (gaps := int(group.attrs.get("time_gaps", 0))) > 0:
+            details = {"gaps": gaps, "missing": int(group.attrs["time_missing"])}
+            yield Finding(ClocksKind.TIME_GAPS, run, label, details=details)
+        if (jitter := float(group.attrs.get("time_jitter_rms", 0.0))) > 0:
+            details = {"jitter": 1e3 * jitter}
+            yield Finding(ClocksKind.JITTER, run, label, jitter, unit="s", details=details)
+        if (rate := record.rates.get(name)) is not None:
+            aside = float(group.attrs.get("time_column_step", 1 / rate.stated))
+            if abs(aside * rate.stated - 1) > RATE_TOLERANCE:
+                kind, found = ClocksKind.TIMES_ASIDE, 1 / aside
+                yield Finding(kind, run, label, found, rate.stated, "Hz")
+            elif abs(step * rate.stated - 1) > RATE_TOLERANCE:
+                yield Finding(ClocksKind.OTHER_RATE, run, label, 1 / step, rate.stated, "Hz")
+        if clock.method == ASSUMED:
+            yield Finding(ClocksKind.ASSUMED_CLOCK, run, label)
+        if clock.offset_error > 0.25 * step or clock.residual > 0.5 * step:
+            details = {"described": clock.describe()}
+            value, limit = clock.offset_error, 0.25 * step
+            yield Finding(
+                ClocksKind.UNCERTAIN_CLOCK, run, label, value, limit, "s", details=details
+            )
+        if abs(clock.drift) > LARGEST_DRIFT:
+            drift, limit = 1e6 * clock.drift, 1e6 * LARGEST_DRIFT
+            yield Finding(ClocksKind.CLOCK_DRIFT, run, label, drift, limit, "1")
+
+
+def rates(record: Record) -> Iterator[Finding]:
+    """Loggers whose rate is a guess."""
+    for name in record.groups:
+        rate = record.rates.get(name)
+        if rate is not None and rate.counted and rate.assumed:
+            details = {"table": f"instruments.{name}" if name else "files"}
+            label = name or "time"
+            yield Finding(
+                ClocksKind.RATE, record.run, label, rate.stated, unit="Hz", details=details
+            )
+
+
+def records(record: Record) -> Iterator[Finding]:
+    """Loggers that start well after the others of their run, or end well before them.
+
+    The others are judged by their median, so that one that was left running speaks against none.
+    What lies outside the span that is used does no harm.
+    """
+    if len(record.groups) < 2:
+        return
+    spans = {n: (float(g["time"][0]), float(g["time"][-1])) for n, g in record.groups.items()}
+    first = max(median_low(start for start, _ in spans.values()), record.span[0])
+    last = min(median_high(end for _, end in spans.values()), record.span[1])
+    limit = LOST * (last - first)
+    for name, (start, end) in spans.items():
+        if start - first > limit:
+            yield Finding(ClocksKind.STARTS_LATE, record.run, name, start, first, "s", start)
+        if last - end > limit:
+            yield Finding(ClocksKind.ENDS_EARLY, record.run, name, end, last, "s", end)
+
+
+def steps(record: Record) -> Iterator[Finding]:
+    """Steps that are too coarse for the waves, or finer than any logger's."""
+    if not record.groups:
+        return
+    dt = step_of(record.whole)
+    own = {name: step_of(group) for name, group in record.groups.items()}
+    finest = min(own.values())
+    if round(finest / dt, 3) > FINER:
+        yield Finding(ClocksKind.FINE_STEP, record.run, "time", 1 / dt, 1 / finest, "Hz")
+    # A filter halves amplitudes in the middle between its pass band and the Nyquist frequency.
+    edge = (0.5 * (PASSBAND + 1.0) if record.anti_alias else 1.0) * 0.5 / dt
+    fate = "is damped or lost" if record.anti_alias else "is folded into slower waves"
+    for logger, group in record.groups.items():
+        for name in map(str, group.data_vars):
+            wanted = is_elevation(group[name]) or name in MOTIONS
+            if not wanted or "derived_from" in group[name].attrs or own[logger] >= dt:
+                continue
+            x = group[name].to_numpy()
+            share, period = energy_above(x, own[logger], edge)
+            if share > LOST_ENERGY and not is_noise(x):
+                details = {"share": 100 * share, "period": period, "fate": fate}
+                kind = ClocksKind.COARSE_STEP
+                yield Finding(kind, record.run, name, 1 / dt, edge, "Hz", details=details)
+
+
+def is_noise(series: FloatArray) -> bool:
+    """Whether most of a channel's variance has no memory from one sample to the next."""
+    series = series[np.isfinite(series)]
+    return series.size > 2 and bool(noise_level(series) > np.sqrt(0.5) * float(series.std()) > 0)
+
+
+def periods(record: Record) -> Iterator[Finding]:
+    """A counted period that is no period of the waves."""
+    if record.period is not None and record.wave_channel is not None:
+        counted, energy = record.period
+        yield Finding(ClocksKind.PERIOD, record.run, record.wave_channel, counted, energy, "s")
+
+
+def others(record: Record) -> Iterator[Finding]:
+    """Runs that are no part of the period and the clocks of all."""
+    for run, words in record.left_out.items():
+        details = {"words": words}
+        yield Finding(ClocksKind.LEFT_OUT, record.run, f"run {run}", details=details)

@@ -1,0 +1,189 @@
+"""Checks report faults as data: which kind, where, how large."""
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import seakeep.quality
+from seakeep.errors import SeakeepWarning
+from seakeep.quality import Finding, Kind, Record, Redundant, as_json, findings_of, warn_of
+from seakeep.quality.samples import SamplesKind
+from seakeep.quality.sensors import redundant
+from seakeep.signals.quality import (
+    LARGEST_NRMSE,
+    LATE,
+    RUN_AWAY,
+    find_outliers,
+    find_saturation,
+    find_stuck,
+    reading_step,
+)
+
+DT = 0.04
+T = DT * np.arange(3000)
+PERIOD = 1.6
+
+
+def waves(shift=0.0, seed=0):
+    frequency = np.linspace(0.4, 0.9, 20)
+    phase = np.random.default_rng(seed).uniform(0, 6.28, 20)
+    return np.cos(2 * np.pi * np.outer(T - shift, frequency) + phase).sum(axis=1)
+
+
+def against(series, trusted=None, step=np.nan, window=None):
+    """Findings against a sensor beside a trusted one."""
+    trusted = waves() if trusted is None else trusted
+    channels = {"one": trusted, "two": series}
+    run = xr.Dataset({n: ("time", x, {"units": "m"}) for n, x in channels.items()}, {"time": T})
+    run["two"].attrs["reading_step"] = step
+    return list(redundant(Record("r", run, redundant=(Redundant(("one", "two"), window),))))
+
+
+def kinds(*args, **keys):
+    return [each.kind.name for each in against(*args, **keys)]
+
+
+class TestRedundantSensors:
+    def test_a_sound_one(self):
+        assert kinds(waves(0.02)) == []
+
+    def test_a_late_one(self):
+        (found,) = against(waves(0.3))
+        assert found.kind.name == "LAG"
+        assert found.value == pytest.approx(0.3, abs=0.004)  # a tenth of a sample
+        assert (found.unit, found.channel, found.run) == ("s", "two", "r")
+        assert found.text.startswith("against one: lag +0.30 s (± 0.0")
+
+    def test_a_phase_that_drifts_about_zero(self):
+        """0.27 periods over the record, with a median near 0: this one passed."""
+        drifting = np.interp(T + 0.27 * PERIOD * (T / T[-1] - 0.5), T, waves())
+        (found,) = against(drifting)
+        assert found.kind.name == "LAG_GROWS"
+        assert found.value == pytest.approx(-0.27 * PERIOD, rel=0.15)  # windows at the ends
+
+    def test_a_phase_that_wanders_and_returns(self):
+        wandering = np.interp(T + 0.2 * PERIOD * np.sin(2 * np.pi * T / T[-1]), T, waves())
+        assert kinds(wandering) == ["LAG_GROWS"] or kinds(wandering) == ["DIFFERENCE"]
+
+    def test_noise_of_another_size_than_a_model_s_error(self):
+        noise = np.random.default_rng(0).normal(0, waves().std(), T.size)
+        assert kinds(waves() + 0.1 * noise) == []
+        assert kinds(waves() + 0.3 * noise) == ["DIFFERENCE"]
+
+    def test_constant_and_unrelated(self):
+        assert kinds(np.full(3000, 0.2)) == ["STILL"]
+        assert kinds(waves(seed=7)) == ["AGREEMENT"]
+
+    @pytest.mark.parametrize(
+        ("factor", "told"),
+        [(1000.0, True), (2.2, True), (1.9, False), (0.55, False), (0.45, True), (0.001, True)],
+    )
+    def test_another_scale(self, factor, told):
+        """A wrong unit does not change a correlation; the limits are 2 and 1/2."""
+        assert kinds(factor * waves()) == (["SCALE"] if told else ["DIFFERENCE"])
+
+    @pytest.mark.parametrize(("part", "told"), [(0.8, False), (1.25, True)])
+    def test_either_side_of_the_limits_on_lags(self, part, told):
+        t = np.sin(2 * np.pi * T / PERIOD)
+        late = np.sin(2 * np.pi * (T / PERIOD - part * LATE))
+        assert bool(kinds(late, t)) is told
+        grown = np.sin(2 * np.pi * (T / PERIOD - part * RUN_AWAY * (T / T[-1] - 0.5)))
+        assert bool(kinds(grown, t)) is told
+
+    def test_the_limits_on_lags_alone_make_the_largest_nrmse(self):
+        still = np.sin(2 * np.pi * T / PERIOD)
+        late = np.sin(2 * np.pi * (T / PERIOD - LATE))
+        assert np.std(late - still) / still.std() == pytest.approx(LARGEST_NRMSE, rel=0.01)
+        grown = np.sin(2 * np.pi * (T / PERIOD - RUN_AWAY * (T / T[-1] - 0.5)))
+        # The limit is stated to two digits.
+        assert np.std(grown - still) / still.std() == pytest.approx(LARGEST_NRMSE, rel=0.03)
+
+    @pytest.mark.parametrize(("spanned", "told"), [(2, True), (4, True), (7, False), (20, False)])
+    def test_motion_below_the_resolution(self, spanned, told):
+        step = 2 * np.sqrt(2) * waves().std() / spanned
+        noisy = waves() + 0.02 * waves().std() * np.random.default_rng(1).standard_normal(T.size)
+        read = step * np.round(noisy / step)
+        assert ("RESOLUTION" in kinds(read, step=reading_step(read))) is told
+
+
+class TestSamples:
+    def test_a_signal_that_freezes_for_its_last_second(self):
+        x = waves()
+        x[-25:] = x[-25]
+        assert np.flatnonzero(find_stuck(x, DT, PERIOD)).tolist() == list(range(2975, 3000))
+
+    def test_a_coarse_signal_does_not_freeze_at_its_last_crest(self):
+        x = np.round(waves())
+        assert not find_stuck(x[: 3000 - np.argmax(np.diff(x[::-1]) != 0)], DT, PERIOD).any()
+
+    def test_a_line_that_sticks_and_slips_has_no_outliers(self):
+        rng = np.random.default_rng(0)
+        load = np.repeat(np.cumsum(rng.normal(0, 1, 150)), 20) + rng.normal(0, 1e-3, T.size)
+        assert not find_outliers(load).any()
+        load[1007] += 30.0
+        assert np.flatnonzero(find_outliers(load)).tolist() == [1007]
+
+    def test_a_camera_that_repeats_frames_is_not_saturated(self):
+        x = np.repeat(waves()[::10], 10)
+        assert not find_saturation(x).any()
+        x = waves()  # repeats now and then, at its highest value too
+        for start in (200, 900, 1500, int(np.argmax(x))):
+            x[start : start + 12] = x[start]
+        assert not find_saturation(x).any()
+        assert find_saturation(np.clip(waves(), -4.0, 4.0)).any()
+
+
+class Silence(Kind):
+    """A kind of this test."""
+
+    QUIET = (
+        "has a standard deviation of {value:.2g}, less than {limit:.2g}",
+        "Check the gain of [channels.{channel}].",
+    )
+
+
+def quiet(record):
+    """Channels that hardly move."""
+    for name, channel in record.whole.data_vars.items():
+        if (spread := float(channel.std())) < 1e-3:
+            yield Finding(Silence.QUIET, record.run, str(name), spread, 1e-3, "m")
+
+
+def test_a_check_is_one_function_and_one_line(monkeypatch):
+    """As CONTRIBUTING shows it; the package is not touched."""
+    monkeypatch.setattr(seakeep.quality, "CHECKS", [*seakeep.quality.CHECKS, quiet])
+    channels = {"heave": 1e-4 * waves(), "surge": waves()}
+    run = xr.Dataset({n: ("time", x, {"units": "m"}) for n, x in channels.items()}, {"time": T})
+    (found,) = seakeep.quality.check(Record("first", run))
+    assert found.text == "has a standard deviation of 0.00032 m, less than 0.001 m"
+    run.attrs["quality"] = as_json([found])
+    assert findings_of(run) == [found]
+    with pytest.warns(SeakeepWarning, match=r"^first: heave has .*0\.001 m\. Check the gain of"):
+        warn_of([found], set())
+
+
+class TestFindings:
+    FOUND = Finding(SamplesKind.DRIFT, "first", "pitch", np.deg2rad(5.0), 0.01, "rad")
+
+    def test_a_sentence_is_rendered_from_data_angles_in_degrees(self):
+        assert self.FOUND.text == "level drifts by +5 deg over the record"
+
+    def test_a_kind_that_is_not_loaded_keeps_its_sentence(self):
+        stored = json.loads(as_json([self.FOUND]))
+        stored[0]["kind"] = "OF_ANOTHER_VERSION"
+        (found,) = findings_of(xr.Dataset(attrs={"quality": json.dumps(stored)}))
+        assert found.text == self.FOUND.text
+        assert found.value == self.FOUND.value
+
+    def test_warnings_of_the_channels_of_a_model_come_once(self):
+        told = set()
+        with pytest.warns(SeakeepWarning, match=r"^first: pitch level drifts .* record\.$"):
+            warn_of([self.FOUND, self.FOUND], told, ["pitch"])
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            warn_of([self.FOUND], told, ["pitch"])
+            warn_of([self.FOUND], set(), ["heave"])
+            warn_of([self.FOUND], set())  # no remedy: nothing is wrong with the campaign file
