@@ -293,39 +293,37 @@ def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
     return picked[whole], measured, int(np.count_nonzero(~whole))
 
 
+DIVERGENCE = (
+    "mean", "lower", "upper", "uncertainty", "of_series", "noise_floor",
+    "noise_floor_lower", "noise_floor_upper", "block_length",
+)  # fmt: skip
+
+
 def _divergences(
     test: xr.Dataset, model: str, channels: Sequence[str], settings: StudySettings, name: str
 ) -> tuple[xr.Dataset, xr.Dataset]:
     predicted, measured, diverged = joined(test, model)
     segments = [test.sizes["time"]] * test.sizes["window"]
-    numbers = (
-        "mean", "lower", "upper", "uncertainty", "of_series", "noise_floor",
-        "noise_floor_lower", "noise_floor_upper", "block_length",
-    )  # fmt: skip
-    table = np.full((len(numbers), len(VARIANTS), len(channels)), np.nan)
+    table = np.full((len(DIVERGENCE), len(VARIANTS), len(channels)), np.nan)
     curves = np.full((7, len(channels), 512), np.nan)
     for c, channel in enumerate(channels):
         p, m = predicted[:, :, c], measured[:, c]
         if not len(p) or np.ptp(m) == 0 or np.any(np.ptp(p, axis=1) == 0):
             continue
-        for v, (variant, choice) in enumerate(VARIANTS.items()):
-            rng = random_stream(settings.study.seed, f"jsd.{name}.{variant}.{channel}")
-            with warnings.catch_warnings():
-                # Caps of the block length and coarse grids: the table prints the length.
-                warnings.simplefilter("ignore", SeakeepWarning)
-                found = statistics.jsd_interval(
-                    p,
-                    m,
-                    block_length=choice["block_length"],
-                    bandwidth=choice["bandwidth"],
-                    segments=None if choice["joins"] else segments,
-                    rng=rng,
-                    n_series=settings.statistics.n_series,
-                )
-            table[:, v, c] = [getattr(found, number) for number in numbers]
-        curves[:, c] = _densities(p, m, settings, f"densities.{name}.{channel}")
+        try:
+            for v, variant in enumerate(VARIANTS):
+                stream = f"jsd.{name}.{variant}.{channel}"
+                table[:, v, c] = _divergence(p, m, segments, variant, settings, stream)
+            curves[:, c] = _densities(p, m, settings, f"densities.{name}.{channel}")
+        except DataError as error:
+            warnings.warn(
+                f"the densities of {channel} as forecast by '{model}' and as measured, over the "
+                f"windows of '{name}', cannot be compared and are left out: {error}",
+                SeakeepWarning,
+                stacklevel=4,
+            )
     divergence = xr.Dataset(
-        {n: (("variant", "channel"), table[i]) for i, n in enumerate(numbers)},
+        {n: (("variant", "channel"), table[i]) for i, n in enumerate(DIVERGENCE)},
         coords={"variant": list(VARIANTS), "channel": list(channels)},
     )
     divergence["diverged_series"] = diverged
@@ -336,6 +334,31 @@ def _divergences(
         coords={"channel": list(channels)},
     )
     return divergence, densities
+
+
+def _divergence(
+    p: FloatArray,
+    m: FloatArray,
+    segments: Sequence[int],
+    variant: str,
+    settings: StudySettings,
+    stream: str,
+) -> list[float]:
+    """Divergence between forecast and measurement, in the order of ``DIVERGENCE``."""
+    choice = VARIANTS[variant]
+    with warnings.catch_warnings():
+        # Caps of the block length and coarse grids: the table prints the length.
+        warnings.simplefilter("ignore", SeakeepWarning)
+        found = statistics.jsd_interval(
+            p,
+            m,
+            block_length=choice["block_length"],
+            bandwidth=choice["bandwidth"],
+            segments=None if choice["joins"] else segments,
+            rng=random_stream(settings.study.seed, stream),
+            n_series=settings.statistics.n_series,
+        )
+    return [getattr(found, number) for number in DIVERGENCE]
 
 
 def _densities(p: FloatArray, m: FloatArray, settings: StudySettings, stream: str) -> FloatArray:

@@ -130,7 +130,7 @@ def _play(folder: Path, preset: Preset, seed: int, progress: Progress | None) ->
     mark = folder / "played.txt"
     if not mark.exists() or mark.read_text(encoding="utf-8").strip() != digest:
         with storing(folder):
-            play(settings, folder, progress=_telling(progress))
+            play(settings, folder, progress=_playing(progress))
             mark.write_text(digest + "\n", encoding="utf-8")
     frequency = np.linspace(0.2, 1.5, 261)
     spectra = {
@@ -150,11 +150,11 @@ def _play(folder: Path, preset: Preset, seed: int, progress: Progress | None) ->
     )
 
 
-def _telling(progress: Progress | None) -> Progress | None:
+def _playing(progress: Progress | None) -> Progress | None:
     if progress is None:
         return None
-    tell = progress
-    return lambda done, total, name: tell(done, total, f"playing {name}")
+    report = progress
+    return lambda done, total, name: report(done, total, f"playing {name}")
 
 
 def study_text(preset: Preset, size: Size, seed: int) -> str:

@@ -87,20 +87,22 @@ def run_study(
         model, training set and window are named, and the result leaves them out.
     """
     out = Path(out)
-    tell = progress or (lambda done, total, what: None)
+    report = progress or (lambda done, total, what: None)
     folder = UnitFolder(out, study.digest)
     folder.check()
-    if (found := _finished(study, out, tell)) is not None:
+    if (found := _finished(study, out, report)) is not None:
         return relabel(found, _labels(study))
-    plan, runs = make_plan(study, lambda done, total, name: tell(done, total, f"preparing {name}"))
+    plan, runs = make_plan(
+        study, lambda done, total, name: report(done, total, f"preparing {name}")
+    )
     warn_of_slow_study(plan, runs)
     folder.open(study.name)
     with folder.alone():
-        found = _finished(study, out, tell)  # by another process, meanwhile
+        found = _finished(study, out, report)  # by another process, meanwhile
         if found is None:
             units = units_of(plan)
-            _compute_all(plan, runs, folder, units, executor, tell)
-            tell(len(units), len(units), "statistics and densities")
+            _compute_all(plan, runs, folder, units, executor, report)
+            report(len(units), len(units), "statistics and densities")
             groups = describe_study(study, plan, runs)
             groups |= collect(study, plan, runs, lambda unit: _arrays(folder, unit))
             groups |= judge(groups, study.settings, list(plan.states))
@@ -124,14 +126,14 @@ def _arrays(folder: UnitFolder, unit: Unit) -> Arrays:
     return found
 
 
-def _finished(study: Study, out: Path, tell: Progress) -> StudyResult | None:
+def _finished(study: Study, out: Path, report: Progress) -> StudyResult | None:
     """The result of an earlier run, if there is one of the same study."""
     if not (out / RESULT).exists():
         return None
     found = read_result(out)
     if found.attrs.get("digest") != study.digest:
         return None
-    tell(1, 1, "finished before")
+    report(1, 1, "finished before")
     return found
 
 
@@ -197,11 +199,11 @@ def _compute_all(
     folder: UnitFolder,
     units: list[Unit],
     executor: Executor | None,
-    tell: Progress,
+    report: Progress,
 ) -> None:
     left = [unit for unit in units if not folder.has(unit.name)]
     done, total = len(units) - len(left), len(units)
-    tell(done, total, "fitting and forecasting")
+    report(done, total, "fitting and forecasting")
     if not left:
         return
     try:
@@ -209,7 +211,7 @@ def _compute_all(
             unit = left[number]
             folder.write(unit.name, arrays)
             done += 1
-            tell(done, total, f"{unit.model}, training set {plan.training[unit.training].name}")
+            report(done, total, f"{unit.model}, training set {plan.training[unit.training].name}")
     except WorkerLostError as error:
         raise WorkerLostError(
             f"{error} What was finished is kept: the same command goes on where it stopped."

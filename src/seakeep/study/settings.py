@@ -54,7 +54,7 @@ class GeneralStudySettings(Table):
         default=0, description="an integer, 0 or more and below 2^64"
     )
     encounter_period: Positive | None = Field(
-        default=None, description="seconds, in which lengths are counted; left out, the campaign's"
+        default=None, description="seconds, that lengths are multiples of; left out, the campaign's"
     )
     truth: str | None = Field(
         default=None, description="folder of RUN.nc with the true channels (the virtual tank's)"
@@ -121,7 +121,7 @@ class TestSetSettings(Table):
         default="random", description="'random' as in the paper, or 'apart': without overlap"
     )
     startup: Annotated[float, Field(ge=0, allow_inf_nan=False)] = Field(
-        default=0.0, description="seconds cut off the beginning of each test span"
+        default=0.0, description="seconds cut off the start of each test span"
     )
     label: str = Field(default="", description="words for titles")
 
@@ -137,7 +137,7 @@ class StatisticsSettings(Table):
     )
     split_period: Positive = Field(
         default=3.0,
-        description="period that parts the low-frequency from the wave-frequency band of ε(t), in "
+        description="period between the low-frequency and the wave-frequency band of ε(t), in "
         "encounter periods",
     )
     calibrate: bool | None = Field(

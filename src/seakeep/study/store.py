@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 FORMAT = 4
-"""Goes into digest and result: raise it when the same settings begin to give other arrays."""
+"""Goes into digest and result: raise it when the same settings give other arrays than before."""
 
 RESULT = "study.nc"
 HEADER = "study.json"
@@ -145,7 +145,7 @@ class UnitFolder:
                 f"another process works on the study in {self.folder}. Wait until it has finished, "
                 "or choose another folder (-o)."
             ) from None
-        except (OSError, NotImplementedError):  # a file system without locks keeps nobody out
+        except (OSError, NotImplementedError):  # without locks in the file system all may work
             yield
             return
         try:
@@ -201,7 +201,7 @@ class UnitFolder:
         """Remove the units; for when all of them are in the result."""
         for path in (self.folder / UNITS).glob("*.npz*"):
             path.unlink(missing_ok=True)
-        with suppress(OSError):  # somebody else's files stay
+        with suppress(OSError):  # files of others stay
             (self.folder / UNITS).rmdir()
 
 
@@ -220,7 +220,7 @@ def _read_header(path: Path) -> dict[str, Any]:
 def _check_header(folder: Path, found: Mapping[str, Any], expected: Mapping[str, Any]) -> None:
     if found["digest"] != expected["digest"]:
         raise RequestError(
-            f"{folder} holds the results of another study: its digest begins with "
+            f"{folder} holds the results of another study: its digest starts with "
             f"{str(found['digest'])[:12]} and this study's with {expected['digest'][:12]}. "
             "Settings, campaign or raw files have changed since. Give another folder with -o, or "
             "remove this one."
