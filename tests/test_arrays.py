@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep import metrics, signals, statistics, waves
+from seakeep import core, metrics, signals, statistics, waves
 from seakeep.arrays import as_bundle, as_real, as_series, fraction, number, positive, whole_number
 from seakeep.errors import DataError, RequestError, SeakeepError
 
@@ -25,7 +25,25 @@ def both(call):
 
 
 # Name: the function of its array arguments, and sound ones.
+def identified(states, inputs):
+    windows = [core.training_window(900, None, 2, 3, "before")]
+    return core.identify([states], [inputs], windows, state_delays=2, input_delays=3, ridge=1.0)
+
+
 CALLS = {
+    "core.embed": (lambda x: core.embed(x, 2, 2, 900), TABLE),
+    "core.identify": (identified, TABLE, X[:, None]),
+    "core.rollout": (
+        core.rollout, np.full((1, 2), 0.3), np.full((1, 2), 0.5), np.ones((3, 2)),
+        np.ones((3, 9, 2)),
+    ),
+    "core.snapshot_matrices": (
+        lambda x, u: core.snapshot_matrices(
+            x, u, core.training_window(900, None, 2, 3, "before"), 2, 3, all_rows=True
+        ),
+        TABLE, X[:, None],
+    ),
+    "core.unembed": (lambda x: core.unembed(x, 2), TABLE.T),
     "signals.band_pass": (lambda x: signals.band_pass(x, 0.05, (0.1, 2.0)), X),
     "signals.bridge": (lambda x: signals.bridge(x, 0.05, 1.0), X),
     "signals.clock_from_correlation": (
@@ -135,8 +153,15 @@ CALLS = {
 WITHOUT_ARRAYS = {
     "signals.contact_sheet", "signals.froude_factor", "signals.lowpass_taps",
     "signals.pool_drift", "signals.track_video", "metrics.labelled",
+    "core.training_window",
 }  # fmt: skip
-ROOMS = {"signals": signals, "statistics": statistics, "metrics": metrics, "waves": waves}
+ROOMS = {
+    "core": core,
+    "signals": signals,
+    "statistics": statistics,
+    "metrics": metrics,
+    "waves": waves,
+}
 
 
 def masked(x):

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
+
+from seakeep.arrays import FloatArray, as_real, whole_number
+from seakeep.errors import RequestError
 
 __all__ = ["History", "TrainingWindow", "embed", "snapshot_matrices", "training_window", "unembed"]
 
-FloatArray = npt.NDArray[np.float64]
 History = Literal["before", "inside"]
 
 
@@ -67,8 +68,19 @@ def training_window(
     -------
     TrainingWindow
         Its ``columns`` may be zero or negative: the caller knows the names for the message.
+
+    Raises
+    ------
+    RequestError
+        If a number is not a whole one, or negative.
     """
-    reach = max(state_delays, input_delays)
+    delays = (state_delays, "state_delays"), (input_delays, "input_delays")
+    reach = max(whole_number(value, name, least=0) for value, name in delays)
+    whole_number(last, "last", least=0)
+    if window is not None:
+        whole_number(window, "window")
+    if history not in ("before", "inside"):
+        raise RequestError(f"history is 'before' or 'inside'; received {history!r}.")
     first = 0 if window is None else last - window + 1
     earliest = first + reach if history == "inside" else reach
     return TrainingWindow(first, last, max(first, earliest))
@@ -91,6 +103,11 @@ def embed(series: FloatArray, delays: int, first: int, count: int) -> FloatArray
     ndarray, shape (channel * (delays + 1), count)
         Column i holds sample ``first + i`` and the `delays` samples before it, newest first.
 
+    Raises
+    ------
+    RequestError
+        If the series is no array (time, channel) of real numbers, or a column lies outside it.
+
     Examples
     --------
     >>> import numpy as np
@@ -98,6 +115,13 @@ def embed(series: FloatArray, delays: int, first: int, count: int) -> FloatArray
     array([[1., 2., 3., 4.],
            [0., 1., 2., 3.]])
     """
+    series = as_real(series, "the series")
+    whole_number(delays, "delays", least=0)
+    if series.ndim != 2 or not 0 <= first - delays <= first + count <= series.shape[0]:
+        raise RequestError(
+            f"columns {first} to {first + count - 1} with {delays} delays do not lie in a series "
+            f"of shape {series.shape}; (time, channel) with all of these samples is needed."
+        )
     channels = series.shape[1]
     out = np.empty((channels * (delays + 1), count))
     for lag in range(delays + 1):
@@ -119,7 +143,22 @@ def unembed(columns: FloatArray, channels: int) -> FloatArray:
     -------
     ndarray, shape (delays + count, channels)
         The samples from the oldest delayed one to the last column's newest.
+
+    Raises
+    ------
+    RequestError
+        If the rows are not whole blocks of channels.
     """
+    columns = as_real(columns, "columns")
+    if (
+        columns.ndim != 2
+        or 0 in columns.shape
+        or columns.shape[0] % whole_number(channels, "channels")
+    ):
+        raise RequestError(
+            f"columns has shape {columns.shape}; (channels * (delays + 1), count) with {channels} "
+            "channels is needed."
+        )
     blocks = columns.reshape(-1, channels, columns.shape[1])
     oldest_first = blocks[:0:-1, :, 0]
     return np.concatenate([oldest_first, blocks[0].T])

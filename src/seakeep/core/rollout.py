@@ -31,7 +31,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import blas
 
-from seakeep.arrays import BoolArray, FloatArray
+from seakeep.arrays import BoolArray, FloatArray, as_real
 from seakeep.errors import RequestError
 
 __all__ = ["feedback_rollout", "rollout"]
@@ -107,9 +107,15 @@ def rollout(
     >>> rollout([[0.5]], [[1.0]], [[1.0]], [[[0.0], [1.0], [0.0]]])[0, :, 0]
     array([0.5  , 1.25 , 0.625])
     """
-    arrays: list[FloatArray] = [np.asarray(each, float) for each in (A, B, histories, inputs)]
-    a, b, start, driving = np.atleast_2d(arrays[0]), *arrays[1:]
-    if start.ndim not in (2, 3) or driving.ndim != 3 or b.ndim != 2 or len(b) != len(a):
+    a, b = np.atleast_2d(as_real(A, "A")), as_real(B, "B")
+    start, driving = as_real(histories, "histories"), as_real(inputs, "inputs")
+    if (
+        a.ndim != 2
+        or start.ndim not in (2, 3)
+        or driving.ndim != 3
+        or b.ndim != 2
+        or len(b) != len(a)
+    ):
         raise RequestError(
             "rollout needs A (rows, N(s+1)), B (rows, Q(z+1)), histories (window, N(s+1)) or "
             "(window, s+1, N), inputs (window, steps, Q(z+1)) or (window, z+steps, Q); received "
@@ -131,7 +137,7 @@ def rollout(
                 "needed, with D of its columns."
             )
         split = b.shape[1] - further[2]
-        groups = [(b[:, :split], driving), (b[:, split:], np.asarray(direct, float))]
+        groups = [(b[:, :split], driving), (b[:, split:], as_real(direct, "direct"))]
     steps = _steps(groups[0][0], driving)
     if direct is not None and further[:2] != (len(start), steps):
         raise RequestError(

@@ -38,7 +38,7 @@ import numpy as np
 from scipy import linalg
 from scipy.linalg import blas, lapack
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, as_real, number, whole_number
 from seakeep.core.embedding import TrainingWindow, embed
 from seakeep.core.gram import (
     Piece,
@@ -49,6 +49,7 @@ from seakeep.core.gram import (
     primal_system,
     snapshot_gram,
 )
+from seakeep.errors import DataError, RequestError
 
 __all__ = ["Method", "Solution", "identify"]
 
@@ -128,10 +129,22 @@ def identify(
     -------
     Solution
         Coefficients of shape (N(s+1) or N, N(s+1) + Q(z+1) + D): states, inputs, direct inputs.
+
+    Raises
+    ------
+    RequestError
+        If shapes, windows or numbers do not fit.
+    DataError
+        If a sample that trains is not finite.
     """
-    groups = [(states, state_delays), (inputs, input_delays)]
+    groups = [
+        (_checked(states, windows, state_delays, "states"), state_delays),
+        (_checked(inputs, windows, input_delays, "inputs"), input_delays),
+    ]
     if direct is not None:
-        groups.append((direct, 0))
+        groups.append((_checked(direct, windows, 0, "direct"), 0))
+    if not number(ridge, "ridge") >= 0 or ridge == np.inf:
+        raise RequestError(f"ridge must be zero or positive, and finite; received {ridge!r}.")
     groups = [groups[0], *(group for group in groups[1:] if group[0][0].shape[1])]
     pieces = [
         Piece(tuple(runs[run] for runs, _ in groups), window.first_column, window.columns)
@@ -144,6 +157,37 @@ def identify(
         return _by_singular_values(*problem.matrices(), effective, rank)
     form = problem.primal if chosen == "primal" else problem.dual
     return Solution(form(effective), chosen, effective, min(problem.rows, problem.columns))
+
+
+def _checked(
+    series: Sequence[FloatArray], windows: Sequence[TrainingWindow], delays: int, name: str
+) -> list[FloatArray]:
+    """Series of the runs as (time, channel), finite in the samples that train."""
+    whole_number(delays, f"delays of {name}", least=0)
+    arrays = [as_real(each, name) for each in series]
+    if not arrays or len(arrays) != len(windows):
+        raise RequestError(
+            f"{name} has {len(arrays)} run(s) and there are {len(windows)} windows; one array "
+            "(time, channel) per run and window is needed."
+        )
+    for array, window in zip(arrays, windows, strict=True):
+        begin, end = window.first_column - delays, window.last + 1
+        if array.ndim != 2 or array.shape[1] != arrays[0].shape[-1] or window.columns < 1:
+            raise RequestError(
+                f"{name} has a run of shape {array.shape} and {window.columns} snapshot pairs; "
+                "(time, channel), the same channels in each run, and at least one pair are needed."
+            )
+        if not 0 <= begin < end <= len(array):
+            raise RequestError(
+                f"samples {begin} to {end - 1} of {name} train, and it has {len(array)}. Shorten "
+                "the delays, or give a longer run."
+            )
+        if not np.all(np.isfinite(array[begin:end])):
+            raise DataError(
+                f"{name} holds values that are NaN or infinite in the samples that train. Fill the "
+                "gaps, or train on a part without them."
+            )
+    return arrays
 
 
 @dataclass(frozen=True)
