@@ -6,7 +6,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from seakeep.core import gram as gram_module
@@ -56,7 +56,12 @@ class Problem:
     def pieces(self):
         """What the fast paths take, without groups that have no channel."""
         return [
-            Piece(tuple(g for g in groups if g.shape[1]), window.first_column, window.columns)
+            Piece(
+                groups[0],
+                tuple(group for group in groups if group.shape[1]),
+                window.first_column,
+                window.columns,
+            )
             for *groups, window in zip(
                 self.states, self.inputs, self.direct, self.windows, strict=True
             )
@@ -144,6 +149,29 @@ def test_every_form_gives_the_papers_formula(problem, ridge, all_rows):
     expected = np.linalg.solve(plain, regressors @ targets.T).T
     for method in ("primal", "dual", "svd", None):
         found = problem.identify(ridge=ridge, all_rows=all_rows, method=method)
+        np.testing.assert_allclose(found, expected, atol=RESULT)
+
+
+@settings(deadline=None)
+@given(problems(), st.floats(0.5, 200.0))
+def test_a_filter_of_the_inputs_has_no_states_among_its_regressors(problem, ridge):
+    assume(problem.inputs[0].shape[1] + problem.direct[0].shape[1] > 0)
+    regressors, targets = problem.matrices(all_rows=False)
+    inputs = regressors[problem.states[0].shape[1] * (problem.s + 1) :]
+    plain = inputs @ inputs.T + ridge * np.eye(len(inputs))
+    expected = np.linalg.solve(plain, inputs @ targets.T).T
+    for method in ("primal", "dual", "svd", None):
+        found = identify(
+            problem.states,
+            problem.inputs,
+            problem.windows,
+            state_delays=None,
+            input_delays=problem.z,
+            direct=problem.direct,
+            ridge=ridge,
+            all_rows=False,
+            method=method,
+        ).coefficients
         np.testing.assert_allclose(found, expected, atol=RESULT)
 
 

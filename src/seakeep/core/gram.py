@@ -64,14 +64,17 @@ class Piece:
 
     Parameters
     ----------
+    states : ndarray, shape (time, N)
+        Targets: each snapshot is followed by the next sample.
     series : tuple of ndarray, each (time, channel)
-        Its groups of channels; the first holds the states.
+        Its groups of regressors; where states are among them, they are the first.
     first : int
         Sample of the first snapshot; its delay history lies before it.
     count : int
         Number of snapshot pairs.
     """
 
+    states: FloatArray
     series: tuple[FloatArray, ...]
     first: int
     count: int
@@ -79,7 +82,7 @@ class Piece:
     @property
     def targets(self) -> FloatArray:
         """Newest blocks of the next snapshots, shape (count, N)."""
-        return self.series[0][self.first + 1 : self.first + 1 + self.count]
+        return self.states[self.first + 1 : self.first + 1 + self.count]
 
 
 @dataclass(frozen=True)
@@ -147,7 +150,7 @@ class PrimalSystem:
         What enters at the start (even rows) and leaves at the end (odd rows) of a run where a
         block moves by a lag.
     groups : tuple of Group
-        Places of the groups; the states are the first.
+        Places of the groups.
     """
 
     gram: FloatArray
@@ -179,20 +182,25 @@ def primal_system(pieces: Sequence[Piece], delays: Sequence[int], room: int = 0)
     groups = lay_out(pieces[0], delays)
     size, width = groups[-1].stop, groups[-1].head.stop
     edges, heads = np.zeros((2 * len(pieces), size)), np.zeros((width, size))
-    right = np.zeros((groups[0].channels, size))
+    N = pieces[0].states.shape[1]
+    right = np.zeros((N, size))
+    # States among the regressors are targets of an instant before too.
+    is_shared = pieces[0].series[0] is pieces[0].states
+    targets = slice(N) if is_shared else slice(width, width + N)
     for piece, entering, leaving in zip(pieces, edges[::2], edges[1::2], strict=True):
         start, end = piece.first, piece.first + piece.count - 1
-        newest = np.concatenate([x[start + 1 : end + 1] for x in piece.series], axis=1)
+        current = piece.series if is_shared else (*piece.series, piece.states)
+        newest = np.concatenate([x[start + 1 : end + 1] for x in current], axis=1)
         first = np.concatenate([x[start] for x in piece.series])[:, None]
-        following = piece.series[0][end + 1][:, None]
+        following = piece.states[end + 1][:, None]
         for x, group in zip(piece.series, groups, strict=True):
             # One more lag and one column less than the heads need: the sums of the next states
             # are the same sums one lag later, up to one product at either end.
             sums = lagged_sums(newest, x, start + 1, group.lags + 1)
             heads[:, group.rows] += first * _recent(x, start, group.lags)
-            heads[:, group.rows] += sums[:, : group.stop - group.start]
+            heads[:, group.rows] += sums[:width, : group.stop - group.start]
             right[:, group.rows] += following * _recent(x, end, group.lags)
-            right[:, group.rows] += sums[: len(right), group.channels :]
+            right[:, group.rows] += sums[targets, group.channels :]
             entering[group.older] = _recent(x, start - 1, group.lags - 1)
             leaving[group.older] = _recent(x, end, group.lags - 1)
     gram = np.empty((size + room, size + room))

@@ -51,7 +51,7 @@ from seakeep.core.gram import (
 )
 from seakeep.errors import DataError, RequestError
 
-__all__ = ["Method", "Solution", "identify"]
+__all__ = ["Method", "Solution", "identify", "solve"]
 
 Method = Literal["primal", "dual", "svd"]
 
@@ -88,7 +88,7 @@ def identify(
     inputs: Sequence[FloatArray],
     windows: Sequence[TrainingWindow],
     *,
-    state_delays: int,
+    state_delays: int | None,
     input_delays: int,
     ridge: float,
     direct: Sequence[FloatArray] | None = None,
@@ -110,7 +110,8 @@ def identify(
     windows : sequence of TrainingWindow
         The samples of each run that train.
     state_delays, input_delays : int
-        s and z.
+        s and z. With `state_delays` None the states are targets and no regressors: a filter of
+        the inputs, for which `all_rows` must be False.
     ridge : float
         λ, zero or positive. Zero gives the solution of least norm.
     direct : sequence of ndarray, each (time, D), optional
@@ -137,17 +138,26 @@ def identify(
     DataError
         If a sample that trains is not finite.
     """
-    groups = [
-        (_checked(states, windows, state_delays, "states"), state_delays),
-        (_checked(inputs, windows, input_delays, "inputs"), input_delays),
-    ]
+    targets = _checked(states, windows, state_delays or 0, "states")
+    groups = [] if state_delays is None else [(targets, state_delays)]
+    groups.append((_checked(inputs, windows, input_delays, "inputs"), input_delays))
     if direct is not None:
         groups.append((_checked(direct, windows, 0, "direct"), 0))
     if not number(ridge, "ridge") >= 0 or ridge == np.inf:
         raise RequestError(f"ridge must be zero or positive, and finite; received {ridge!r}.")
-    groups = [groups[0], *(group for group in groups[1:] if group[0][0].shape[1])]
+    groups = [(runs, delays) for runs, delays in groups if runs[0].shape[1]]
+    if not groups or (state_delays is None and all_rows):
+        raise RequestError(
+            "without states among the regressors there must be inputs, and all_rows=False. Give "
+            "state_delays, or inputs."
+        )
     pieces = [
-        Piece(tuple(runs[run] for runs, _ in groups), window.first_column, window.columns)
+        Piece(
+            targets[run],
+            tuple(runs[run] for runs, _ in groups),
+            window.first_column,
+            window.columns,
+        )
         for run, window in enumerate(windows)
     ]
     problem = _Delayed(pieces, tuple(delays for _, delays in groups), all_rows)
@@ -254,7 +264,7 @@ class _Delayed:
         )
         target_delays = self.delays[0] if self.all_rows else 0
         targets = [
-            embed(piece.series[0], target_delays, piece.first + 1, piece.count)
+            embed(piece.states, target_delays, piece.first + 1, piece.count)
             for piece in self.pieces
         ]
         return regressors, np.concatenate(targets, axis=1)
@@ -264,7 +274,7 @@ class _Delayed:
         if self.all_rows:
             system = primal_system(self.pieces, self.delays)
             return _all_rows(system, _factor(system.gram, ridge), ridge)
-        room = self.pieces[0].series[0].shape[1]
+        room = self.pieces[0].states.shape[1]
         system = primal_system(self.pieces, self.delays, room)
         return np.ascontiguousarray(_solve_beside(system.gram, system.right, ridge))
 
@@ -342,6 +352,30 @@ def _solve_beside(padded: FloatArray, right: FloatArray, ridge: float) -> FloatA
     half[:, :size] = padded[:size, size:].T
     solved = blas.dtrsm(1.0, factor, half.T, lower=1, trans_a=1, overwrite_b=1)
     return np.asarray(solved).T[:, :size]
+
+
+def solve(regressors: FloatArray, targets: FloatArray, ridge: float) -> Solution:
+    """Ridge regression of plain matrices.
+
+    Parameters
+    ----------
+    regressors, targets : ndarray, shapes (p, columns) and (q, columns)
+        One column per observation.
+    ridge : float
+        λ, zero or positive. Zero gives the solution of least norm.
+
+    Returns
+    -------
+    Solution
+        Coefficients of shape (q, p).
+    """
+    gram = regressors @ regressors.T
+    if ridge <= 0 or ridge < GRAM_LIMIT * np.trace(gram):
+        return _by_singular_values(regressors, targets, ridge, None)
+    factor = _factor(gram, ridge)
+    right = targets @ regressors.T
+    solved = np.asarray(lapack.dpotrs(factor, right.T, lower=1)[0]).T
+    return Solution(solved, "primal", ridge, min(regressors.shape))
 
 
 def _by_singular_values(

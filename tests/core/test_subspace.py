@@ -1,0 +1,107 @@
+"""Subspace identification: known systems, another package, and noise."""
+
+import numpy as np
+import pytest
+
+from seakeep.core.embedding import TrainingWindow
+from seakeep.core.subspace import identify_subspace
+from seakeep.errors import DataError
+
+
+def plant(seed=0, order=4, outputs=2, inputs=2):
+    """A damped system with eigenvalues of radius 0.7 to 0.95."""
+    rng = np.random.default_rng(seed)
+    blocks = np.zeros((order, order))
+    for at in range(0, order, 2):
+        radius, angle = rng.uniform(0.7, 0.95), rng.uniform(0.2, 1.5)
+        c, s = radius * np.cos(angle), radius * np.sin(angle)
+        blocks[at : at + 2, at : at + 2] = [[c, -s], [s, c]]
+    return blocks, rng.normal(size=(order, inputs)), rng.normal(size=(outputs, order))
+
+
+def simulate(system, u, noise=0.0, seed=1):
+    """y_{j+1} = C z_{j+1}, so that an input acts on the next sample."""
+    a, b, c = system
+    z = np.zeros(len(a))
+    out = np.empty((len(u), len(c)))
+    for j, row in enumerate(u):
+        out[j] = c @ z
+        z = a @ z + b @ row
+    return out + noise * np.random.default_rng(seed).normal(size=out.shape)
+
+
+def fitted(outputs, inputs, order=4, ridge=0.0, delays=12, future=8):
+    windows = [TrainingWindow(delays, len(y) - 1, delays) for y in outputs]
+    return identify_subspace(
+        outputs,
+        inputs,
+        windows,
+        order=order,
+        output_delays=delays,
+        input_delays=delays,
+        future=future,
+        ridge=ridge,
+    )
+
+
+def by_modulus(values):
+    return np.sort_complex(values)
+
+
+@pytest.mark.parametrize("inputs", [1, 3])
+def test_a_known_system_is_recovered_and_forecast_to_rounding(inputs):
+    # Of two runs, each from rest: pairs across their joint would not fit the system.
+    system = plant(inputs=inputs)
+    rng = np.random.default_rng(2)
+    u = [rng.normal(size=(n, inputs)) for n in (300, 200, 500)]
+    y = [simulate(system, each) for each in u]
+    found = fitted(y[:2], u[:2])
+    np.testing.assert_allclose(
+        by_modulus(np.linalg.eigvals(found.A)), by_modulus(np.linalg.eigvals(system[0])), atol=1e-8
+    )
+    starts = [50, 200]
+    outputs = np.stack([y[2][k - 12 : k + 1] for k in starts])
+    driving = np.stack([u[2][k - 12 : k + 100] for k in starts])
+    expected = np.stack([y[2][k + 1 : k + 101] for k in starts])
+    np.testing.assert_allclose(found.free_runs(outputs, driving, 100), expected, atol=1e-7)
+
+
+def test_another_package_finds_the_same_system():
+    pytest.importorskip("nfoursid", reason="dependency group bench")
+    import pandas as pd
+    from nfoursid.nfoursid import NFourSID
+
+    system = plant(seed=4, outputs=1, inputs=1)
+    u = np.random.default_rng(5).normal(size=(1500, 1))
+    y = simulate(system, u, noise=0.02)
+    table = pd.DataFrame({"u": u[:, 0], "y": y[:, 0]})
+    other = NFourSID(table, output_columns=["y"], input_columns=["u"], num_block_rows=12)
+    other.subspace_identification()
+    space, _ = other.system_identification(rank=4)
+    truth = by_modulus(np.linalg.eigvals(system[0]))
+    theirs = np.abs(by_modulus(np.linalg.eigvals(space.a)) - truth).max()
+    ours = np.abs(by_modulus(np.linalg.eigvals(fitted([y], [u]).A)) - truth).max()
+    # Both are consistent; with this noise their eigenvalues are within a hundredth of the truth.
+    assert max(ours, theirs) < 0.01
+    assert ours < 2.0 * theirs + 1e-3
+
+
+def test_an_input_that_tells_its_own_future_needs_a_ridge_and_forecasts_with_it():
+    system = plant(seed=6)
+    time = np.arange(2000)
+    u = np.stack([np.sin(0.3 * time), np.cos(0.3 * time) + np.sin(0.5 * time)], axis=1)
+    u += 1e-3 * np.random.default_rng(7).normal(size=u.shape)
+    y = simulate(system, u, noise=1e-3)
+    found = fitted([y[:1200]], [u[:1200]], ridge=1e-6)
+    run = found.free_runs(y[None, 1488:1501], u[None, 1488:1800], 300)[0]
+    error = np.sqrt(np.mean((run - y[1501:1801]) ** 2)) / y.std()
+    assert error < 0.02
+
+
+def test_an_order_that_the_data_do_not_hold_is_refused():
+    system = plant()
+    u = np.random.default_rng(8).normal(size=(300, 2))
+    with pytest.raises(DataError, match=r"fewer than 9 directions .* Lower order"):
+        fitted([simulate(system, u)], [u], order=9)
+    with pytest.raises(DataError, match=r"13 snapshot pairs .* future of 20 .* longer run"):
+        fitted([simulate(system, u[:26])], [u[:26]], future=20)
