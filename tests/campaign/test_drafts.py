@@ -1,7 +1,6 @@
 """Drafts of campaign files: they must be read and prepared as they are."""
 
 import re
-import tomllib
 from time import perf_counter
 
 import h5py
@@ -272,21 +271,6 @@ def test_relative_to_the_campaigns_folder(tmp_path):
     text, campaign = drafted(tmp_path / "settings", [tmp_path / "runs" / "run.csv"])
     assert 'file = "../runs/run.csv"' in text
     assert campaign.prepare()
-
-
-def test_what_is_left_out_stays_valid_toml(tmp_path):
-    """The commented proposals can be switched on."""
-    text, _ = drafted(tmp_path, [write_csv(tmp_path / "run.csv", tank_columns())])
-    switched = re.sub(
-        r"^# (state_delays|input_delays|ridge|ridge_scale|delay_rows|encounter_period) =",
-        r"\1 =",
-        text,
-        flags=re.M,
-    )
-    model = tomllib.loads(switched)["model"]
-    assert model["ridge"] == 100 / 640
-    (tmp_path / "campaign.toml").write_text(switched)
-    assert read_campaign(tmp_path / "campaign.toml").model().delay_rows == "exact"
 
 
 def test_nothing_to_draft_from(tmp_path):

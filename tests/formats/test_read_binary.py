@@ -88,7 +88,7 @@ def test_what_is_no_matlab_run(tmp_path, content, error, message):
         read_table(tmp_path / "run.mat")
 
 
-@pytest.mark.parametrize("part", [20, 127, 128, 200, 1500])
+@pytest.mark.parametrize("part", [5, 20, 127, 128, 200, 1500])
 @pytest.mark.parametrize("compressed", [False, True])
 def test_matlab_cut_off(tmp_path, part, compressed):
     path = tmp_path / "run.mat"

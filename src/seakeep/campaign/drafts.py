@@ -399,9 +399,8 @@ def _model(guesses: Sequence[Guess]) -> Iterator[str]:
     if gapped := [name for name in motions if mapped[name].gaps == "long"]:
         yield from _left_out(gapped, "states")
     if loads:
-        yield f"# Loads ({', '.join(loads)}) may be added to the states to have them forecast too."
-        yield "# They are left out because a line that goes slack or snaps is not linear, and the"
-        yield "# model is: judge their extremes, or compute them from the motions forecast."
+        yield f"# Loads ({', '.join(loads)}) may be added to the states; but a line that goes slack"
+        yield "# or snaps is not linear, and the model is: judge their extremes."
     yield f"inputs = {_value(inputs)} # guessed: the waves that drive it"
     probes = [name for name in mapped if name.startswith("eta_") and name not in inputs]
     if behind := [name for name in probes if mapped[name].behind]:
@@ -410,12 +409,6 @@ def _model(guesses: Sequence[Guess]) -> Iterator[str]:
         yield "# Take probes out that stand behind the vessel: what it makes is no input."
     if gapped := [n for n in probes if mapped[n].gaps and n not in behind]:
         yield from _left_out(gapped, "inputs")
-    yield "# in place of the preset's, in encounter periods T or in samples:"
-    yield '# state_delays = "1 T"'
-    yield '# input_delays = "5 T"'
-    yield "# ridge = 0.15625      # 100/640, with the next line"
-    yield '# ridge_scale = "per_snapshot"'
-    yield '# delay_rows = "exact"'
 
 
 def _left_out(names: Sequence[str], key: str) -> Iterator[str]:

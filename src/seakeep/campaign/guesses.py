@@ -153,9 +153,7 @@ def sea_of(file: File, column: str) -> Sea | None:
 def waves_of_name(run: str) -> str | None:
     """Say "regular" or "irregular" if the name of a run does."""
     words = set(_words(run))
-    if words & _IRREGULAR:
-        return "irregular"
-    return "regular" if words & _REGULAR else None
+    return "irregular" if words & _IRREGULAR else "regular" if words & _REGULAR else None
 
 
 def is_trigger(column: str) -> bool:
@@ -215,7 +213,11 @@ def arranged(
         folders = [_by_folder(path)[0] for path in paths]
         if len(set(stems)) == 1 and len(set(folders)) > 1:
             stems = folders
-        keys = [(name, "") for name in _numbered(stems)]
+        taken: list[str] = []
+        count: Counter[str] = Counter()
+        for stem in stems:
+            taken.append(_free(stem, taken, count))
+        keys = [(name, "") for name in taken]
     return [
         File(path, run, logger, table, time)
         for path, (run, logger), table, time in zip(paths, keys, tables, times, strict=True)
@@ -232,14 +234,6 @@ def _fits(keys: Sequence[tuple[str, str]], own: Sequence[set[str]]) -> bool:
             if (run == other and alike) or (logger == same and not alike):
                 return False
     return True
-
-
-def _numbered(stems: Sequence[str]) -> list[str]:
-    taken: dict[str, None] = {}
-    count: Counter[str] = Counter()
-    for stem in stems:
-        taken[_free(stem, taken, count)] = None
-    return list(taken)
 
 
 def _free(stem: str, taken: Iterable[str], count: Counter[str]) -> str:
@@ -276,7 +270,7 @@ def _resting(guesses: Sequence[Guess], files: Sequence[File]) -> list[Guess]:
     for guess in guesses:
         if guess.channel is not None and guess.channel.partition("_")[0] in MOTIONS:
             series = [f.table.values[guess.column] for f in files if f.logger == guess.logger]
-            size = max(float(np.nanstd(each)) for each in series)
+            size = max(float(np.std(each, where=np.isfinite(each))) for each in series)
             target = si_unit(str(guess.unit))
             sizes[guess.channel] = target, size * conversion(str(guess.unit), target)
     largest: dict[str, float] = {}
@@ -299,15 +293,13 @@ def _guess(column: str, files: Sequence[File]) -> Guess:
     if unit is not None and not is_unit(unit):
         why = why or f"its unit '{unit}' is not known; state unit = '…'"
     # One file per run may be that of one logger, whose name tells what it measured.
-    meant = None
-    if unit is None or is_unit(unit):
-        meant = suggest_channel(name, unit, logger or _stem(files[0].path))
-    canonical = canonical_channel(meant) if meant else None
+    channel = None if why else suggest_channel(name, unit, logger or _stem(files[0].path))
+    canonical = canonical_channel(channel) if channel else None
     return Guess(
         column=column,
         header=header,
         unit=unit if unit is not None else (canonical.units if canonical else "-"),
-        channel=None if why else meant,
+        channel=channel,
         logger=logger,
         why=why,
         assumed_unit=unit is None,
@@ -324,7 +316,7 @@ def _fault(column: str, files: Sequence[File]) -> tuple[str, Literal["", "short"
     bad = [f for f in files if f.table.find(column) is None or column in f.table.faults]
     if bad:
         return f"missing or unusable in {_listed(bad)}", ""
-    missing = [np.isnan(f.table.values[column]) for f in files]
+    missing = [~np.isfinite(f.table.values[column]) for f in files]
     if gapped := [f for f, m in zip(files, missing, strict=True) if m.mean() > 1 - USABLE]:
         return f"has gaps in {_listed(gapped)}", "long"
     if all(_step_of(f.table.values[column]) == 1.0 for f in files):
@@ -402,19 +394,7 @@ def _motion(words: Sequence[str], dimension: str | None) -> str | None:
 def suggest_channel(column: str, unit: str | None, logger: str = "") -> str:
     """Name for a column: a canonical one if words and unit speak for it, else the column's own.
 
-    Parameters
-    ----------
-    column : str
-        Name of the column.
-    unit : str or None
-        Unit that the file states.
-    logger : str, optional
-        Name of the logger: of "wave_probes", any length is an elevation.
-
-    Returns
-    -------
-    str
-        Name of the channel.
+    A length of a logger called "wave_probes" is an elevation.
     """
     words = _words(column)
     dimension = None if unit is None else si_unit(unit)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import struct
 import warnings
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -61,12 +59,16 @@ def _loaded(path: Path) -> dict[str, Any]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of classes: they are no channels
             content = read_mat(path, ignore_fields=[name.rpartition("/")[2] for name in opaque])
-    except RecursionError:
-        raise _damaged(path, version, "structs and cells nest without end") from None
-    except (OSError, ValueError, TypeError, KeyError, IndexError, RuntimeError, AttributeError,
-            EOFError, NotImplementedError, AssertionError, MemoryError, zlib.error,
-            struct.error) as error:  # fmt: skip
-        raise _damaged(path, version, str(error) or type(error).__name__) from None
+    except DataError:
+        raise
+    # On a damaged file scipy, h5py and pymatreader raise whatever their parts do.
+    except Exception as error:
+        said = str(error).splitlines()[0] if str(error) else type(error).__name__
+        said = "structs and cells nest without end" if isinstance(error, RecursionError) else said
+        raise DataError(
+            f"{path} cannot be read as a MATLAB file of {version}: cut off or damaged ({said}). "
+            "Save it again from MATLAB."
+        ) from None
     # HDF5 keeps no order, and pymatreader hands names on as a set.
     content = _in_order(content) if hdf5 else content
     if opaque and not content:
@@ -100,13 +102,6 @@ def _opaque(path: Path) -> dict[str, str]:
         check_declared(path, file)
         file.visititems(look)
     return found
-
-
-def _damaged(path: Path, version: str, said: str) -> DataError:
-    return DataError(
-        f"{path} cannot be read as a MATLAB file of {version}: cut off or damaged "
-        f"({said.splitlines()[0]}). Save it again from MATLAB."
-    )
 
 
 def _unwrapped(found: dict[str, Any]) -> dict[str, Any]:
