@@ -503,3 +503,8 @@ def test_a_text_is_parsed_once(tmp_path, monkeypatch):
     assert len(parsed) == 1
     with pytest.raises(DataError, match="line 2, column 'on': True is not a number"):
         read_table(path, columns=["on"])
+
+
+def test_more_lines_to_skip_than_there_are(tmp_path):
+    with pytest.raises(DataError, match="holds no rows, only comments and blank lines"):
+        read_table(write(tmp_path, PLAIN), FileSettings(skip_rows=10**12))

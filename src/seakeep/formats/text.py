@@ -207,9 +207,9 @@ def _line_number(raw: bytes, layout: _Layout, row: int) -> int:
 
 def _layout(path: Path, raw: bytes, options: Options) -> _Layout:
     marks = (options.comment,) if options.comment else ("#", "%")
-    begin = 0
-    for _ in range(options.skip_rows):
-        begin = raw.find(b"\n", begin) + 1 or len(raw)
+    begin, skip = 0, options.skip_rows
+    while skip and begin < len(raw):
+        begin, skip = raw.find(b"\n", begin) + 1 or len(raw), skip - 1
     rows = list(islice(_rows(raw, begin, marks), HEAD))
     text = [line for _, line in rows if not _RULE.match(line)]
     if not text:
@@ -229,7 +229,8 @@ def _layout(path: Path, raw: bytes, options: Options) -> _Layout:
             raise _transposed(path, words, len(rows), len(headers))
         at = 0
         units = _units(said[-1], said[-2]) if len(said) > 1 else None
-        headers = said[-2] if units else said[-1] if said else list(map(str, _count(headers)))
+        numbered = [str(i + 1) for i in range(len(headers))]
+        headers = said[-2] if units else said[-1] if said else numbered
     elif said and (units := _units(headers, said[-1])):
         headers = said[-1]
     else:
@@ -243,10 +244,6 @@ def _layout(path: Path, raw: bytes, options: Options) -> _Layout:
     start = rows[at][0]
     decimal = options.decimal or _decimal(raw, start, marks, delimiter)
     return _Layout(delimiter, decimal, headers, units, start, marks)
-
-
-def _count(cells: list[str]) -> range:
-    return range(1, len(cells) + 1)
 
 
 def _remarks(above: bytes, marks: tuple[str, ...], delimiter: str, width: int) -> list[list[str]]:
