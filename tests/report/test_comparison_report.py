@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.report.style import LINES
-from seakeep.report.tables import (
+from seakeep.report.comparison import (
     band_findings,
     rich_bands,
     rich_comparison,
     write_csv,
     write_forecast,
 )
+from seakeep.report.style import LINES
 from seakeep.study import (
     Comparison,
     at_full_scale,

@@ -12,28 +12,17 @@ import pytest
 from tutorial_study import put_tutorial
 
 from seakeep.errors import RequestError
-from seakeep.report.deviations import (
-    deviations,
-    training_overlap,
-    training_windows_overlap,
-    unequal_training,
-)
-from seakeep.report.deviations import test_overlap as overlap_of_tests
-from seakeep.report.glossary import few_cells, glossary, plain_symbol
-from seakeep.report.interactive import dashes, history_data, pack
-from seakeep.report.latex import latex_text
-from seakeep.report.published import PUBLISHED
-from seakeep.report.study_tables import (
-    coverage_table,
-    divergence_table,
-    error_table,
-    number,
-    probability,
-    small_number,
-    trend_table,
-)
-from seakeep.report.study_words import findings, training_table
+from seakeep.report.section import Section
+from seakeep.report.sections import SECTIONS
+from seakeep.report.sections.errors import error_table
+from seakeep.report.sections.histories import history_data, pack
+from seakeep.report.sections.judgements import PUBLISHED, age, coverage_table, divergence_table
+from seakeep.report.sections.settings import settings as settings_of
+from seakeep.report.sections.settings import test_overlap as overlap_of_tests
+from seakeep.report.sections.settings import training_overlap, unequal_training
+from seakeep.report.sections.summary import findings, plain_symbol, summary
 from seakeep.report.style import LINES
+from seakeep.report.tables import latex_text, number, probability, small_number
 from seakeep.study import read_result, read_study, run_study
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
@@ -42,7 +31,7 @@ from seakeep.report.figures.boxes import FEWEST, draw_box_violin
 from seakeep.report.figures.common import grid_of_axes
 from seakeep.report.figures.eigenvalues import eigenvalue_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
-from seakeep.report.page import headings, write_report
+from seakeep.report.page import write_report
 
 STUDY = """
 [study]
@@ -92,7 +81,7 @@ def test_no_id_stands_twice(page):
 
 def test_what_it_holds(page):
     text = page.read_text("utf-8")
-    wanted = ["summary", "errors", "explore", "densities", "settings", "deviations", "versions"]
+    wanted = ["summary", "errors", "explore", "densities", "settings", "versions"]
     found = re.findall(r'<section id="(.*?)">', text)
     assert [each for each in found if each in wanted] == wanted
     assert "a &amp; b &lt; c" in text
@@ -142,26 +131,40 @@ def test_models_that_learn_from_unequal_lengths_are_told(page):
     result = read_result(page.parent)
     said = unequal_training(result)
     assert said in findings(result)
-    spans = [re.findall(r"[\d.]+", each)[-2:] for each in result.groups["training"]["spans"].values]
-    period = result.attrs["encounter_period"]
-    lengths = sorted((float(end) - float(begin)) / period for begin, end in spans)
+    training = result.groups["training"]
+    lengths = (training["end"] - training["begin"]).sum("of_run").values
+    lengths = sorted(lengths / result.attrs["encounter_period"])
     assert (
         f"deterministic from all of a training set ({lengths[0]:.0f} to {lengths[-1]:.0f}" in said
     )
-    assert "Bayesian from a part (uniform from 10 to 20 T̂)" in said
-    assert "(all of it: deterministic)" in training_table(result).note
+    assert "Bayesian from a part (uniform, 10 to 20 T̂)" in said
+    assert "(all of it: deterministic)" in settings_of(result).tables[-1].note
     # In one run both sets begin where its span begins, so that the shorter lies in the longer.
-    training = result.groups["training"]
-    training = training.assign(run=training["run"].copy(data=["a"] * training.sizes["training"]))
-    one = replace(result, groups={**result.groups, "training": training})
-    assert "where deterministic reads them, they share" in training_overlap(one)
-    assert training_windows_overlap(one)
-    specs = json.loads(result.attrs["specs"])
-    for window in ("300", "None"):
-        specs["deterministic"]["window"] = window
-        specs["bayesian"]["train_length"] = window
-        alike = replace(result, attrs={**result.attrs, "specs": json.dumps(specs)})
+    one = replace(result, groups={**result.groups, "training": in_one_run(training)})
+    shares, words = training_overlap(one)
+    assert shares
+    assert "as deterministic reads them, they share" in words
+    for window in (300, None):
+        alike = with_models(result, deterministic__window=window, bayesian__train_length=window)
         assert unequal_training(alike) == ""
+
+
+def in_one_run(training):
+    """The same windows, in one run."""
+    edges = {key: training[key].max("of_run").values for key in ("begin", "end")}
+    moved = training.drop_dims("of_run").assign_coords(of_run=["a"])
+    return moved.assign(
+        {key: (("training", "of_run"), values[:, None]) for key, values in edges.items()}
+    )
+
+
+def with_models(result, **values):
+    """The same study with other settings of models, MODEL__KEY."""
+    models = json.loads(result.attrs["models"])
+    for place, value in values.items():
+        model, _, key = place.partition("__")
+        models[model]["settings"][key]["value"] = value
+    return replace(result, attrs={**result.attrs, "models": json.dumps(models)})
 
 
 def test_a_history_shows_the_calibrated_band_around_that_of_the_members(page):
@@ -208,12 +211,13 @@ def test_tables_say_what_the_campaign_calls_a_channel(page):
     told = channels.assign(long_name=("name", words))
     other = replace(found, groups={**found.groups, "channels": told})
     assert ("Trim angle (MRU-5)",) in [row[:1] for row in error_table(other, "unseen").rows]
-    assert "θ Trim angle (MRU-5); " in dict(glossary(other))["in figures"]
-    assert '"label":"Trim angle (MRU-5)"' in history_data(other)
+    assert "θ Trim angle (MRU-5); " in dict(summary(other).terms)["in figures"]
+    labels = [each["label"] for each in history_data(other)[0]["channels"]]
+    assert "Trim angle (MRU-5)" in labels
     # A free name has no symbol: it is said once.
     lone = replace(found, groups={**found.groups, "channels": _renamed(channels)})
-    assert "kraft bug; " in dict(glossary(lone))["in figures"]
-    assert "kraft bug kraft bug" not in dict(glossary(lone))["in figures"]
+    assert "kraft bug; " in dict(summary(lone).terms)["in figures"]
+    assert "kraft bug kraft bug" not in dict(summary(lone).terms)["in figures"]
 
 
 def _renamed(channels):
@@ -250,30 +254,37 @@ def test_the_data_quality_is_in_the_page_for_every_run_and_channel(page):
         assert [row[0] for row in csv.reader(file)] == ["run", *result.prepared]
 
 
-def test_the_deviations_name_what_is_in_effect(page):
-    with (page.parent / "tables" / "method.csv").open(encoding="utf-8", newline="") as file:
-        rows = {row[0]: row[1] for row in csv.reader(file)}
-    assert rows["preset"].startswith("'recommended'")
-    assert rows["alignment of the waves to the vessel"].startswith("none: ")
-    assert rows["measured outputs read after the start"] == "none: forecasts in the strict sense"
-    assert rows["rows of Â that shift the delays"] == "exact shifts"
-    assert not any("None" in value or "celerity=" in value for value in rows.values())
-    assert " T̂ of " in rows["training windows"]
+def test_each_setting_of_a_model_says_where_it_comes_from(page):
+    with (page.parent / "tables" / "models.csv").open(encoding="utf-8", newline="") as file:
+        rows = {(model, key): told for model, key, *told in csv.reader(file)}
+    assert rows["Bayesian", "train length"] == ["uniform, 10 to 20 T̂", "stated"]
+    assert rows["Bayesian", "n members"] == ["4", "stated"]
+    assert rows["deterministic", "delay rows"] == ["exact", "preset"]
+    assert rows["deterministic", "window"] == ["all samples", "default"]
+    assert not any("(" in value or "None" in value for value, _ in rows.values())
 
 
-def test_the_paper_stands_beside_a_study_that_asks_for_it(page):
+def test_the_published_divergences_stand_beside_a_study_that_asks_for_them(page):
     plain = read_result(page.parent)
-    assert list(headings(plain))[-2:] == ["deviations", "versions"]
-    assert deviations(plain).columns == ("subject", "in effect")
+    assert "paper: EV" not in divergence_table(plain, "bayesian", "paper").columns[-1]
     settings = plain.settings
     settings["output"]["paper"] = True
     asked = replace(plain, attrs={**plain.attrs, "settings": json.dumps(settings)})
-    assert list(headings(asked))[:2] == ["summary", "deviations"]
-    assert set(headings(asked)) == set(headings(plain))
-    assert deviations(asked).columns == ("subject", "the paper", "in effect here")
     table = divergence_table(asked, "bayesian", "paper")
     assert table.columns[-1] == "paper: EV, another data set"
     assert [row[-1] for row in table.rows if row[0] == "heave"] == [PUBLISHED["heave"]]
+
+
+def test_a_section_is_a_function_and_a_line(page, monkeypatch, tmp_path):
+    def trial(result):
+        return Section("trial", "<Trial>", words=(f"{len(result.channels)} channels & more",))
+
+    monkeypatch.setattr("seakeep.report.page.SECTIONS", [*SECTIONS[:1], trial, lambda _: None])
+    result = replace(read_result(page.parent), folder=tmp_path)
+    text = write_report(result).read_text("utf-8")
+    assert '<section id="trial"><h2>&lt;Trial&gt;</h2>' in text
+    assert "channels &amp; more</p>" in text
+    assert '<li><a href="#trial">' in text
 
 
 def test_words_and_symbols_are_said_once(page):
@@ -292,7 +303,7 @@ def test_few_cells_are_told_and_drawn_without_a_density(page):
     result = read_result(page.parent)
     count = int(result.tests["unseen"]["judged"].sum())
     assert count < FEWEST
-    assert f": n = {count})" in few_cells(result)
+    assert any(f": n = {count})" in notice for notice in summary(result).notices)
     assert "Few cells (a &amp; b" in page.read_text("utf-8")
     for size, violins in ((FEWEST - 1, 0), (FEWEST, 1)):
         axes = Figure().subplots()
@@ -343,7 +354,7 @@ def test_numbers_have_a_minus_and_zero_has_none():
 
 def test_small_numbers_keep_two_digits_and_probabilities_are_no_zero(page):
     result = read_result(page.parent)
-    for table in (divergence_table(result, "bayesian", "recommended"), trend_table(result)):
+    for table in (divergence_table(result, "bayesian", "recommended"), *age(result).tables):
         cells = [cell for row in table.rows for k, cell in enumerate(row) if k in table.numeric]
         assert not [cell for cell in cells if re.search(r"\b0\.0000\b", cell)]
     assert (probability(0.0004), probability(0.0386)) == ("< 0.001", "0.039")
@@ -354,21 +365,17 @@ def test_training_windows_that_do_not_overlap_are_no_warning(page):
     result = read_result(page.parent)
     text = page.read_text("utf-8")
     notices = re.findall(r'<p class="notice">(.*?)</p>', text, flags=re.S)
-    assert training_windows_overlap(result) == any("A training window" in n for n in notices)
-    stops = result.groups["training"]["stop"]
-    specs = json.loads(result.attrs["specs"])
-    specs["deterministic"]["window"] = "300"  # without one it reads each span from its begin
-    attrs = {**result.attrs, "specs": json.dumps(specs)}
+    assert training_overlap(result)[0] == any("A training window" in n for n in notices)
+    part = with_models(result, deterministic__window=300)  # without one it reads from the start
+    length = float(result.attrs["longest_training"])
+    one = in_one_run(result.groups["training"])
     for apart, overlaps in ((2.0, False), (0.5, True)):
-        length = float(result.attrs["longest_training"])
-        moved = stops.copy(data=length * (1 + apart * np.arange(stops.size)))
-        runs = result.groups["training"]["run"]
-        same = result.groups["training"].assign(stop=moved, run=runs.copy(data=["a"] * runs.size))
-        other = replace(result, attrs=attrs, groups={**result.groups, "training": same})
-        assert training_windows_overlap(other) == overlaps
-        windows = {row[0]: row[-1] for row in deviations(other).rows}["training windows"]
-        assert windows.startswith("2 windows, placed at random; ")
-        assert ("they do not overlap" in windows) != overlaps
+        ends = length * (1 + apart * np.arange(one.sizes["training"]))
+        moved = one.assign(end=one["end"].copy(data=ends[:, None]))
+        other = replace(part, groups={**result.groups, "training": moved})
+        shares, words = training_overlap(other)
+        assert shares == overlaps
+        assert ("do not overlap" in words) != overlaps
 
 
 def test_the_date_stands_in_one_piece_and_titles_have_the_width_of_the_page(page):
@@ -406,11 +413,10 @@ def test_packing_loses_a_step_of_the_range_at_most():
     np.testing.assert_allclose(found, values, rtol=0, atol=0.5 * step)
 
 
-def test_the_interactive_lines_have_the_dashes_of_the_figures():
-    for key in ("ensemble", "forecast"):
-        assert dashes(LINES[key]["linestyle"]) == list(LINES[key]["linestyle"][1])
-    assert LINES["measured"]["linestyle"] == "-"
-    assert dashes("-") == []
+def test_the_interactive_lines_have_the_dashes_of_the_figures(page):
+    single, ensemble = history_data(read_result(page.parent))[0]["channels"][0]["models"]
+    assert single["dash"] == list(LINES["forecast"]["linestyle"][1])
+    assert ensemble["dash"] == list(LINES["ensemble"]["linestyle"][1])
 
 
 def test_boxes_and_whiskers_are_matplotlibs():
@@ -484,12 +490,12 @@ def test_the_time_histories_zoom_choose_and_show_members(opened):
     canvas = opened.find_element("id", "history")
     whole = state(opened, "range")
     opened.execute_script("arguments[0].scrollIntoView({block: 'center'})", canvas)
-    opened.find_element("id", "zoom-in").click()
+    opened.find_element("css selector", "[data-act='+']").click()
     low, high = map(float, state(opened, "range").split())
     assert high - low < 0.7 * (float(whole.split()[1]) - float(whole.split()[0]))
-    opened.find_element("id", "zoom-right").click()
+    opened.find_element("css selector", "[data-act=ArrowRight]").click()
     assert float(state(opened, "range").split()[0]) > low
-    opened.find_element("id", "zoom-reset").click()
+    opened.find_element("css selector", "[data-act='0']").click()
     assert state(opened, "range") == whole
     drag = ActionChains(opened).move_to_element_with_offset(canvas, -100, 0)
     drag.click_and_hold().move_by_offset(150, 0).release().perform()

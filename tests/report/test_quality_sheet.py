@@ -107,9 +107,9 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
         },
         {"time": time, "heave_flags": ("time", flags)},
     )
-    rows = {row["channel"]: row for row in channel_rows(run)}
-    assert rows["pitch"]["units"] == "deg"
-    assert rows["pitch"]["numbers"][1] == pytest.approx(5.0, rel=2e-3)  # the nearest sample
+    rows = {row.channel: row for row in channel_rows(run)}
+    assert rows["pitch"].unit == "deg"
+    assert rows["pitch"].numbers[1] == pytest.approx(5.0, rel=2e-3)  # the nearest sample
     # Windows stand 1 s apart, and two are missing.
     centre, lags = np.array([1.0, 2.0, 5.0, 6.0]), np.array([0.01, 0.02, 0.01, 0.02])
     found = Agreement(
@@ -182,10 +182,10 @@ def test_prepare_writes_a_page_that_needs_nothing_else(tmp_path, capsys):
     page = page_of.read_text(encoding="utf-8")
     assert not re.search(r'(src|href)="(?!data:|#)', page)
     assert page.count("<img") == 2
-    assert '<th class="n">findings</th>' in page  # heads stand over their numbers
+    assert '<th class="number">findings</th>' in page  # heads stand over their numbers
     for table in re.findall(r"<table.*?</table>", page):
-        heads = re.findall(r"<th( class=\"n\")?>", table)
-        cells = re.findall(r"<td( class=\"n\")?>", table.split("</tr>")[1])
+        heads = re.findall(r"<th( class=\"number\")?>", table)
+        cells = re.findall(r"<td( class=\"number\")?>", table.split("</tr>")[1])
         assert heads == cells
     assert "outlier: 1 samples in 1 place(s)" in page
     before = {path: path.stat().st_mtime_ns for path in folder.iterdir()}

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import xarray as xr
 
-from seakeep.report.regular import response_words
+from seakeep.report.sections.regular import response_words
 from seakeep.study import StudyResult
 
 
@@ -29,7 +29,7 @@ def result(offsets, shift=2.0, ratio=0.5, slack=0.0):
         {"slack": (("run", "name"), [[np.nan, slack]])}, coords={"run": ["wave"], "name": names}
     )
     test = xr.Dataset({"run": ("window", ["wave"])}, coords={"channel": names})
-    settings = {"models": {"m": {"kind": "hankel_dmdc"}}, "tests": {"t": {"label": ""}}}
+    settings = {"tests": {"t": {"label": ""}}}
     groups = {
         "channels": xr.Dataset(
             {"long_name": ("name", ["surge", "stern mooring load"])},
@@ -39,12 +39,11 @@ def result(offsets, shift=2.0, ratio=0.5, slack=0.0):
         "runs": runs,
         "tests/t": test,
     }
-    return StudyResult(None, {"settings": json.dumps(settings)}, groups)
+    return StudyResult(None, {"settings": json.dumps(settings), "models": '{"m": {}}'}, groups)
 
 
 def words(*arguments, **keywords):
-    (said,) = response_words(result(*arguments, **keywords))
-    return said
+    return response_words(result(*arguments, **keywords), "t")
 
 
 def test_an_offset_of_the_size_of_a_fall_back_is_explained_by_it():

@@ -1,19 +1,23 @@
 """Tables as files: what LaTeX gets, and settings in words."""
 
+import csv
+import io
 import re
-from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import xarray as xr
+from rich.console import Console
 
-from seakeep.report.latex import PAGE, write_latex_table
-from seakeep.report.study_tables import ReportTable
-from seakeep.report.study_words import _setting_words, clock_table
+from seakeep.report.quality_sheet import clock_rows
+from seakeep.report.sections.settings import setting_text
+from seakeep.report.tables import PAGE, Table, rich_table, write_csv, write_latex
+from seakeep.signals.synchronisation import Clock
 
 
 def latex(tmp_path, rows, **options):
-    table = ReportTable("t", "Title", ("name", "unit", "number"), tuple(rows), **options)
-    return write_latex_table(table, tmp_path / "t.tex").read_text("utf-8")
+    table = Table("t", "Title", ("name", "unit", "number"), tuple(rows), **options)
+    return write_latex(table, tmp_path / "t.tex").read_text("utf-8")
 
 
 def test_columns_of_long_text_break_lines_and_those_of_numbers_stand_to_the_right(tmp_path):
@@ -43,37 +47,56 @@ def test_a_table_longer_than_a_page_breaks_and_repeats_its_head(tmp_path, rows):
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("models.m.window", "None", "all samples"),
-        ("alignment", "None", "none"),
-        ("standardize", "True", "yes"),
-        ("tests.unseen.startup", "2.50", "2.5 s"),
-        ("state_delays", "32", "32 samples"),
-        ("encounter_period", "1.6456710747033423", "1.64567 s"),
-        ("ridge", "Uniform(low=50, high=150)", "uniform, 50 to 150"),
-        ("train_length", "Fixed(value=20)", "20 T̂"),
-        ("train_length", "scipy.stats.norm(loc=15.0, scale=1.0)", None),
-        ("name", "Virtual CK-14e", None),
+        ("window", None, "all samples"),
+        ("alignment", None, "none"),
+        ("standardize", True, "yes"),
+        ("tests.unseen.startup", 2.5, "2.5 s"),
+        ("state_delays", 32, "32 samples"),
+        ("encounter_period", 1.6456710747033423, "1.64567 s"),
+        ("seed", 2**63, "9223372036854775808"),
+        ("ridge", {"prior": "Uniform", "low": 50.0, "high": 150.0}, "uniform, 50 to 150"),
+        ("train_length", {"prior": "Fixed", "value": 20.0}, "20 T̂"),
         (
-            "alignment",
-            "ProbeAlignment(mode='effective', surge='measured', celerity=None, offset=0.0)",
-            "elevation carried to the vessel, celerity estimated; surge measured",
+            "train_length",
+            {"prior": "scipy.stats.norm", "args": [], "kwds": {"loc": 15.0, "scale": 1.0}},
+            "scipy.stats.norm(loc=15, scale=1) T̂",
         ),
-        (
-            "alignment",
-            "ProbeAlignment(mode='dispersion', surge='none', celerity=None, offset=0.0)",
-            "elevation carried to the vessel, by linear dispersion; surge none",
-        ),
+        ("runs", ["first", "second"], "first, second"),
+        ("lead", 24, "24 samples"),
     ],
 )
 def test_settings_are_words_and_not_code(key, value, words):
-    assert _setting_words(key, value) == (words or value)
+    assert setting_text(key, value) == words
 
 
-def test_each_clock_has_a_row():
-    told = "+370.00 ± 0.10 ms, +25.0 ppm (trigger pulses, drift of 2 runs, n = 13)"
-    run = xr.Dataset(attrs={"clock_mru": told, "clock_mru_offset": 0.37})
-    table = clock_table(SimpleNamespace(prepared={"first": run, "second": run}))
-    assert table.rows[1] == (
-        "second", "mru", "+370.00 ± 0.10 ms", "+25.0 ppm", "trigger pulses, drift of 2 runs, n = 13"
-    )  # fmt: skip
-    assert clock_table(SimpleNamespace(prepared={"alone": xr.Dataset()})) is None
+def test_no_cell_of_a_csv_file_is_a_formula(tmp_path):
+    names = ("=1+1", "@SUM(A1)", "+cmd|' /C calc'!A0", "-2+HYPERLINK(A1)", "\tx")
+    numbers = ("-0.4", "+370.00 ± 0.10 ms", "–", "-", "heave")
+    table = Table("t", "T", ("=head",), tuple((each,) for each in names + numbers))
+    with write_csv(table, tmp_path / "t.csv").open(encoding="utf-8", newline="") as file:
+        rows = [row[0] for row in csv.reader(file)]
+    assert rows == ["'=head", *(f"'{name}" for name in names), *numbers]
+
+
+@pytest.mark.parametrize("width", [80, 60])
+def test_a_table_for_the_terminal_keeps_its_numbers(width):
+    heads = ("test set", "model", "ANRMSE median", "ANRMSE IQR", "NAMMAE median", "NAMMAE IQR")
+    row = ("irregular waves of the second day", "deterministic", *["0.123"] * 3, "0.456")
+    console = Console(file=io.StringIO(), width=width)
+    console.print(rich_table(Table("t", "T", heads, (row,), numeric=(2, 3, 4, 5))))
+    text = console.file.getvalue()
+    assert text.count("0.123") == 3
+    assert "0.456" in text
+    assert "…" not in text
+    assert max(map(len, text.splitlines())) <= width
+
+
+def test_each_clock_has_a_row_and_none_is_parsed_from_a_sentence():
+    told = {"offset": 0.37, "offset_error": 1e-4, "drift_ppm": 25.0, "drift_error_ppm": np.nan,
+            "method": "trigger pulses, drift of 2 runs", "count": 13}  # fmt: skip
+    run = xr.Dataset(attrs={f"clock_mru_{key}": value for key, value in told.items()})
+    row = ("mru", "+370.00 ± 0.10 ms", "+25.0 ppm", "trigger pulses, drift of 2 runs, n = 13")
+    assert clock_rows(run) == [row]
+    same = run.assign_attrs(clock_mru_method=Clock.method, clock_mru_count=0)
+    assert clock_rows(same) == [("mru", "", "", "the same clock")]
+    assert clock_rows(xr.Dataset()) == []

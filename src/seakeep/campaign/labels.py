@@ -73,6 +73,8 @@ def attributes_of(
     for logger, clock in list(clocks.items())[1:]:
         attributes |= {
             f"clock_{logger}": clock.describe(),
+            f"clock_{logger}_method": clock.method,
+            f"clock_{logger}_count": clock.count,
             f"clock_{logger}_offset": clock.offset,
             f"clock_{logger}_offset_error": clock.offset_error,
             f"clock_{logger}_drift_ppm": 1e6 * clock.drift,

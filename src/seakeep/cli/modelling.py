@@ -121,7 +121,7 @@ def forecast(
     from seakeep.campaign import read_campaign
     from seakeep.models import HankelDMDcModel, HankelEnsemble, load_model
     from seakeep.quality import warn_of_runs
-    from seakeep.report.tables import forecast_header, forecast_words, write_forecast
+    from seakeep.report.comparison import forecast_header, forecast_words, write_forecast
     from seakeep.signals.time_axis import instant_text
     from seakeep.study import forecast_at_full_scale, with_degrees
     from seakeep.study.comparison import instant_of, samples_of
@@ -217,9 +217,9 @@ def compare(
         raise RequestError(f"--format must be png, svg or pdf; received '{format_}'.")
     from seakeep.campaign import read_campaign
     from seakeep.models import HankelDMDcModel, load_model
+    from seakeep.report.comparison import band_findings, rich_bands, rich_comparison, write_csv
     from seakeep.report.overlay import overlay_figure
     from seakeep.report.style import save_figure
-    from seakeep.report.tables import band_findings, rich_bands, rich_comparison, write_csv
     from seakeep.study import at_full_scale, comparison_table, in_degrees
     from seakeep.study import compare as compare_runs
 

@@ -16,9 +16,6 @@ from seakeep.cli.options import Scheduler, checked_count
 from seakeep.errors import RequestError
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
-    from seakeep.report.study_tables import ReportTable
     from seakeep.study import StudyResult
 
 __all__ = ["report", "reproduce", "study"]
@@ -162,8 +159,8 @@ def _run(
 ) -> None:
     from seakeep.models.executor import make_executor
     from seakeep.report.page import write_report
-    from seakeep.report.study_tables import overview_table
-    from seakeep.report.study_words import findings
+    from seakeep.report.sections.summary import findings, overview_table
+    from seakeep.report.tables import rich_table
 
     try:
         with make_executor(workers, scheduler) as executor, _Progress("Study") as tell:
@@ -175,19 +172,7 @@ def _run(
             f"What was finished is kept in {folder}; the same command goes on where it stopped."
         )
         raise
-    results().print(_rich(overview_table(found)))
+    results().print(rich_table(overview_table(found)))
     for text in findings(found):
         results().print(text, soft_wrap=True)
     results().print(f"\nReport: {page}", soft_wrap=True)
-
-
-def _rich(table: ReportTable) -> Table:
-    from rich import box
-    from rich.table import Table
-
-    out = Table(box=box.SIMPLE_HEAD, title=table.title, title_justify="left")
-    for number, heading in enumerate(table.columns):
-        out.add_column(heading, justify="right" if number in table.numeric else "left")
-    for number, row in enumerate(table.rows):
-        out.add_row(*row, style="bold" if number in table.averages else None)
-    return out

@@ -1,11 +1,10 @@
-"""The data-quality sheet: one page with a picture a channel and a table a run."""
+"""The data-quality sheet: one page with a table per run and a picture of its channels."""
 
 from __future__ import annotations
 
-import base64
-import html
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,14 +15,23 @@ from seakeep.campaign.pipeline import redundant_pairs
 from seakeep.campaign.settings import CampaignSettings, long_name_of
 from seakeep.conventions import displayed
 from seakeep.files import replacing
-from seakeep.quality import Finding, compared, findings_of
+from seakeep.quality import compared, findings_of
+from seakeep.report.html import inline_picture, rendered
 from seakeep.report.style import COLOURS, axis_label, figure_style, new_figure, shown_unit
 from seakeep.signals.quality import FLAGS, LATE, Agreement
+from seakeep.signals.synchronisation import ASSUMED, Clock
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["channel_rows", "quality_figure", "steps_of", "write_quality_sheet"]
+__all__ = [
+    "ChannelRow",
+    "channel_rows",
+    "clock_rows",
+    "quality_figure",
+    "steps_of",
+    "write_quality_sheet",
+]
 
 _MARKS = {
     "missing": ("#D55E00", "x"),
@@ -35,19 +43,70 @@ _MARKS = {
 }
 """Colour and shape of each flag: shapes tell them apart in grey print."""
 FOUND = "#FDEEE4"
-"""Ground of a panel, and of a row, in which something was found."""
-_STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #1b2430; max-width: 1080px;
-       margin: 2em auto; padding: 0 1em; }
-h1 { font-size: 1.5em; } h2 { margin-top: 2em; border-top: 1px solid #ccd; padding-top: 1em; }
-table { border-collapse: collapse; font-size: 13px; width: 100%; }
-th, td { text-align: left; padding: 3px 8px; border-bottom: 1px solid #e4e7ec;
-         vertical-align: top; }
-td.n, th.n { text-align: right; white-space: nowrap; }
-td.n { font-variant-numeric: tabular-nums; } table.short { width: auto; }
-.bad { background: FOUND; } .ok { color: #5b6770; } img { width: 100%; height: auto; }
-.scroll { overflow-x: auto; } li { margin: 2px 0; }
-""".replace("FOUND", FOUND)
+"""Ground of a panel in which something was found; the style sheet has the same for rows."""
+
+
+@dataclass(frozen=True)
+class ChannelRow:
+    """Data quality of a channel: statistics (min, max, mean, SD), flagged parts, what was found."""
+
+    channel: str
+    words: str
+    unit: str
+    numbers: tuple[float, ...]
+    flagged: str
+    found: tuple[str, ...]
+
+
+def channel_rows(run: xr.Dataset) -> list[ChannelRow]:
+    """Data quality of each channel of a prepared run; angles and their rates in degrees."""
+    findings = findings_of(run)
+    rows = []
+    for name in map(str, run.data_vars):
+        attrs, flags = run[name].attrs, _flags(run, name)
+        factor, unit = displayed(str(attrs.get("units", "")))
+        x = factor * run[name].to_numpy()
+        numbers = [np.nan] * 4
+        if np.isfinite(x).any():
+            numbers = [np.nanmin(x), np.nanmax(x), np.nanmean(x), np.nanstd(x, ddof=1)]
+        shares = [
+            f"{word} {100 * np.mean((flags & bit) > 0):.2g} %"
+            for word, bit in FLAGS.items()
+            if (flags & bit).any()
+        ]
+        found = [each.text for each in findings if each.channel == name]
+        if attrs.get("repaired"):
+            found.append(f"repaired: {attrs['repaired']}")
+        words = long_name_of(name, attrs.get("long_name"))
+        flagged = ", ".join(shares)
+        rows.append(
+            ChannelRow(name, words, shown_unit(unit), tuple(numbers), flagged, tuple(found))
+        )
+    return rows
+
+
+def clock_rows(run: xr.Dataset) -> list[tuple[str, str, str, str]]:
+    """Logger, offset, drift and how they were found, of each clock but the reference."""
+    rows = []
+    for key in run.attrs:
+        if not (key.startswith("clock_") and key.endswith("_method")):
+            continue
+        clock = key.removesuffix("_method")
+        at = {k: run.attrs[f"{clock}_{k}"] for k in ("offset", "offset_error", "drift_ppm",
+              "drift_error_ppm", "method", "count")}  # fmt: skip
+        numbers = ("", "")
+        if at["method"] not in (Clock.method, ASSUMED):
+            offset = _with_error(1e3 * float(at["offset"]), 1e3 * float(at["offset_error"]), 2)
+            drift = _with_error(float(at["drift_ppm"]), float(at["drift_error_ppm"]), 1)
+            numbers = (f"{offset} ms", f"{drift} ppm")
+        origin = f"{at['method']}, n = {int(at['count'])}" if numbers[0] else str(at["method"])
+        rows.append((clock.removeprefix("clock_"), *numbers, origin))
+    return rows
+
+
+def _with_error(value: float, error: float, digits: int) -> str:
+    known = f" ± {error:.{digits}f}" if np.isfinite(error) else ""
+    return f"{value:+z.{digits}f}{known}"
 
 
 def _flags(run: xr.Dataset, name: str) -> Any:
@@ -55,48 +114,6 @@ def _flags(run: xr.Dataset, name: str) -> Any:
     if key in run.coords:
         return run[key].to_numpy().astype(int)
     return np.zeros(run.sizes["time"], dtype=int)
-
-
-def channel_rows(run: xr.Dataset) -> list[dict[str, Any]]:
-    """Rows of a run's table: statistics, flagged shares and findings of each channel.
-
-    Angles and their rates are in degrees.
-
-    Parameters
-    ----------
-    run : Dataset
-        A prepared run.
-
-    Returns
-    -------
-    list of dict
-        One a channel, in the run's order.
-    """
-    found = findings_of(run)
-    rows = []
-    for name in map(str, run.data_vars):
-        x, flags = run[name].to_numpy(), _flags(run, name)
-        some = bool(np.isfinite(x).any())
-        factor, units = displayed(str(run[name].attrs.get("units", "")))
-        x = factor * x
-        numbers = [np.nanmin(x), np.nanmax(x), np.nanmean(x), np.nanstd(x, ddof=1)] if some else []
-        shares = [
-            f"{word} {100 * np.mean((flags & bit) > 0):.2g} %"
-            for word, bit in FLAGS.items()
-            if (flags & bit).any()
-        ]
-        rows.append(
-            {
-                "channel": name,
-                "words": long_name_of(name, run[name].attrs.get("long_name")),
-                "units": units,
-                "numbers": [float(each) for each in numbers] or [float("nan")] * 4,
-                "flagged": ", ".join(shares),
-                "repaired": str(run[name].attrs.get("repaired", "")),
-                "findings": [each for each in found if each.channel == name],
-            }
-        )
-    return rows
 
 
 def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figure:
@@ -112,7 +129,7 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
     Returns
     -------
     matplotlib.figure.Figure
-        One panel a channel, and one a compared channel.
+        One panel per channel, and one per compared channel.
     """
     names = [str(name) for name in run.data_vars]
     lagging = [name for name in agreements if agreements[name].lags.size]
@@ -178,7 +195,7 @@ def write_quality_sheet(
     folder: Path,
     unread: Mapping[str, str] | None = None,
 ) -> list[Path]:
-    """Write the sheet of prepared runs: one self-contained page, and a PNG a run.
+    """Write the sheet of prepared runs: one self-contained page, and a PNG per run.
 
     Parameters
     ----------
@@ -203,7 +220,7 @@ def write_quality_sheet(
     RequestError
         If matplotlib is not installed, or a file cannot be written.
     """
-    parts, written = [], []
+    told, written = [], []
     for name, run in runs.items():
         pairs = compared(run, redundant_pairs(settings, run.attrs.get("encounter_period")))
         agreements = {channel: each for (channel, _), each in pairs.items()}
@@ -212,11 +229,39 @@ def write_quality_sheet(
         with replacing(path) as temporary:
             temporary.write_bytes(picture)
         written.append(path)
-        parts.append(_section(name, run, picture))
+        told.append(_told(name, run) | {"picture": inline_picture(picture, f"channels of {name}")})
     page = folder / "quality.html"
     with replacing(page) as temporary:
-        temporary.write_text(_page(title, runs, parts, unread or {}), encoding="utf-8")
+        text = rendered(
+            "quality.html",
+            kind="sheet",
+            title=f"Data quality: {title}",
+            runs=told,
+            unread=unread or {},
+        )
+        temporary.write_text(text, encoding="utf-8")
     return [page, *written]
+
+
+def _told(name: str, run: xr.Dataset) -> dict[str, Any]:
+    """What the page says of a run."""
+    found, rows = findings_of(run), channel_rows(run)
+    known = {row.channel for row in rows}
+    clocks = [
+        f"clock of {logger}: {', '.join(filter(None, (offset, drift)))}"
+        f"{f' ({origin})' if offset else origin}"
+        for logger, offset, drift, origin in clock_rows(run)
+    ]
+    others = [f"{each.channel}: {each.text}" for each in found if each.channel not in known]
+    return {
+        "name": name,
+        "span": f"{float(run['time'][0]):.2f} to {float(run['time'][-1]):.2f} s",
+        "count": len(found),
+        "kinds": ", ".join(dict.fromkeys(f"{each.channel} ({each.kind.word})" for each in found)),
+        "steps": steps_of(run),
+        "items": [*clocks, *others],
+        "rows": rows,
+    }
 
 
 def _png(figure: Figure) -> bytes:
@@ -226,66 +271,6 @@ def _png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def _page(
-    title: str,
-    runs: Mapping[str, xr.Dataset],
-    parts: Sequence[str],
-    unread: Mapping[str, str],
-) -> str:
-    lines = []
-    for name, run in runs.items():
-        found = findings_of(run)
-        words = ", ".join(dict.fromkeys(f"{each.channel} ({each.kind.word})" for each in found))
-        mark = "bad" if found else "ok"
-        lines.append(
-            f'<tr class="{mark}"><td><a href="#{html.escape(name)}">{html.escape(name)}</a></td>'
-            f'<td class="n">{float(run["time"][0]):.2f} to {float(run["time"][-1]):.2f} s</td>'
-            f'<td class="n">{len(found)}</td><td>{html.escape(words) or "nothing found"}</td></tr>'
-        )
-    lines += [
-        f'<tr class="bad"><td>{html.escape(name)}</td><td>not prepared</td><td class="n">–</td>'
-        f"<td>{html.escape(why)}</td></tr>"
-        for name, why in unread.items()
-    ]
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        f"<title>Data quality: {html.escape(title)}</title><style>{_STYLE}</style></head><body>"
-        f"<h1>Data quality: {html.escape(title)}</h1>"
-        "<p>Checks flag and tell; nothing is repaired unless the campaign asks for it, and what "
-        "was repaired is listed. A lag is positive where a sensor is late against the trusted one "
-        "of its group; inside the green band it does no harm. Findings count over the whole "
-        "record that was read; the shares flagged, the statistics and the pictures show "
-        "the span used.</p>"
-        '<div class="scroll"><table class="short"><tr><th>run</th><th class="n">span used</th>'
-        '<th class="n">findings</th>'
-        f"<th>channels</th></tr>{''.join(lines)}</table></div>{''.join(parts)}</body></html>"
-    )
-
-
-def _section(name: str, run: xr.Dataset, picture: bytes) -> str:
-    rows = channel_rows(run)
-    known = {row["channel"] for row in rows}
-    others = [each for each in findings_of(run) if each.channel not in known]
-    clocks = [
-        f"<li>clock of {html.escape(key.removeprefix('clock_'))}: {html.escape(value)}</li>"
-        for key, value in run.attrs.items()
-        if key.startswith("clock_") and isinstance(value, str)
-    ]
-    items = "".join(clocks + [_item(each) for each in others])
-    body = "".join(_row(row) for row in rows)
-    encoded = base64.b64encode(picture).decode("ascii")
-    return (
-        f'<h2 id="{html.escape(name)}">{html.escape(name)}</h2><p>{html.escape(steps_of(run))}</p>'
-        + (f"<ul>{items}</ul>" if items else "")
-        + '<div class="scroll"><table><tr><th>channel</th><th>unit</th><th class="n">min</th>'
-        '<th class="n">max</th><th class="n">mean</th><th class="n">SD</th>'
-        "<th>flagged in the span</th>"
-        "<th>found in the record, and done about it</th></tr>"
-        f'{body}</table></div><img alt="channels of {html.escape(name)}" '
-        f'src="data:image/png;base64,{encoded}">'
-    )
-
-
 def steps_of(run: xr.Dataset) -> str:
     """Step, rate and, where it is known, encounter period of a prepared run, in words."""
     dt, period = float(run.attrs["dt"]), run.attrs.get("encounter_period")
@@ -293,19 +278,3 @@ def steps_of(run: xr.Dataset) -> str:
     if period is None:
         return f"{words}, encounter period not needed"
     return f"{words}, encounter period T {period:.4g} s ({period / dt:.3g} steps)"
-
-
-def _item(finding: Finding) -> str:
-    return f"<li>{html.escape(finding.channel)}: {html.escape(finding.text)}</li>"
-
-
-def _row(row: Mapping[str, Any]) -> str:
-    numbers = "".join(f'<td class="n">{value:.4g}</td>' for value in row["numbers"])
-    words = [html.escape(each.text) for each in row["findings"]]
-    if row["repaired"]:
-        words.append(f"repaired: {html.escape(row['repaired'])}")
-    mark = ' class="bad"' if row["findings"] else ""
-    return (
-        f"<tr{mark}><td>{html.escape(row['channel'])}</td><td>{html.escape(shown_unit(row['units']))}</td>"
-        f"{numbers}<td>{html.escape(row['flagged'])}</td><td>{'<br>'.join(words)}</td></tr>"
-    )

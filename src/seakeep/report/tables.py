@@ -1,292 +1,229 @@
-"""Tables for the terminal and for files."""
+"""Tables as data, and what becomes of them: CSV, LaTeX, the terminal (pages have a template)."""
 
 from __future__ import annotations
 
+import csv
+import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
-import pandas as pd
-import xarray as xr
-from rich import box
-from rich.table import Table
 
-from seakeep.files import MARK, replacing, write_netcdf
+from seakeep.files import replacing
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
 
 __all__ = [
-    "band_findings",
-    "forecast_header",
-    "forecast_words",
-    "rich_bands",
-    "rich_comparison",
+    "MISSING",
+    "Table",
+    "latex_text",
+    "number",
+    "plain_cell",
+    "probability",
+    "rich_table",
+    "signed",
+    "small_number",
     "write_csv",
-    "write_forecast",
+    "write_latex",
 ]
 
-_HEADINGS = {
-    "nrmse": ("NRMSE", "{:.3f}"),
-    "fit": ("fit %", "{:.1f}"),
-    "nammae": ("NAMMAE", "{:.3f}"),
-    "sd_ratio": ("SD ratio", "{:.3f}"),
-    "measured_min": ("min meas.", "{:.4g}"),
-    "predicted_min": ("min pred.", "{:.4g}"),
-    "measured_max": ("max meas.", "{:.4g}"),
-    "predicted_max": ("max pred.", "{:.4g}"),
-}
-_BAND_HEADINGS = {
-    "coverage": ("in band %", "{:.1f}"),
-    "band_width": ("mean width", "{:.4g}"),
-    "relative_band_width": ("width in SD", "{:.3f}"),
-}
-_OF_RUNS = ("start", "status", "anrmse", "conditional_on", "probe_offset", "probe_offset_spread")
-_OF_BANDS = ("band", "level", "members", "diverged")
-_OF_SCALE = ("scale", "scale_factor")
+MISSING = "–"
 
 
-def rich_comparison(table: xr.Dataset) -> Table:
-    """Comparison of forecasts with measurements as a table for the terminal.
+@dataclass(frozen=True)
+class Table:
+    """A table.
 
     Parameters
     ----------
-    table : Dataset
-        From :func:`seakeep.study.comparison_table`.
-
-    Returns
-    -------
-    rich.table.Table
-        A row a run and channel, and the averages below each run.
+    name : str
+        Name of its files.
+    title : str
+        Caption.
+    columns : tuple of str
+        Headings.
+    rows : tuple of tuple of str
+        Cells.
+    note : str
+        What a reader must know about it.
+    numeric : tuple of int
+        Columns of numbers.
+    elsewhere : tuple of int
+        Columns that come from another data set.
+    averages : tuple of int
+        Rows that are averages of others.
+    folded : bool
+        Whether a page folds it away until it is wanted.
     """
-    title = "Forecast against measurement"
-    if "scale" in table:
-        title += f", full scale (1:{float(table['scale_factor'][0]):g})"
-    out = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
-    out.add_column("run", no_wrap=True)
-    out.add_column("channel", no_wrap=True)
-    out.add_column("unit", no_wrap=True)
-    for heading, _ in _HEADINGS.values():
-        out.add_column(heading, justify="right", no_wrap=True)
-    for run in table["run"].values:
-        rows = table.sel(run=run)
-        for channel in table["channel"].values:
-            at = rows.sel(channel=channel)
-            out.add_row(
-                str(run),
-                str(channel),
-                str(at["channel_units"].values),
-                *(_shown(float(at[name]), form) for name, (_, form) in _HEADINGS.items()),
-            )
-        slack = int(rows["slack_channels"])
-        left_out = f" ({slack} still channel{'s' * (slack > 1)} left out)" if slack else ""
-        status = str(rows["status"].values)
-        mean = [
-            _shown(float(rows["anrmse"]), "{:.3f}"),
-            "",
-            _shown(float(rows["mean_nammae"]), "{:.3f}"),
-        ]
-        out.add_row(
-            str(run),
-            "average" + left_out + ("" if status == "ok" else f" ({status})"),
-            "",
-            *mean,
-            style="bold",
-        )
-        for note in _notes(rows):
-            out.add_row(str(run), note, style="italic")
-        out.add_section()
-    return out
+
+    name: str
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+    numeric: tuple[int, ...] = ()
+    elsewhere: tuple[int, ...] = ()
+    averages: tuple[int, ...] = ()
+    folded: bool = False
 
 
-def _notes(rows: xr.Dataset) -> list[str]:
-    notes = []
-    condition = str(rows["conditional_on"].values)
-    if condition:
-        notes.append(f"conditional on measured {condition}")
-    offset, spread = float(rows["probe_offset"]), float(rows["probe_offset_spread"])
-    if np.isfinite(offset):
-        known = f" ± {spread:.2g}" if np.isfinite(spread) else ""
-        notes.append(f"probe offset {offset:.3g}{known} m")
-    return notes
+def number(value: float, digits: int = 3) -> str:
+    """Text of a number; a dash for one that is not finite."""
+    if not np.isfinite(value):
+        return MISSING
+    text = f"{value:.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0 else text
 
 
-def _shown(value: float, form: str) -> str:
-    return form.format(value) if np.isfinite(value) else "–"
+def small_number(value: float) -> str:
+    """Text of a number of four decimals, or as many more as two digits of it need.
 
-
-def rich_bands(table: xr.Dataset) -> Table:
-    """Coverage and width of an ensemble's bands as a table for the terminal.
-
-    Parameters
-    ----------
-    table : Dataset
-        From :func:`seakeep.study.comparison_table`, of an ensemble.
-
-    Returns
-    -------
-    rich.table.Table
-        A row a run and channel, and the average of the channels that are judged below each run.
+    Examples
+    --------
+    >>> small_number(0.0186), small_number(0.00023), small_number(-1.4e-5), small_number(3e-9)
+    ('0.0186', '0.00023', '-0.000014', '3.0e-09')
     """
-    level = 100.0 * float(table["level"].values[0])
-    title = f"{level:g} % {_kind(str(table['band'].values[0]))}band against measurement"
-    out = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
-    for heading in ("run", "channel", "unit"):
-        out.add_column(heading, no_wrap=True)
-    for heading, _ in _BAND_HEADINGS.values():
-        out.add_column(heading, justify="right", no_wrap=True)
-    for run in table["run"].values:
-        rows = table.sel(run=run)
-        for channel in table["channel"].values:
-            at = rows.sel(channel=channel)
-            numbers = [_shown(float(at[name]), form) for name, (_, form) in _BAND_HEADINGS.items()]
-            out.add_row(str(run), str(channel), str(at["channel_units"].values), *numbers)
-        mean = _shown(float(rows["mean_coverage"]), "{:.1f}")
-        out.add_row(str(run), "average", "", mean, style="bold")
-        out.add_section()
-    return out
+    if not np.isfinite(value) or value == 0:
+        return number(value, 0)
+    decimals = max(4, 1 - int(np.floor(np.log10(abs(value)))))
+    return f"{value:.{decimals}f}" if decimals <= 7 else f"{value:.1e}"
 
 
-def band_findings(table: xr.Dataset) -> list[str]:
-    """Sentences on the bands of an ensemble, one a run; none for a single model.
+def signed(value: float, digits: int) -> str:
+    """Text of a number with its sign, where anything of it is left after rounding.
 
-    Parameters
-    ----------
-    table : Dataset
-        From :func:`seakeep.study.comparison_table`.
-
-    Returns
-    -------
-    list of str
-        How much of the measurement the band holds, and of how many members it is made.
+    Examples
+    --------
+    >>> signed(1.4, 0), signed(-0.04, 1), signed(-0.06, 1)
+    ('+1', '0.0', '-0.1')
     """
-    if "coverage" not in table:
-        return []
-    said = []
-    for run in table["run"].values:
-        rows = table.sel(run=run)
-        level, found = 100.0 * float(rows["level"]), float(rows["mean_coverage"])
-        lost, members = int(rows["diverged"]), int(rows["members"])
-        left_out = f"; {lost} of {members} members diverged and are left out" if lost else ""
-        if not np.isfinite(found):
-            said.append(f"{run}: there is no band to judge{left_out}.")
-            continue
-        words = "as it claims" if abs(found - level) <= 5.0 else "not what it claims"
-        if found < level - 20.0:
-            words = "far too little"
-        kind = str(rows["band"].values)
-        said.append(
-            f"{run}: the {level:g} % {_kind(kind)}band of {members - lost} members holds "
-            f"{found:.0f} % of the measured instants, {words}. {_CARRIES[kind]}{left_out}."
-        )
-    return said
+    text = number(value, digits)
+    if text == MISSING or float(text) == 0.0:
+        return text.removeprefix("-")
+    return text if value < 0 else f"+{text}"
 
 
-def _kind(band: str) -> str:
-    """Word before a band that is not that of the members."""
-    return "calibrated " if band == "calibrated" else ""
+def probability(value: float) -> str:
+    """Text of a p-value."""
+    return "< 0.001" if value < 0.001 else number(value)
 
 
-_CARRIES = {
-    "members": "It carries the spread of the members, and no noise or model error",
-    "calibrated": "It carries the errors of the sea and the horizon that it was calibrated on",
-}
+def plain_cell(text: str) -> str:
+    """Text that no spreadsheet takes for a formula: an apostrophe stands before it.
 
-
-def write_csv(table: xr.Dataset, path: Path) -> Path:
-    """Write a comparison table as CSV, a row a run and channel, full precision.
-
-    Parameters
-    ----------
-    table : Dataset
-        From :func:`seakeep.study.comparison_table`.
-    path : Path
-        The file.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    RequestError
-        If the file cannot be written.
+    Examples
+    --------
+    >>> plain_cell("=1+1"), plain_cell("-0.5"), plain_cell("heave")
+    ("'=1+1", '-0.5', 'heave')
     """
-    columns = [name for name in (*_HEADINGS, *_BAND_HEADINGS) if name in table]
-    frame = table[columns].to_dataframe().reset_index()
-    for name in (*_OF_RUNS, *(each for each in (*_OF_BANDS, *_OF_SCALE) if each in table)):
-        frame[name] = frame["run"].map(table[name].to_series())
-    front = ["run", "channel", "channel_units"]
-    frame = frame[front + [name for name in frame.columns if name not in front]]
+    if not text.startswith(("=", "+", "-", "@", "\t", "\r")):
+        return text
+    if re.match(r"[+-]?(\d|\.\d|inf|nan)", text) and not re.search(r"[=(!|]", text):
+        return text
+    return text if text in ("-", MISSING) else f"'{text}"
+
+
+def write_csv(table: Table, path: Path) -> Path:
+    """Write a table as CSV (UTF-8)."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerows([*map(plain_cell, row)] for row in (table.columns, *table.rows))
     with replacing(path) as temporary:
-        frame.to_csv(temporary, index=False)
+        temporary.write_text(buffer.getvalue(), encoding="utf-8")
     return path
 
 
-def forecast_header(states: Sequence[str]) -> str:
-    """Pattern of the first line of a CSV file that :func:`write_forecast` writes."""
-    one = rf"({'|'.join(map(re.escape, states))})( (std|lower|upper|member \d+))? \[[^]]*\]"
-    return rf'time \[s\](,"?{one}"?)+(,scale_factor)?\r?'
+def rich_table(table: Table) -> RichTable:
+    """Table for the terminal: text wraps before numbers are cut."""
+    from rich import box
+    from rich.table import Table as RichTable
 
-
-def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
-    """Write a forecast as NetCDF, or as CSV with a column a channel, full precision.
-
-    Parameters
-    ----------
-    forecast : Dataset
-        Of a model, or of an ensemble: statistics, whose columns are ``heave [m]`` (the mean),
-        ``heave std [m]``, ``heave lower [m]`` and ``heave upper [m]``, or members, whose columns
-        are ``heave member 0 [m]`` and so on. At full scale a last column, ``scale_factor``, says
-        so.
-    path : Path
-        The file; its suffix, ``.nc`` or ``.csv``, decides the format.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    RequestError
-        If the file cannot be written.
-    """
-    with replacing(path) as temporary:
-        if path.suffix == ".nc":
-            write_netcdf(temporary, forecast.assign_attrs({MARK: "forecast"}))
+    out = RichTable(
+        box=box.SIMPLE_HEAD, title=table.title, title_justify="left", padding=(0, 1, 0, 0)
+    )
+    for k, heading in enumerate(table.columns):
+        if k in table.numeric:
+            # A heading may wrap between its words; a number stays on one line.
+            longest = max((len(row[k]) for row in table.rows), default=0)
+            width = max(longest, *map(len, heading.split() or [""]))
+            out.add_column(heading, justify="right", min_width=width, overflow="fold")
         else:
-            # Instants are multiples of a step; nine decimals hide the rounding of the product.
-            time = pd.Index(forecast["time"].values.round(9), name="time [s]")
-            pd.DataFrame(_columns(forecast), index=time).to_csv(temporary)
+            out.add_column(heading, overflow="fold")
+    for k, row in enumerate(table.rows):
+        out.add_row(*row, style="bold" if k in table.averages else None)
+    return out
+
+
+_LATEX = {
+    "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
+    "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
+    "–": "--", "×": r"$\times$", "λ": r"$\lambda$", "ε": r"$\varepsilon$", "τ": r"$\tau$",
+    "−": r"$-$", "η": r"$\eta$", "≥": r"$\ge$", "²": r"$^2$", "±": r"$\pm$", "°": r"$^\circ$",
+    "→": r"$\to$", "σ": r"$\sigma$", "Δ": r"$\Delta$", "√": r"$\surd$", "π": r"$\pi$",
+    "·": r"$\cdot$", "³": r"$^3$", "φ": r"$\varphi$", "θ": r"$\theta$", "ω": r"$\omega$",
+    "<": r"$<$", ">": r"$>$", "T̂": r"$\hat T$", "τ̂": r"$\hat\tau$",
+}  # fmt: skip
+WIDE = 24
+"""Characters of a cell from which on its column may break lines in LaTeX."""
+LINE = 90
+"""Characters, about, that fit beside each other on a page of an article in small type."""
+PAGE = 35
+"""Rows from which on a LaTeX table breaks pages."""
+
+
+def latex_text(text: str) -> str:
+    r"""Text that LaTeX prints as it stands.
+
+    Examples
+    --------
+    >>> latex_text("50 % of λ_max")
+    '50 \\% of $\\lambda$\\_max'
+    """
+    text = re.sub(r"(?<![\w)])-(?=\d)", "−", text.replace("T̂", "\0"))
+    return "".join(_LATEX.get(each, each) for each in text).replace("\0", r"$\hat T$")
+
+
+def write_latex(table: Table, path: Path) -> Path:
+    r"""Write a table as LaTeX with booktabs rules; longer than a page it is a longtable."""
+    caption = rf"\caption{{{latex_text(f'{table.title}. {table.note}'.strip())}}}"
+    label = rf"\label{{tab:{table.name}}}"
+    head = [r"\toprule", _latex_line(table.columns), r"\midrule"]
+    body = []
+    for k, row in enumerate(table.rows):
+        body += [r"\midrule"] * (k in table.averages) + [_latex_line(row)]
+    form = _latex_columns(table)
+    if len(table.rows) > PAGE:
+        lines = [r"\begingroup\small", rf"\begin{{longtable}}{{{form}}}", rf"{caption}{label}\\"]
+        lines += [*head, r"\endfirsthead", *head, r"\endhead", *body, r"\bottomrule"]
+        lines += [r"\end{longtable}", r"\endgroup", ""]
+    else:
+        lines = [r"\begin{table}", r"\centering\small", caption, label]
+        lines += [rf"\begin{{tabular}}{{{form}}}", *head, *body, r"\bottomrule"]
+        lines += [r"\end{tabular}", r"\end{table}", ""]
+    with replacing(path) as temporary:
+        temporary.write_text("\n".join(lines), encoding="utf-8")
     return path
 
 
-def _columns(forecast: xr.Dataset) -> dict[str, npt.NDArray[np.float64]]:
-    columns = {}
-    for name, variable in forecast.data_vars.items():
-        if "time" not in variable.dims:
-            continue
-        units = variable.attrs.get("units", "")
-        for dim, words in (("statistic", "{}"), ("member", "member {}")):
-            if dim in variable.dims:
-                for each in variable[dim].values:
-                    what = "" if each == "mean" else f" {words.format(each)}"
-                    columns[f"{name}{what} [{units}]"] = variable.sel({dim: each}).values
-                break
-        else:
-            columns[f"{name} [{units}]"] = variable.values
-    if forecast.attrs.get("scale") == "full":
-        scale = float(forecast.attrs["scale_factor"])
-        columns["scale_factor"] = np.full(forecast.sizes["time"], scale)
-    return columns
+def _latex_line(cells: Iterable[str]) -> str:
+    return " & ".join(map(latex_text, cells)) + r" \\"
 
 
-def forecast_words(forecast: xr.Dataset) -> str:
-    """What a forecast of an ensemble holds, for a message; empty for a single model's."""
-    if "statistic" in forecast.dims:
-        level = 100.0 * float(forecast.attrs["level"])
-        kept = int(forecast.attrs["members"]) - int(forecast.attrs["diverged"])
-        kind = _kind(str(forecast.attrs.get("band", "members")))
-        return f"mean, std and {level:g} % {kind}band of {kept} members at "
-    return f"{forecast.sizes['member']} members at " if "member" in forecast.dims else ""
+def _latex_columns(table: Table) -> str:
+    """Columns of numbers to the right, of text to the left, of long text in lines that break."""
+    columns: Sequence[Sequence[str]] = list(zip(table.columns, *table.rows, strict=True))
+    longest = [max(map(len, column)) for column in columns]
+    wide = [length for length in longest if length > WIDE]
+    room = 1.0 - sum(length + 2 for length in longest if length <= WIDE) / LINE
+    part = max(room, 0.12 * len(wide)) / max(sum(wide), 1)
+    breaks = sum(longest) > LINE
+    return "".join(
+        rf"p{{{part * length:.2f}\linewidth}}"
+        if breaks and length > WIDE
+        else "lr"[k in table.numeric]
+        for k, length in enumerate(longest)
+    )

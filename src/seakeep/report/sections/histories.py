@@ -1,9 +1,9 @@
-"""Data of the time histories that the report shows interactively, packed small."""
+"""Time histories: figures, and data for the interactive plot, packed small."""
 
 from __future__ import annotations
 
 import base64
-import json
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,31 +11,43 @@ import numpy.typing as npt
 
 from seakeep.conventions import displayed
 from seakeep.report.figures.common import line_of, model_colour, model_words
-from seakeep.report.figures.histories import shown_cells
+from seakeep.report.figures.histories import history_figure, shown_cells
+from seakeep.report.section import Drawing, Section
 from seakeep.report.style import shown_unit
 from seakeep.study import StudyResult
 
-__all__ = ["dashes", "history_data", "pack"]
-
-FloatArray = npt.NDArray[np.float64]
+__all__ = ["explorer", "histories", "history_data", "pack"]
 
 MOST_MEMBERS = 40
 """Members of a cell that are embedded; more cannot be told apart on a screen."""
 MISSING = 65535
 
 
+def explorer(result: StudyResult) -> Section | None:
+    """Return the interactive plot of the cells that are shown."""
+    data = history_data(result)
+    return Section("explore", "Time histories, interactive", histories=data) if data else None
+
+
+def histories(result: StudyResult) -> Section | None:
+    """Return figures of the cells that are shown."""
+    level = 100 * float(result.settings["statistics"]["level"])
+    edges = ", and that band calibrated (dotted)" if result.is_calibrated else ""
+    figures = tuple(
+        Drawing(
+            f"history_{test}_{window:03d}",
+            f"Time histories, {result.label_of(test)}: deviations from the training mean in "
+            "training standard deviations; measured, deterministic forecast, and the ensemble's "
+            f"mean with its {level:g} % band{edges}.",
+            partial(history_figure, result, test, training, window),
+        )
+        for test, training, window in shown_cells(result)
+    )
+    return Section("histories", "Time histories", figures=figures) if figures else None
+
+
 def pack(values: npt.ArrayLike) -> dict[str, Any]:
     """Pack numbers as 16-bit integers between their bounds, base64; NaN has a code of its own.
-
-    Parameters
-    ----------
-    values : array_like
-        Numbers.
-
-    Returns
-    -------
-    dict
-        ``low``, ``high`` and ``data``; a step is 1/65534 of the range.
 
     Examples
     --------
@@ -52,33 +64,9 @@ def pack(values: npt.ArrayLike) -> dict[str, Any]:
     return {"low": low, "high": high, "data": base64.b64encode(codes.tobytes()).decode()}
 
 
-def dashes(style: str | tuple[int, tuple[float, ...]]) -> list[float]:
-    """Dashes and gaps of a line of :data:`seakeep.report.style.LINES`, in line widths.
-
-    Examples
-    --------
-    >>> dashes("-"), dashes((0, (4, 1.5)))
-    ([], [4, 1.5])
-    """
-    return [] if isinstance(style, str) else list(style[1])
-
-
-def history_data(result: StudyResult) -> str:
-    """JSON of the cells that are shown, safe inside a script element.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-
-    Returns
-    -------
-    str
-        A list of cells: labels, time step, and for each channel the measurement and each model's
-        mean, band and members.
-    """
-    cells = [_cell(result, *place) for place in shown_cells(result)]
-    return json.dumps(cells, separators=(",", ":")).replace("<", "\\u003c")
+def history_data(result: StudyResult) -> list[dict[str, Any]]:
+    """Cells that are shown: labels, time step, and per channel measurement and forecasts."""
+    return [_cell(result, *place) for place in shown_cells(result)]
 
 
 def _cell(result: StudyResult, test: str, training: int, window: int) -> dict[str, Any]:
@@ -107,11 +95,11 @@ def _channel(
     models = []
     for model in result.models:
         ensemble = result.is_ensemble(model)
+        style = line_of(result, model)["linestyle"]
         entry: dict[str, Any] = {
-            "name": model,
             "label": f"{model_words(model)} mean" if ensemble else model_words(model),
             "colour": model_colour(result, model),
-            "dash": dashes(line_of(result, model)["linestyle"]),
+            "dash": [] if isinstance(style, str) else list(style[1]),
             "mean": pack(factor * cell[f"{model}_mean"].values[:, column]),
         }
         if ensemble:

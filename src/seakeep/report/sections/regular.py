@@ -9,10 +9,12 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.report.figures.common import model_words
-from seakeep.report.study_tables import MISSING, ReportTable, conditional, number
+from seakeep.report.section import Section
+from seakeep.report.sections.summary import conditional
+from seakeep.report.tables import Table, number, signed
 from seakeep.study import StudyResult
 
-__all__ = ["response_table", "response_words"]
+__all__ = ["regular", "response_words"]
 
 LARGE = 0.5
 """NRMSE from which on the words look for a cause."""
@@ -24,47 +26,25 @@ SELDOM = 0.01
 """Part of a run's samples below which a slack line is not worth a word."""
 
 
-def _response(result: StudyResult, test: str) -> xr.Dataset | None:
-    return result.groups.get(f"statistics/response/{test}")
-
-
-def signed(value: float, digits: int) -> str:
-    """Text of a number with its sign, where anything of it is left after rounding.
-
-    Examples
-    --------
-    >>> signed(1.4, 0), signed(-0.04, 1), signed(-0.06, 1)
-    ('+1', '0.0', '-0.1')
-    """
-    text = number(value, digits)
-    if text == MISSING or float(text) == 0.0:
-        return text.removeprefix("-")
-    return text if value < 0 else f"+{text}"
-
-
-def response_table(result: StudyResult, test: str) -> ReportTable | None:
-    """Error of a test set in regular waves, taken apart channel by channel.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-    test : str
-        Test set.
-
-    Returns
-    -------
-    ReportTable or None
-        None where the set's waves are not regular.
-    """
-    data = _response(result, test)
-    if data is None:
+def regular(result: StudyResult) -> Section | None:
+    """Return the errors in regular waves, taken apart."""
+    tests = [test for test in result.tests if f"statistics/response/{test}" in result.groups]
+    if not tests:
         return None
+    return Section(
+        "regular",
+        "Regular waves: where the error comes from",
+        words=tuple(response_words(result, test) for test in tests),
+        tables=tuple(_table(result, test) for test in tests),
+    )
+
+
+def _table(result: StudyResult, test: str) -> Table:
+    data = result.groups[f"statistics/response/{test}"]
     rows = []
     for name in result.channels:
         for model in result.models:
             at = data.sel(channel=name, model=model)
-            lead = float(at["phase_lead"])
             rows.append(
                 (
                     result.words_of(name),
@@ -73,10 +53,10 @@ def response_table(result: StudyResult, test: str) -> ReportTable | None:
                     signed(float(at["mean_shift"]), 2),
                     *(number(float(at[f"error_{key}"]), 2) for key in ("offset", "wave", "rest")),
                     number(float(at["amplitude_ratio"]), 2),
-                    signed(lead, 0),
+                    signed(float(at["phase_lead"]), 0),
                 )
             )
-    return ReportTable(
+    return Table(
         f"response_{test}",
         f"Error taken apart, {result.label_of(test)} ({data.attrs['frequency']:.3f} Hz)",
         (
@@ -92,28 +72,9 @@ def response_table(result: StudyResult, test: str) -> ReportTable | None:
     )  # fmt: skip
 
 
-def response_words(result: StudyResult) -> list[str]:
-    """Why the error in regular waves is what it is, as far as the numbers tell.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-
-    Returns
-    -------
-    list of str
-        A paragraph a test set of regular waves.
-    """
-    said = []
-    for test in result.tests:
-        data = _response(result, test)
-        if data is not None:
-            said.append(_words(result, test, data))
-    return said
-
-
-def _words(result: StudyResult, test: str, data: xr.Dataset) -> str:
+def response_words(result: StudyResult, test: str) -> str:
+    """Why the error in regular waves is what it is, as far as the numbers tell."""
+    data = result.groups[f"statistics/response/{test}"]
     label, model = result.label_of(test), result.models[0]
     at, facts = data.sel(model=model), data.attrs
     words = [f"{label[:1].upper() + label[1:]}, {facts['frequency']:.3f} Hz:"]
@@ -148,8 +109,8 @@ def _slack_words(result: StudyResult, test: str) -> list[str]:
         return []
     return [
         f"Slack line: {', '.join(listed)} of a run's samples (a load below 0.1 % of the largest). "
-        "A line that loses its load does not answer linearly, and where it is slack throughout "
-        "only noise is left: offset, amplitude ratio and phase lead say little of such a load."
+        "A slack line does not respond linearly. Where it is slack throughout, only noise is left: "
+        "offset, amplitude ratio and phase lead say little of such a load."
     ]
 
 
@@ -201,10 +162,11 @@ def _drift_words(result: StudyResult, at: xr.Dataset, names: list[str]) -> str:
     off = abs(np.log(expected / part["error_offset"])) > np.log(FITS)
     away = [str(name) for name in part["channel"].values[off.values]]
     if len(away) < len(names):
-        which = "" if not away else f" in {_listed(result, [n for n in names if n not in away])}"
+        near = ", ".join(result.words_of(name) for name in names if name not in away)
         said.append(
             "A linear model falls back to its training mean, and steady drift grows with the "
-            f"square of the waves: that accounts for the offset{which} within a factor of {FITS:g}."
+            f"square of the waves: that accounts for the offset{f' in {near}' if away else ''} "
+            f"within a factor of {FITS:g}."
         )
     if away:
         numbers = ", ".join(
@@ -215,7 +177,3 @@ def _drift_words(result: StudyResult, at: xr.Dataset, names: list[str]) -> str:
             f"{numbers}: that does not account for what was found."
         )
     return " ".join(said)
-
-
-def _listed(result: StudyResult, names: list[str]) -> str:
-    return ", ".join(map(result.words_of, names))

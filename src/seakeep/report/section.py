@@ -1,0 +1,73 @@
+"""What a page is made of: sections of words, figures and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from seakeep.report.tables import Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Drawing", "Section"]
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure that is drawn when the page is written.
+
+    Parameters
+    ----------
+    name : str
+        Name of its files.
+    caption : str
+        What it shows.
+    draw : callable
+        Draws it.
+    raster : bool, optional
+        Too many points for vectors: PNG alone, folded away on the page until it is wanted.
+    """
+
+    name: str
+    caption: str
+    draw: Callable[[], Figure]
+    raster: bool = False
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of a report, in the order in which a page shows its parts.
+
+    Parameters
+    ----------
+    key : str
+        Name of its place on the page.
+    title : str
+        Heading.
+    points : sequence of str
+        Results, as a list.
+    notices : sequence of str
+        Paragraphs that stand out.
+    terms : sequence of (str, str)
+        Words and what they mean.
+    words : sequence of str
+        Paragraphs.
+    histories : list of dict, optional
+        Data of an interactive plot, from :func:`seakeep.report.sections.histories.history_data`.
+    figures : sequence of Drawing
+        Figures.
+    tables : sequence of Table
+        Tables.
+    """
+
+    key: str
+    title: str
+    points: tuple[str, ...] = ()
+    notices: tuple[str, ...] = ()
+    terms: tuple[tuple[str, str], ...] = ()
+    words: tuple[str, ...] = ()
+    histories: list[dict[str, Any]] | None = None
+    figures: tuple[Drawing, ...] = ()
+    tables: tuple[Table, ...] = ()

@@ -1,0 +1,28 @@
+"""Sections of a study's report: each is a function of the result; here is their order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from seakeep.report.section import Section
+from seakeep.report.sections import data, errors, histories, judgements, regular, settings, summary
+from seakeep.study import StudyResult
+
+__all__ = ["SECTIONS"]
+
+SECTIONS: list[Callable[[StudyResult], Section | None]] = [
+    summary.summary,
+    errors.errors,
+    regular.regular,
+    histories.explorer,
+    histories.histories,
+    judgements.age,
+    judgements.coverage,
+    judgements.densities,
+    judgements.members,
+    data.waves,
+    data.data,
+    settings.settings,
+    settings.versions,
+]
+"""A section is one function here; where it has nothing to show it returns None."""

@@ -1,0 +1,151 @@
+"""What the study was made of: waves, channels and signs, quality of the runs, clocks."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from seakeep.quality import findings_of
+from seakeep.report.figures.spectra import spectrum_figure
+from seakeep.report.quality_sheet import channel_rows, clock_rows, quality_figure
+from seakeep.report.section import Drawing, Section
+from seakeep.report.style import shown_unit
+from seakeep.report.tables import Table
+from seakeep.study import StudyResult
+
+__all__ = ["data", "waves"]
+
+
+def waves(result: StudyResult) -> Section | None:
+    """Return the spectra of the waves."""
+    if "spectra" not in result.groups:
+        return None
+    regular = bool(np.isfinite(result.groups["runs"]["wave_frequency"].values).any())
+    figure = Drawing(
+        "spectrum",
+        "Power spectral density of the wave elevation: nominal where it is known, and measured "
+        "(mean over the irregular runs, or over all where none is) with the paper's Welch segments "
+        "and with long ones." + (" Vertical lines: the regular waves." if regular else ""),
+        partial(spectrum_figure, result),
+    )
+    return Section("waves", "Waves", figures=(figure,))
+
+
+def data(result: StudyResult) -> Section:
+    """Return channels, and what preparation found in each run."""
+    figures = tuple(
+        Drawing(
+            f"quality_{name}",
+            f"All channels of {name} after preparation, flagged samples marked; "
+            "tinted: a channel in which something was found.",
+            partial(quality_figure, run, {}),
+            raster=True,
+        )
+        for name, run in result.prepared.items()
+    )
+    tables = [_sign_table(result), _run_table(result)]
+    tables += [clocks] if (clocks := _clock_table(result)) is not None else []
+    tables += [_quality_table(result, name) for name in result.prepared]
+    return Section("data", "Data", figures=figures, tables=tuple(tables))
+
+
+def _sign_table(result: StudyResult) -> Table:
+    channels = result.groups["channels"]
+    rows = []
+    for name in map(str, channels["name"].values):
+        at = {
+            k: str(channels[k].sel(name=name).values)
+            for k in ("use", "units", "positive", "source")
+        }
+        row = (at["use"], shown_unit(at["units"]), at["positive"], at["source"])
+        rows.append((result.words_of(name), *row))
+    frame = str(channels.attrs.get("frame", ""))
+    return Table(
+        "signs",
+        "Channels and signs",
+        ("channel", "use", "unit", "positive", "source"),
+        tuple(rows),
+        f"Frame: {frame}." if frame else "",
+    )
+
+
+def _run_table(result: StudyResult) -> Table:
+    runs, rows = result.groups["runs"], []
+    for name, run in result.prepared.items():
+        found = findings_of(run)
+        others = [
+            f"{each.channel}: {each.text}" for each in found if each.channel not in run.data_vars
+        ]
+        words = dict.fromkeys(f"{each.channel.replace('_', ' ')} ({each.kind.word})" for each in found)
+        rows.append(
+            (
+                name,
+                str(runs["sea_state"].sel(run=name).values),
+                f"{float(run['time'][0]):.2f} to {float(run['time'][-1]):.2f} s",
+                str(len(found)),
+                ", ".join(words) or "none",
+                "; ".join(others),
+            )
+        )
+    return Table(
+        "runs",
+        "Data quality of the runs, as preparation found it",
+        ("run", "sea state", "part used", "findings", "channel (kind)", "findings of loggers"),
+        tuple(rows),
+        "Checks flag and report; nothing is repaired unless the campaign asks for it, and what was "
+        "repaired is in the tables below. A finding concerns the whole record, the part that is "
+        "cut off too.",
+        (3,),
+    )
+
+
+def _clock_table(result: StudyResult) -> Table | None:
+    rows = [(n, *row) for n, run in result.prepared.items() for row in clock_rows(run)]
+    if not rows:
+        return None
+    return Table(
+        "clocks",
+        "Clocks of the loggers against the reference",
+        ("run", "logger", "offset", "drift", "from"),
+        tuple(rows),
+        "Offset: what the logger's clock reads when the reference reads zero. n: pulses, windows "
+        "or samples that it rests on. ±: one standard error.",
+        folded=True,
+    )
+
+
+def _quality_table(result: StudyResult, name: str) -> Table:
+    """Data quality of all channels of a run, those that the study does not use too."""
+    runs, used = result.groups["runs"], set(result.groups["runs"]["name"].values)
+    rows = []
+    for each in channel_rows(result.prepared[name]):
+        frozen = slack = ""
+        if each.channel in used:
+            at = runs.sel(run=name, name=each.channel)
+            frozen = f"{100 * float(at['constant']):.2f}"
+            part = float(at["slack"])
+            slack = f"{100 * part:.1f}" if np.isfinite(part) else ""
+        low, high, mean, spread = (f"{value:.4g}" for value in each.numbers)
+        row = (
+            each.words,
+            "yes" if each.channel in used else "",
+            each.unit,
+            mean,
+            spread,
+            low,
+            high,
+        )
+        rows.append((*row, frozen, slack, each.flagged, "; ".join(each.found)))
+    return Table(
+        f"quality_{name}",
+        f"Data quality of {name}, channel by channel (SI units)",
+        ("channel", "used", "unit", "mean", "SD", "min", "max", "frozen %", "slack %", "flagged",
+         "found, and done about it"),
+        tuple(rows),
+        "After preparation; no value that the study uses is missing, or it would have refused the "
+        "run. Frozen: samples equal to both neighbours. Slack: a load below 0.1 % of its largest. "
+        "Flagged: part of the samples.",
+        (3, 4, 5, 6, 7, 8),
+        folded=True,
+    )  # fmt: skip

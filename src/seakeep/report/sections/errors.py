@@ -1,0 +1,83 @@
+"""Errors of all cells: averages, and channel by channel."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from seakeep.report.figures.boxes import FEWEST, average_boxes, channel_boxes
+from seakeep.report.figures.common import HEADING, model_words
+from seakeep.report.section import Drawing, Section
+from seakeep.report.sections.summary import conditional
+from seakeep.report.tables import Table, number
+from seakeep.study import StudyResult
+
+__all__ = ["error_table", "errors"]
+
+BOX = (
+    "Boxes: quartiles; whiskers: furthest values within 1.5 inter-quartile ranges; violins: "
+    f"density, from {FEWEST} cells on; dots: single cells, outliers included."
+)
+
+
+def errors(result: StudyResult) -> Section:
+    """Return the errors of every model in every test set."""
+    tests = list(result.tests)
+    groups = [tests[:1], tests[1:]] if len(tests) <= 9 else [tests]
+    averages = [
+        Drawing(
+            f"errors_{group[0] if len(group) == 1 else 'others'}",
+            f"ANRMSE and NAMMAE of all cells ({', '.join(map(result.label_of, group))}). {BOX}",
+            partial(average_boxes, result, group),
+        )
+        for group in groups
+        if group
+    ]
+    channels = [
+        Drawing(
+            f"errors_{test}_by_channel",
+            f"NRMSE and NAMMAE channel by channel, {result.label_of(test)}. {BOX}",
+            partial(channel_boxes, result, test),
+        )
+        for test in tests
+    ]
+    tables = tuple(error_table(result, test) for test in tests)
+    return Section("errors", "Errors", figures=(*averages, *channels), tables=tables)
+
+
+def error_table(result: StudyResult, test: str) -> Table:
+    """Medians and inter-quartile ranges of both measures, average and per channel."""
+    boxes = result.groups[f"statistics/boxes/{test}"]
+    columns = ["channel"]
+    for measure in HEADING:
+        columns += [f"{measure.upper()} {model_words(m)}: median [IQR]" for m in result.models]
+    rows, left_out = [], 0
+    names = [str(name) for name in boxes["channel"].values]
+    for name in [*names[1:], names[0]]:
+        row = ["average" if name == "average" else result.words_of(name)]
+        for measure in HEADING:
+            for model in result.models:
+                at = boxes.sel(model=model, measure=measure, channel=name)
+                spread = float(at["upper_quartile"] - at["lower_quartile"])
+                row.append(f"{number(float(at['median']))} [{number(spread)}]")
+                left_out += int(at["left_out"]) if measure == "nrmse" else 0
+        rows.append(tuple(row))
+    note = (
+        f"Over {int(result.tests[test]['judged'].sum())} cells (training set × test window). "
+        "Errors in measured standard deviations of the window, k = 1. The average row is the "
+        "paper's ANRMSE and NAMMAE: the average of each cell over its channels, then the median "
+        "over the cells."
+    )
+    if left_out:
+        note += (
+            f" {left_out} values were left out: a channel whose measured SD is below 1 % of its "
+            "training SD (a slack line) is not judged, nor is a forecast that diverged."
+        )
+    return Table(
+        f"errors_{test}",
+        f"ANRMSE and NAMMAE, {result.label_of(test)}",
+        tuple(columns),
+        tuple(rows),
+        note + conditional(result),
+        tuple(range(1, len(columns))),
+        averages=(len(rows) - 1,),
+    )

@@ -1,0 +1,268 @@
+"""Beyond one number per cell: age of a forecast, band, densities, members."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from seakeep.report.figures.common import model_words
+from seakeep.report.figures.densities import density_figure
+from seakeep.report.figures.eigenvalues import LOWEST, eigenvalue_figure
+from seakeep.report.figures.errors import BAND_WORDS, error_over_time_figure, hyperparameter_figure
+from seakeep.report.section import Drawing, Section
+from seakeep.report.sections.summary import conditional
+from seakeep.report.tables import MISSING, Table, number, probability, small_number
+from seakeep.study import StudyResult
+from seakeep.study.judge import VARIANTS
+
+__all__ = ["age", "coverage", "coverage_table", "densities", "divergence_table", "members"]
+
+PUBLISHED = {
+    "surge": "0.0026",
+    "heave": "0.0031",
+    "pitch": "0.0035",
+    "surge_rate": "0.0021",
+    "heave_rate": "0.0036",
+    "pitch_rate": "0.0041",
+    "surge_acceleration": "0.0045",
+    "heave_acceleration": "0.0071",
+    "pitch_acceleration": "0.0086",
+    "mooring_bow": "0.0186",
+    "mooring_stern": "0.0274",
+    "average": "0.0077 [0.0040, 0.0139]",
+}
+"""Expected value of the divergence that the paper publishes: BHDMDc, CK-14e in irregular waves.
+
+They come from another vessel in another tank; they are for orientation, and nothing is tuned to
+them.
+"""
+
+
+def _ensembles(result: StudyResult) -> list[str]:
+    return [model for model in result.models if result.is_ensemble(model)]
+
+
+def age(result: StudyResult) -> Section:
+    """Return the error over the age of a forecast."""
+    split = float(result.settings["statistics"]["split_period"])
+    figure = Drawing(
+        "error_over_time",
+        "ε(t): mean over all cells (lines) and quartiles (shaded), with the p-value of its trend "
+        f"test; the error as a whole, and parted at a period of {split:g} T̂ into slow drift and "
+        "waves. Each row has its own scale.",
+        partial(error_over_time_figure, result),
+    )
+    title = "Error over the age of a forecast"
+    return Section("time", title, figures=(figure,), tables=(_trend_table(result),))
+
+
+def _trend_table(result: StudyResult) -> Table:
+    rows = []
+    for test in result.tests:
+        data: xr.Dataset = result.groups[f"statistics/trend/{test}"]
+        for band, words in BAND_WORDS.items():
+            for model in result.models:
+                at = data.sel(model=model, band=band)
+                interval = ", ".join(small_number(float(at[key])) for key in ("lower", "upper"))
+                rows.append(
+                    (
+                        result.label_of(test),
+                        words,
+                        model_words(model),
+                        number(float(at["error_mean"].mean())),
+                        number(float(at["change"])),
+                        f"{small_number(float(at['slope']))} [{interval}]",
+                        number(float(at["kendall_tau"]), 2),
+                        probability(float(at["p_value"])),
+                    )
+                )
+    period = float(result.settings["statistics"]["split_period"])
+    seconds = period * float(result.attrs["encounter_period"])
+    return Table(
+        "trend",
+        "Trend of ε(t), whole and in bands",
+        (
+            "test set", "band", "model", "mean ε", "change over the window",
+            "slope [1/s] with 95 %", "Kendall's τ", "p",
+        ),
+        tuple(rows),
+        "Block-bootstrap Mann–Kendall test of ε(t) averaged over all cells. A p below 0.05 says "
+        "that the error changes with the age of the forecast; blocks break some of the "
+        "dependence, so slow series are called trends too often (10 to 15 %). The error is parted "
+        f"at a period of {period:g} T̂ ({seconds:.2f} s) into slow drift and waves; both are "
+        "counted in SDs of the whole measured channel." + conditional(result),
+        (3, 4, 5, 6, 7),
+    )  # fmt: skip
+
+
+def coverage(result: StudyResult) -> Section | None:
+    """Return coverage and width of the bands of ensembles."""
+    tables = tuple(
+        coverage_table(result, model, calibrated)
+        for model in _ensembles(result)
+        for calibrated in (False, True)
+        if not calibrated or f"calibration/{model}" in result.groups
+    )
+    return Section("coverage", "Coverage of the band", tables=tables) if tables else None
+
+
+def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> Table:
+    """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
+    prefix, words = ("calibrated_", "calibrated ") if calibrated else ("", "")
+    columns = ["channel"]
+    groups = {t: result.groups[f"statistics/coverage/{t}"].sel(model=model) for t in result.tests}
+    true = any("truth" in data["against"].values for data in groups.values())
+    for test in groups:
+        columns.append(f"{result.label_of(test)}: inside" + (" [of the truth]" if true else ""))
+        columns.append(f"{result.label_of(test)}: width [SD]")
+    rows = []
+    for name in [*result.channels, "average"]:
+        row = ["average" if name == "average" else result.words_of(name)]
+        for data in groups.values():
+            at = data.sel(channel=name)
+            first, *others = (number(float(v), 2) for v in at[f"{prefix}inside"].values)
+            row.append(first + "".join(f" [{each}]" for each in others))
+            width = at[f"{prefix}relative_width"].sel(against="measured")
+            row.append(number(float(width), 2))
+        rows.append(tuple(row))
+    level = float(result.settings["statistics"]["level"])
+    note = (
+        f"Part of the measured instants inside the band of nominally {level:g} (quantiles of the "
+        "members), and its mean width in measured SD; means over all cells."
+    )
+    if calibrated:
+        note += (
+            " Calibrated: these quantiles, moved outwards by a margin found on training data that "
+            "the members had not read, in windows as long as the first test set's. "
+            + _other_lengths(result)
+            + _calibrated_on(result.groups[f"calibration/{model}"], level)
+            + "The margin warrants nothing in a sea of another kind."
+        )
+    if true:
+        note += (
+            " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
+            "slap; rates are not filtered."
+        )
+    return Table(
+        f"coverage_{prefix}{model}",
+        f"Coverage of the {words}{100 * level:g} % band, {model_words(model)}",
+        tuple(columns),
+        tuple(rows),
+        note + conditional(result),
+        tuple(range(1, len(columns))),
+        averages=(len(rows) - 1,),
+    )
+
+
+def _other_lengths(result: StudyResult) -> str:
+    """Sentence on test sets whose windows are not as long as those that the margin is for."""
+    lengths = {test: float(each["length"]) for test, each in result.settings["tests"].items()}
+    first = next(iter(result.tests))
+    others = [
+        f"{result.label_of(test)} ({lengths[test]:g} T̂)"
+        for test in result.tests
+        if lengths[test] != lengths[first]
+    ]
+    if not others:
+        return ""
+    return f"Those are {lengths[first]:g} T̂ long; the margin is not made for {', '.join(others)}. "
+
+
+def _calibrated_on(found: xr.Dataset, level: float) -> str:
+    """Sentence on how much the calibration of a study rests on."""
+    windows = found["windows"].values
+    if not windows.all():
+        return "Some training sets hold no such window. "
+    said = (
+        f"A training set had {_range_of(windows)} of them; allowing for their dependence, their "
+        f"scores are worth {_range_of(found['blocks'].values)} independent ones. "
+    )
+    warranted = float(found["warranted"].min())
+    if warranted < level:
+        said += f"Of some channels that is too few: {warranted:.2f} is warranted there. "
+    return said
+
+
+def _range_of(values: np.ndarray[Any, Any]) -> str:
+    low, high = (f"{float(each):.0f}" for each in (values.min(), values.max()))
+    return low if low == high else f"{low} to {high}"
+
+
+def densities(result: StudyResult) -> Section:
+    """Return densities of measurement and forecasts, and their divergence."""
+    ensembles = _ensembles(result)
+    figures = tuple(
+        Drawing(
+            f"densities_{model}",
+            f"Densities of measurement and {model_words(model)} forecast with the 95 % bands of "
+            "their moving-block bootstrap (paper's settings); area 1 each, no common height.",
+            partial(density_figure, result, model),
+        )
+        for model in (ensembles or result.models[:1])
+    )
+    order = sorted(result.models, key=lambda model: model not in ensembles)
+    tables = tuple(divergence_table(result, m, variant) for m in order for variant in VARIANTS)
+    return Section("densities", "Densities and their divergence", figures=figures, tables=tables)
+
+
+def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
+    """Jensen–Shannon divergence per channel beside its noise floor and, if asked, the paper's."""
+    data = result.groups["statistics/divergence"]
+    at = data.sel(model=model, variant=variant)
+    numbers = ("mean", "lower", "upper", "uncertainty", "noise_floor")
+    comparable = result.is_ensemble(model) and result.shows_paper
+    rows = []
+    for name in result.channels:
+        one = at.sel(channel=name)
+        block = float(one["block_length"])
+        row = [result.words_of(name), *(small_number(float(one[key])) for key in numbers)]
+        row.append(f"{block:.0f}" if np.isfinite(block) else MISSING)
+        rows.append((*row, *[PUBLISHED.get(name, MISSING)] * comparable))
+    means = [small_number(float(at[key].mean())) for key in numbers]
+    rows.append(("average", *means, "", *[PUBLISHED["average"]] * comparable))
+    columns = ("channel", "EV", "q0.025", "q0.975", "U", "noise floor", "block (samples)")
+    test = result.label_of(str(data.attrs["test"]))
+    how = "blocks may cross joins, block length and bandwidth as printed in the paper"
+    if variant == "recommended":
+        how = "no block crosses a join, Politis–White blocks, Silverman's bandwidth"
+    return Table(
+        f"jsd_{model}_{variant}",
+        f"Divergence of the densities, {model_words(model)}, {test}: {variant} variant",
+        (*columns, *["paper: EV, another data set"] * comparable),
+        tuple(rows),
+        f"Nats, 0 to ln 2; {how}. The noise floor is the divergence of the measurement from "
+        "itself under two independent bootstraps: what a record of this length cannot tell from "
+        "none." + conditional(result),
+        tuple(range(1, len(columns) + int(comparable))),
+        elsewhere=(len(columns),) if comparable else (),
+        averages=(len(rows) - 1,),
+    )
+
+
+def members(result: StudyResult) -> Section | None:
+    """Return errors of the members of ensembles over what was drawn, and eigenvalues."""
+    figures = [
+        Drawing(
+            f"hyperparameters_{model}",
+            f"Median ANRMSE of each member of the {model_words(model)} ensemble over all cells, "
+            "against what was drawn for it, with Spearman's rank correlation.",
+            partial(hyperparameter_figure, result, model),
+        )
+        for model in _ensembles(result)
+    ]
+    if any(name.startswith("eigenvalues/") for name in result.groups):
+        figures.append(
+            Drawing(
+                "eigenvalues",
+                "Eigenvalues of the models of the first training set: upper half of the complex "
+                "plane, and modulus against frequency. A modulus of 1 neither grows nor decays; "
+                f"those below {LOWEST:g} are left out on the right.",
+                partial(eigenvalue_figure, result),
+            )
+        )
+    return (
+        Section("members", "Members of the ensemble", figures=tuple(figures)) if figures else None
+    )

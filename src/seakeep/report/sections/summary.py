@@ -1,0 +1,228 @@
+"""What came out, in sentences, with the words and symbols of the report."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from seakeep.conventions import canonical_channel
+from seakeep.report.figures.boxes import FEWEST
+from seakeep.report.figures.common import HEADING, model_words
+from seakeep.report.section import Section
+from seakeep.report.sections.settings import test_overlap, training_overlap, unequal_training
+from seakeep.report.tables import Table, number
+from seakeep.study import StudyResult
+
+__all__ = ["findings", "overview_table", "summary"]
+
+
+def summary(result: StudyResult) -> Section:
+    """Return the summary of a study."""
+    shares, words = training_overlap(result)
+    condition = str(result.attrs.get("conditional_on", ""))
+    notices = [
+        str(result.attrs.get("preparation_note", "")),
+        _few_cells(result),
+        words if shares else "",
+        test_overlap(result),
+        f"Every number here is conditional on measured {condition}: the alignment of the waves "
+        "reads it after the start of a forecast. It is no forecast in the strict sense."
+        if condition
+        else "",
+    ]
+    return Section(
+        "summary",
+        "What came out",
+        points=tuple(findings(result)),
+        notices=tuple(filter(None, notices)),
+        terms=tuple(_glossary(result)),
+        tables=(overview_table(result),),
+    )
+
+
+def overview_table(result: StudyResult) -> Table:
+    """Both measures of each model in each test set, averages over the channels."""
+    rows = []
+    for test in result.tests:
+        boxes = result.groups[f"statistics/boxes/{test}"].sel(channel="average")
+        for model in result.models:
+            row = [result.label_of(test), model_words(model)]
+            for measure in HEADING:
+                at = boxes.sel(model=model, measure=measure)
+                spread = float(at["upper_quartile"] - at["lower_quartile"])
+                row += [number(float(at["median"])), number(spread)]
+            count = boxes.sel(model=model, measure="nrmse")["count"]
+            rows.append((*row, str(int(count))))
+    heads = [f"{words} {k}" for words in HEADING.values() for k in ("median", "IQR")]
+    return Table(
+        "overview",
+        "ANRMSE and NAMMAE",
+        ("test set", "model", *heads, "cells"),
+        tuple(rows),
+        "Medians and inter-quartile ranges over all cells (training set × test window) of the "
+        "average over the channels that are judged; in measured standard deviations."
+        + conditional(result),
+        (2, 3, 4, 5, 6),
+    )
+
+
+def conditional(result: StudyResult) -> str:
+    """Sentence for tables whose forecasts read a measured output after the start."""
+    words = str(result.attrs.get("conditional_on", ""))
+    return f" Conditional on measured {words}." if words else ""
+
+
+def findings(result: StudyResult) -> list[str]:
+    """What came out, sentence by sentence, whichever way it came out."""
+    said = []
+    singles = [m for m in result.models if not result.is_ensemble(m)]
+    ensembles = [m for m in result.models if result.is_ensemble(m)]
+    for test in result.tests:
+        boxes = result.groups[f"statistics/boxes/{test}"].sel(channel="average")
+        parts = []
+        for measure, heading in HEADING.items():
+            at = boxes["median"].sel(measure=measure)
+            medians = {m: float(at.sel(model=m)) for m in result.models}
+            listed = ", ".join(f"{model_words(m)} {v:.3f}" for m, v in medians.items())
+            verdict = ""
+            if singles and ensembles:
+                verdict = _verdict(medians[singles[0]], medians[ensembles[0]])
+            parts.append(f"median {heading} {listed}{verdict}")
+        label = result.label_of(test)
+        said.append(f"{label[:1].upper()}{label[1:]}: {'; '.join(parts)}.")
+    said += [unequal] if (unequal := unequal_training(result)) else []
+    for model in ensembles:
+        said += _coverage_findings(result, model)
+    return said + _fewer_windows(result)
+
+
+def _verdict(single: float, ensemble: float) -> str:
+    def percent(part: float) -> str:
+        return "less than 1 %" if part < 0.005 else f"{100 * part:.0f} %"
+
+    if not np.isfinite(single + ensemble):
+        return ""
+    if ensemble < single:
+        return f" (the ensemble's mean is better by {percent(1 - ensemble / single)})"
+    return (
+        " (the ensemble does not beat the deterministic model: it is worse by "
+        f"{percent(ensemble / single - 1)})"
+    )
+
+
+def _coverage_findings(result: StudyResult, model: str) -> list[str]:
+    first = next(iter(result.tests))
+    level = float(result.settings["statistics"]["level"])
+    table = result.groups[f"statistics/coverage/{first}"].sel(model=model, against="measured")
+    row = table.sel(channel="average")
+    inside = float(row["inside"])
+    words = "which is what it claims"
+    if abs(inside - level) > 0.05:
+        words = "far too little" if inside < level - 0.2 else "not what it claims"
+    calibrated = ""
+    if "calibrated_inside" in row and np.isfinite(row["calibrated_inside"]):
+        calibrated = (
+            f" Calibrated on training data it holds {100 * float(row['calibrated_inside']):.0f} %, "
+            f"{float(row['calibrated_relative_width']):.2g} measured SD wide instead of "
+            f"{float(row['relative_width']):.2g}."
+        )
+    lost = int(sum((test[f"{model}_lost"] >= 0).sum() for test in result.tests.values()))
+    total = int(sum((test[f"{model}_lost"] >= -1).sum() for test in result.tests.values()))
+    return [
+        f"The {100 * level:g} % band of the {model_words(model)} model holds "
+        f"{100 * inside:.0f} % of the measured instants of {result.label_of(first)}, {words}: "
+        f"it carries the spread of the hyperparameters, and no noise or model error.{calibrated}",
+        f"{lost} of {total} member forecasts diverged and were left out of mean and band.",
+    ]
+
+
+def _fewer_windows(result: StudyResult) -> list[str]:
+    """Say of which windows, placed without overlap, fewer fit than were asked for."""
+    settings = result.settings
+    places = {
+        f"test windows of {result.label_of(name)}": (settings["tests"][name], data.sizes["window"])
+        for name, data in result.tests.items()
+    }
+    if settings["training"]["scheme"] == "halves":
+        used = result.groups["training"].sizes["training"]
+        places = {"training windows": (settings["training"], used), **places}
+    return [
+        f"{used} {what} were used of the {each['windows']} asked for: no more fit without overlap."
+        for what, (each, used) in places.items()
+        if each["windows"] is not None and used < each["windows"]
+    ]
+
+
+def _few_cells(result: StudyResult) -> str:
+    """Sentence where a test set has too few cells for its statistics; else empty."""
+    counts = {test: int(data["judged"].sum()) for test, data in result.tests.items()}
+    small = [f"{result.label_of(test)}: n = {n}" for test, n in counts.items() if n < FEWEST]
+    if not small:
+        return ""
+    return (
+        f"Few cells ({'; '.join(small)}): medians, quartiles and differences between models say "
+        f"little below about {FEWEST}. Ask for more training or test windows before a conclusion."
+    )
+
+
+_LETTERS = {r"\theta": "θ", r"\phi": "φ", r"\psi": "ψ", r"\eta": "η"}
+_ACCENTS = {"dot": "\N{COMBINING DOT ABOVE}", "ddot": "\N{COMBINING DIAERESIS}"}
+
+
+def plain_symbol(channel: str) -> str:
+    """Symbol of a channel as figures print it, in plain letters; its name where it has none.
+
+    Examples
+    --------
+    >>> plain_symbol("mooring_bow"), plain_symbol("heave"), plain_symbol("torque")
+    ('M_bow', 'z', 'torque')
+    """
+    known = canonical_channel(channel)
+    if known is None:
+        return channel.replace("_", " ")
+    text = re.sub(r"\\mathrm\{([^}]*)\}|\\mathrm ?(\w+)", r"\1\2", known.symbol)
+    for tex, letter in _LETTERS.items():
+        text = text.replace(tex, letter)
+    return re.sub(r"\\(d?dot)\{(\w)\}", lambda m: m[2] + _ACCENTS[m[1]], text)
+
+
+def _explained(result: StudyResult, channel: str) -> str:
+    """Symbol and words of a channel; once where they are the same."""
+    symbol, words = plain_symbol(channel), result.words_of(channel)
+    return words if symbol == words else f"{symbol} {words}"
+
+
+def _glossary(result: StudyResult) -> list[tuple[str, str]]:
+    """Terms and symbols with what they mean."""
+    period = float(result.attrs["encounter_period"])
+    symbols = "; ".join(_explained(result, name) for name in result.channels)
+    loads = any(name.startswith("mooring_") for name in result.channels)
+    regular = any(f"statistics/response/{test}" in result.groups for test in result.tests)
+    same = (
+        " It is that of the irregular sea and counts lengths in regular waves too: 5 T̂ may hold "
+        "more or fewer than five regular waves."
+    )
+    terms = [
+        ("cell", "one training set × one test window: one forecast of each model"),
+        ("judged", "counted: not a cell whose run was trained on, nor a channel that hardly moves "
+         "in the window"),
+        ("T̂", f"mean encounter period, {period:.3f} s; lengths are counted in it."
+         + (same if regular else "")),
+        ("NRMSE, ANRMSE", "root mean square error over the measured SD of the window; ANRMSE: "
+         "averaged over the channels"),
+        ("NAMMAE", "mean absolute error of the smallest and the largest value in the window, over "
+         "k measured SDs, k = 1; averaged over the channels"),
+        ("SD, IQR", "standard deviation; inter-quartile range, upper quartile − lower quartile"),
+        ("HDMDc, BHDMDc", "Hankel dynamic mode decomposition with control: a linear model with "
+         "delays; its ensemble over hyperparameters, here 'Bayesian'"),
+        ("EV, U", "of a bootstrapped divergence: mean, and q0.975 − q0.025"),
+        ("ε(t)", "absolute error at an age of the forecast, averaged over the channels, in "
+         "measured SDs"),
+        ("in figures", symbols + (". M is a mooring load, a force in N." if loads else "")),
+    ]  # fmt: skip
+    if regular:
+        terms.append(("λ/L", "length of the regular waves over that of the vessel"))
+    if any("truth" in data for data in result.tests.values()):
+        terms.append(("slap", "decaying pulses in a load as its line dips into the water and out"))
+    return terms
