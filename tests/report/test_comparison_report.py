@@ -10,9 +10,9 @@ import xarray as xr
 
 from seakeep.report.comparison import (
     band_findings,
-    rich_bands,
-    rich_comparison,
-    write_csv,
+    comparison_blocks,
+    model_blocks,
+    write_comparison,
     write_forecast,
 )
 from seakeep.report.style import LINES
@@ -65,8 +65,14 @@ def ensemble(half=0.2, diverged=1, slack=False):
     return Comparison("r1", "calm", mean, measured, single.inputs, band)
 
 
-def text_of(table):
-    return [str(cell) for column in table.columns for cell in column.cells]
+def block_of(table):
+    errors, extremes = comparison_blocks(table)
+    assert extremes.rows[0][2] == f"{float(table['measured_min'][0, 0]):.4g}"
+    return errors
+
+
+def write_csv(table, path):
+    return write_comparison({"m": table}, path)
 
 
 def test_the_band_of_an_ensemble_is_judged_by_hand():
@@ -103,9 +109,10 @@ def test_degrees_widen_a_band_and_leave_its_coverage():
 
 def test_tables_and_words_of_a_band(tmp_path):
     table = comparison_table([ensemble()])
-    shown = rich_bands(table)
-    assert shown.title == "90 % band against measurement"
-    assert "0.4" in text_of(shown)
+    shown = block_of(table)
+    assert shown.title == "r1: forecast against measurement, 90 % band"
+    assert shown.columns[-2:] == ("in band %", "width in SD")
+    assert shown.rows[-1][-2] == f"{float(table['mean_coverage'][0]):.1f}"
     (words,) = band_findings(table)
     found = float(table["mean_coverage"][0])
     assert words == (
@@ -213,8 +220,9 @@ def test_a_slack_line_is_left_out_and_shown_as_such():
     judged = float(table["nrmse"].sel(channel=["heave", "pitch"]).mean())
     assert float(table["anrmse"]) == pytest.approx(judged, rel=1e-12)
     assert int(table["slack_channels"]) == 1
-    shown = rich_comparison(comparison_table([comparison(slack=True)]))
-    assert "average (1 still channel left out)" in [c for col in shown.columns for c in col.cells]
+    shown = block_of(comparison_table([comparison(slack=True)]))
+    assert shown.note == "1 still channel left out of the average"
+    assert shown.rows[2][2] == "–"
 
 
 def test_csv_has_a_row_a_channel_and_all_digits(tmp_path):
@@ -227,9 +235,47 @@ def test_csv_has_a_row_a_channel_and_all_digits(tmp_path):
 
 
 def test_terminal_table_names_the_status_of_a_diverged_run():
-    table = rich_comparison(comparison_table([comparison(status="diverged at t = 3 s")]))
-    cells = [cell for column in table.columns for cell in column.cells]
-    assert "average (diverged at t = 3 s)" in cells
+    table = block_of(comparison_table([comparison(status="diverged at t = 3 s")]))
+    assert table.note == "diverged at t = 3 s"
+
+
+def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path):
+    tables = {
+        name: comparison_table([comparison(factor)])
+        for name, factor in {"ours": 0.9, "hold_last": 0.8, "arx": 0.95, "fir": 0.7}.items()
+    }
+    references = {"hold last": ["hold_last"], "best linear": ["arx", "fir"]}
+    averages, channels = model_blocks(tables, references)
+    assert averages.columns == (
+        "model", "ANRMSE", "fit %", "NAMMAE", "below hold last", "below best linear"
+    )  # fmt: skip
+    ours = averages.rows[0]
+    assert ours[:2] == ("ours", "0.100")
+    assert ours[-2:] == ("+50 %", "-100 %")  # errors of 0.1 against 0.2 and 0.05
+    assert channels.rows[0] == ("heave", "0.100", "0.200", "0.050", "0.300")
+    path = write_comparison(tables, tmp_path / "t.csv")
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    assert [row["model"] for row in rows[::3]] == list(tables)
+
+
+def test_the_figure_judges_as_the_table_does_where_loads_are_shown_in_kilonewtons():
+    pytest.importorskip("matplotlib")
+    from seakeep.report.overlay import overlay_figure
+
+    plain = comparison()
+    large = {name: data.copy() for name, data in (("m", plain.measured), ("f", plain.forecast))}
+    for data in large.values():
+        attrs = data["mooring_stern"].attrs
+        data["mooring_stern"] = 5000.0 * data["mooring_stern"]
+        data["mooring_stern"].attrs = attrs
+    large["f"]["mooring_stern"].attrs = {"units": "N", "training_std": 3500.0}
+    large["f"]["heave"] = 0.5 * large["f"]["heave"]  # errors differ between channels
+    large["f"]["heave"].attrs = plain.forecast["heave"].attrs
+    judged = replace(plain, measured=large["m"], forecast=large["f"])
+    expected = float(comparison_table([judged])["anrmse"][0])
+    figure = overlay_figure(judged)
+    assert "[kN]" in figure.axes[2].get_ylabel()
+    assert f"ANRMSE {expected:.3f}" in figure.get_suptitle()
 
 
 def test_figure_has_a_row_a_channel_with_units_and_no_overlap():
@@ -367,7 +413,7 @@ def test_a_figure_at_full_scale_says_so_and_shows_loads_with_a_prefix(tmp_path):
     table = comparison_table([large])
     rows = list(csv.DictReader(write_csv(table, tmp_path / "t.csv").read_text().splitlines()))
     assert {(row["scale"], row["scale_factor"]) for row in rows} == {("full", "120.0")}
-    assert "full scale (1:120)" in str(rich_comparison(table).title)
+    assert "full scale (1:120)" in block_of(table).title
     path = write_forecast(large.forecast, tmp_path / "f.csv")
     lines = list(csv.DictReader(path.read_text().splitlines()))
     assert {line["scale_factor"] for line in lines} == {"120.0"}
@@ -465,11 +511,9 @@ def test_tables_say_what_a_forecast_was_conditional_on(tmp_path):
     notes = {"conditional_on": "surge", "probe_offset": 38.8, "probe_offset_spread": 1.2}
     judged.forecast.attrs.update(notes)
     table = comparison_table([judged])
-    cells = [cell for column in rich_comparison(table).columns for cell in column.cells]
-    assert "conditional on measured surge" in cells
-    assert "probe offset 38.8 ± 1.2 m" in cells
+    note = "conditional on measured surge; probe offset 38.8 ± 1.2 m"
+    assert block_of(table).note == note
     rows = list(csv.DictReader(write_csv(table, tmp_path / "t.csv").read_text().splitlines()))
     assert {row["conditional_on"] for row in rows} == {"surge"}
     assert float(rows[0]["probe_offset_spread"]) == 1.2
-    plain = rich_comparison(comparison_table([comparison()]))
-    assert not any("conditional" in cell for column in plain.columns for cell in column.cells)
+    assert block_of(comparison_table([comparison()])).note == ""

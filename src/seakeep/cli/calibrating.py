@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from seakeep.cli.console import messages, progress_bar, quietly, results
+from seakeep.cli.console import messages, print_table, progress_bar, quietly, results
 from seakeep.cli.options import (
     DEFAULT_LEVEL,
     CampaignFile,
@@ -25,10 +25,10 @@ from seakeep.files import check_output, check_place
 
 if TYPE_CHECKING:
     import xarray as xr
-    from rich.table import Table
 
     from seakeep.campaign import Campaign
     from seakeep.models import HankelEnsemble
+    from seakeep.report.tables import Table
 
 __all__ = ["calibrate"]
 
@@ -120,7 +120,7 @@ def calibrate(
             executor=executor,
             progress=quietly(progress),
         )
-    results().print(_table(calibrated))
+    print_table(_table(calibrated))
     assert calibrated.calibration is not None
     spans = calibrated.calibration.spans.items()
     used = [f"{name} {span_text(*span, calibrated.dt)}" for name, span in spans]
@@ -174,10 +174,8 @@ def _part(run: xr.Dataset, start: float | None, stop: float | None) -> xr.Datase
 
 def _table(ensemble: HankelEnsemble) -> Table:
     """Margins of the channels, and what they were found on."""
-    from rich import box
-    from rich.table import Table
-
     from seakeep.models.forecasting import counted
+    from seakeep.report.tables import Table
 
     assert ensemble.calibration is not None
     found, windows = ensemble.calibration.found, ensemble.calibration.windows
@@ -186,19 +184,18 @@ def _table(ensemble: HankelEnsemble) -> Table:
         f"{counted(sum(windows.values()), 'window')} of {ensemble.calibration.steps} instants "
         f"({', '.join(windows)})"
     )
-    table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
-    table.add_column("channel", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
-    for heading in ("margin", "in SD", "blocks", "warranted %"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    rows = []
     for k, label in enumerate(ensemble.state_labels):
         factor, shown = displayed(label.units)
-        table.add_row(
-            label.name,
-            shown,
-            f"{factor * found.margin[k]:.4g}",
-            f"{found.margin[k] / ensemble.state_spread[k]:.3f}",
-            f"{found.blocks[k]:.0f}",
-            f"{math.floor(1e4 * found.warranted[k] + 1e-6) / 100:g}",
+        rows.append(
+            (
+                label.name,
+                shown,
+                f"{factor * found.margin[k]:.4g}",
+                f"{found.margin[k] / ensemble.state_spread[k]:.3f}",
+                f"{found.blocks[k]:.0f}",
+                f"{math.floor(1e4 * found.warranted[k] + 1e-6) / 100:g}",
+            )
         )
-    return table
+    columns = ("channel", "unit", "margin", "in SD", "blocks", "warranted %")
+    return Table("margins", title, columns, tuple(rows), numeric=(2, 3, 4, 5))

@@ -8,14 +8,19 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from seakeep.errors import SeakeepWarning
 
+if TYPE_CHECKING:
+    from seakeep.report.tables import Table
+
 __all__ = [
     "Report",
     "messages",
+    "print_table",
     "progress_bar",
     "quietly",
     "results",
@@ -35,6 +40,16 @@ def results() -> Console:
     """Console of results, on standard output."""
     width = None if sys.stdout.isatty() else PIPE_WIDTH
     return Console(file=sys.stdout, width=width, highlight=False, markup=False)
+
+
+def print_table(table: Table, note: bool = True) -> None:
+    """Print a table, its title above and its note below."""
+    from seakeep.report.tables import rich_table
+
+    results().print(table.title, style="bold", soft_wrap=True)
+    results().print(rich_table(table))
+    if note and table.note:
+        results().print(f"{table.note}\n", soft_wrap=True)
 
 
 def messages() -> Console:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from seakeep.cli.console import messages, progress_bar, quietly, results
+from seakeep.cli.console import messages, print_table, progress_bar, quietly, results
 from seakeep.cli.options import (
     DEFAULT_LEVEL,
     BandKind,
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 
     from seakeep.campaign import Campaign
     from seakeep.models import HankelDMDcModel, HankelEnsemble
+    from seakeep.study import Comparison
 
 __all__ = ["compare", "fit", "forecast"]
 
@@ -151,7 +154,7 @@ def forecast(
                 result = identified.forecast(prepared, first, count, **how)
             else:
                 result = identified.forecast_summary(
-                    prepared, first, count, **_band(identified, level, band), **how
+                    prepared, first, count, **_band({str(model): identified}, level, band), **how
                 )
     else:
         result = identified.forecast(prepared, start=first, steps=count)
@@ -174,7 +177,10 @@ def forecast(
 
 
 def compare(
-    model: ModelFile,
+    model: Annotated[
+        list[Path],
+        typer.Argument(help="Model files written by seakeep fit.", metavar="MODEL.nc..."),
+    ],
     campaign: CampaignFile,
     run: Annotated[
         list[str] | None,
@@ -206,66 +212,105 @@ def compare(
 ) -> None:
     """Judge forecasts of test runs against the measurement.
 
-    Prints a table a channel and writes it as CSV, with an overlay figure a run. Of an ensemble the
-    members' mean is judged, and how much of the measurement their band holds.
+    Prints a table per run and writes it as CSV, with an overlay figure per run. Of an ensemble the
+    members' mean is judged, and how much of the measurement their band holds. Several models are
+    judged over the same instants.
 
     Example: seakeep compare model.nc docs/tutorial/campaign.toml -o comparison
 
-    An ensemble: seakeep compare ensemble.nc docs/tutorial/campaign.toml -o judged
+    Two models: seakeep compare model.nc ensemble.nc docs/tutorial/campaign.toml -o judged
     """
     if format_ not in ("png", "svg", "pdf"):
         raise RequestError(f"--format must be png, svg or pdf; received '{format_}'.")
     from seakeep.campaign import read_campaign
-    from seakeep.models import HankelDMDcModel, load_model
-    from seakeep.report.comparison import band_findings, rich_bands, rich_comparison, write_csv
-    from seakeep.report.overlay import overlay_figure
-    from seakeep.report.style import save_figure
-    from seakeep.study import at_full_scale, comparison_table, in_degrees
-    from seakeep.study import compare as compare_runs
+    from seakeep.models import load_model
+    from seakeep.report.comparison import write_comparison
+    from seakeep.study import at_full_scale, compare_models, comparison_table, in_degrees
 
     make_folder(out)
-    identified = load_model(model)
-    if isinstance(identified, HankelDMDcModel):
-        given = {"--level": level is not None, "--band": band is not None}
-        _refuse_for_one(model, given | {"--scheduler": scheduler is not None})
+    fitted = {name: load_model(path) for name, path in _named(model).items()}
+    shown = _band(fitted, level, band, scheduler)
     read = read_campaign(campaign)
-    _check_outputs(out, run or read.test_runs, format_, read_files(read, model))
+    figures = _figures(fitted, run or read.test_runs, out, format_)
+    used = read_files(read, *model)
+    check_output(out / TABLE, "table", used, "run,channel,channel_units,.*")
+    for path in figures.values():
+        check_output(path, "figure", used)
     with member_executor(workers, scheduler) as executor, progress_bar("Comparing") as progress:
-        comparisons = compare_runs(
-            identified,
+        found = compare_models(
+            fitted,
             read,
             run or (),
             start,
             steps,
             progress,
             members=quietly(progress),
-            **_band(identified, level, band),
+            **shown,
             executor=executor,
         )
     if full_scale:
         scale = _scale(read)
-        comparisons = [at_full_scale(each, scale) for each in comparisons]
+        found = {name: [at_full_scale(each, scale) for each in of] for name, of in found.items()}
     if not radians:
-        comparisons = [in_degrees(each) for each in comparisons]
-    table = comparison_table(comparisons)
-    results().print(rich_comparison(table))
-    if "coverage" in table:
-        results().print(rich_bands(table))
-    for text in band_findings(table):
-        results().print(text, soft_wrap=True)
-    written = [write_csv(table, out / TABLE)]
+        found = {name: [in_degrees(each) for each in of] for name, of in found.items()}
+    tables = {name: comparison_table(of) for name, of in found.items()}
+    _print_comparison(tables)
+    written = [write_comparison(tables, out / TABLE), *_draw(found, figures)]
+    messages().print("Wrote " + ", ".join(map(str, written)))
+    if not all(each.complete for of in found.values() for each in of):
+        raise typer.Exit(1)
+
+
+def _named(files: list[Path]) -> dict[str, Path]:
+    """Names of model files: their stems, or their paths where two would be the same."""
+    stems = [path.stem for path in files]
+    return {p.stem if stems.count(p.stem) == 1 else str(p.with_suffix("")): p for p in files}
+
+
+def _figures(
+    models: Iterable[str], runs: list[str], out: Path, suffix: str
+) -> dict[tuple[str, str], Path]:
+    """File of the figure of each model and run, where figures can be drawn."""
     if find_spec("matplotlib") is None:
         messages().print(
             "Note: no figures, because matplotlib is not installed. "
             "Install it with: pip install 'seakeep[figures]'"
         )
-    else:
-        for comparison in comparisons:
-            path = out / f"{comparison.run}.{format_}"
-            written.append(save_figure(overlay_figure(comparison), path))
-    messages().print("Wrote " + ", ".join(map(str, written)))
-    if not all(comparison.complete for comparison in comparisons):
-        raise typer.Exit(1)
+        return {}
+    names = {name: "_" + re.sub(r"[^\w.-]", "_", name) for name in models}
+    if len(names) == 1:
+        names = dict.fromkeys(names, "")
+    return {
+        (name, run): out / f"{run}{end}.{suffix}" for name, end in names.items() for run in runs
+    }
+
+
+def _print_comparison(tables: Mapping[str, xr.Dataset]) -> None:
+    from seakeep.report.comparison import band_findings, comparison_blocks, model_blocks
+
+    several = len(tables) > 1
+    blocks = model_blocks(tables, {}) if several else comparison_blocks(*tables.values())
+    for block in blocks:
+        print_table(block)
+    for name, table in tables.items():
+        for text in band_findings(table):
+            results().print(f"{name}, {text}" if several else text, soft_wrap=True)
+
+
+def _draw(
+    found: Mapping[str, list[Comparison]], figures: Mapping[tuple[str, str], Path]
+) -> list[Path]:
+    if not figures:
+        return []
+    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.style import save_figure
+
+    return [
+        save_figure(overlay_figure(each), figures[name, each.run])
+        for name, of in found.items()
+        for each in of
+        if (name, each.run) in figures
+    ]
 
 
 def _check_outputs(out: Path, runs: list[str], suffix: str, used: list[Path]) -> None:
@@ -295,7 +340,7 @@ def _prepared(campaign: Campaign, run: str) -> xr.Dataset:
     return load_prepared(campaign, names=[run])[run]
 
 
-def _refuse_for_one(model: Path, given: dict[str, bool]) -> None:
+def _refuse_for_one(model: Path | str, given: dict[str, bool]) -> None:
     """Refuse options of ensembles where a file holds a single model."""
     for option, stated in given.items():
         if stated:
@@ -306,21 +351,28 @@ def _refuse_for_one(model: Path, given: dict[str, bool]) -> None:
 
 
 def _band(
-    identified: HankelDMDcModel | HankelEnsemble, level: float | None, band: str | None
+    models: Mapping[str, HankelDMDcModel | HankelEnsemble],
+    level: float | None,
+    band: str | None,
+    scheduler: str | None = None,
 ) -> dict[str, Any]:
     """Level and kind of band that were asked for; a calibrated one knows its level."""
     if band not in (None, "members", "calibrated"):
         raise RequestError(f"--band must be members or calibrated; received '{band}'.")
     from seakeep.models import HankelEnsemble
 
-    kept = identified.calibration if isinstance(identified, HankelEnsemble) else None
-    if kept is not None and band is None:
+    ensembles = [each for each in models.values() if isinstance(each, HankelEnsemble)]
+    if not ensembles:
+        given = {"--level": level is not None, "--band": band is not None}
+        _refuse_for_one(", ".join(models), given | {"--scheduler": scheduler is not None})
+    kept = [each.calibration for each in ensembles if each.calibration is not None]
+    if kept and band is None:
         messages().print(
             "Note: the ensemble is calibrated, and the band shown is that of its members. "
             "--band calibrated shows the calibrated one."
         )
     if level is None:
-        level = kept.found.level if kept and band == "calibrated" else DEFAULT_LEVEL
+        level = kept[0].found.level if kept and band == "calibrated" else DEFAULT_LEVEL
     return {"level": level, "band": band or "members"}
 
 

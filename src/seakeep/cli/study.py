@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import Report, progress_bar, results
+from seakeep.cli.console import Report, print_table, progress_bar, results
 from seakeep.cli.options import Scheduler, checked_count
 from seakeep.errors import RequestError
 
@@ -160,7 +160,6 @@ def _run(
     from seakeep.models.executor import make_executor
     from seakeep.report.page import write_report
     from seakeep.report.sections.summary import findings, overview_table
-    from seakeep.report.tables import rich_table
 
     try:
         with make_executor(workers, scheduler) as executor, _Progress("Study") as tell:
@@ -172,7 +171,7 @@ def _run(
             f"What was finished is kept in {folder}; the same command goes on where it stopped."
         )
         raise
-    results().print(rich_table(overview_table(found)))
+    print_table(overview_table(found), note=False)
     for text in findings(found):
         results().print(text, soft_wrap=True)
     results().print(f"\nReport: {page}", soft_wrap=True)

@@ -1,153 +1,187 @@
-"""Tables for the terminal and for files."""
+"""Comparisons and forecasts as tables: blocks for the terminal, CSV with all digits."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 import xarray as xr
-from rich import box
-from rich.table import Table
 
+from seakeep.arrays import FloatArray
 from seakeep.files import MARK, replacing, write_netcdf
+from seakeep.report.tables import MISSING, Table, plain_cell
 
 __all__ = [
     "band_findings",
+    "comparison_blocks",
     "forecast_header",
     "forecast_words",
-    "rich_bands",
-    "rich_comparison",
-    "write_csv",
+    "model_blocks",
+    "write_comparison",
     "write_forecast",
 ]
 
-_HEADINGS = {
-    "nrmse": ("NRMSE", "{:.3f}"),
-    "fit": ("fit %", "{:.1f}"),
-    "nammae": ("NAMMAE", "{:.3f}"),
-    "sd_ratio": ("SD ratio", "{:.3f}"),
-    "measured_min": ("min meas.", "{:.4g}"),
-    "predicted_min": ("min pred.", "{:.4g}"),
-    "measured_max": ("max meas.", "{:.4g}"),
-    "predicted_max": ("max pred.", "{:.4g}"),
+_SHOWN = {
+    "nrmse": ("NRMSE", "{:.3f}", "anrmse"),
+    "fit": ("fit %", "{:.1f}", ""),
+    "nammae": ("NAMMAE", "{:.3f}", "mean_nammae"),
+    "sd_ratio": ("SD ratio", "{:.3f}", ""),
+    "coverage": ("in band %", "{:.1f}", "mean_coverage"),
+    "relative_band_width": ("width in SD", "{:.3f}", ""),
 }
-_BAND_HEADINGS = {
-    "coverage": ("in band %", "{:.1f}"),
-    "band_width": ("mean width", "{:.4g}"),
-    "relative_band_width": ("width in SD", "{:.3f}"),
+"""Columns of a terminal: heading, format, and the average over the channels."""
+_IN_UNITS = {
+    "measured_min": "min measured",
+    "predicted_min": "min predicted",
+    "measured_max": "max measured",
+    "predicted_max": "max predicted",
+    "band_width": "mean width of band",
 }
+"""Columns of a second table, in the unit of the channel."""
+_STORED = (
+    *("nrmse", "fit", "nammae", "sd_ratio", "measured_min", "predicted_min", "measured_max"),
+    *("predicted_max", "coverage", "band_width", "relative_band_width"),
+)
+"""Columns of a CSV file."""
 _OF_RUNS = ("start", "status", "anrmse", "conditional_on", "probe_offset", "probe_offset_spread")
 _OF_BANDS = ("band", "level", "members", "diverged")
 _OF_SCALE = ("scale", "scale_factor")
 
 
-def rich_comparison(table: xr.Dataset) -> Table:
-    """Comparison of forecasts with measurements as a table for the terminal.
+def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
+    """Comparison of forecasts with measurements, two tables per run that fit a terminal.
 
     Parameters
     ----------
     table : Dataset
         From :func:`seakeep.study.comparison_table`.
 
-    Returns
-    -------
-    rich.table.Table
-        A row a run and channel, and the averages below each run.
+    Yields
+    ------
+    Table
+        Errors per channel, and their averages; then extremes in the channels' units.
     """
-    title = "Forecast against measurement"
-    if "scale" in table:
-        title += f", full scale (1:{float(table['scale_factor'][0]):g})"
-    out = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
-    out.add_column("run", no_wrap=True)
-    out.add_column("channel", no_wrap=True)
-    out.add_column("unit", no_wrap=True)
-    for heading, _ in _HEADINGS.values():
-        out.add_column(heading, justify="right", no_wrap=True)
+    shown = {name: each for name, each in _SHOWN.items() if name in table}
+    columns = ("channel", "unit", *(heading for heading, _, _ in shown.values()))
     for run in table["run"].values:
-        rows = table.sel(run=run)
-        for channel in table["channel"].values:
-            at = rows.sel(channel=channel)
-            out.add_row(
-                str(run),
-                str(channel),
-                str(at["channel_units"].values),
-                *(_shown(float(at[name]), form) for name, (_, form) in _HEADINGS.items()),
+        at = table.sel(run=run)
+        rows = [
+            (
+                str(name),
+                str(at["channel_units"].sel(channel=name).values),
+                *(_text(at[key].sel(channel=name), form) for key, (_, form, _) in shown.items()),
             )
-        slack = int(rows["slack_channels"])
-        left_out = f" ({slack} still channel{'s' * (slack > 1)} left out)" if slack else ""
-        status = str(rows["status"].values)
-        mean = [
-            _shown(float(rows["anrmse"]), "{:.3f}"),
-            "",
-            _shown(float(rows["mean_nammae"]), "{:.3f}"),
+            for name in table["channel"].values
         ]
-        out.add_row(
-            str(run),
-            "average" + left_out + ("" if status == "ok" else f" ({status})"),
-            "",
-            *mean,
-            style="bold",
+        means = [_text(at[mean], form) if mean else "" for _, form, mean in shown.values()]
+        rows.append(("average", "", *means))
+        numeric = tuple(range(2, len(columns)))
+        name, title = f"comparison_{run}", f"{run}: {_title(at)}"
+        last = (len(rows) - 1,)
+        yield Table(name, title, columns, tuple(rows), _note(at), numeric, averages=last)
+        yield _extremes(at, str(run))
+
+
+def _extremes(at: xr.Dataset, run: str) -> Table:
+    shown = {name: heading for name, heading in _IN_UNITS.items() if name in at}
+    rows = [
+        (
+            str(name),
+            str(at["channel_units"].sel(channel=name).values),
+            *(_text(at[key].sel(channel=name), "{:.4g}") for key in shown),
         )
-        for note in _notes(rows):
-            out.add_row(str(run), note, style="italic")
-        out.add_section()
-    return out
+        for name in at["channel"].values
+    ]
+    columns = ("channel", "unit", *shown.values())
+    numeric = tuple(range(2, len(columns)))
+    return Table(f"extremes_{run}", f"{run}: extremes", columns, tuple(rows), "", numeric)
 
 
-def _notes(rows: xr.Dataset) -> list[str]:
-    notes = []
-    condition = str(rows["conditional_on"].values)
-    if condition:
-        notes.append(f"conditional on measured {condition}")
-    offset, spread = float(rows["probe_offset"]), float(rows["probe_offset_spread"])
+def _title(at: xr.Dataset) -> str:
+    said = ["forecast against measurement"]
+    if "scale" in at:
+        said.append(f"full scale (1:{float(at['scale_factor']):g})")
+    if "level" in at:
+        level, kind = 100.0 * float(at["level"]), _kind(str(at["band"].values))
+        said.append(f"{level:g} % {kind}band")
+    return ", ".join(said)
+
+
+def _note(at: xr.Dataset) -> str:
+    said = []
+    if (slack := int(at["slack_channels"])) > 0:
+        said.append(f"{slack} still channel{'s' * (slack > 1)} left out of the average")
+    if (status := str(at["status"].values)) != "ok":
+        said.append(status)
+    if condition := str(at["conditional_on"].values):
+        said.append(f"conditional on measured {condition}")
+    offset, spread = float(at["probe_offset"]), float(at["probe_offset_spread"])
     if np.isfinite(offset):
         known = f" ± {spread:.2g}" if np.isfinite(spread) else ""
-        notes.append(f"probe offset {offset:.3g}{known} m")
-    return notes
+        said.append(f"probe offset {offset:.3g}{known} m")
+    return "; ".join(said)
 
 
-def _shown(value: float, form: str) -> str:
-    return form.format(value) if np.isfinite(value) else "–"
+def _text(value: Any, form: str) -> str:
+    return form.format(float(value)) if np.isfinite(float(value)) else MISSING
 
 
-def rich_bands(table: xr.Dataset) -> Table:
-    """Coverage and width of an ensemble's bands as a table for the terminal.
+def model_blocks(
+    tables: Mapping[str, xr.Dataset], references: Mapping[str, Sequence[str]]
+) -> Iterator[Table]:
+    """Several models beside each other, a table of averages and one of channels per run.
 
     Parameters
     ----------
-    table : Dataset
-        From :func:`seakeep.study.comparison_table`, of an ensemble.
+    tables : mapping of str to Dataset
+        Comparison table of each model, over the same instants.
+    references : mapping of str to sequence of str
+        Models to which all are compared, by heading; of several the best one in each run counts.
 
-    Returns
-    -------
-    rich.table.Table
-        A row a run and channel, and the average of the channels that are judged below each run.
+    Yields
+    ------
+    Table
+        Averages, and by how much the ANRMSE of each model lies below that of each reference; then
+        the NRMSE per channel.
     """
-    level = 100.0 * float(table["level"].values[0])
-    title = f"{level:g} % {_kind(str(table['band'].values[0]))}band against measurement"
-    out = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
-    for heading in ("run", "channel", "unit"):
-        out.add_column(heading, no_wrap=True)
-    for heading, _ in _BAND_HEADINGS.values():
-        out.add_column(heading, justify="right", no_wrap=True)
-    for run in table["run"].values:
-        rows = table.sel(run=run)
-        for channel in table["channel"].values:
-            at = rows.sel(channel=channel)
-            numbers = [_shown(float(at[name]), form) for name, (_, form) in _BAND_HEADINGS.items()]
-            out.add_row(str(run), str(channel), str(at["channel_units"].values), *numbers)
-        mean = _shown(float(rows["mean_coverage"]), "{:.1f}")
-        out.add_row(str(run), "average", "", mean, style="bold")
-        out.add_section()
-    return out
+    first = next(iter(tables.values()))
+    heads = ("model", "ANRMSE", "fit %", "NAMMAE", *(f"below {each}" for each in references))
+    for run in first["run"].values:
+        of_run = {name: table.sel(run=run) for name, table in tables.items()}
+        errors = {name: float(at["anrmse"]) for name, at in of_run.items()}
+        best = {
+            head: min((errors[name] for name in names), default=np.nan)
+            for head, names in references.items()
+        }
+        rows = [
+            (
+                name,
+                _text(at["anrmse"], "{:.3f}"),
+                _text(at["fit"].mean(), "{:.1f}"),
+                _text(at["mean_nammae"], "{:.3f}"),
+                *(_text(100 * (1 - errors[name] / each), "{:+.0f} %") for each in best.values()),
+            )
+            for name, at in of_run.items()
+        ]
+        title = f"{run}: models against measurement"
+        numeric = tuple(range(1, len(heads)))
+        note = _note(next(iter(of_run.values())))
+        yield Table(f"models_{run}", title, heads, tuple(rows), note, numeric)
+        channels = [
+            (str(name), *(_text(at["nrmse"].sel(channel=name), "{:.3f}") for at in of_run.values()))
+            for name in first["channel"].values
+        ]
+        columns = ("channel", *of_run)
+        numeric = tuple(range(1, len(columns)))
+        yield Table(f"channels_{run}", f"{run}: NRMSE", columns, tuple(channels), "", numeric)
 
 
 def band_findings(table: xr.Dataset) -> list[str]:
-    """Sentences on the bands of an ensemble, one a run; none for a single model.
+    """Sentences on the bands of an ensemble, one per run; none for a single model.
 
     Parameters
     ----------
@@ -192,13 +226,13 @@ _CARRIES = {
 }
 
 
-def write_csv(table: xr.Dataset, path: Path) -> Path:
-    """Write a comparison table as CSV, a row a run and channel, full precision.
+def write_comparison(tables: Mapping[str, xr.Dataset], path: Path) -> Path:
+    """Write comparison tables as CSV, a row per run and channel, full precision.
 
     Parameters
     ----------
-    table : Dataset
-        From :func:`seakeep.study.comparison_table`.
+    tables : mapping of str to Dataset
+        From :func:`seakeep.study.comparison_table`, by model; of several, ``model`` is a column.
     path : Path
         The file.
 
@@ -212,14 +246,19 @@ def write_csv(table: xr.Dataset, path: Path) -> Path:
     RequestError
         If the file cannot be written.
     """
-    columns = [name for name in (*_HEADINGS, *_BAND_HEADINGS) if name in table]
-    frame = table[columns].to_dataframe().reset_index()
-    for name in (*_OF_RUNS, *(each for each in (*_OF_BANDS, *_OF_SCALE) if each in table)):
-        frame[name] = frame["run"].map(table[name].to_series())
-    front = ["run", "channel", "channel_units"]
-    frame = frame[front + [name for name in frame.columns if name not in front]]
+    frames = []
+    for model, table in tables.items():
+        frame = table[[name for name in _STORED if name in table]].to_dataframe().reset_index()
+        for name in (*_OF_RUNS, *(each for each in (*_OF_BANDS, *_OF_SCALE) if each in table)):
+            frame[name] = frame["run"].map(table[name].to_series())
+        frames.append(frame.assign(model=model) if len(tables) > 1 else frame)
+    whole = pd.concat(frames, ignore_index=True)
+    front = ["run", "channel", "channel_units", *["model"] * (len(tables) > 1)]
+    whole = whole[front + [name for name in whole.columns if name not in front]]
     with replacing(path) as temporary:
-        frame.to_csv(temporary, index=False)
+        whole.map(lambda cell: plain_cell(cell) if isinstance(cell, str) else cell).to_csv(
+            temporary, index=False
+        )
     return path
 
 
@@ -230,7 +269,7 @@ def forecast_header(states: Sequence[str]) -> str:
 
 
 def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
-    """Write a forecast as NetCDF, or as CSV with a column a channel, full precision.
+    """Write a forecast as NetCDF, or as CSV with a column per channel, full precision.
 
     Parameters
     ----------
@@ -262,7 +301,7 @@ def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
     return path
 
 
-def _columns(forecast: xr.Dataset) -> dict[str, npt.NDArray[np.float64]]:
+def _columns(forecast: xr.Dataset) -> dict[str, FloatArray]:
     columns = {}
     for name, variable in forecast.data_vars.items():
         if "time" not in variable.dims:
@@ -272,10 +311,12 @@ def _columns(forecast: xr.Dataset) -> dict[str, npt.NDArray[np.float64]]:
             if dim in variable.dims:
                 for each in variable[dim].values:
                     what = "" if each == "mean" else f" {words.format(each)}"
-                    columns[f"{name}{what} [{units}]"] = variable.sel({dim: each}).values
+                    columns[plain_cell(f"{name}{what} [{units}]")] = variable.sel(
+                        {dim: each}
+                    ).values
                 break
         else:
-            columns[f"{name} [{units}]"] = variable.values
+            columns[plain_cell(f"{name} [{units}]")] = variable.values
     if forecast.attrs.get("scale") == "full":
         scale = float(forecast.attrs["scale_factor"])
         columns["scale_factor"] = np.full(forecast.sizes["time"], scale)

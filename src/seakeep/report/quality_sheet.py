@@ -68,7 +68,8 @@ def channel_rows(run: xr.Dataset) -> list[ChannelRow]:
         x = factor * run[name].to_numpy()
         numbers = [np.nan] * 4
         if np.isfinite(x).any():
-            numbers = [np.nanmin(x), np.nanmax(x), np.nanmean(x), np.nanstd(x, ddof=1)]
+            found_in = (np.nanmin(x), np.nanmax(x), np.nanmean(x), np.nanstd(x, ddof=1))
+            numbers = [float(each) for each in found_in]
         shares = [
             f"{word} {100 * np.mean((flags & bit) > 0):.2g} %"
             for word, bit in FLAGS.items()

@@ -138,13 +138,11 @@ def write_csv(table: Table, path: Path) -> Path:
 
 
 def rich_table(table: Table) -> RichTable:
-    """Table for the terminal: text wraps before numbers are cut."""
+    """Body of a table for the terminal: text wraps before numbers are cut."""
     from rich import box
     from rich.table import Table as RichTable
 
-    out = RichTable(
-        box=box.SIMPLE_HEAD, title=table.title, title_justify="left", padding=(0, 1, 0, 0)
-    )
+    out = RichTable(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for k, heading in enumerate(table.columns):
         if k in table.numeric:
             # A heading may wrap between its words; a number stays on one line.

@@ -31,6 +31,7 @@ __all__ = [
     "Comparison",
     "at_full_scale",
     "compare",
+    "compare_models",
     "comparison_table",
     "forecast_at_full_scale",
     "in_degrees",
@@ -257,6 +258,58 @@ def compare(
     SeakeepWarning
         If an input of a test run repeats what the model was trained on.
     """
+    several = compare_models(
+        {"model": model},
+        campaign,
+        runs,
+        start,
+        steps,
+        progress,
+        members=members,
+        level=level,
+        band=band,
+        executor=executor,
+    )
+    return several["model"]
+
+
+def compare_models(
+    models: Mapping[str, HankelDMDcModel | HankelEnsemble],
+    campaign: Campaign,
+    runs: Sequence[str] = (),
+    start: float | str | None = None,
+    steps: int | str | None = None,
+    progress: Progress | None = None,
+    *,
+    members: Progress | None = None,
+    level: float = 0.95,
+    band: Band = "members",
+    executor: Executor | None = None,
+) -> dict[str, list[Comparison]]:
+    """Forecast the same instants with several models and put the measurement beside.
+
+    Parameters
+    ----------
+    models : mapping of str to model
+        Models by name; by default all start where the one with the longest history can.
+    campaign, runs, start, steps, progress, members, level, band, executor
+        As in :func:`compare`; `level` and `band` concern ensembles.
+
+    Returns
+    -------
+    dict of str to list of Comparison
+        One per run, by model.
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`compare`; also if the time steps of the models differ.
+
+    Warns
+    -----
+    SeakeepWarning
+        As :func:`compare`.
+    """
     wanted = list(runs) or campaign.test_runs
     known = list(campaign.settings.runs)  # unused ones too: whoever names one wants it
     unknown = [name for name in wanted if name not in known]
@@ -270,33 +323,48 @@ def compare(
             "no run of the campaign tests a model. Name one with --run, or give one "
             "role = 'test' or a span test = [begin, end]."
         )
+    forecast = [model.states for model in models.values()]
+    if any(states != forecast[0] for states in forecast):
+        listed = "; ".join(f"{name}: {', '.join(each.states)}" for name, each in models.items())
+        raise RequestError(
+            f"models are compared on the same channels, and these forecast different ones ({listed}"
+            "). Compare them one by one, or fit them with the same states."
+        )
     prepared = load_prepared(campaign, names=wanted, progress=progress)
-    warn_of_runs(prepared.values(), [*model.states, *model.inputs])
-    warn_of_repeats(model, campaign, prepared)
+    used = dict.fromkeys(c for model in models.values() for c in (*model.states, *model.inputs))
+    warn_of_runs(prepared.values(), list(used))
     known_runs = list(prepared.values())
     first = None if start is None else instant_of(start, campaign, known_runs, "start")
-    count = None if steps is None else samples_of(steps, campaign, known_runs, model.dt, "steps")
+    history = max(model.history_samples for model in models.values())
+    found: dict[str, list[Comparison]] = {}
+    for label, model in models.items():
+        warn_of_repeats(model, campaign, prepared)
+        dt = model.dt
+        count = None if steps is None else samples_of(steps, campaign, known_runs, dt, "steps")
 
-    def forecast(run: xr.Dataset, start: float, steps: int) -> xr.Dataset:
-        if isinstance(model, HankelDMDcModel):
-            return model.forecast(run, start=start, steps=steps)
-        tell = None if members is None else _named(members, str(run.attrs["run"]))
-        return model.forecast_summary(
-            run,
-            start,
-            steps,
-            level,
-            band=band,
-            executor=executor,
-            progress=tell,
-        )
+        def forecast_run(
+            run: xr.Dataset,
+            start: float,
+            steps: int,
+            model: HankelDMDcModel | HankelEnsemble = model,
+        ) -> xr.Dataset:
+            if isinstance(model, HankelDMDcModel):
+                return model.forecast(run, start=start, steps=steps)
+            tell = None if members is None else _named(members, str(run.attrs["run"]))
+            return model.forecast_summary(
+                run, start, steps, level, band=band, executor=executor, progress=tell
+            )
 
-    compared = [
-        _compare_run(model, forecast, run, name, first, count) for name, run in prepared.items()
-    ]
-    for each in compared:
-        _warn_of_known(model, each)
-    return compared
+        found[label] = [
+            _compare_run(model, forecast_run, run, name, first, count, history)
+            for name, run in prepared.items()
+        ]
+        for each in found[label]:
+            _warn_of_known(model, each)
+    for of_run in zip(*found.values(), strict=True):
+        parts = [part for each in of_run for part in (each.measured, each.inputs)]
+        _warn_of_dead(xr.merge(parts, compat="override"), of_run[0].run)
+    return found
 
 
 def _warn_of_known(model: HankelDMDcModel | HankelEnsemble, compared: Comparison) -> None:
@@ -332,11 +400,12 @@ def _compare_run(
     name: str,
     start: float | None,
     steps: int | None,
+    history: int,
 ) -> Comparison:
     time = run["time"].values
     begin, end = run.attrs.get("test_span", (time[0], time[-1]))
     if start is None:
-        first = min(model.history_samples - 1, time.size - 1)
+        first = min(history - 1, time.size - 1)
         start = max(float(begin), float(time[first]))
     if steps is None:
         last = int(np.searchsorted(time, float(end) + 0.5 * model.dt)) - 1
@@ -350,7 +419,6 @@ def _compare_run(
     if "statistic" in inside.dims:
         forecast = inside.sel(statistic="mean", drop=True)
         band = inside.sel(statistic=["lower", "upper"])
-    _warn_of_dead(run[[*model.states, *model.inputs]].sel(instants), name)
     return Comparison(
         run=name,
         sea_state=str(run.attrs.get("sea_state", "")),
@@ -370,7 +438,7 @@ def _warn_of_dead(run: xr.Dataset, name: str) -> None:
             "forecast. Look for a dead sensor: a state that stands still is not judged, and an "
             "input that does gives a forecast without waves.",
             SeakeepWarning,
-            stacklevel=4,
+            stacklevel=3,
         )
 
 

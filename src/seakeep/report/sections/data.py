@@ -77,7 +77,9 @@ def _run_table(result: StudyResult) -> Table:
         others = [
             f"{each.channel}: {each.text}" for each in found if each.channel not in run.data_vars
         ]
-        words = dict.fromkeys(f"{each.channel.replace('_', ' ')} ({each.kind.word})" for each in found)
+        words = dict.fromkeys(
+            f"{each.channel.replace('_', ' ')} ({each.kind.word})" for each in found
+        )
         rows.append(
             (
                 name,
