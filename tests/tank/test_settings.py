@@ -53,6 +53,8 @@ def test_default_hull_settings_are_those_of_the_default_file():
         ("[simulation]\nstepp = 0.1", r"stepp: unknown key, .* Did you mean 'step'"),
         ("[vesel]\nposition = 1", r"vesel: unknown key, .* Did you mean 'vessel'\?"),
         ("[runs.a]\nwavelenght = 2", r"runs\.a\.wavelenght: .* Did you mean 'wavelength'\?"),
+        ("[runs.'a/b']\nwavelength = 2.0\nheight = 0.1", r"runs\.a/b: the name of a run is"),
+        ("[instruments.probes.'a/b']\nposition = 1.0\nnoise = 0.1", r"holds no '/'"),
         ("[runs.a]\nwavelength = 2.0", r"either a spectrum \(irregular\) or wavelength and height"),
         ("[runs.a]\nwavelength = 2.0\nheight = 0.1\nspectrum = { height = 0.1, peak_period = 2 }",
          r"either a spectrum \(irregular\) or wavelength and height"),

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
+from seakeep.campaign.settings import ChannelName, RunName
 from seakeep.errors import RequestError
 from seakeep.tank.moorings import LineSettings
 from seakeep.toml import Count, Finite, Mistake, NotNegative, Pair, Positive, Table, validated
@@ -242,7 +243,7 @@ class SlapSettings(Table):
 class InstrumentPlan(Table):
     """Instruments: probes, MRU, load cells, video, their noise (SI, radians) and clocks."""
 
-    probes: dict[str, ProbeSettings]
+    probes: dict[ChannelName, ProbeSettings]
     slap: dict[str, SlapSettings] = Field(default_factory=dict)
     second_order: bool = True
     acceleration_noise: NotNegative = 0.03
@@ -274,10 +275,10 @@ class TankSettings(Table):
     hull: HullSettings = HullSettings()
     vessel: VesselSettings = VesselSettings()
     drift: DriftSettings = DriftSettings()
-    moorings: dict[str, LineSettings]
+    moorings: dict[ChannelName, LineSettings]
     simulation: SimulationSettings = SimulationSettings()
     instruments: InstrumentPlan
-    runs: dict[str, RunPlan]
+    runs: dict[RunName, RunPlan]
 
 
 def _too_large(settings: TankSettings) -> Iterator[Mistake]:
