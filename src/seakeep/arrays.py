@@ -15,6 +15,7 @@ import numpy.typing as npt
 from seakeep.errors import DataError, RequestError, SeakeepError
 
 __all__ = [
+    "GREATEST",
     "BoolArray",
     "ComplexArray",
     "FloatArray",
@@ -36,6 +37,9 @@ ComplexArray = npt.NDArray[np.complex128]
 
 LARGEST = 10**300
 """Integers beyond this are taken for it: no float holds them."""
+
+GREATEST = 1e150
+"""Samples beyond this overflow when squared; no sensor reads them."""
 
 _REMEDIES = {
     "c": "Give its real part or its modulus",
@@ -67,6 +71,8 @@ def as_real(values: object, name: str, error: type[SeakeepError] = RequestError)
     RequestError
         If they are not real numbers: masked values, complex, dates, text, a Dataset, or rows of
         unequal length.
+    DataError
+        If a finite value is so large that its square is not.
 
     Examples
     --------
@@ -74,7 +80,7 @@ def as_real(values: object, name: str, error: type[SeakeepError] = RequestError)
     array([1., 2.])
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
-        return values
+        return _bounded(values, name)
     if hasattr(values, "data_vars"):
         raise error(
             f"{name} must be an array; received a Dataset. Select one channel: data['heave']."
@@ -93,7 +99,19 @@ def as_real(values: object, name: str, error: type[SeakeepError] = RequestError)
             f"{name} must be real numbers; received {type(values).__name__} of type "
             f"{array.dtype}. {remedy}."
         )
-    return np.asarray(array, dtype=np.float64)
+    return _bounded(np.asarray(array, dtype=np.float64), name)
+
+
+def _bounded(array: FloatArray, name: str) -> FloatArray:
+    """Refuse finite values whose squares overflow; NaN and infinite ones pass."""
+    if array.size and not (array.max() <= GREATEST and array.min() >= -GREATEST):
+        finite = array[np.isfinite(array)]
+        if np.any(np.abs(finite) > GREATEST):
+            raise DataError(
+                f"{name} holds values beyond {GREATEST:g}, whose squares overflow. Look for a "
+                "damaged row or a wrong unit."
+            )
+    return array
 
 
 def _check_mask(values: object, name: str, error: type[SeakeepError]) -> None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.arrays import FloatArray, as_real
+from seakeep.arrays import GREATEST, FloatArray, as_real
 from seakeep.errors import DataError, RequestError, did_you_mean
 
 __all__ = ["Expression", "parse"]
@@ -28,9 +28,6 @@ LONGEST = 1000
 DEEPEST = 100
 """Operations inside one another, or in a row: Python allows some 1000 nested calls, and each takes
 three of them."""
-
-GREATEST = 1e150
-"""Numbers beyond this overflow when squared."""
 
 GREATEST_EXPONENT = 16.0
 """A physical law has no higher power; 9**9**9 has."""
