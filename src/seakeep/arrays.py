@@ -50,7 +50,12 @@ _REMEDIES = {
 }
 
 
-def as_real(values: object, name: str, error: type[SeakeepError] = RequestError) -> FloatArray:
+def as_real(
+    values: object,
+    name: str,
+    error: type[SeakeepError] = RequestError,
+    greatest: float = GREATEST,
+) -> FloatArray:
     """Return real numbers as an array of floats.
 
     Parameters
@@ -61,6 +66,8 @@ def as_real(values: object, name: str, error: type[SeakeepError] = RequestError)
         What messages call them.
     error : type, optional
         What is raised; a DataError where the values come from a file.
+    greatest : float, optional
+        Finite values beyond it are refused, since their squares overflow.
 
     Returns
     -------
@@ -72,7 +79,7 @@ def as_real(values: object, name: str, error: type[SeakeepError] = RequestError)
         If they are not real numbers: masked values, complex, dates, text, a Dataset, or rows of
         unequal length.
     DataError
-        If a finite value is so large that its square is not.
+        If a finite value is so large that its square overflows.
 
     Examples
     --------
@@ -80,7 +87,7 @@ def as_real(values: object, name: str, error: type[SeakeepError] = RequestError)
     array([1., 2.])
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
-        return _bounded(values, name)
+        return _bounded(values, name, greatest)
     if hasattr(values, "data_vars"):
         raise error(
             f"{name} must be an array; received a Dataset. Select one channel: data['heave']."
@@ -99,16 +106,16 @@ def as_real(values: object, name: str, error: type[SeakeepError] = RequestError)
             f"{name} must be real numbers; received {type(values).__name__} of type "
             f"{array.dtype}. {remedy}."
         )
-    return _bounded(np.asarray(array, dtype=np.float64), name)
+    return _bounded(np.asarray(array, dtype=np.float64), name, greatest)
 
 
-def _bounded(array: FloatArray, name: str) -> FloatArray:
-    """Refuse finite values whose squares overflow; NaN and infinite ones pass."""
-    if array.size and not (array.max() <= GREATEST and array.min() >= -GREATEST):
+def _bounded(array: FloatArray, name: str, greatest: float) -> FloatArray:
+    """Refuse finite values beyond a limit; NaN and infinite ones pass."""
+    if array.size and greatest < np.inf and not -greatest <= array.min() <= array.max() <= greatest:
         finite = array[np.isfinite(array)]
-        if np.any(np.abs(finite) > GREATEST):
+        if np.any(np.abs(finite) > greatest):
             raise DataError(
-                f"{name} holds values beyond {GREATEST:g}, whose squares overflow. Look for a "
+                f"{name} holds values beyond {greatest:g}, whose squares overflow. Look for a "
                 "damaged row or a wrong unit."
             )
     return array

@@ -107,8 +107,10 @@ def rollout(
     >>> rollout([[0.5]], [[1.0]], [[1.0]], [[[0.0], [1.0], [0.0]]])[0, :, 0]
     array([0.5  , 1.25 , 0.625])
     """
-    a, b = np.atleast_2d(as_real(A, "A")), as_real(B, "B")
-    start, driving = as_real(histories, "histories"), as_real(inputs, "inputs")
+    # A free run may overflow: it is cut off where it does.
+    given = {"A": A, "B": B, "histories": histories, "inputs": inputs}
+    arrays = [as_real(each, name, greatest=np.inf) for name, each in given.items()]
+    a, b, start, driving = np.atleast_2d(arrays[0]), *arrays[1:]
     if (
         a.ndim != 2
         or start.ndim not in (2, 3)
@@ -137,7 +139,10 @@ def rollout(
                 "needed, with D of its columns."
             )
         split = b.shape[1] - further[2]
-        groups = [(b[:, :split], driving), (b[:, split:], as_real(direct, "direct"))]
+        groups = [
+            (b[:, :split], driving),
+            (b[:, split:], as_real(direct, "direct", greatest=np.inf)),
+        ]
     steps = _steps(groups[0][0], driving)
     if direct is not None and further[:2] != (len(start), steps):
         raise RequestError(
