@@ -63,6 +63,11 @@ _FIXED = {
     "mooring_bow": ("N", "bow mooring load", r"M_\mathrm{bow}"),
     "mooring_stern": ("N", "stern mooring load", r"M_\mathrm{stern}"),
 }
+_DERIVATIVES = {
+    "": ("", "{}"),
+    "rate": ("/s", r"\dot{{{}}}"),
+    "acceleration": ("/s^2", r"\ddot{{{}}}"),
+}
 _ELEVATION = re.compile(r"eta_([a-z0-9_]+)\Z")
 _MOORING = re.compile(r"mooring_([a-z0-9_]+)\Z")
 
@@ -71,13 +76,9 @@ _MOORING = re.compile(r"mooring_([a-z0-9_]+)\Z")
 def _table() -> dict[str, Channel]:
     table = {}
     for motion, (unit, symbol) in _MOTIONS.items():
-        for suffix, per, accent in (
-            ("", "", "{}"),
-            ("_rate", "/s", r"\dot{{{}}}"),
-            ("_acceleration", "/s^2", r"\ddot{{{}}}"),
-        ):
-            name = motion + suffix
-            label = f"{motion} {suffix[1:]}".strip()
+        for suffix, (per, accent) in _DERIVATIVES.items():
+            name = f"{motion}_{suffix}".removesuffix("_")
+            label = f"{motion} {suffix}".strip()
             table[name] = Channel(name, unit + per, label, accent.format(symbol))
     for name, (unit, label, symbol) in _FIXED.items():
         table[name] = Channel(name, unit, label, symbol)
@@ -91,7 +92,8 @@ def canonical_names() -> list[str]:
     -------
     list of str
         Motions, their rates and accelerations, and the mooring loads. Besides these, any
-        ``eta_…`` is a wave elevation in metres and any ``mooring_…`` a load in newtons.
+        ``eta_…`` is a wave elevation in metres (``eta_…_rate`` in m/s) and any ``mooring_…`` a
+        load in newtons.
     """
     return list(_table())
 
@@ -122,9 +124,13 @@ def canonical_channel(name: str) -> Channel | None:
     if known is not None:
         return known
     if match := _ELEVATION.match(name):
-        place = match[1].replace("_", " ")
-        symbol = rf"\eta_\mathrm{{{match[1].replace('_', ' ')}}}"
-        return Channel(name, "m", f"wave elevation {place}", symbol)
+        place, _, suffix = match[1].rpartition("_")
+        if not place or suffix not in _DERIVATIVES:
+            place, suffix = match[1], ""
+        per, accent = _DERIVATIVES[suffix]
+        place = place.replace("_", " ")
+        symbol = accent.format(r"\eta") + rf"_\mathrm{{{place}}}"
+        return Channel(name, f"m{per}", f"wave elevation {place} {suffix}".rstrip(), symbol)
     if match := _MOORING.match(name):
         place = match[1].replace("_", " ")
         return Channel(name, "N", f"mooring load {place}", rf"M_\mathrm{{{place}}}")

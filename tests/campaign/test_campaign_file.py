@@ -343,6 +343,14 @@ def test_names_that_no_file_or_variable_can_hold(edited):
         assert "a channel is not called 'time', nor does its name end in '_flags'" in message
 
 
+def test_a_derived_rate_of_an_elevation(edited):
+    """It was refused: m/s against m."""
+    rate = '[derived.eta_fwd_rate]\nfrom = "eta_fwd"\nstep = "differentiate"\n[runs.first]'
+    campaign = read_campaign(edited(("[runs.first]", rate)))
+    assert campaign.prepare(["first"])["first"]["eta_fwd_rate"].attrs["units"] == "m/s"
+    assert campaign.period_channel() == "eta_fwd"
+
+
 class TestModels:
     def test_any_kind_with_keys_of_its_constructor(self, edited):
         path = edited(("[model]", '[model]\nkind = "fir"\nmemory = "2 T"\nlead = "0.75 T"\n'))

@@ -788,7 +788,7 @@ class CampaignSettings(Table):
         if self.campaign.period_channel is not None:
             return self.campaign.period_channel
         inputs = [name for model in self.all_models().values() for name in model.inputs]
-        waves = [name for name in (*inputs, *self.channel_names) if name.startswith("eta_")]
+        waves = [name for name in (*inputs, *self.channel_names) if is_elevation(name)]
         return next(iter((*waves, *inputs)), None)
 
     @property
@@ -802,6 +802,12 @@ class CampaignSettings(Table):
         """Models by the key of their table: ``model`` and ``models.NAME``."""
         unnamed = {} if self.model is None else {"model": self.model}
         return {**unnamed, **{f"models.{name}": each for name, each in self.models.items()}}
+
+
+def is_elevation(name: str) -> bool:
+    """Whether a channel is called as wave elevations are; their rates are none."""
+    known = canonical_channel(name)
+    return name.startswith("eta_") and known is not None and known.units == "m"
 
 
 def long_name_of(name: str, stated: str | None) -> str:
