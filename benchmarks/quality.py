@@ -5,7 +5,7 @@
 Each fault is put into the heave of the motion reference unit (50 Hz), at a random place and with
 a random size from the range printed; the heave integrated from its accelerometer is the trusted
 one. A fault counts as found if a finding of its own kind names the channel. Lags and coarse
-readings are drawn from both sides of the limits that follow from a least correlation of 0.8 and
+readings are drawn from both sides of the limits that follow from a largest NRMSE of 0.2 and
 from five steps a motion, and both sides are stated: what lies below a limit is not to be flagged.
 False alarms are findings of any kind in the same runs without a fault.
 """

@@ -198,3 +198,12 @@ def test_prepare_writes_a_page_that_needs_nothing_else(tmp_path, capsys):
     (folder / "first.nc").touch()
     assert cli.main(["prepare", str(tmp_path / "campaign.toml")]) == 0
     assert page_of.stat().st_mtime_ns > before[page_of]
+    # Only the picture of the run that changed is drawn again.
+    first, second = folder / "quality_first.png", folder / "quality_second.png"
+    assert second.stat().st_mtime_ns == before[second]
+    assert first.stat().st_mtime_ns > before[first]
+    first.write_bytes(b"a photo of mine")
+    for command in ("prepare", "prepare --anew"):
+        assert cli.main([*command.split(), str(tmp_path / "campaign.toml")]) == 2
+    assert "quality_first.png exists and is no data-quality sheet that" in capsys.readouterr().err
+    assert first.read_bytes() == b"a photo of mine"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -114,6 +114,8 @@ def prepare(
     from seakeep.campaign.survey import as_one
 
     read = read_campaign(campaign)
+    if sheet:
+        _check_sheet(read, prepared_folder(read, out))
     with progress_bar("Preparing") as progress:
         failures: dict[str, SeakeepError] = {}
         files = write_prepared(read, out, progress=progress, anew=anew, failures=failures)
@@ -131,12 +133,21 @@ def prepare(
         raise as_one(failures)
 
 
+def _check_sheet(read: Campaign, folder: Path) -> None:
+    """Refuse, before any work, to replace files of the user by those of the sheet."""
+    from seakeep.report.quality_sheet import SHEET
+
+    if folder.is_dir():
+        for name in ("quality.html", *(f"quality_{run}.png" for run in read.runs)):
+            check_output(folder / name, SHEET)
+
+
 def _report_runs(
     read: Campaign, files: Mapping[str, Path], failures: Mapping[str, SeakeepError], sheet: bool
 ) -> None:
     """Print steps and findings of prepared runs, and write their sheet unless it is fresh."""
     from seakeep.campaign import load_prepared
-    from seakeep.report.quality_sheet import steps_of, write_quality_sheet
+    from seakeep.report.quality_sheet import is_newer, steps_of, write_quality_sheet
 
     folder = next(iter(files.values())).parent
     runs = load_prepared(read, folder, list(files))
@@ -144,7 +155,9 @@ def _report_runs(
     messages().print(f"{words[0].upper()}{words[1:]}.")
     _print_findings(runs)
     page = folder / "quality.html"
-    if not sheet or (not failures and _is_fresh(page, files.values())):
+    pictures = {path.stem.removeprefix("quality_") for path in folder.glob("quality_*.png")}
+    same = pictures == set(files) and all(is_newer(page, file) for file in files.values())
+    if not sheet or (same and not failures):
         return
     unread = {name: str(error) for name, error in failures.items()}
     try:
@@ -153,18 +166,6 @@ def _report_runs(
         messages().print(f"Note: no data-quality sheet: {error}", style="yellow")
         return
     messages().print(f"Wrote {page}: look at it before you use the runs.")
-
-
-def _is_fresh(page: Path, files: Iterable[Path]) -> bool:
-    """Whether a sheet was written after all prepared runs, of exactly these runs."""
-    if not page.exists():
-        return False
-    runs = list(files)
-    pictures = {path.stem.removeprefix("quality_") for path in page.parent.glob("quality_*.png")}
-    written = page.stat().st_mtime_ns
-    return pictures == {file.stem for file in runs} and all(
-        file.stat().st_mtime_ns <= written for file in runs
-    )
 
 
 def _print_findings(runs: Mapping[str, xr.Dataset]) -> None:

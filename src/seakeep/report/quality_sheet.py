@@ -14,7 +14,7 @@ import xarray as xr
 from seakeep.campaign.pipeline import redundant_pairs
 from seakeep.campaign.settings import CampaignSettings, long_name_of
 from seakeep.conventions import displayed
-from seakeep.files import replacing
+from seakeep.files import MARK, replacing
 from seakeep.quality import compared, findings_of
 from seakeep.report.html import inline_picture, rendered
 from seakeep.report.style import COLOURS, axis_label, figure_style, new_figure, shown_unit
@@ -32,6 +32,9 @@ __all__ = [
     "steps_of",
     "write_quality_sheet",
 ]
+
+SHEET = "data-quality sheet"
+"""Kind of the files of a sheet, by which they are told from the user's."""
 
 _MARKS = {
     "missing": ("#D55E00", "x"),
@@ -211,6 +214,8 @@ def write_quality_sheet(
     unread : mapping of str to str, optional
         Runs that could not be prepared, and why.
 
+    Pictures that are newer than ``RUN.nc`` beside them are taken as they are.
+
     Returns
     -------
     list of Path
@@ -223,19 +228,22 @@ def write_quality_sheet(
     """
     told, written = [], []
     for name, run in runs.items():
-        pairs = compared(run, redundant_pairs(settings, run.attrs.get("encounter_period")))
-        agreements = {channel: each for (channel, _), each in pairs.items()}
-        picture = _png(quality_figure(run, agreements))
-        path = folder / f"quality_{name}.png"
-        with replacing(path) as temporary:
-            temporary.write_bytes(picture)
+        path, source = folder / f"quality_{name}.png", folder / f"{name}.nc"
+        if is_newer(path, source):
+            picture = path.read_bytes()
+        else:
+            pairs = compared(run, redundant_pairs(settings, run.attrs.get("encounter_period")))
+            agreements = {channel: each for (channel, _), each in pairs.items()}
+            picture = _png(quality_figure(run, agreements))
+            with replacing(path) as temporary:
+                temporary.write_bytes(picture)
         written.append(path)
         told.append(_told(name, run) | {"picture": inline_picture(picture, f"channels of {name}")})
     page = folder / "quality.html"
     with replacing(page) as temporary:
         text = rendered(
             "quality.html",
-            kind="sheet",
+            kind=SHEET,
             title=f"Data quality: {title}",
             runs=told,
             unread=unread or {},
@@ -265,10 +273,17 @@ def _told(name: str, run: xr.Dataset) -> dict[str, Any]:
     }
 
 
+def is_newer(path: Path, source: Path) -> bool:
+    """Whether a file was written after the one that it is made from."""
+    both = path.exists() and source.exists()
+    return both and path.stat().st_mtime_ns >= source.stat().st_mtime_ns
+
+
 def _png(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     with figure_style():
-        figure.savefig(buffer, format="png", dpi=100, pil_kwargs={"optimize": True})
+        mark = {"Software": f"{MARK}: {SHEET}"}
+        figure.savefig(buffer, format="png", dpi=100, metadata=mark, pil_kwargs={"optimize": True})
     return buffer.getvalue()
 
 
