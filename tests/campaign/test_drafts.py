@@ -57,6 +57,9 @@ def drafted(folder, files):
         ("Force_Sway", "N", "force_sway"),
         ("3rd thing", None, "column_3_rd_thing"),
         ("Ærlig", None, "rlig"),
+        ("Time", "V", "time_signal"),
+        ("heave flags", None, "heave"),
+        ("odd flags", None, "odd_flags_signal"),
         ("°", None, "channel"),
     ],
 )

@@ -6,6 +6,7 @@ import sys
 import types
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from seakeep import files
@@ -50,6 +51,22 @@ def test_a_reader_added_refuses_text_under_its_name(tmp_path, raw):
     (tmp_path / "run.raw").write_text("time,heave\n0,1\n1,2\n")
     with pytest.raises(DataError, match=r"run\.raw is no RAW file: it holds text and begins with"):
         read_columns(tmp_path / "run.raw")
+
+
+def test_each_file_is_parsed_once_in_a_preparation(tmp_path, monkeypatch):
+    """Although the encounter period is measured on all runs before the first is prepared."""
+    parsed, read_csv = [], pd.read_csv
+    monkeypatch.setattr(pd, "read_csv", lambda *a, **k: parsed.append(1) or read_csv(*a, **k))
+    t = 0.1 * np.arange(400)
+    for name in "ab":
+        table = pd.DataFrame({"t [s]": t, "eta_1 [m]": np.sin(t), "heave [m]": np.cos(t)})
+        table.to_csv(tmp_path / f"{name}.csv", index=False)
+    runs = "".join(f"[runs.{name}]\nfile = '{name}.csv'\n" for name in "ab")
+    (tmp_path / "campaign.toml").write_text(
+        f"[channels.eta_1]\n[channels.heave]\n{runs}[preparation]\nsteps_per_period = 32\n"
+    )
+    assert len(read_campaign(tmp_path / "campaign.toml").prepare()) == 2
+    assert len(parsed) == 2
 
 
 def test_columns_are_found_by_name_or_header():

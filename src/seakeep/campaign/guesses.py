@@ -126,6 +126,7 @@ class Sea:
     noisy: bool
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def sea_of(file: File, column: str) -> Sea | None:
     """Waves that a probe recorded in a run; None where it recorded none."""
     series = file.table.values.get(column, np.zeros(0))
@@ -270,7 +271,8 @@ def _resting(guesses: Sequence[Guess], files: Sequence[File]) -> list[Guess]:
     for guess in guesses:
         if guess.channel is not None and guess.channel.partition("_")[0] in MOTIONS:
             series = [f.table.values[guess.column] for f in files if f.logger == guess.logger]
-            size = max(float(np.std(each, where=np.isfinite(each))) for each in series)
+            spans = [np.percentile(each[np.isfinite(each)], [5, 95]) for each in series]
+            size = max(float(high - low) for low, high in spans)
             target = si_unit(str(guess.unit))
             sizes[guess.channel] = target, size * conversion(str(guess.unit), target)
     largest: dict[str, float] = {}
@@ -419,4 +421,5 @@ def suggest_channel(column: str, unit: str | None, logger: str = "") -> str:
     free = "_".join(words) or "channel"
     free = free if not free[0].isdigit() else f"column_{free}"
     canonical = canonical_channel(free)
-    return f"{free}_signal" if canonical and not _fits_unit(free, dimension) else free
+    taken = free == "time" or free.endswith("_flags")
+    return f"{free}_signal" if taken or (canonical and not _fits_unit(free, dimension)) else free
