@@ -184,7 +184,7 @@ def test_text_under_the_name_of_a_binary_format(path, encoding):
         return
     with pytest.raises(
         DataError,
-        match=r"run\..* is no (MATLAB|NetCDF|HDF5|TDMS|MCAP) file: it holds text and begins with "
+        match=r"run\..* is no (MATLAB|NetCDF|HDF5|TDMS|MCAP) file: it holds text and starts with "
         r"'tid \[s\],vinkel .*If it is a table, name it \.csv or \.txt; else copy or export it",
     ):
         read_table(path)
@@ -237,7 +237,7 @@ class TestBagFolder:
         database = next(folder.glob("*.db3"))
         database.write_bytes(content)
         self.refused(folder)
-        self.refused(database, "is a PNG|holds text and begins with|cannot be read as a recording")
+        self.refused(database, "is a PNG|holds text and starts with|cannot be read as a recording")
 
     def test_a_database_of_another_kind(self, folder):
         database = next(folder.glob("*.db3"))

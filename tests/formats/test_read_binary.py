@@ -79,7 +79,7 @@ def test_matlab_headers_with_units(tmp_path):
             r"lists 2 channel names, and no matrix has as many columns \(matrices: data \(200, 3\)",
         ),
         ({"comment": "nothing"}, DataError, "holds no channels; found comment. Save one vector"),
-        ({"heave": HEAVE}, RequestError, "has no column that is called as a time is"),
+        ({"heave": HEAVE}, RequestError, "has no column with a usual name of times"),
     ],
 )
 def test_what_is_no_matlab_run(tmp_path, content, error, message):
@@ -229,7 +229,7 @@ def test_netcdf_cut_off(tmp_path, engine, part):
 def test_netcdf_that_is_none(tmp_path):
     path = tmp_path / "run.nc"
     path.write_text("not a NetCDF file")
-    with pytest.raises(DataError, match=r"is no NetCDF file: it holds text and begins with 'not a"):
+    with pytest.raises(DataError, match=r"is no NetCDF file: it holds text and starts with 'not a"):
         read_table(path)
 
 

@@ -164,7 +164,7 @@ def test_classes_that_are_left_out(tmp_path):
         ({"time": T, "heave": HEAVE[:-3]}, DataError, r"differ in length \(heave 197, time 200\)"),
         ({"comment": "nothing"}, DataError, r"holds no channels; found comment\. Save one vector"),
         ({}, DataError, r"holds no channels; found nothing"),
-        ({"heave": HEAVE}, RequestError, "has no column that is called as a time is"),
+        ({"heave": HEAVE}, RequestError, "has no column with a usual name of times"),
     ],
 )
 def test_what_is_no_run(tmp_path, content, error, message):

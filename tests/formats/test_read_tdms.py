@@ -123,7 +123,7 @@ def test_one_name_in_two_groups(tmp_path):
             DataError,
             r"the channels are sampled differently \(a 0\.1 s from 0 s, b 0\.2 s from 0 s\)",
         ),
-        ([channel("heave", HEAVE)], RequestError, "has no column that is called as a time is"),
+        ([channel("heave", HEAVE)], RequestError, "has no column with a usual name of times"),
     ],
 )
 def test_what_is_no_run(tmp_path, channels, error, message):
@@ -156,7 +156,7 @@ def test_a_second_segment_cut_off(tmp_path, more):
 def test_foreign_and_empty(tmp_path):
     path = tmp_path / "run.tdms"
     path.write_bytes("temps;pilonnement é\n".encode("latin-1") * 40)
-    with pytest.raises(DataError, match=r"is no TDMS file: it holds text and begins"):
+    with pytest.raises(DataError, match=r"is no TDMS file: it holds text and starts"):
         read_table(path)
     path.write_bytes(b"")
     with pytest.raises(DataError, match=r"run\.tdms is empty \(0 bytes\)"):

@@ -307,12 +307,12 @@ def test_round_trip(tmp_path, values, delimiter, comma, units, compressed, newli
         (
             "t,heave,heave\n0,1,2\n1,2,3\n",
             DataError,
-            "2 columns are called 'heave'. Rename them in the file's header",
+            "2 columns have the name 'heave'. Rename them in the file's header",
         ),
         (
             "clock,heave\n0,1\n1,2\n",
             RequestError,
-            r"has no column that is called as a time is\. State time = 'NAME' or sampling_rate "
+            r"has no column with a usual name of times\. State time = 'NAME' or sampling_rate "
             r"\(Hz\) in \[files\]\. Its columns: clock, heave",
         ),
         (
@@ -335,7 +335,7 @@ def test_round_trip(tmp_path, values, delimiter, comma, units, compressed, newli
         ("t,heave\n0,1\n,2\n", DataError, "hold a value that is not finite at sample 1"),
         ("t,heave\n0,1\n", DataError, r"has 1 instant\(s\); a time axis needs at least two"),
         ("t [m],heave\n0,1\n1,2\n", RequestError, "the unit 'm' does not fit the time column 't'"),
-        ("t,t,heave\n0,0,1\n1,1,2\n", DataError, "2 columns are called 't'"),
+        ("t,t,heave\n0,0,1\n1,1,2\n", DataError, "2 columns have the name 't'"),
     ],
 )
 def test_what_is_no_table(tmp_path, text, error, message):
@@ -369,7 +369,7 @@ def test_what_is_no_table(tmp_path, text, error, message):
             FileSettings(delimiter=";"),
             None,
             RequestError,
-            "has no column that is called as a time is",
+            "has no column with a usual name of times",
         ),
     ],
 )

@@ -49,7 +49,7 @@ def test_a_reader_is_added_without_touching_the_package(tmp_path, raw, name):
 
 def test_a_reader_added_refuses_text_under_its_name(tmp_path, raw):
     (tmp_path / "run.raw").write_text("time,heave\n0,1\n1,2\n")
-    with pytest.raises(DataError, match=r"run\.raw is no RAW file: it holds text and begins with"):
+    with pytest.raises(DataError, match=r"run\.raw is no RAW file: it holds text and starts with"):
         read_columns(tmp_path / "run.raw")
 
 

@@ -89,7 +89,7 @@ def read_table(
     Returns
     -------
     xarray.Dataset
-        Dimension ``time`` (s, increasing, not necessarily uniform); one variable a column, its
+        Dimension ``time`` (s, increasing, not necessarily uniform); one variable per column, its
         attribute ``units`` what the file says, if it says something, and ``long_name`` its full
         header.
 
@@ -117,8 +117,8 @@ def labelled_table(
         name = find_column(path, table, each)
         if name == "time":
             raise RequestError(
-                f"{path}: the column 'time' cannot be a channel, since a run's instants are called "
-                "so. Leave it out, or rename it in the file."
+                f"{path}: the column 'time' cannot be a channel, since a run's instants have this "
+                "name. Leave it out, or rename it in the file."
             )
         attributes = {"long_name": table.headers.get(name, name)}
         if name in table.units:
@@ -145,7 +145,7 @@ def find_column(path: Path, table: Columns, wanted: str) -> str:
 
 
 def time_column(table: Columns, stated: str | None = None) -> str | None:
-    """Name of the time column: the one stated, or the one that is called as times are."""
+    """Name of the time column: the one stated, or the first with a usual name of times."""
     if stated is not None:
         return table.find(stated)
     for name in table.names:
@@ -170,7 +170,7 @@ def _said_unit(table: Columns, name: str) -> str:
 
 
 def time_step_of(table: Columns, name: str) -> float | None:
-    """Step of a time column, s, by which gaps do not count; None where it tells none."""
+    """Step of a time column in s, gaps left out; None where it has too few values."""
     times, unit = table.values.get(name), time_unit_of(table, name)
     if times is None or times.size < 3:
         return None
@@ -192,7 +192,7 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
         )
     if name is None and rate is None:
         raise RequestError(
-            f"{path} has no column that is called as a time is. State time = 'NAME' or "
+            f"{path} has no column with a usual name of times. State time = 'NAME' or "
             f"sampling_rate (Hz) in [files]. Its columns: {', '.join(table.names)}."
         )
     if name is None or (options.sampling_rate and options.time is None):

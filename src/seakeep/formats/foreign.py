@@ -37,7 +37,7 @@ def refuse_text(path: Path, head: bytes, kind: str) -> None:
     if _is_text(head):
         shown = head[:24].decode("latin-1").splitlines()[0] if head.strip() else ""
         raise DataError(
-            f"{path} is no {kind} file: it holds text and begins with {shown!r}. If it is a table, "
+            f"{path} is no {kind} file: it holds text and starts with {shown!r}. If it is a table, "
             "name it .csv or .txt; else copy or export it again."
         )
 

@@ -169,7 +169,7 @@ def _named_matrix(path: Path, found: Mapping[str, Any]) -> dict[str, FloatArray]
     shapes = ", ".join(f"{key} {value.shape}" for key, value in matrices.items()) or "none"
     raise DataError(
         f"{path} lists {len(names)} channel names, and no matrix has as many columns (matrices: "
-        f"{shapes}). A matrix is (time, channel), one name a column."
+        f"{shapes}). A matrix is (time, channel), one name per column."
     )
 
 
@@ -199,9 +199,9 @@ def _vectors(path: Path, found: Mapping[str, Any]) -> dict[str, FloatArray]:
             raise _transposed(path, name, matrix.shape)
         raise DataError(
             f"{path}: the matrix '{name}' {matrix.shape} has no names for its columns. Save a cell "
-            "array 'names' beside it, or one vector a channel."
+            "array 'names' beside it, or one vector per channel."
         )
     raise DataError(
-        f"{path} holds no channels; found {', '.join(found) or 'nothing'}. Save one vector a "
+        f"{path} holds no channels; found {', '.join(found) or 'nothing'}. Save one vector per "
         "channel, a struct of vectors, or a matrix (time, channel) with a cell array 'names'."
     )

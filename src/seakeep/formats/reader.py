@@ -1,4 +1,4 @@
-"""What a reader is, and what it may be told about a file."""
+"""What a reader is, and what may be known about a file before it is read."""
 
 from __future__ import annotations
 

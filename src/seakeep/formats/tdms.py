@@ -60,7 +60,7 @@ def read_tdms(path: Path, options: Options) -> Columns:
 def _check_whole(path: Path) -> None:
     """Refuse a file whose segments do not end where it ends.
 
-    Each segment begins with 28 bytes: ``TDSm``, two numbers of four bytes, and the lengths of what
+    Each segment starts with 28 bytes: ``TDSm``, two numbers of four bytes, and the lengths of what
     follows. nptdms leaves an incomplete last segment out, with a line in a log.
     """
     size, at = path.stat().st_size, 0
@@ -69,7 +69,7 @@ def _check_whole(path: Path) -> None:
             raw.seek(at)
             head = raw.read(LEAD_IN)
             if len(head) < LEAD_IN or head[:4] != b"TDSm":
-                raise _damaged(path, f"no segment begins at byte {at}")
+                raise _damaged(path, f"no segment starts at byte {at}")
             at += LEAD_IN + int.from_bytes(head[12:20], "little")
     if at > size:
         raise _damaged(path, f"its last segment is not complete, the file ends at byte {size}")

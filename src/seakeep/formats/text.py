@@ -79,7 +79,7 @@ def read_text(path: Path, options: Options) -> Columns:
     keep = [i for i, name in enumerate(names) if name and count[name] == 1]
     numbers, faults = _numbers(path, raw, frame, layout, {i: names[i] for i in keep})
     faults |= {
-        name: f"{path}: {count[name]} columns are called '{name}'. Rename them in the file's "
+        name: f"{path}: {count[name]} columns have the name '{name}'. Rename them in the file's "
         "header, so that it is plain which one is meant."
         for name in count
         if name and count[name] > 1
