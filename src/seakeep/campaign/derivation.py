@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.campaign.settings import CampaignSettings, DerivedSettings, long_name_of
 from seakeep.campaign.validation import sources_of
 from seakeep.conventions import canonical_channel, conversion, si_unit
@@ -31,7 +31,6 @@ from seakeep.waves import GRAVITY
 
 __all__ = ["derive"]
 
-FloatArray = npt.NDArray[np.float64]
 
 ANGLES = ("roll", "pitch", "yaw")
 AXES = {"surge": 0, "sway": 1, "heave": 2, "x": 0, "y": 1, "z": 2}

@@ -17,6 +17,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep import statistics
+from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
@@ -35,7 +36,6 @@ __all__ = [
     "wave_frequency",
 ]
 
-FloatArray = npt.NDArray[np.float64]
 
 BAND_ERRORS = {"all": "error_over_time", "low": "error_low", "wave": "error_wave"}
 """Names of ε(t), as a whole and in its two bands."""

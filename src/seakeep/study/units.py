@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.core import metrics
 from seakeep.core.bands import band_error_over_time
 from seakeep.core.calibration import conformal_margin
@@ -32,7 +33,6 @@ from seakeep.study.settings import Study
 
 __all__ = ["Unit", "collect", "compute", "fit_training", "units_of"]
 
-FloatArray = npt.NDArray[np.float64]
 Runs = Mapping[str, xr.Dataset]
 Arrays = dict[str, npt.NDArray[Any]]
 Read = Callable[["Unit"], Arrays]

@@ -13,7 +13,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from seakeep.arrays import FloatArray
 
 # Reassociation lets the memory integral run in vector registers; NaN is still NaN. Contraction to
 # fused multiply-adds is left out: code compiled in this process and code read from the cache fuse

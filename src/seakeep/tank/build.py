@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.tank.hull import HullMesh, Hydrostatics, hull_mesh, hydrostatics
 from seakeep.tank.hydrodynamics import CONVENTIONS, save_hydrodynamics
@@ -23,8 +24,6 @@ from seakeep.tank.settings import HullSettings, PoolGeometry
 from seakeep.waves import GRAVITY
 
 __all__ = ["build_hydrodynamics", "default_frequencies"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def default_frequencies() -> FloatArray:

@@ -17,6 +17,7 @@ from types import ModuleType
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.tank.hydrodynamics import (
     Hydrodynamics,
@@ -42,7 +43,6 @@ __all__ = [
     "tensions",
 ]
 
-FloatArray = npt.NDArray[np.float64]
 
 LIMITS = {"surge": 20.0, "heave": 2.0, "pitch": 1.2, "piston": 2.0, "slosh": 2.0}
 """Beyond these (m, rad) a simulation has left the physics it was made for."""

@@ -15,13 +15,13 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError
 from seakeep.tank.settings import HullSettings, PoolGeometry
 from seakeep.waves import GRAVITY
 
 __all__ = ["HullMesh", "Hydrostatics", "hull_mesh", "hydrostatics"]
 
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 

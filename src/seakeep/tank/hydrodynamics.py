@@ -17,6 +17,7 @@ import numpy.typing as npt
 import scipy
 import xarray as xr
 
+from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import RequestError
 from seakeep.files import replacing, write_netcdf
 
@@ -32,8 +33,6 @@ __all__ = [
     "save_hydrodynamics",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 CONVENTIONS = {
     "format": "seakeep-hydrodynamics 1",

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from seakeep.arrays import FloatArray
 from seakeep.tank.dynamics import Motion, Rig, tensions
 from seakeep.tank.seas import Sea
 from seakeep.tank.settings import (
@@ -25,7 +26,6 @@ from seakeep.tank.settings import (
 
 __all__ = ["Column", "Played", "Record", "clock_instants", "record_run", "slap_pulses", "trigger"]
 
-FloatArray = npt.NDArray[np.float64]
 
 TRIGGER_VOLTS = 5.0
 TRIGGER_NOISE = 0.01  # V

@@ -10,15 +10,14 @@ from collections.abc import Callable, Mapping
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, field_validator
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.toml import Finite, NotNegative, Positive, Table
 
 __all__ = ["KINDS", "LineSettings", "line_table", "mooring_stiffness"]
 
-FloatArray = npt.NDArray[np.float64]
 Elasticity = tuple[float, float, float]
 """Coefficients of a tension that is a cubic in the stretch: N/m, N/m², N/m³."""
 Point = Annotated[tuple[Finite, Finite], Field(strict=False)]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError
 from seakeep.signals import (
     encounter_period,
@@ -22,7 +23,6 @@ from seakeep.waves import group_speed, phase_speed, wavelength_to_frequency
 
 __all__ = ["PAPER", "Realised", "Row", "comparison", "matrix_rows", "paper_peak", "realise"]
 
-FloatArray = npt.NDArray[np.float64]
 
 PAPER = {
     "significant height": (0.16, 0.01, "m"),

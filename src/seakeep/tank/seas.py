@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import RequestError
 from seakeep.tank.settings import FacilitySettings, RunPlan, SpectrumSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber
@@ -24,9 +25,6 @@ __all__ = [
     "sea_of_run",
     "spectral_density",
 ]
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 
 BLOCK = 512  # instants evaluated at a time at a fixed place

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.tank.instruments import Played, clock_instants, trigger
 
@@ -29,7 +30,6 @@ __all__ = [
     "side_view",
 ]
 
-FloatArray = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8]
 
 WIDTH, HEIGHT = 1280, 720

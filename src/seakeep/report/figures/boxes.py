@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.arrays import FloatArray
 from seakeep.report.figures.common import (
     HEADING,
     model_colour,
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["average_boxes", "channel_boxes", "draw_box_violin"]
 
-FloatArray = npt.NDArray[np.float64]
 
 NARROW = 14
 """Letters of a test set's label on one line."""

@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from seakeep.conventions import canonical_channel
 from seakeep.report.style import COLOURS, LINES
 from seakeep.study import StudyResult
 
 __all__ = ["HEADING", "grid_of_axes", "line_of", "model_colour", "model_words", "short_label"]
 
-FloatArray = npt.NDArray[np.float64]
 
 FURTHER = ("#CC79A7", "#E69F00", "#009E73", "#56B4E9")
 HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}

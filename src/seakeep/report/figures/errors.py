@@ -6,9 +6,9 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
+from seakeep.arrays import FloatArray
 from seakeep.report.figures.common import line_of, model_colour, model_words
 from seakeep.report.style import figure_style, new_figure
 from seakeep.study import StudyResult
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 __all__ = ["BAND_WORDS", "error_over_time_figure", "hyperparameter_figure", "member_errors"]
 
-FloatArray = npt.NDArray[np.float64]
 
 BAND_WORDS = {"all": "all frequencies", "low": "low frequencies", "wave": "wave frequencies"}
 """Bands of ε(t)."""
