@@ -110,10 +110,6 @@ def _prepared(run: xr.Dataset) -> xr.Dataset:
 
 
 def _training(plan: Plan, runs: Runs) -> xr.Dataset:
-    spans = [
-        ", ".join(f"{run}, {begin:.2f} to {stop:.2f} s" for run, begin, stop in each.spans)
-        for each in plan.training
-    ]
     single = all(len(each.spans) == 1 for each in plan.training)
     edges = np.full((2, len(plan.training), len(runs)), np.nan)
     for number, each in enumerate(plan.training):
@@ -123,7 +119,6 @@ def _training(plan: Plan, runs: Runs) -> xr.Dataset:
         {
             "begin": (("training", "of_run"), edges[0], {"units": "s"}),
             "end": (("training", "of_run"), edges[1], {"units": "s"}),
-            "spans": ("training", np.array(spans, dtype=object)),
             "left_out": (
                 "training",
                 np.array([", ".join(each.left_out) for each in plan.training], dtype=object),
@@ -173,10 +168,6 @@ def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
         key: ("run", np.array([str(run.attrs.get(key, "")) for run in runs.values()], dtype=object))
         for key in ("sea_state", "waves", "role", "file_sha256")
     }
-    spans = {
-        key: ("run", np.array([_span(run, key) for run in runs.values()], dtype=object))
-        for key in ("train_span", "test_span")
-    }
     nowhere = (np.nan, np.nan)
     edges = {
         f"{use}_{end}": (
@@ -195,7 +186,6 @@ def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
             "wave_frequency": ("run", np.array([_frequency(plan, r) for r in runs.values()])),
             **{n: (("run", "name"), values[i]) for i, n in enumerate(numbers)},
             **words,
-            **spans,
             **edges,
             "duration": (
                 "run",
@@ -215,11 +205,6 @@ def _frequency(plan: Plan, run: xr.Dataset) -> float:
     if run.attrs.get("waves") != "regular" or not waves:
         return float("nan")
     return wave_frequency(between(run, whole_span(run))[waves[0]].values, plan.dt)
-
-
-def _span(run: xr.Dataset, key: str) -> str:
-    span = run.attrs.get(key)
-    return "" if span is None else f"{float(span[0]):.2f} to {float(span[1]):.2f} s"
 
 
 def _spectra(plan: Plan, runs: Runs) -> xr.Dataset | None:

@@ -6,7 +6,6 @@ import json
 import warnings
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import xarray as xr
@@ -14,11 +13,9 @@ import xarray as xr
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models.executor import WorkerLostError, as_finished
-from seakeep.models.priors import Prior, describe
 from seakeep.study.describe import describe_study
 from seakeep.study.judge import judge, words_of_lost
 from seakeep.study.plan import Plan, make_plan, warn_of_slow_study
-from seakeep.study.resolve import Spec
 from seakeep.study.settings import Study
 from seakeep.study.store import (
     RESULT,
@@ -163,27 +160,10 @@ def _attributes(
         "longest_training": plan.needs.training * plan.dt,
         "preparation": study.campaign.settings.preparation.model_dump_json(),
         "models": json.dumps({name: each.to_json() for name, each in plan.models.items()}),
-        "specs": json.dumps({name: _fields(spec) for name, spec in plan.specs.items()}),
         "conditional_on": _conditional(plan),
         "versions": json.dumps(versions()),
         "groups": json.dumps(list(groups)),
     }
-
-
-def _fields(spec: Spec) -> dict[str, str]:
-    """Settings of a model as words."""
-    kept = [each for each in fields(spec) if each.repr and each.name != "dt"]
-    return {each.name: _words_of(getattr(spec, each.name)) for each in kept}
-
-
-def _words_of(value: object) -> str:
-    """A setting in words; a distribution of scipy.stats by name, for it prints as an address."""
-    if not isinstance(value, Prior) or is_dataclass(value):
-        return str(value)
-    known = describe(value)
-    assert known is not None
-    stated = [*map(str, known["args"]), *(f"{key}={v}" for key, v in known["kwds"].items())]
-    return f"{known['prior']}({', '.join(stated)})"
 
 
 def _conditional(plan: Plan) -> str:
