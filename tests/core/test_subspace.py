@@ -66,6 +66,27 @@ def test_a_known_system_is_recovered_and_forecast_to_rounding(inputs):
     np.testing.assert_allclose(found.free_runs(outputs, driving, 100), expected, atol=1e-7)
 
 
+def test_direct_inputs_drive_and_do_not_tell_the_past():
+    a, b, c = plant(inputs=3)
+    u = np.random.default_rng(9).normal(size=(500, 3))
+    y = simulate((a, b, c), u)
+    found = identify_subspace(
+        [y],
+        [u[:, :2]],
+        [TrainingWindow(12, 399, 12)],
+        order=4,
+        output_delays=12,
+        input_delays=12,
+        future=8,
+        ridge=0.0,
+        direct=[u[:, 2:]],
+    )
+    # Without the past of the third input the filter estimates the state, no more.
+    run = found.free_runs(y[None, 408:421], u[None, 408:490, :2], 70, u[None, 420:490, 2:])[0]
+    late = y[451:491]
+    assert np.sqrt(np.mean((run[30:] - late) ** 2)) < 0.05 * late.std()
+
+
 def test_another_package_finds_the_same_system():
     pytest.importorskip("nfoursid", reason="dependency group bench")
     import pandas as pd

@@ -30,8 +30,8 @@ class StateSpace:
 
     Parameters
     ----------
-    A, B, C, D : ndarray, shapes (n, n), (n, Q), (N, n), (N, Q)
-        Matrices.
+    A, B, C, D : ndarray, shapes (n, n), (n, Q + d), (N, n), (N, Q + d)
+        Matrices, with d direct inputs.
     filter : ndarray, shape (n, N(s+1) + Q z)
         Maps the past [y_j; …; y_{j−s}; u_{j−1}; …; u_{j−z}] to the state z_j.
     """
@@ -42,7 +42,13 @@ class StateSpace:
     D: FloatArray
     filter: FloatArray
 
-    def free_runs(self, outputs: FloatArray, inputs: FloatArray, steps: int) -> FloatArray:
+    def free_runs(
+        self,
+        outputs: FloatArray,
+        inputs: FloatArray,
+        steps: int,
+        direct: FloatArray | None = None,
+    ) -> FloatArray:
         """Free runs over several windows.
 
         Parameters
@@ -53,6 +59,8 @@ class StateSpace:
             Inputs, oldest first; sample z is that of the start.
         steps : int
             Number of instants.
+        direct : ndarray, shape (window, steps, d), optional
+            Further inputs, from the start on, which the filter of the past does not read.
 
         Returns
         -------
@@ -63,6 +71,8 @@ class StateSpace:
         past = [outputs[:, ::-1].reshape(count, -1), inputs[:, :delays][:, ::-1].reshape(count, -1)]
         start = np.concatenate(past, axis=1) @ self.filter.T
         driving = inputs[:, delays:]
+        if direct is not None:
+            driving = np.concatenate([driving, direct], axis=2)
         after = rollout(self.A, self.B, start, driving, n_states=len(self.A))
         states = np.concatenate([start[:, None], after[:, :-1]], axis=1)
         return np.asarray(states @ self.C.T + driving @ self.D.T)
@@ -78,6 +88,7 @@ def identify_subspace(
     input_delays: int,
     future: int,
     ridge: float,
+    direct: Sequence[FloatArray] | None = None,
 ) -> StateSpace:
     """Identify a state-space model from one or several runs.
 
@@ -97,6 +108,8 @@ def identify_subspace(
         f, instants of the future.
     ridge : float
         λ of the first regression per column, for inputs that nearly tell their own future.
+    direct : sequence of ndarray, each (time, d), optional
+        Further inputs of the runs, which the filter of the past does not read.
 
     Returns
     -------
@@ -108,8 +121,9 @@ def identify_subspace(
     DataError
         If the past decides fewer than `order` directions of the future.
     """
+    beside = [u[:, :0] for u in inputs] if direct is None else direct
     pasts, driving, following, ahead = [], [], [], []
-    for y, u, window in zip(outputs, inputs, windows, strict=True):
+    for y, u, d, window in zip(outputs, inputs, beside, windows, strict=True):
         first, columns = window.first_column, window.columns
         if columns < future:
             raise DataError(
@@ -120,12 +134,14 @@ def identify_subspace(
         if input_delays:
             past.append(embed(u, input_delays - 1, first - 1, columns))
         pasts.append(np.concatenate(past))
-        driving.append(u[first : first + columns].T)
+        drives = np.concatenate([u, d], axis=1)
+        driving.append(drives[first : first + columns].T)
         following.append(y[first + 1 : first + 1 + columns].T)
         count = columns - future + 1
-        seen = embed(u, future - 1, first + future - 1, count)
+        seen = embed(drives, future - 1, first + future - 1, count)
         ahead.append(np.concatenate([seen, embed(y, future - 1, first + future, count)]))
-    seen, targets = np.split(np.concatenate(ahead, axis=1), [inputs[0].shape[1] * future])
+    split = (inputs[0].shape[1] + beside[0].shape[1]) * future
+    seen, targets = np.split(np.concatenate(ahead, axis=1), [split])
     known = np.concatenate(
         [past[:, : each.shape[1]] for past, each in zip(pasts, ahead, strict=True)], axis=1
     )
