@@ -58,7 +58,7 @@ def test_a_study_ends_with_its_table_and_the_place_of_its_report(folder, capfd):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["study", "missing.toml"], "the study file missing.toml does not exist"),
+        (["study", "missing.toml"], "missing.toml does not exist"),
         (["report", "nowhere"], "nowhere holds no finished study"),
         (["reproduce", "--preset", "papers"], "--preset must be paper or recommended"),
         (

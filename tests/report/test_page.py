@@ -9,12 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from tutorial_study import put_tutorial
 
 from seakeep.errors import RequestError
 from seakeep.report.section import Section
 from seakeep.report.sections import SECTIONS
-from seakeep.report.sections.errors import error_table
+from seakeep.report.sections.errors import error_table, errors
 from seakeep.report.sections.histories import history_data, pack
 from seakeep.report.sections.judgements import PUBLISHED, age, coverage_table, divergence_table
 from seakeep.report.sections.settings import settings as settings_of
@@ -534,3 +535,23 @@ def test_it_prints(opened):
     assert pdf.startswith(b"%PDF")
     # A page without its figures would be a few ten kilobytes.
     assert len(pdf) > 100_000
+
+
+def test_models_stand_beside_the_baselines_and_lost_forecasts_are_named(page):
+    result = read_result(page.parent)
+    change = xr.DataArray(
+        [[[-0.2, 0.1]], [[0.0, 0.5]]],
+        coords={
+            "model": result.models, "reference": ["best_linear"], "measure": ["nrmse", "nammae"]
+        },
+        dims=("model", "reference", "measure"),
+    )  # fmt: skip
+    skill = xr.Dataset({"change": change, "reference_model": ("reference", ["bayesian"])})
+    cell = {"model": "m", "test": "unseen", "training": "t0", "window": 1, "run": "r", "start": 2.0}
+    lost = xr.Dataset({key: ("cell", [value]) for key, value in cell.items()})
+    groups = {**result.groups, "statistics/skill/unseen": skill, "statistics/lost": lost}
+    judged = replace(result, groups=groups)
+    table = errors(judged).tables[0]
+    assert table.rows == (("a & b < c", "best linear (Bayesian)", "deterministic", "-20", "+10"),)
+    (notice,) = (text for text in summary(judged).notices if "diverged and are left out" in text)
+    assert "window 1 of 'unseen' (r from 2 s)" in notice

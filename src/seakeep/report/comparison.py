@@ -53,18 +53,7 @@ _OF_SCALE = ("scale", "scale_factor")
 
 
 def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
-    """Comparison of forecasts with measurements, two tables per run that fit a terminal.
-
-    Parameters
-    ----------
-    table : Dataset
-        From :func:`seakeep.study.comparison_table`.
-
-    Yields
-    ------
-    Table
-        Errors per channel, and their averages; then extremes in the channels' units.
-    """
+    """Comparison of forecasts with measurements, two tables per run that fit a terminal."""
     shown = {name: each for name, each in _SHOWN.items() if name in table}
     columns = ("channel", "unit", *(heading for heading, _, _ in shown.values()))
     for run in table["run"].values:
@@ -133,21 +122,7 @@ def _text(value: Any, form: str) -> str:
 def model_blocks(
     tables: Mapping[str, xr.Dataset], references: Mapping[str, Sequence[str]]
 ) -> Iterator[Table]:
-    """Several models beside each other, a table of averages and one of channels per run.
-
-    Parameters
-    ----------
-    tables : mapping of str to Dataset
-        Comparison table of each model, over the same instants.
-    references : mapping of str to sequence of str
-        Models to which all are compared, by heading; of several the best one in each run counts.
-
-    Yields
-    ------
-    Table
-        Averages, and by how much the ANRMSE of each model lies below that of each reference; then
-        the NRMSE per channel.
-    """
+    """Several models beside each other, a table of averages and one of channels per run."""
     first = next(iter(tables.values()))
     heads = ("model", "ANRMSE", "fit %", "NAMMAE", *(f"below {each}" for each in references))
     for run in first["run"].values:
@@ -181,18 +156,7 @@ def model_blocks(
 
 
 def band_findings(table: xr.Dataset) -> list[str]:
-    """Sentences on the bands of an ensemble, one per run; none for a single model.
-
-    Parameters
-    ----------
-    table : Dataset
-        From :func:`seakeep.study.comparison_table`.
-
-    Returns
-    -------
-    list of str
-        How much of the measurement the band holds, and of how many members it is made.
-    """
+    """Sentences on the bands of an ensemble, one per run; none for a single model."""
     if "coverage" not in table:
         return []
     said = []
@@ -227,25 +191,7 @@ _CARRIES = {
 
 
 def write_comparison(tables: Mapping[str, xr.Dataset], path: Path) -> Path:
-    """Write comparison tables as CSV, a row per run and channel, full precision.
-
-    Parameters
-    ----------
-    tables : mapping of str to Dataset
-        From :func:`seakeep.study.comparison_table`, by model; of several, ``model`` is a column.
-    path : Path
-        The file.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    RequestError
-        If the file cannot be written.
-    """
+    """Write comparison tables as CSV, a row per run and channel, full precision."""
     frames = []
     for model, table in tables.items():
         frame = table[[name for name in _STORED if name in table]].to_dataframe().reset_index()
@@ -269,28 +215,7 @@ def forecast_header(states: Sequence[str]) -> str:
 
 
 def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
-    """Write a forecast as NetCDF, or as CSV with a column per channel, full precision.
-
-    Parameters
-    ----------
-    forecast : Dataset
-        Of a model, or of an ensemble: statistics, whose columns are ``heave [m]`` (the mean),
-        ``heave std [m]``, ``heave lower [m]`` and ``heave upper [m]``, or members, whose columns
-        are ``heave member 0 [m]`` and so on. At full scale a last column, ``scale_factor``, says
-        so.
-    path : Path
-        The file; its suffix, ``.nc`` or ``.csv``, decides the format.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    RequestError
-        If the file cannot be written.
-    """
+    """Write a forecast as NetCDF, or as CSV with a column per channel, full precision."""
     with replacing(path) as temporary:
         if path.suffix == ".nc":
             write_netcdf(temporary, forecast.assign_attrs({MARK: "forecast"}))

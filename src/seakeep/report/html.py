@@ -44,15 +44,7 @@ def _source(name: str) -> Markup:
 
 
 def inline_svg(text: str, name: str) -> Markup:
-    """Turn an SVG file into an element that may stand inside a page beside others.
-
-    Parameters
-    ----------
-    text : str
-        The file.
-    name : str
-        Prefix of all ids, so that figures of one page do not share any.
-    """
+    """Turn an SVG file into an element that may stand inside a page beside others."""
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
     text = re.sub(r'\bid="', f'id="{name}-', text)

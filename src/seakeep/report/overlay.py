@@ -56,20 +56,7 @@ BAND: dict[str, Any] = {"color": COLOURS["ensemble"], "alpha": 0.35, "linewidth"
 
 
 def overlay_figure(comparison: Comparison) -> Figure:
-    """Time histories of every state, forecast over measurement, with the inputs below.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        From :func:`seakeep.study.compare`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One row a channel. Of a long record the first column shows the envelope, what each series
-        reaches in each period, and a second one the last 20 periods. Of an ensemble the members'
-        mean is drawn, and their band.
-    """
+    """Time histories of every state, forecast over measurement, with the inputs below."""
     with figure_style():
         return _draw(comparison)
 
@@ -291,18 +278,7 @@ def _draw_inputs(axes: Any, inputs: xr.Dataset, names: list[str]) -> None:
 
 
 def input_styles(count: int) -> list[dict[str, Any]]:
-    """Styles of inputs in one panel; beyond the eighth, colours meet other dashes.
-
-    Parameters
-    ----------
-    count : int
-        Inputs, 64 at most that differ.
-
-    Returns
-    -------
-    list of dict
-        Keywords of ``plot``.
-    """
+    """Styles of inputs in one panel; beyond the eighth, colours meet other dashes."""
     size = len(SHADES)
     return [
         {

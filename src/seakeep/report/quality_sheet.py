@@ -121,20 +121,7 @@ def _flags(run: xr.Dataset, name: str) -> Any:
 
 
 def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figure:
-    """Draw every channel of a run, flagged samples marked; lags of redundant sensors below.
-
-    Parameters
-    ----------
-    run : Dataset
-        A prepared run.
-    agreements : mapping of str to Agreement
-        Comparison with a trusted sensor, by channel.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One panel per channel, and one per compared channel.
-    """
+    """Draw every channel of a run, flagged samples marked; lags of redundant sensors below."""
     names = [str(name) for name in run.data_vars]
     lagging = [name for name in agreements if agreements[name].lags.size]
     rows = len(names) + len(lagging)
@@ -201,30 +188,7 @@ def write_quality_sheet(
 ) -> list[Path]:
     """Write the sheet of prepared runs: one self-contained page, and a PNG per run.
 
-    Parameters
-    ----------
-    runs : mapping of str to Dataset
-        Prepared runs by name.
-    settings : CampaignSettings
-        The campaign.
-    title : str
-        Name of the campaign.
-    folder : Path
-        Where to; it exists.
-    unread : mapping of str to str, optional
-        Runs that could not be prepared, and why.
-
     Pictures that are newer than ``RUN.nc`` beside them are taken as they are.
-
-    Returns
-    -------
-    list of Path
-        ``quality.html`` and ``quality_RUN.png``.
-
-    Raises
-    ------
-    RequestError
-        If matplotlib is not installed, or a file cannot be written.
     """
     told, written = [], []
     for name, run in runs.items():

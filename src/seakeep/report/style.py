@@ -78,13 +78,7 @@ _RC: Any = {
 
 @contextmanager
 def figure_style() -> Iterator[None]:
-    """Draw in our style, without touching anybody's global settings.
-
-    Raises
-    ------
-    RequestError
-        If matplotlib is not installed.
-    """
+    """Draw in our style, without touching anybody's global settings."""
     try:
         import matplotlib as mpl
     except ImportError as error:
@@ -104,27 +98,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def save_figure(figure: Figure, path: Path, dpi: float | None = None) -> Path:
-    """Write a figure to a temporary name and rename it; the suffix decides the format.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    path : Path
-        The file.
-    dpi : float, optional
-        Dots an inch of a PNG, where not the style's.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    RequestError
-        If the file cannot be written.
-    """
+    """Write a figure to a temporary name and rename it; the suffix decides the format."""
     with figure_style(), replacing(path) as temporary:
         kind = path.suffix.removeprefix(".")
         if kind != "png":
@@ -146,18 +120,6 @@ def save_figure(figure: Figure, path: Path, dpi: float | None = None) -> Path:
 
 def axis_label(name: str, units: str, long_name: str | None = None) -> str:
     r"""Label of a channel for an axis: words, symbol where it has one, and unit.
-
-    Parameters
-    ----------
-    name, units : str
-        Of the channel.
-    long_name : str, optional
-        What the campaign calls it; by default its canonical name in full, else `name`.
-
-    Returns
-    -------
-    str
-        Lines that fit the height of a panel, the last one with symbol and unit.
 
     Examples
     --------
@@ -189,18 +151,6 @@ def plain_text(words: str) -> str:
 
 def prefixed(units: str, largest: float) -> tuple[float, str]:
     """Factor and unit in which a large force, moment, pressure or power is shown.
-
-    Parameters
-    ----------
-    units : str
-        Its SI unit.
-    largest : float
-        Largest modulus, in that unit.
-
-    Returns
-    -------
-    (float, str)
-        For other units, and below a thousand: 1 and the same unit.
 
     Examples
     --------

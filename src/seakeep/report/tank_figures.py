@@ -47,20 +47,7 @@ def _mark_waves(axes: Axes, settings: TankSettings, unit: float = 1.0) -> None:
 
 
 def hydrodynamics_figure(rig: Rig, settings: TankSettings) -> Figure:
-    """Added mass, damping, excitation and response amplitude operators over frequency.
-
-    Parameters
-    ----------
-    rig : Rig
-        Vessel and moorings.
-    settings : TankSettings
-        Its settings; frequencies of regular runs are marked.
-
-    Returns
-    -------
-    Figure
-        Points are the solver's values, lines what the time domain sees of them.
-    """
+    """Added mass, damping, excitation and response amplitude operators over frequency."""
     hydro = rig.hydro
     omega = hydro.omega
     fine = np.linspace(max(0.5, omega[0]), omega[-1], 500)
@@ -107,20 +94,7 @@ def hydrodynamics_figure(rig: Rig, settings: TankSettings) -> Figure:
 
 
 def spectrum_figure(settings: TankSettings, realised: Sequence[Realised]) -> Figure:
-    """Nominal wave spectrum against the measured one, regular waves' frequencies marked.
-
-    Parameters
-    ----------
-    settings : TankSettings
-        The settings.
-    realised : sequence of Realised
-        Measured runs; the irregular ones are averaged.
-
-    Returns
-    -------
-    Figure
-        The paper's Welch settings, and 60 s segments with half overlap beside them.
-    """
+    """Nominal wave spectrum against the measured one, regular waves' frequencies marked."""
     seas = [r for r in realised if r.irregular]
     with figure_style():
         figure = new_figure(6.4, 3.8)
@@ -157,19 +131,7 @@ def spectrum_figure(settings: TankSettings, realised: Sequence[Realised]) -> Fig
 
 
 def run_figure(data: xr.Dataset, channels: Sequence[str] | None = None) -> Figure:
-    """All channels of a run over time, its start-up shaded.
-
-    Parameters
-    ----------
-    data : Dataset
-        A run, such as :func:`seakeep.tank.play.truth` returns it.
-    channels : sequence of str, optional
-        Channels to draw; the default is all but doubles of elevation probes and crests.
-
-    Returns
-    -------
-    Figure
-    """
+    """All channels of a run over time, its start-up shaded."""
     names = list(channels) if channels is not None else _distinct(data)
     time = data["time"].values
     with figure_style():

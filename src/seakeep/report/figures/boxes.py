@@ -44,19 +44,7 @@ DECADE = 10.0
 def draw_box_violin(
     axes: Any, values: npt.ArrayLike, place: float, width: float, colour: str
 ) -> None:
-    """Draw one box-violin.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        Where; on a logarithmic axis the violin is the density of the logarithm.
-    values : array_like
-        Numbers; those that are not finite are left out.
-    place, width : float
-        Centre and width, in the unit of the axis.
-    colour : str
-        Colour.
-    """
+    """Draw one box-violin."""
     x = np.asarray(values, dtype=float).ravel()
     x = x[np.isfinite(x)]
     if x.size == 0:
@@ -102,19 +90,7 @@ def _cells(result: StudyResult, test: str, model: str, measure: str) -> FloatArr
 
 
 def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
-    """ANRMSE and NAMMAE of all cells of some test sets, a box-violin a model.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-    tests : sequence of str
-        Test sets.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """ANRMSE and NAMMAE of all cells of some test sets, a box-violin a model."""
     with figure_style():
         figure = new_figure(max(8.5, 2.0 + 1.7 * len(tests)), 3.6)
         for axes, (measure, heading) in zip(figure.subplots(1, 2), HEADING.items(), strict=True):
@@ -130,19 +106,7 @@ def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
 
 
 def channel_boxes(result: StudyResult, test: str) -> Figure:
-    """NRMSE and NAMMAE of all cells of a test set, channel by channel.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-    test : str
-        The test set.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """NRMSE and NAMMAE of all cells of a test set, channel by channel."""
     with figure_style():
         figure = new_figure(8.5, 5.6)
         logarithmic = _span_decades(result, test)

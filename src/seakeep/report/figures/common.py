@@ -57,22 +57,7 @@ def short_label(channel: str) -> str:
 
 
 def grid_of_axes(figure: Any, count: int, most: int) -> list[Any]:
-    """Axes in rows of `most`, or of fewer that fill as few rows; empty places are taken away.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        The figure.
-    count : int
-        Axes wanted.
-    most : int
-        Axes a row, at most.
-
-    Returns
-    -------
-    list of matplotlib.axes.Axes
-        `count` of them.
-    """
+    """Axes in rows of `most`, or of fewer that fill as few rows; empty places are taken away."""
     rows = -(-count // most)
     columns = -(-count // rows)
     axes: Sequence[Any] = list(figure.subplots(rows, columns, squeeze=False).ravel())

@@ -17,19 +17,7 @@ __all__ = ["density_figure"]
 
 
 def density_figure(result: StudyResult, model: str) -> Figure:
-    """Density of each channel, measured and predicted, each with its 95 % band.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-    model : str
-        The model.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Density of each channel, measured and predicted, each with its 95 % band."""
     with figure_style():
         data = result.groups["statistics/densities"].sel(model=model)
         names = result.channels

@@ -21,17 +21,7 @@ LOWEST = 0.8
 
 
 def eigenvalue_figure(result: StudyResult) -> Figure:
-    """Eigenvalues of each model of the first training set, of an ensemble all members'.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Eigenvalues of each model of the first training set, of an ensemble all members'."""
     with figure_style():
         figure = new_figure(8.5, 3.0)
         plane, decay = figure.subplots(1, 2)

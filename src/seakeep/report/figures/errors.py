@@ -32,18 +32,7 @@ HYPERPARAMETERS = {
 
 
 def error_over_time_figure(result: StudyResult) -> Figure:
-    """ε(t) of each test set, whole and in bands: mean over all cells with its quartiles.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A row a test set; all frequencies, low frequencies, wave frequencies.
-    """
+    """ε(t) of each test set, whole and in bands: mean over all cells with its quartiles."""
     from matplotlib.lines import Line2D
 
     with figure_style():
@@ -85,20 +74,7 @@ def _draw_band(axes: Any, result: StudyResult, trend: Any) -> float:
 
 
 def member_errors(result: StudyResult, test: str, model: str) -> FloatArray:
-    """Median ANRMSE of each member over all cells of a test set.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-    test, model : str
-        Test set and ensemble.
-
-    Returns
-    -------
-    ndarray, shape (member,)
-        NaN for a member that diverged in most of them.
-    """
+    """Median ANRMSE of each member over all cells of a test set."""
     data = result.tests[test]
     cells = data[f"{model}_member_nrmse"].values[data["judged"].values].astype(float)
     averages = np.stack([average_of(each) for each in cells])
@@ -109,19 +85,7 @@ def member_errors(result: StudyResult, test: str, model: str) -> FloatArray:
 
 
 def hyperparameter_figure(result: StudyResult, model: str) -> Figure:
-    """Error of each member against what was drawn for it, a row a test set.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-    model : str
-        An ensemble.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Error of each member against what was drawn for it, a row a test set."""
     with figure_style():
         draws = result.groups[f"draws/{model}"]
         drawn = [name for name in HYPERPARAMETERS if np.ptp(draws[name].values) > 0]

@@ -20,19 +20,7 @@ EDGE: dict[str, Any] = {"linewidth": 0.7, "linestyle": (0, (1, 1))}
 
 
 def shown_cells(result: StudyResult) -> list[tuple[str, int, int]]:
-    """Cells that are drawn: test set, training set and window.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-
-    Returns
-    -------
-    list of (str, int, int)
-        Two windows of the first test set and one of each other, or as the settings say; each with
-        the first training set that may be tested on it.
-    """
+    """Cells that are drawn: test set, training set and window."""
     count = int(result.settings["output"]["shown_windows"])
     cells = []
     for number, (name, test) in enumerate(result.tests.items()):
@@ -46,23 +34,7 @@ def shown_cells(result: StudyResult) -> list[tuple[str, int, int]]:
 
 
 def history_figure(result: StudyResult, test: str, training: int, window: int) -> Figure:
-    """All channels of one cell over time.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study.
-    test : str
-        Test set.
-    training, window : int
-        The cell.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Deviations from the training mean in training standard deviations, against time in
-        encounter periods.
-    """
+    """All channels of one cell over time."""
     with figure_style():
         cell = result.tests[test].isel(training=training, window=window)
         names = result.channels

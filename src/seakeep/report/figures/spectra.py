@@ -22,17 +22,7 @@ KINDS: dict[str, tuple[str, str, Any]] = {
 
 
 def spectrum_figure(result: StudyResult) -> Figure:
-    """Mean spectrum of the irregular runs, and the peaks of the regular ones.
-
-    Parameters
-    ----------
-    result : StudyResult
-        The study, with the group ``spectra``.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Mean spectrum of the irregular runs, and the peaks of the regular ones."""
     with figure_style():
         spectra, runs = result.groups["spectra"], result.groups["runs"]
         figure = new_figure(8.5, 4.2)

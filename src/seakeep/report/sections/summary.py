@@ -13,6 +13,7 @@ from seakeep.report.section import Section
 from seakeep.report.sections.settings import test_overlap, training_overlap, unequal_training
 from seakeep.report.tables import Table, number
 from seakeep.study import StudyResult
+from seakeep.study.judge import words_of_lost
 
 __all__ = ["findings", "overview_table", "summary"]
 
@@ -21,8 +22,10 @@ def summary(result: StudyResult) -> Section:
     """Return the summary of a study."""
     shares, words = training_overlap(result)
     condition = str(result.attrs.get("conditional_on", ""))
+    lost = result.groups.get("statistics/lost")
     notices = [
         str(result.attrs.get("preparation_note", "")),
+        words_of_lost(lost) if lost is not None else "",
         _few_cells(result),
         words if shares else "",
         test_overlap(result),
