@@ -299,6 +299,7 @@ def test_another_unit_than_trained_is_refused(model, run, channels):
     message = r"channel 'pitch' of .* is in 'deg' and the model expects 'rad'\. Convert"
     with pytest.raises(DataError, match=message):
         model.forecast(degrees, start=5.0, steps=5)
+    message = r"channel 'pitch' is in 'rad' in run 1 and in 'deg' in run 2\. Convert one of them"
     with pytest.raises(DataError, match=message):
         SPEC.fit([run, degrees], **channels)
 

@@ -171,7 +171,7 @@ def test_windows_side_by_side_are_single_forecasts(model, test_run):
             # Three windows are one product: other roundings, over 60 steps of a stable model.
             np.testing.assert_allclose(together[name][window], alone[name], rtol=0, atol=1e-11)
             assert together[name].attrs == alone[name].attrs
-        assert together.attrs == {"run": alone.attrs["run"]}
+        assert together.attrs == {key: alone.attrs[key] for key in ("run", "reads_input_until")}
     with pytest.raises(RequestError, match=r"starts is empty: name at least one instant"):
         model.forecast_windows(test_run, [], steps=60)
     with pytest.raises(RequestError, match=r"starts must be a list of instants; received 5.0"):

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import seakeep
-from seakeep.models import forecasting, shelf
+from seakeep.models import engine, summaries
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def peak(work):
 @pytest.mark.parametrize("delay_rows", ["exact", "ridge"])
 def test_a_long_forecast_holds_little_beside_its_result(run, monkeypatch, delay_rows):
     monkeypatch.setattr(sys.modules["seakeep.core.rollout"], "PIECE", 50_000)
-    monkeypatch.setattr(forecasting, "PIECE", 5_000)
+    monkeypatch.setattr(engine, "PIECE", 5_000)
     model = seakeep.HankelDMDc(
         state_delays=4, input_delays=6, ridge=1.0, delay_rows=delay_rows, window=400
     ).fit(run, STATES, ["eta"], stop=100.0)
@@ -49,8 +49,8 @@ def test_a_long_forecast_holds_little_beside_its_result(run, monkeypatch, delay_
 
 
 def test_a_summary_does_not_hold_its_members(run, monkeypatch):
-    monkeypatch.setattr(shelf, "HELD", 0)
-    monkeypatch.setattr(shelf, "CHUNK", 200_000)
+    monkeypatch.setattr(engine, "HELD", 0)
+    monkeypatch.setattr(summaries, "CHUNK", 200_000)
 
     def summary(members):
         spec = seakeep.BayesianHankelDMDc(

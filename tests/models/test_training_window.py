@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seakeep import HankelDMDc, SeakeepWarning
-from seakeep.models.identification import Scale
+from seakeep.models.interface import Scale
 from seakeep.signals import uniform_step
 
 DT = 0.05
@@ -288,7 +288,7 @@ def test_times_in_single_precision_do_not_matter(run, channels):
     values=st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=20),
 )
 def test_standardising_and_back_returns_the_values(mean, std, values):
-    scale = Scale(np.array([mean]), np.array([std]), np.array([std]))
+    scale = Scale(*(np.array([each]) for each in (mean, std, std, mean, std)))
     series = np.array(values)[:, None]
     # Numbers up to 2e3 are subtracted and added: rounding of these.
     np.testing.assert_allclose(scale.physical(scale.deviations(series)), series, rtol=0, atol=1e-12)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from seakeep.campaign import Campaign
-    from seakeep.models import HankelDMDcModel, HankelEnsemble
+    from seakeep.models import Model
     from seakeep.study import Comparison
 
 __all__ = ["compare", "fit", "forecast"]
@@ -122,7 +122,7 @@ def forecast(
         raise RequestError(f"{out} ends in '{out.suffix}'; a forecast is written as .nc or .csv.")
     check_place(out)
     from seakeep.campaign import read_campaign
-    from seakeep.models import HankelDMDcModel, HankelEnsemble, load_model
+    from seakeep.models import HankelEnsemble, load_model
     from seakeep.quality import warn_of_runs
     from seakeep.report.comparison import forecast_header, forecast_words, write_forecast
     from seakeep.signals.time_axis import instant_text
@@ -132,7 +132,7 @@ def forecast(
     identified = load_model(model)
     read = read_campaign(campaign)
     check_output(out, "forecast", read_files(read, model), forecast_header(identified.states))
-    if isinstance(identified, HankelDMDcModel):
+    if not isinstance(identified, HankelEnsemble):
         given = {"--level": level is not None, "--band": band is not None, "--members": members}
         _refuse_for_one(model, given | {"--scheduler": scheduler is not None})
     elif members and (level is not None or band is not None):
@@ -351,7 +351,7 @@ def _refuse_for_one(model: Path | str, given: dict[str, bool]) -> None:
 
 
 def _band(
-    models: Mapping[str, HankelDMDcModel | HankelEnsemble],
+    models: Mapping[str, Model],
     level: float | None,
     band: str | None,
     scheduler: str | None = None,

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -17,13 +17,11 @@ from seakeep.core.calibration import ConformalMargin, band_scores, conformal_mar
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice
-from seakeep.models.ensemble_series import shelved
+from seakeep.models.engine import Runs as FreeRuns
+from seakeep.models.engine import member_series, read_windows
 from seakeep.models.executor import Progress
+from seakeep.models.members import TrainingArrays
 from seakeep.models.summaries import STATISTICS, check_level, reduce_members
-from seakeep.models.windows import read_windows
-
-if TYPE_CHECKING:
-    from seakeep.models.fitted_ensemble import HankelEnsemble
 
 __all__ = [
     "Band",
@@ -38,6 +36,15 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 Band = Literal["members", "calibrated"]
 NUMBERS = ("margin", "block_length", "blocks", "warranted")
+
+
+class Ensemble(FreeRuns, Protocol):
+    """What a calibration must know of an ensemble."""
+
+    @property
+    def arrays(self) -> TrainingArrays: ...
+    @property
+    def read_spans(self) -> dict[str, tuple[float, float]]: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +89,7 @@ class Calibration:
 
 
 def calibrate(
-    ensemble: HankelEnsemble,
+    ensemble: Ensemble,
     runs: labelled.Runs,
     steps: int,
     level: float,
@@ -94,24 +101,29 @@ def calibrate(
     level = check_level(level)
     free = _free_starts(ensemble, named, steps)
     scores = _scores(ensemble, named, free, steps, level, executor, progress)
+    history = ensemble.signature.history_samples
     if not scores:
-        longest = max(run.sizes["time"] for run in named.values()) - ensemble.history_samples
+        longest = (
+            max(run.sizes["time"] for run in named.values()) - ensemble.signature.history_samples
+        )
         reason = "members have read what is left of them"
         if longest < steps:
             reason = f"at most {max(longest, 0)} steps fit into the longest of them"
         raise RequestError(
-            f"no window of {steps} steps with {ensemble.history_samples} samples of history is "
+            f"no window of {steps} steps with {history} samples of history is "
             f"free in {', '.join(named)}, as given here: {reason}. Give fewer steps, longer parts, "
             "or runs that do not train."
         )
     margin = conformal_margin(np.concatenate(list(scores.values())), level)
     windows = {name: len(each) for name, each in scores.items()}
-    spans = {n: (starts[0], starts[-1] + steps * ensemble.dt) for n, starts in free.items()}
+    spans = {
+        n: (starts[0], starts[-1] + steps * ensemble.signature.dt) for n, starts in free.items()
+    }
     return Calibration(margin, windows, steps, spans)
 
 
 def held_out_scores(
-    ensemble: HankelEnsemble,
+    ensemble: Ensemble,
     runs: Mapping[str, xr.Dataset],
     steps: int,
     level: float,
@@ -121,7 +133,7 @@ def held_out_scores(
 
     Parameters
     ----------
-    ensemble : HankelEnsemble
+    ensemble : Ensemble
         The ensemble.
     runs : mapping of str to Dataset
         Runs, or parts of runs, under the names by which they trained.
@@ -142,7 +154,7 @@ def held_out_scores(
 
 
 def _free_starts(
-    ensemble: HankelEnsemble, runs: Mapping[str, xr.Dataset], steps: int
+    ensemble: Ensemble, runs: Mapping[str, xr.Dataset], steps: int
 ) -> dict[str, list[float]]:
     """Starts of the windows of each run in which there are any."""
     free = {name: _unread_starts(ensemble, name, run, steps) for name, run in runs.items()}
@@ -150,7 +162,7 @@ def _free_starts(
 
 
 def _scores(
-    ensemble: HankelEnsemble,
+    ensemble: Ensemble,
     runs: Mapping[str, xr.Dataset],
     free: Mapping[str, list[float]],
     steps: int,
@@ -163,12 +175,13 @@ def _scores(
     for number, (name, starts) in enumerate(free.items()):
         run = runs[name]
         tell = None if progress is None else _counted(progress, number, len(free), name)
-        windows = read_windows(ensemble, run, starts, steps)
-        with shelved(ensemble, run, windows, executor, tell) as (shelf, lost):
-            values = reduce_members(shelf, lost, level)
+        places = [(name, start) for start in starts]
+        windows = read_windows(ensemble.signature, {name: run}, places, steps)
+        with member_series(ensemble, windows, executor, tell) as (series, lost):
+            values = reduce_members(series, lost, level)
         lower, upper = (values[:, STATISTICS.index(key)] for key in ("lower", "upper"))
         measured = np.stack(
-            [_measured(ensemble, run, name, window.start, steps) for window in windows]
+            [_measured(ensemble, run, name, start, steps) for _, start in windows.places]
         )
         found[name] = band_scores(lower, upper, measured)
     return found
@@ -181,14 +194,14 @@ def _counted(progress: Progress, before: int, runs: int, name: str) -> Progress:
     )
 
 
-def _unread_starts(ensemble: HankelEnsemble, name: str, run: xr.Dataset, steps: int) -> list[float]:
+def _unread_starts(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) -> list[float]:
     """Starts of windows end to end in a run, clear of what members have read of it."""
     if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
         raise RequestError(f"steps must be a positive integer; received {steps!r}.")
     time = np.asarray(run["time"].values, dtype=float)
-    slack = 1e-6 * ensemble.dt
+    slack = 1e-6 * ensemble.signature.dt
     read = _read_span(ensemble, name, run)
-    starts, at = [], ensemble.history_samples - 1
+    starts, at = [], ensemble.signature.history_samples - 1
     while at + steps < time.size:
         # The instants at + 1 … at + steps are forecast.
         if read and time[at + 1] <= read[1] + slack and time[at + steps] >= read[0] - slack:
@@ -200,7 +213,7 @@ def _unread_starts(ensemble: HankelEnsemble, name: str, run: xr.Dataset, steps: 
     return starts
 
 
-def _read_span(ensemble: HankelEnsemble, name: str, run: xr.Dataset) -> tuple[float, float] | None:
+def _read_span(ensemble: Ensemble, name: str, run: xr.Dataset) -> tuple[float, float] | None:
     """What members have read of a run: of the one that holds their samples, else of its name.
 
     A name that was made up for a run without one says nothing.
@@ -213,35 +226,43 @@ def _read_span(ensemble: HankelEnsemble, name: str, run: xr.Dataset) -> tuple[fl
 
 
 def _holds(
-    run: xr.Dataset, ensemble: HankelEnsemble, name: str, begin: float, states: FloatArray
+    run: xr.Dataset, ensemble: Ensemble, name: str, begin: float, states: FloatArray
 ) -> bool:
     """Whether a run has the same states at the same instants, as far as both reach."""
     time = np.asarray(run["time"].values, dtype=float)
     if not time.size:
         return False
-    ahead = round((begin - time[0]) / ensemble.dt)  # samples of the run before the states
+    dt = ensemble.signature.dt
+    ahead = round((begin - time[0]) / dt)  # samples of the run before the states
     first, skipped = max(ahead, 0), max(-ahead, 0)
     count = min(time.size - first, len(states) - skipped)
-    if count < 1 or abs(time[first] - begin - skipped * ensemble.dt) > 0.5 * ensemble.dt:
+    if (
+        count < 1
+        or abs(time[first] - begin - skipped * ensemble.signature.dt) > 0.5 * ensemble.signature.dt
+    ):
         return False
-    held = labelled.channel_matrix(run, ensemble.states, name, slice(first, first + count))
+    held = labelled.channel_matrix(
+        run, ensemble.signature.states, name, slice(first, first + count)
+    )
     return bool(np.array_equal(held, states[skipped : skipped + count]))
 
 
 def _measured(
-    ensemble: HankelEnsemble, run: xr.Dataset, name: str, start: float, steps: int
+    ensemble: Ensemble, run: xr.Dataset, name: str, start: float, steps: int
 ) -> FloatArray:
     at = labelled.nearest_sample(np.asarray(run["time"].values, dtype=float), start, name)
-    return labelled.channel_matrix(run, ensemble.states, name, slice(at + 1, at + 1 + steps))
+    return labelled.channel_matrix(
+        run, ensemble.signature.states, name, slice(at + 1, at + 1 + steps)
+    )
 
 
-def check_band(ensemble: HankelEnsemble, level: float, band: Band) -> None:
+def check_band(calibration: Calibration | None, level: float, band: Band) -> None:
     """Refuse a band that the ensemble does not have.
 
     Parameters
     ----------
-    ensemble : HankelEnsemble
-        The ensemble.
+    calibration : Calibration or None
+        Of the ensemble.
     level : float
         Probability that is asked of the band.
     band : {"members", "calibrated"}
@@ -255,12 +276,12 @@ def check_band(ensemble: HankelEnsemble, level: float, band: Band) -> None:
     check_choice("band", band, get_args(Band))
     if band == "members":
         return
-    if ensemble.calibration is None:
+    if calibration is None:
         raise RequestError(
             "the ensemble is not calibrated. Call ensemble.calibrate(runs, steps), or seakeep "
             "calibrate, with runs that its members did not learn from, and use the result."
         )
-    known = ensemble.calibration.found.level
+    known = calibration.found.level
     if abs(known - level) > 1e-12:
         raise RequestError(
             f"the band was calibrated for level = {known:g}, and {level:g} was asked for. "
@@ -268,11 +289,13 @@ def check_band(ensemble: HankelEnsemble, level: float, band: Band) -> None:
         )
 
 
-def warn_of_horizon(ensemble: HankelEnsemble, name: str, steps: int, stacklevel: int = 5) -> None:
+def warn_of_horizon(
+    calibration: Calibration | None, name: str, steps: int, stacklevel: int = 4
+) -> None:
     """Warn where a forecast is longer than those that its calibrated band was made from."""
-    if ensemble.calibration is not None and steps > ensemble.calibration.steps:
+    if calibration is not None and steps > calibration.steps:
         warnings.warn(
-            f"the forecast of {name} is longer than the {ensemble.calibration.steps} instants that "
+            f"the forecast of {name} is longer than the {calibration.steps} instants that "
             "the band was calibrated for: its coverage is not warranted there. Calibrate with "
             "longer windows.",
             SeakeepWarning,
@@ -280,11 +303,11 @@ def warn_of_horizon(ensemble: HankelEnsemble, name: str, steps: int, stacklevel:
         )
 
 
-def widened(ensemble: HankelEnsemble, values: FloatArray, band: Band) -> FloatArray:
+def widened(calibration: Calibration | None, values: FloatArray, band: Band) -> FloatArray:
     """Statistics of shape (…, 4, steps, N) with the bounds of a band that was checked."""
-    if band == "members" or ensemble.calibration is None:
+    if band == "members" or calibration is None:
         return values
-    out, margin = values.copy(), ensemble.calibration.found.margin
+    out, margin = values.copy(), calibration.found.margin
     out[..., STATISTICS.index("lower"), :, :] -= margin
     out[..., STATISTICS.index("upper"), :, :] += margin
     return out

@@ -16,17 +16,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 import scipy
 
 from seakeep.errors import DataError
-from seakeep.models.settings import periods_to_samples
-
-if TYPE_CHECKING:
-    from seakeep.models.ensemble import BayesianHankelDMDc
+from seakeep.models.interface import InputMap
+from seakeep.models.settings import History, periods_to_samples
 
 __all__ = ["Draw", "Sampling", "TrainOn", "draw_members"]
 
@@ -73,13 +71,47 @@ class Draw:
     last: int | None
     redrawn: int
 
-    def needed(self, inside: bool) -> int:
-        """Samples of a run that the window and its history take."""
-        reach = max(self.state_delays, self.input_delays)
-        least = reach + 2
+    def needed(self, inside: bool, extra: int = 0, lead: int = 0) -> int:
+        """Samples of a run that the window, its history and its look-ahead take."""
+        reach = max(self.state_delays, self.input_delays + extra)
+        least = reach + 2 + max(lead - 1, 0)
         if self.window is None:
             return least
         return max(self.window, least) if inside else self.window + reach
+
+
+class Drawn(Protocol):
+    """Priors, seed and rules that make the draws."""
+
+    @property
+    def encounter_period(self) -> float:
+        """As in :class:`seakeep.BayesianHankelDMDc`."""
+        ...
+
+    @property
+    def n_members(self) -> int:
+        """As in :class:`seakeep.BayesianHankelDMDc`."""
+        ...
+
+    @property
+    def sampling(self) -> Sampling:
+        """As in :class:`seakeep.BayesianHankelDMDc`."""
+        ...
+
+    @property
+    def train_on(self) -> TrainOn:
+        """As in :class:`seakeep.BayesianHankelDMDc`."""
+        ...
+
+    @property
+    def history(self) -> History:
+        """As in :class:`seakeep.BayesianHankelDMDc`."""
+        ...
+
+    @property
+    def seed_sequence(self) -> np.random.SeedSequence:
+        """As in :class:`seakeep.BayesianHankelDMDc`."""
+        ...
 
 
 def child(seed: np.random.SeedSequence, member: int) -> np.random.Generator:
@@ -88,7 +120,7 @@ def child(seed: np.random.SeedSequence, member: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(seed.entropy, spawn_key=key))
 
 
-def draw_members(spec: BayesianHankelDMDc, dt: float, samples: Sequence[int]) -> list[Draw]:
+def draw_members(spec: Drawn, dt: float, samples: Sequence[int], input_map: InputMap) -> list[Draw]:
     """Draw the settings of all members.
 
     Parameters
@@ -99,6 +131,8 @@ def draw_members(spec: BayesianHankelDMDc, dt: float, samples: Sequence[int]) ->
         Time step, s.
     samples : sequence of int
         Samples of each run up to its stop.
+    input_map : InputMap
+        Says what history and look-ahead it takes.
 
     Returns
     -------
@@ -118,15 +152,16 @@ def draw_members(spec: BayesianHankelDMDc, dt: float, samples: Sequence[int]) ->
         # A power of two, the balance of which the net keeps; the first n_members are used.
         points = engine.random_base2(max(spec.n_members - 1, 1).bit_length())
     return [
-        _draw_member(spec, dt, samples, child(seed, member), points[member])
+        _draw_member(spec, dt, samples, input_map, child(seed, member), points[member])
         for member in range(spec.n_members)
     ]
 
 
 def _draw_member(
-    spec: BayesianHankelDMDc,
+    spec: Drawn,
     dt: float,
     samples: Sequence[int],
+    input_map: InputMap,
     generator: np.random.Generator,
     point: FloatArray,
 ) -> Draw:
@@ -140,7 +175,7 @@ def _draw_member(
         draw = _rounded(spec, dt, drawn, redrawn)
         if refused := _out_of_range(draw, inside):
             continue
-        needed = draw.needed(inside)
+        needed = draw.needed(inside, input_map.extra_history, input_map.lead_samples)
         run = None if spec.train_on == "all" else int(generator.integers(len(samples)))
         if (min(samples) if run is None else samples[run]) < needed:
             refused = (
@@ -158,7 +193,7 @@ def _draw_member(
     raise DataError(f"no feasible draw in {MOST_REDRAWS}: {refused}")
 
 
-def _quantiles_of(spec: BayesianHankelDMDc, quantiles: FloatArray) -> dict[str, float]:
+def _quantiles_of(spec: Drawn, quantiles: FloatArray) -> dict[str, float]:
     return {
         name: float(prior.ppf(float(q)))
         for name, q in zip(PRIORS, quantiles, strict=True)
@@ -196,7 +231,7 @@ def _out_of_range(draw: Draw, inside: bool) -> str:
     return ""
 
 
-def _rounded(spec: BayesianHankelDMDc, dt: float, drawn: dict[str, float], redrawn: int) -> Draw:
+def _rounded(spec: Drawn, dt: float, drawn: dict[str, float], redrawn: int) -> Draw:
     def to_samples(periods: float) -> int:
         return periods_to_samples(periods, spec.encounter_period, dt)
 

@@ -1,318 +1,965 @@
-"""The Bayesian and the frequentist ensemble of Hankel models: what a user sets, and its fit."""
+"""A fitted ensemble: its draws, its members on demand, their forecasts, and its file."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any, Self
+import json
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
+import xarray as xr
 
-from seakeep.errors import RequestError
-from seakeep.models import labelled
-from seakeep.models.aligned import align_training
-from seakeep.models.alignment import ProbeAlignment
-from seakeep.models.checks import check_choice
-from seakeep.models.draws import Sampling, TrainOn, draw_members
-from seakeep.models.fitted_ensemble import HankelEnsemble
-from seakeep.models.identification import Stop, check_names, last_sample, stop_instants, until
-from seakeep.models.labelled import Runs, as_runs
-from seakeep.models.members import TrainingArrays, reach
-from seakeep.models.priors import LogUniform, Prior, Uniform, check_prior, describe
-from seakeep.models.settings import (
-    DelayRows,
-    HankelSettings,
-    History,
-    RidgeScale,
-    check_integer,
-    periods_to_samples,
+from seakeep.arrays import FloatArray
+from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.models import engine, store
+from seakeep.models.calibration import (
+    Band,
+    Calibration,
+    calibrate,
+    check_band,
+    warn_of_horizon,
+    widened,
 )
+from seakeep.models.draws import Draw
+from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
+from seakeep.models.executor import Progress, in_order, one_blas_thread
+from seakeep.models.forecasts import (
+    check_arrays,
+    forecast_notes,
+    label_channels,
+    one_run,
+    statuses,
+    verdict,
+    window_coords,
+)
+from seakeep.models.inputs import Chain, FittedAlignment
+from seakeep.models.interface import Json, Signature
+from seakeep.models.labelled import ChannelLabel, Runs
+from seakeep.models.linear import HankelDMDcModel, counted, with_units
+from seakeep.models.members import (
+    TrainingArrays,
+    identify_member,
+    spectral_radius,
+    window_ends,
+)
+from seakeep.models.settings import HankelSettings
+from seakeep.models.summaries import (
+    check_level,
+    reduce_members,
+    statistic_coordinate,
+    statistics_of,
+)
+from seakeep.models.training import Training
+from seakeep.models.validity import Coverage
+from seakeep.signals.time_axis import span_text
 
-__all__ = ["BayesianHankelDMDc"]
+__all__ = ["BandForecast", "HankelEnsemble", "HeldEnsemble"]
 
-PAPER_RIDGE_PER_SNAPSHOT = 100.0 / 640
+DRAWN = {
+    "train_length": ("length of the training window", "encounter periods"),
+    "state_delay": ("longest delay of the states", "encounter periods"),
+    "input_delay": ("longest delay of the inputs", "encounter periods"),
+    "ridge": ("ridge λ", "1"),
+}
+ROUNDED = {
+    "train_length_samples": ("window", "length of the training window; −1 for all of a run"),
+    "state_delay_samples": ("state_delays", "number of delayed copies of the states"),
+    "input_delay_samples": ("input_delays", "number of delayed copies of the inputs"),
+    "training_run": ("run", "run that trains; −1 for all"),
+    "last_sample": ("last", "last sample of the training window; −1 for that at stop"),
+    "redrawn": ("redrawn", "infeasible draws before this one"),
+}
+OPTIONAL = ("window", "run", "last")
+SAMPLING = {"monte_carlo": "Monte Carlo", "sobol": "Sobol"}
+TRAIN_ON = {
+    "all": "together",
+    "runs": "one of them a member, drawn",
+    "windows": "a window of one of them a member, drawn",
+}
 
 
-@dataclass(frozen=True)
-class BayesianHankelDMDc:
-    r"""Settings of a Bayesian ensemble of Hankel models (paper, section UQ through ensembling).
+class _Forecasts:
+    """Forecasts of several members: what an ensemble and members that are held have in common."""
 
-    Priors over training length, delays and ridge are pushed forward: each member is a
-    :class:`HankelDMDc` with settings drawn from them, and the spread of the members' forecasts is
-    the uncertainty (paper, equations of :math:`\mu[x(t)]` and :math:`\sigma[x(t)]`). There is no
-    likelihood: "Bayesian" is the paper's word, and a band holds what the members differ in, not
-    noise or model error: judge its coverage before you trust it. With ``train_on`` members also,
-    or only, differ in the data they saw: a frequentist ensemble.
-
-    Parameters
-    ----------
-    encounter_period : float
-        Mean encounter period, s.
-    train_length : prior or None
-        Length of the training window, encounter periods; None takes all of a run up to ``stop``.
-    state_delay, input_delay : prior
-        Longest delay of states and inputs, encounter periods.
-    ridge : prior
-        λ.
-    n_members : int, optional
-        Number of members.
-    seed : int, SeedSequence or Generator, optional
-        Root of the members' generators. A Generator gives one number, when the settings are made.
-    sampling : {"monte_carlo", "sobol"}, optional
-        Independent points, or a scrambled Sobol net.
-    train_on : {"all", "runs", "windows"}, optional
-        What a member learns from: the windows at ``stop`` in all runs together (the paper); that
-        in one run, drawn for each member; or a window that ends anywhere up to ``stop`` in one run.
-    dt : float, optional
-        Time step the runs must have, s; None takes theirs.
-    history, delay_rows, ridge_scale, rank, standardize, alignment
-        As in :class:`HankelDMDc`. What an alignment estimates, it estimates once for all members,
-        from all that is given up to ``stop``: no member's draw moves another's input.
-
-    Raises
-    ------
-    RequestError
-        If a setting is out of range, or not a prior.
-
-    Examples
-    --------
-    >>> spec = BayesianHankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32)
-    >>> spec.n_members, spec.train_length
-    (100, Uniform(low=10, high=30))
-    """
-
-    encounter_period: float
-    train_length: Prior | None
-    state_delay: Prior
-    input_delay: Prior
-    ridge: Prior
-    n_members: int = 100
-    seed: int | np.random.SeedSequence | np.random.Generator = 0
-    sampling: Sampling = "monte_carlo"
-    train_on: TrainOn = "all"
-    dt: float | None = None
-    history: History = "before"
-    delay_rows: DelayRows = "ridge"
-    ridge_scale: RidgeScale = "absolute"
-    rank: int | None = None
-    standardize: bool = True
-    alignment: ProbeAlignment | None = None
-    seed_sequence: np.random.SeedSequence = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        for name in ("train_length", "state_delay", "input_delay", "ridge"):
-            if name != "train_length" or self.train_length is not None:
-                check_prior(name, getattr(self, name))
-        check_integer("n_members", self.n_members, 1)
-        periods_to_samples(1, self.encounter_period, self.dt if self.dt is not None else 1.0)
-        check_choice("sampling", self.sampling, ("monte_carlo", "sobol"))
-        check_choice("train_on", self.train_on, ("all", "runs", "windows"))
-        object.__setattr__(self, "alignment", self.shared.alignment)
-        object.__setattr__(self, "seed_sequence", _seed_sequence(self.seed))
+    signature: Signature
+    origin: Json
+    calibration: Calibration | None
 
     @property
-    def shared(self) -> HankelSettings:
-        """What all members share; delays, window and λ in it stand for nothing."""
-        return HankelSettings(
-            state_delays=0,
-            input_delays=0,
-            ridge=0.0,
-            history=self.history,
-            delay_rows=self.delay_rows,
-            ridge_scale=self.ridge_scale,
-            rank=self.rank,
-            standardize=self.standardize,
-            alignment=self.alignment,
-        )
+    def n_members(self) -> int:
+        """Number of members."""
+        raise NotImplementedError
 
-    @classmethod
-    def paper(
-        cls,
-        encounter_period: float,
-        dt: float | None = None,
-        n_members: int = 100,
-        seed: int | np.random.SeedSequence | np.random.Generator = 0,
-    ) -> Self:
-        """Priors of the paper: ±50 % around its deterministic settings, uniform.
+    def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
+        """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
+        raise NotImplementedError
 
-        Parameters
-        ----------
-        encounter_period : float
-            Mean encounter period, s.
-        dt : float, optional
-            Time step the runs must have, s.
-        n_members, seed
-            As in the class.
+    @property
+    def dt(self) -> float:
+        """Time step, s."""
+        return self.signature.dt
 
-        Returns
-        -------
-        BayesianHankelDMDc
-            Lengths of 10–30, 0.5–1.5 and 2.5–7.5 encounter periods, λ of 50–150, all else as in
-            :meth:`HankelDMDc.paper`.
-        """
-        return cls(
-            encounter_period=encounter_period,
-            train_length=Uniform(10, 30),
-            state_delay=Uniform(0.5, 1.5),
-            input_delay=Uniform(2.5, 7.5),
-            ridge=Uniform(50, 150),
-            n_members=n_members,
-            seed=seed,
-            dt=dt,
-        )
+    @property
+    def states(self) -> list[str]:
+        """Names of the states, in the order of the members."""
+        return self.signature.states
 
-    @classmethod
-    def recommended(
-        cls,
-        encounter_period: float,
-        dt: float | None = None,
-        n_members: int = 100,
-        seed: int | np.random.SeedSequence | np.random.Generator = 0,
-    ) -> Self:
-        """Priors around :meth:`HankelDMDc.recommended`.
+    @property
+    def inputs(self) -> list[str]:
+        """Names of the measured inputs, in the order of the members."""
+        return self.signature.inputs
 
-        Parameters
-        ----------
-        encounter_period, dt, n_members, seed
-            As in :meth:`paper`.
+    @property
+    def regressors(self) -> list[str]:
+        """Names of what the inputs become: the delayed regressors, then the direct ones."""
+        return self.signature.regressors
 
-        Returns
-        -------
-        BayesianHankelDMDc
-            All of the runs, the paper's delays, exact delay rows, and a ridge per snapshot,
-            log-uniform over 0.3 to 3 times 100/640.
-        """
-        return cls(
-            encounter_period=encounter_period,
-            train_length=None,
-            state_delay=Uniform(0.5, 1.5),
-            input_delay=Uniform(2.5, 7.5),
-            ridge=LogUniform(0.3 * PAPER_RIDGE_PER_SNAPSHOT, 3 * PAPER_RIDGE_PER_SNAPSHOT),
-            n_members=n_members,
-            seed=seed,
-            dt=dt,
-            delay_rows="exact",
-            ridge_scale="per_snapshot",
-        )
+    @property
+    def state_labels(self) -> tuple[ChannelLabel, ...]:
+        """Names, units and long names of the states."""
+        return self.signature.state_labels
 
-    def fit(
+    @property
+    def input_labels(self) -> tuple[ChannelLabel, ...]:
+        """Names, units and long names of the measured inputs."""
+        return self.signature.input_labels
+
+    @property
+    def state_delays(self) -> int:
+        """Longest s of a member."""
+        return self.signature.state_delays
+
+    @property
+    def input_delays(self) -> int:
+        """Longest z of a member."""
+        return self.signature.input_delays
+
+    @property
+    def history_samples(self) -> int:
+        """Samples a forecast needs up to its start, so that every member has its history."""
+        return self.signature.history_samples
+
+    @property
+    def lead_samples(self) -> int:
+        """Samples of input after the one a step starts from that drive the step."""
+        return self.signature.lead_samples
+
+    @property
+    def state_spread(self) -> FloatArray:
+        """Standard deviation of the states over all that members learn from, shape (N,)."""
+        return self.signature.state_scale.spread
+
+    def read_windows(
         self,
-        runs: Runs,
-        states: Sequence[str],
-        inputs: Sequence[str],
-        stop: Stop = None,
-    ) -> HankelEnsemble:
-        """Draw the members and gather what they learn from; their matrices are made on demand.
+        runs: Mapping[str, xr.Dataset],
+        places: Sequence[tuple[str, float]],
+        steps: int | None,
+    ) -> Windows:
+        """What forecasts from several starts, in several runs, read: (run, start in s) each."""
+        return engine.read_windows(self.signature, runs, places, steps)
+
+    def forecast(
+        self,
+        run: xr.Dataset,
+        start: float,
+        steps: int | None = None,
+        *,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+    ) -> xr.Dataset:
+        """Free runs of all members.
 
         Parameters
         ----------
-        runs, states, inputs, stop
-            As in :meth:`HankelDMDc.fit`.
+        run, start, steps
+            As in :meth:`HankelDMDcModel.forecast`.
+        executor : concurrent.futures.Executor, optional
+            Who identifies and runs the members: :func:`seakeep.models.processes`, or Dask's
+            ``client.get_executor()``; by default this process. The result does not depend on it.
+        progress : callable, optional
+            Called as ``progress(done, total, what)`` after each member.
 
         Returns
         -------
-        HankelEnsemble
-            The ensemble, immutable. The same settings give the same draws for every training
-            window that all of them fit into.
+        Dataset
+            States with dimensions (member, time), and ``status`` over ``member``. A member that
+            diverges is NaN from there on.
 
         Raises
         ------
         RequestError, DataError
-            As :meth:`HankelDMDc.fit`; DataError too if no draw fits the runs.
+            As :meth:`HankelDMDcModel.forecast`.
         """
-        named = as_runs(runs)
-        check_names(states, inputs)
-        fitted = None
-        if self.alignment is not None:
-            named, stop = until(named, stop), None
-            fitted, named = align_training(self.alignment, named, states, inputs, None, 0)
-        stops = stop_instants(stop, list(named))
-        first_name, first_run = next(iter(named.items()))
-        dt = labelled.run_step(first_run, first_name)
-        if self.dt is not None:
-            labelled.check_step(first_run, first_name, self.dt)
-        lasts = []
-        for name, run in named.items():
-            labelled.check_step(run, name, dt)
-            time = np.asarray(run["time"].values, dtype=float)
-            lasts.append(last_sample(time, stops[name], name))
-        samples = [last + 1 for last in lasts]
-        members = draw_members(self, dt, samples)
-        earliest = reach(members, samples, self.history == "inside")
-        arrays, labels = _training_arrays(named, states, inputs, samples, earliest)
-        return HankelEnsemble(
-            settings=self.shared,
-            origin=_origin(self),
-            members=tuple(members),
+        windows = self.read_windows(*one_run(run, [start]), steps)
+        with member_series(self, windows, executor, progress) as (series, lost):
+            variables = label_channels(self.signature, np.array(series[:, 0]), ("member", "time"))
+        variables["status"] = self._status(lost[:, 0], windows)
+        return xr.Dataset(
+            variables,
+            coords={"member": np.arange(self.n_members), "time": windows.time[0]},
+            attrs=self._notes(windows) | verdict(lost) | {"start": windows.places[0][1]},
+        )
+
+    def forecast_summary(
+        self,
+        run: xr.Dataset,
+        start: float,
+        steps: int | None = None,
+        level: float = 0.95,
+        *,
+        band: Band = "members",
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+    ) -> xr.Dataset:
+        """Mean, standard deviation and band of the members, never all of them at once.
+
+        Parameters
+        ----------
+        run, start, steps, executor, progress
+            As in :meth:`forecast`.
+        level : float, optional
+            Probability between ``lower`` and ``upper``.
+        band : {"members", "calibrated"}, optional
+            Quantiles of the members, or these moved outwards as :meth:`calibrate` found.
+
+        Returns
+        -------
+        Dataset
+            As :func:`seakeep.summarize` makes of :meth:`forecast`, dimensions (statistic, time),
+            with ``status`` over ``member``. More than 32 MiB of members are spilled to a
+            temporary file and reduced in pieces of time.
+
+        Raises
+        ------
+        RequestError, DataError
+            As :meth:`forecast`.
+        """
+        windows, values, lost = self._reduced(run, [start], steps, level, band, executor, progress)
+        variables = label_channels(self.signature, values[0], ("statistic", "time"))
+        variables["status"] = self._status(lost[:, 0], windows)
+        counts = {"start": windows.places[0][1]} | self._counts(level, band) | verdict(lost)
+        return xr.Dataset(
+            variables,
+            coords={
+                "statistic": statistic_coordinate(level, band == "calibrated"),
+                "member": np.arange(self.n_members),
+                "time": windows.time[0],
+            },
+            attrs=self._notes(windows) | counts,
+        )
+
+    def forecast_windows(
+        self,
+        run: xr.Dataset,
+        starts: Sequence[float],
+        steps: int,
+        *,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+    ) -> xr.Dataset:
+        """Free runs of all members from several starts side by side.
+
+        Parameters
+        ----------
+        run, steps, executor, progress
+            As in :meth:`forecast`; `steps` holds for all.
+        starts : sequence of float
+            Instants of the last measured state, s.
+
+        Returns
+        -------
+        Dataset
+            States with dimensions (window, member, lead), ``lead`` in s after each ``start``
+            (over ``window``), and ``status`` over (window, member).
+
+        Raises
+        ------
+        RequestError, DataError
+            As :meth:`forecast`.
+        """
+        windows = self.read_windows(*one_run(run, starts), steps)
+        with member_series(self, windows, executor, progress) as (series, lost):
+            values = np.array(series).swapaxes(0, 1)
+        variables = label_channels(self.signature, values, ("window", "member", "lead"))
+        status = [
+            statuses(row, time.values, self.dt)
+            for row, time in zip(lost.T, windows.time, strict=True)
+        ]
+        variables["status"] = xr.Variable(("window", "member"), np.stack(status))
+        coords = window_coords(windows, self.dt) | {"member": np.arange(self.n_members)}
+        return xr.Dataset(variables, coords=coords, attrs=self._notes(windows))
+
+    def summarize_windows(
+        self,
+        run: xr.Dataset,
+        starts: Sequence[float],
+        steps: int,
+        level: float = 0.95,
+        *,
+        band: Band = "members",
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+    ) -> xr.Dataset:
+        """Mean, standard deviation and band from several starts, never all members at once.
+
+        Parameters
+        ----------
+        run, starts, steps, executor, progress
+            As in :meth:`forecast_windows`.
+        level : float, optional
+            Probability between ``lower`` and ``upper``.
+        band
+            As in :meth:`forecast_summary`.
+
+        Returns
+        -------
+        Dataset
+            Dimensions (window, statistic, lead); ``diverged`` counts over ``window``.
+
+        Raises
+        ------
+        RequestError, DataError
+            As :meth:`forecast`.
+        """
+        windows, values, lost = self._reduced(run, starts, steps, level, band, executor, progress)
+        variables = label_channels(self.signature, values, ("window", "statistic", "lead"))
+        variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
+        coords = window_coords(windows, self.dt)
+        coords["statistic"] = statistic_coordinate(level, band == "calibrated")
+        return xr.Dataset(
+            variables, coords=coords, attrs=self._notes(windows) | self._counts(level, band)
+        )
+
+    def _reduced(
+        self,
+        run: xr.Dataset,
+        starts: Sequence[float],
+        steps: int | None,
+        level: float,
+        band: Band,
+        executor: Executor | None,
+        progress: Progress | None,
+    ) -> tuple[Windows, FloatArray, npt.NDArray[np.int64]]:
+        """Windows, statistics (window, 4, steps, N), and where members were lost."""
+        level = check_level(level)
+        check_band(self.calibration, level, band)
+        windows = self.read_windows(*one_run(run, starts), steps)
+        if band == "calibrated":
+            warn_of_horizon(self.calibration, windows.places[0][0], windows.steps)
+        with member_series(self, windows, executor, progress) as (series, lost):
+            values = reduce_members(series, lost, level)
+        return windows, widened(self.calibration, values, band), lost
+
+    def _status(self, lost: npt.NDArray[np.int64], windows: Windows) -> xr.Variable:
+        return xr.Variable(("member",), statuses(lost, windows.time[0].values, self.dt))
+
+    def _counts(self, level: float, band: Band) -> dict[str, Any]:
+        kind = {"band": band} if band == "calibrated" else {}
+        return {"level": level, "members": self.n_members, **kind}
+
+    def _notes(self, windows: Windows) -> dict[str, Any]:
+        notes = forecast_notes(self.signature, windows)
+        return {"run": notes.pop("run"), "ensemble": json.dumps(self.origin), **notes}
+
+
+@dataclass(frozen=True, eq=False)
+class HankelEnsemble(_Forecasts):
+    """Members that differ in their settings, or in what they learned from.
+
+    Made by :meth:`BayesianHankelDMDc.fit` or :func:`seakeep.load_model`. It holds draws and
+    training arrays; a member's matrices exist while it is at work, and no longer.
+
+    Parameters
+    ----------
+    settings : HankelSettings
+        What all members share.
+    origin : dict
+        Priors, seed and rules that made the draws, as JSON values.
+    members : tuple of Draw
+        Settings of each member.
+    arrays : TrainingArrays
+        What they learn from.
+    signature : Signature
+        Time step, names and units, longest delays, and how inputs drive the members.
+    coverage : Coverage
+        Waves that they were trained in.
+    calibration : Calibration, optional
+        By how much the calibrated band is wider than that of the members; see :meth:`calibrate`.
+    """
+
+    kind: ClassVar[str] = "bayesian_hankel_dmdc"
+    settings: HankelSettings
+    origin: Json
+    members: tuple[Draw, ...]
+    arrays: TrainingArrays
+    signature: Signature
+    coverage: Coverage
+    calibration: Calibration | None = None
+
+    def __repr__(self) -> str:
+        return (
+            f"{type(self).__name__}(n_members={self.n_members}, states={self.states}, "
+            f"inputs={self.inputs}, dt={self.dt:g}; print(ensemble.summary()) says more)"
+        )
+
+    @property
+    def n_members(self) -> int:
+        """Number of members."""
+        return len(self.members)
+
+    @cached_property
+    def draws(self) -> xr.Dataset:
+        """What was drawn, over ``member``.
+
+        ``train_length``, ``state_delay`` and ``input_delay`` in encounter periods (NaN where all
+        of a run trains), the integers ``…_samples`` they became (−1 for all of a run), ``ridge``,
+        the run that trains (−1 for all) and its last sample (−1 for ``stop``), and how many
+        infeasible draws came before.
+        """
+        return draws_dataset(self.members, self.origin)
+
+    @cached_property
+    def training_spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant of the training windows in each run that trains a member, s."""
+        spans: dict[str, tuple[float, float]] = {}
+        for run, name in enumerate(self.arrays.names):
+            ends = [
+                window_ends(self.arrays, draw, run, self.dt)
+                for draw in self.members
+                if draw.run in (None, run)
+            ]
+            if ends:
+                spans[name] = min(first for first, _ in ends), max(stop for _, stop in ends)
+        return spans
+
+    @cached_property
+    def read_spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant that any member reads of each run, delay history included, s."""
+        arrays = self.arrays
+        return {
+            name: (begin, begin + (len(x) - 1) * self.dt)
+            for name, begin, x in zip(arrays.names, arrays.begins, arrays.states, strict=True)
+            if len(x)
+        }
+
+    @property
+    def alignment(self) -> FittedAlignment | None:
+        """How the wave input is aligned to the vessel; the training arrays are aligned."""
+        input_map = self.signature.input_map
+        return input_map.alignment if isinstance(input_map, Chain) else None
+
+    def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
+        """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
+        return linear_runs([self.dynamics(number) for number in members], groups)
+
+    def system_matrices(self) -> Iterator[FloatArray]:
+        """Â of each member."""
+        return (self.member(number).A for number in range(self.n_members))
+
+    def dynamics(self, number: int) -> Dynamics:
+        """A member identified: what a free run of it needs."""
+        draw, input_map = self.members[number], self.signature.input_map
+        return identify_member(self.arrays, self.settings, input_map, draw).dynamics
+
+    def member(self, number: int) -> HankelDMDcModel:
+        """One member as a model of its own.
+
+        Parameters
+        ----------
+        number : int
+            Which, from zero.
+
+        Returns
+        -------
+        HankelDMDcModel
+            Equal to :class:`HankelDMDc` with the member's settings and data.
+
+        Raises
+        ------
+        RequestError
+            If there is no such member.
+        """
+        if not 0 <= number < self.n_members:
+            raise RequestError(
+                f"there is no member {number!r}: the ensemble has {self.n_members}, counted from "
+                f"0 to {self.n_members - 1}."
+            )
+        draw, signature = self.members[number], self.signature
+        found = identify_member(self.arrays, self.settings, signature.input_map, draw)
+        ends = [window_ends(self.arrays, draw, run, self.dt) for run in found.runs]
+        return HankelDMDcModel(
+            settings=replace(
+                self.settings,
+                state_delays=draw.state_delays,
+                input_delays=draw.input_delays,
+                ridge=draw.ridge,
+                window=draw.window,
+            ),
+            coefficients=found.solution.coefficients,
+            signature=replace(
+                signature,
+                state_delays=draw.state_delays,
+                input_delays=draw.input_delays,
+                state_scale=found.dynamics.state_scale,
+                input_scale=found.dynamics.input_scale,
+                direct_scale=found.dynamics.direct_scale,
+            ),
+            training=Training(
+                runs=tuple(self.arrays.names[run] for run in found.runs),
+                first=tuple(first for first, _ in ends),
+                stop=tuple(stop for _, stop in ends),
+                columns=tuple(window.columns for window in found.windows),
+                method=found.solution.method,
+                ridge=found.solution.ridge,
+                rank=found.solution.rank,
+            ),
+            coverage=self.coverage,
+        )
+
+    def spectral_radii(
+        self, *, executor: Executor | None = None, progress: Progress | None = None
+    ) -> FloatArray:
+        """Largest modulus of an eigenvalue of each member; a member is stable below one.
+
+        Found once for an ensemble in memory; its file does not depend on it.
+
+        Parameters
+        ----------
+        executor, progress
+            As in :meth:`forecast`.
+
+        Returns
+        -------
+        ndarray, shape (member,)
+
+        Warns
+        -----
+        SeakeepWarning
+            When they are found, if one or more are not below one.
+        """
+        if not self._radii:
+            found = in_order(_radius, self, range(self.n_members), executor, progress)
+            radii = np.array(list(found))
+            radii.flags.writeable = False
+            self._radii.append(radii)
+            _warn_of_unstable(radii)
+        return self._radii[0]
+
+    @cached_property
+    def _radii(self) -> list[FloatArray]:
+        """Spectral radii, once they have been asked for."""
+        return []
+
+    def summary(self) -> str:
+        """Text that says what the ensemble is made of, and how stable its members are.
+
+        Returns
+        -------
+        str
+            A few lines; the first reading finds the :meth:`spectral_radii`.
+        """
+        origin, settings, draws = self.origin, self.settings, self.members
+        count = self.n_members
+        refused = sum(draw.redrawn for draw in draws)
+        scale = ", per snapshot pair" if settings.ridge_scale == "per_snapshot" else ""
+        lines = [
+            f"Ensemble of {counted(count, 'Hankel DMD model')} with control: "
+            f"{counted(len(self.states), 'state')}, {counted(len(self.inputs), 'input')}, "
+            f"dt {self.dt:g} s",
+            f"  states        {', '.join(with_units(self.state_labels))}",
+            f"  inputs        {', '.join(with_units(self.input_labels)) or 'none (autonomous)'}",
+            f"  draws         {SAMPLING[origin['sampling']]}, seed {origin['seed']}; "
+            f"{refused or 'none'} infeasible and drawn again",
+            f"  window        {_window(self.members)}",
+            f"  state delay   {_periods([d.state_delay for d in draws])} "
+            f"({_samples([d.state_delays for d in draws])})",
+            f"  input delay   {_periods([d.input_delay for d in draws])} "
+            f"({_samples([d.input_delays for d in draws])})",
+            f"  ridge         {_range([d.ridge for d in draws], '.4g')}{scale}; delay rows "
+            f"{'exact' if settings.delay_rows == 'exact' else 'regressed'}",
+            f"  history       {self.history_samples} samples up to the start of a forecast",
+            *self.signature.input_map.describe(self.dt),
+            f"  training      {counted(len(self.arrays.names), 'run')}"
+            + (f", {TRAIN_ON[origin['train_on']]}" if len(self.arrays.names) > 1 else ""),
+        ]
+        lines += [
+            f"    {name}: {span_text(*span, self.dt)}" for name, span in self.training_spans.items()
+        ]
+        if (calibration := self.calibration) is not None:
+            found, count_of = calibration.found, sum(calibration.windows.values())
+            relative = found.margin / self.state_spread
+            lines.append(
+                f"  band          calibrated for {found.level:g} on "
+                f"{counted(count_of, 'window')} of {calibration.steps} steps: wider by "
+                f"{_range(relative, '.2g')} training SD either way"
+            )
+        radii = self.spectral_radii()
+        unstable = int(np.count_nonzero(radii >= 1.0))
+        verdict = (
+            f"{unstable} of {count} UNSTABLE: their long forecasts diverge"
+            if unstable
+            else "stable"
+        )
+        lines.append(
+            f"  stability     spectral radius {_range(radii, '.6f')}, median "
+            f"{np.median(radii):.6f} ({verdict})"
+        )
+        return "\n".join(lines)
+
+    def hold(
+        self,
+        *,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+    ) -> HeldEnsemble:
+        """Identify all members once and keep them, for forecasts in a loop or on board.
+
+        Parameters
+        ----------
+        executor, progress
+            As in :meth:`forecast`.
+
+        Returns
+        -------
+        HeldEnsemble
+            Its ``forecast_arrays`` gives mean and band from plain arrays. It takes N(N(s+1) +
+            Q(z+1)) numbers a member with exact delay rows, and s + 1 times as many with
+            regressed ones.
+        """
+        found = in_order(_identify, self, range(self.n_members), executor, progress)
+        return HeldEnsemble(self, tuple(found))
+
+    def calibrate(
+        self,
+        runs: Runs,
+        steps: int,
+        level: float = 0.95,
+        *,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+    ) -> Self:
+        """Widen the band so that it holds unseen measurements as often as it says.
+
+        The band forecasts windows end to end in `runs` that no member has read, and is moved
+        outwards, channel by channel, by a quantile of how far measurements lie outside of it
+        (:func:`seakeep.statistics.conformal_margin`, which says what that warrants and what not).
+
+        Parameters
+        ----------
+        runs : Dataset, sequence of Dataset, or mapping of names to Datasets
+            Runs of the same sea, or parts of them, under the names by which they trained. Leave
+            out what the ensemble is to be tested on.
+        steps : int
+            Instants of a window: as many as will be forecast.
+        level : float, optional
+            Probability that the band is to have.
+        executor, progress
+            As in :meth:`forecast`; a step is a member in one of the runs.
+
+        Returns
+        -------
+        HankelEnsemble
+            The same members, with the :attr:`calibration` that ``band="calibrated"`` uses.
+
+        Raises
+        ------
+        RequestError
+            If there is no such window, or a setting is out of range.
+        DataError
+            If a run cannot be used.
+        """
+        return replace(self, calibration=calibrate(self, runs, steps, level, executor, progress))
+
+    def save(self, path: str | Path) -> Path:
+        """Write draws and training arrays as NetCDF, to a temporary name first.
+
+        Parameters
+        ----------
+        path : str or Path
+            File, overwritten if it exists.
+
+        Returns
+        -------
+        Path
+            The file; :func:`seakeep.load_model` reads it, running no code from it.
+        """
+        return store.write(self.to_dataset(), path, self.kind)
+
+    def to_dataset(self) -> xr.Dataset:
+        """The ensemble as a Dataset: what :meth:`save` writes."""
+        arrays, variables = self.arrays, {}
+        for group in ("states", "delayed", "direct"):
+            for number, values in enumerate(getattr(arrays, group)):
+                variables[f"{group}_{number}"] = ((f"{group}_{number}_sample", group), values)
+        place = {
+            "names": arrays.names,
+            "offsets": [int(offset) for offset in arrays.offsets],
+            "begins": arrays.begins,
+        }
+        calibration = "null" if self.calibration is None else self.calibration.to_json()
+        return (
+            draws_dataset(self.members, self.origin)
+            .assign(
+                {
+                    **variables,
+                    **store.pack_signature(self.signature),
+                    **self.coverage.to_variables(),
+                }
+            )
+            .assign_attrs(
+                runs=json.dumps(place),
+                signature=store.as_json(store.signature_json(self.signature)),
+                calibration=calibration,
+            )
+        )
+
+    @classmethod
+    def from_dataset(
+        cls, dataset: xr.Dataset, signature: Signature, settings: HankelSettings, origin: Json
+    ) -> HankelEnsemble:
+        """Rebuild an ensemble from :meth:`to_dataset`; its members are equal to the last bit."""
+        place = store.content(dataset, "runs")
+        delayed, direct = signature.input_map.regressors(signature.input_labels)
+        names = (
+            tuple(signature.states),
+            tuple(label.name for label in delayed),
+            tuple(label.name for label in direct),
+        )
+        series = [
+            tuple(
+                store.numbers(dataset, f"{group}_{number}", (None, len(channels)))
+                for number in range(len(place["names"]))
+            )
+            for group, channels in zip(("states", "delayed", "direct"), names, strict=True)
+        ]
+        arrays = TrainingArrays(
+            names=tuple(str(name) for name in place["names"]),
+            states=series[0],
+            delayed=series[1],
+            direct=series[2],
+            offsets=tuple(int(offset) for offset in place["offsets"]),
+            begins=tuple(float(begin) for begin in place["begins"]),
+            channels=names,
+        )
+        if len({len(arrays.names), len(arrays.offsets), len(arrays.begins)}) != 1:
+            raise ValueError("runs, offsets and instants are of unequal number")
+        return cls(
+            settings=settings,
+            origin=origin,
+            members=tuple(_draw(dataset, number) for number in range(dataset.sizes["member"])),
             arrays=arrays,
-            dt=dt,
-            state_labels=labels[0],
-            input_labels=labels[1],
-            alignment=fitted,
+            signature=signature,
+            coverage=Coverage.from_dataset(dataset),
+            calibration=Calibration.from_json(dataset.attrs["calibration"]),
         )
 
 
-def _seed_sequence(seed: object) -> np.random.SeedSequence:
-    if isinstance(seed, np.random.SeedSequence):
-        return seed
-    if isinstance(seed, np.random.Generator):
-        return np.random.SeedSequence(int(seed.integers(2**63)))
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise RequestError(
-            f"seed must be an integer, zero or more, a SeedSequence or a Generator of numpy; "
-            f"received {seed!r}."
+def _radius(ensemble: HankelEnsemble, number: int) -> float:
+    return spectral_radius(ensemble.dynamics(number))
+
+
+def _identify(ensemble: HankelEnsemble, number: int) -> Dynamics:
+    return ensemble.dynamics(number)
+
+
+class BandForecast(NamedTuple):
+    """Forecast of an ensemble as plain arrays, physical units.
+
+    Attributes
+    ----------
+    mean, std, lower, upper : ndarray, shape (steps, N)
+        Mean, standard deviation and bounds over the members, at k + 1 … k + steps.
+    diverged : int
+        Members that diverged and are left out of all four.
+    """
+
+    mean: FloatArray
+    std: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    diverged: int
+
+
+@dataclass(frozen=True, eq=False)
+class HeldEnsemble(_Forecasts):
+    """Members with their matrices, for forecasts in a loop or on board.
+
+    Made by :meth:`HankelEnsemble.hold`. A :class:`~seakeep.models.HankelEnsemble` identifies its
+    members anew in each call and so needs little memory; here each is identified once. It
+    forecasts runs as the ensemble does, and plain arrays with :meth:`forecast_arrays`.
+
+    Parameters
+    ----------
+    ensemble : HankelEnsemble
+        Where the members come from.
+    members : tuple of Dynamics
+        All of them, identified.
+    """
+
+    ensemble: HankelEnsemble
+    members: tuple[Dynamics, ...]
+
+    def __repr__(self) -> str:
+        return (
+            f"{type(self).__name__}(n_members={len(self.members)}, states={self.states}, "
+            f"inputs={self.inputs}, dt={self.dt:g}, "
+            f"{self.nbytes / 2**20:.0f} MiB)"
         )
-    return np.random.SeedSequence(int(seed))
+
+    @property
+    def n_members(self) -> int:
+        """Number of members."""
+        return len(self.members)
+
+    @property
+    def signature(self) -> Signature:  # type: ignore[override]
+        """That of the ensemble."""
+        return self.ensemble.signature
+
+    @property
+    def origin(self) -> Json:  # type: ignore[override]
+        """That of the ensemble."""
+        return self.ensemble.origin
+
+    @property
+    def calibration(self) -> Calibration | None:  # type: ignore[override]
+        """That of the ensemble."""
+        return self.ensemble.calibration
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the members' coefficients."""
+        return sum(member.coefficients.nbytes for member in self.members)
+
+    def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
+        """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
+        return linear_runs([self.members[number] for number in members], groups)
+
+    def forecast_arrays(
+        self,
+        x_history: npt.ArrayLike,
+        u_history: npt.ArrayLike,
+        u_future: npt.ArrayLike,
+        steps: int,
+        level: float = 0.95,
+        *,
+        band: Band = "members",
+        ahead: str = "refuse",
+    ) -> BandForecast:
+        """Free runs of all members from arrays, reduced to mean and band.
+
+        Parameters
+        ----------
+        x_history : array_like, shape (at least s + 1, N)
+            States up to and including instant k, oldest first, physical units, in the order of
+            ``ensemble.states``; s is the longest of a member (``ensemble.state_delays``).
+        u_history : array_like, shape (at least z + 1, Q)
+            Inputs up to and including instant k, in the order of ``ensemble.inputs``, aligned
+            already if the ensemble aligns them; z likewise.
+        u_future : array_like, shape (at least steps − 1 + lead_samples, Q)
+            Inputs at k + 1, k + 2, …; shape (0, 0) for members without input.
+        steps : int
+            Number of instants.
+        level : float, optional
+            Probability between ``lower`` and ``upper``.
+        band : {"members", "calibrated"}, optional
+            As in :meth:`HankelEnsemble.forecast_summary`.
+        ahead
+            As in :meth:`HankelDMDcModel.forecast_arrays`.
+
+        Returns
+        -------
+        BandForecast
+            The numbers of :meth:`HankelEnsemble.forecast_summary`.
+
+        Raises
+        ------
+        RequestError
+            If a shape or name does not fit, or there is no such band.
+        """
+        level = check_level(level)
+        check_band(self.calibration, level, band)
+        windows = check_arrays(self.signature, x_history, u_history, u_future, steps, ahead)
+        if band == "calibrated":
+            warn_of_horizon(self.calibration, "these arrays", int(steps), stacklevel=3)
+        with one_blas_thread():
+            out = linear_runs(self.members, [windows])[0][:, 0]
+        kept = out[engine.first_lost(out) < 0]
+        values = widened(self.calibration, statistics_of(kept, level), band)
+        mean, std, lower, upper = values
+        return BandForecast(mean, std, lower, upper, len(out) - len(kept))
 
 
-def _training_arrays(
-    runs: dict[str, Any],
-    states: Sequence[str],
-    inputs: Sequence[str],
-    samples: Sequence[int],
-    earliest: Sequence[int],
-) -> tuple[TrainingArrays, tuple[tuple[labelled.ChannelLabel, ...], ...]]:
-    labels: tuple[tuple[labelled.ChannelLabel, ...], ...] = ()
-    read: list[list[npt.NDArray[np.float64]]] = []
-    begins = []
-    for (name, run), first, end in zip(runs.items(), earliest, samples, strict=True):
-        time = np.asarray(run["time"].values, dtype=float)
-        pair = []
-        for channels in (states, inputs):
-            values = labelled.channel_matrix(run, channels, name, slice(first, end))
-            labelled.check_finite(values, channels, name, first, time)
-            values.flags.writeable = False
-            pair.append(values)
-        labels = labels or tuple(labelled.channel_labels(run, names) for names in (states, inputs))
-        for group in labels:
-            labelled.check_units(run, group, name)
-        read.append(pair)
-        begins.append(float(time[min(first, time.size - 1)]))
-    arrays = TrainingArrays(
-        names=tuple(runs),
-        states=tuple(pair[0] for pair in read),
-        inputs=tuple(pair[1] for pair in read),
-        offsets=tuple(earliest),
-        begins=tuple(begins),
-        state_names=tuple(states),
-        input_names=tuple(inputs),
-    )
-    return arrays, labels
-
-
-def _origin(spec: BayesianHankelDMDc) -> dict[str, Any]:
-    """What made the draws, as plain data: for the attributes of files and results."""
-    seed = spec.seed_sequence
-    return {
-        "encounter_period": float(spec.encounter_period),
-        "train_length": describe(spec.train_length),
-        "state_delay": describe(spec.state_delay),
-        "input_delay": describe(spec.input_delay),
-        "ridge": describe(spec.ridge),
-        "n_members": int(spec.n_members),
-        "seed": str(seed.entropy),
-        "spawn_key": [int(key) for key in seed.spawn_key],
-        "sampling": spec.sampling,
-        "train_on": spec.train_on,
+def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Dataset:
+    """Draws over ``member``; see ``HankelEnsemble.draws``."""
+    variables = {
+        name: (
+            "member",
+            np.array([getattr(draw, name) for draw in members], dtype=float),
+            {"long_name": label, "units": units},
+        )
+        for name, (label, units) in DRAWN.items()
     }
+    for name, (attribute, label) in ROUNDED.items():
+        values = [getattr(draw, attribute) for draw in members]
+        integers = np.array([-1 if value is None else value for value in values], dtype=np.int64)
+        variables[name] = ("member", integers, {"long_name": label, "units": "1"})
+    attrs = {
+        "ensemble": json.dumps(dict(origin)),
+        "redrawn": sum(draw.redrawn for draw in members),
+    }
+    return xr.Dataset(variables, coords={"member": np.arange(len(members))}, attrs=attrs)
+
+
+def _draw(dataset: xr.Dataset, member: int) -> Draw:
+    fields: dict[str, Any] = {name: float(dataset[name].values[member]) for name in DRAWN}
+    for name, (attribute, _) in ROUNDED.items():
+        value = int(dataset[name].values[member])
+        if value < 0 and attribute not in OPTIONAL:
+            raise ValueError(f"{name} of member {member} is {value}")
+        fields[attribute] = None if value < 0 and attribute in OPTIONAL else value
+    return Draw(**fields)
+
+
+def _warn_of_unstable(radii: FloatArray) -> None:
+    """Warn of members whose spectral radius is one or more, with what to do."""
+    if unstable := int(np.count_nonzero(radii >= 1.0)):
+        warnings.warn(
+            f"{unstable} of {counted(radii.size, 'member')} have a spectral radius of one or more "
+            f"(up to {radii.max():.6f}): a free run of theirs grows, and once it is lost it is "
+            "left out of mean and band. Raise the ridge, train on more data, use shorter state "
+            "delays, or look for transients at the ends of the training runs.",
+            SeakeepWarning,
+            stacklevel=4,  # past spectral_radii, to who asked for them
+        )
+
+
+def _window(draws: Sequence[Draw]) -> str:
+    windows = [draw.window for draw in draws if draw.window is not None]
+    if not windows:
+        return "all of a run"
+    periods = _periods([draw.train_length for draw in draws])
+    return f"{periods} ({_samples(windows)})"
+
+
+def _range(values: Sequence[float] | FloatArray, form: str) -> str:
+    low, high = format(min(values), form), format(max(values), form)
+    return low if low == high else f"{low} to {high}"
+
+
+def _periods(values: Sequence[float]) -> str:
+    return _of(_range(values, ".4g"), "encounter period")
+
+
+def _samples(values: Sequence[int]) -> str:
+    return _of(_range(values, "d"), "sample")
+
+
+def _of(count: str, unit: str) -> str:
+    return f"{count} {unit}" if count == "1" else f"{count} {unit}s"

@@ -8,20 +8,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError
 from seakeep.files import replacing
+from seakeep.models.interface import Signature
 
 if TYPE_CHECKING:
     import control
 
-    from seakeep.models.model import HankelDMDcModel
-
 __all__ = ["initial_state", "matrices", "to_control", "to_mat"]
 
-FloatArray = npt.NDArray[np.float64]
+System = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
-def matrices(model: HankelDMDcModel) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def matrices(
+    a_hat: FloatArray, b_hat: FloatArray, signature: Signature
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     r"""A, B, C, D of the system in physical deviations.
 
     Its state is :math:`[x_k; …; x_{k-s}; u_{k-1}; …; u_{k-z}]`, its input :math:`u_k`, its output
@@ -29,8 +31,10 @@ def matrices(model: HankelDMDcModel) -> tuple[FloatArray, FloatArray, FloatArray
 
     Parameters
     ----------
-    model : HankelDMDcModel
-        The model.
+    a_hat, b_hat : ndarray
+        All rows of Â and B̂, on standardised deviations.
+    signature : Signature
+        Of the model.
 
     Returns
     -------
@@ -42,17 +46,17 @@ def matrices(model: HankelDMDcModel) -> tuple[FloatArray, FloatArray, FloatArray
     RequestError
         If the model has no input.
     """
-    states, inputs = len(model.states), len(model.inputs)
+    states, inputs = len(signature.states), len(signature.inputs)
     if inputs == 0:
         raise RequestError(
             "the model has no input, and a state-space system without input cannot be represented "
             "here. Use model.A and model.eigenvalues."
         )
-    scale_x = np.tile(model.state_std, model.state_delays + 1)
-    scale_u = np.tile(model.input_std, model.input_delays + 1)
-    a = model.A * scale_x[:, None] / scale_x
-    b = model.B * scale_x[:, None] / scale_u
-    extended, line = a.shape[0], inputs * model.input_delays
+    scale_x = np.tile(signature.state_scale.std, signature.state_delays + 1)
+    scale_u = np.tile(signature.input_scale.std, signature.input_delays + 1)
+    a = a_hat * scale_x[:, None] / scale_x
+    b = b_hat * scale_x[:, None] / scale_u
+    extended, line = a.shape[0], inputs * signature.input_delays
     size = extended + line
     A = np.zeros((size, size))
     A[:extended, :extended] = a
@@ -65,29 +69,18 @@ def matrices(model: HankelDMDcModel) -> tuple[FloatArray, FloatArray, FloatArray
     return A, B, np.eye(states, size), np.zeros((states, inputs))
 
 
-def initial_state(
-    model: HankelDMDcModel, x_history: FloatArray, u_history: FloatArray
-) -> FloatArray:
+def initial_state(signature: Signature, x_history: FloatArray, u_history: FloatArray) -> FloatArray:
     """State of the system of :func:`matrices` at the last row of the histories.
 
-    Parameters
-    ----------
-    model : HankelDMDcModel
-        The model.
-    x_history, u_history : ndarray, shape (at least max(s, z) + 1, channel)
-        Samples up to the instant, physical units.
-
-    Returns
-    -------
-    ndarray, shape (N(s+1) + Qz,)
-        The state. The input at the instant itself is not part of it.
+    The histories hold at least s + 1 and z + 1 rows; the input at the instant itself is not part
+    of the state.
     """
-    states = (x_history - model.state_mean)[::-1][: model.state_delays + 1]
-    inputs = (u_history - model.input_mean)[::-1][1 : model.input_delays + 1]
+    states = (x_history - signature.state_scale.mean)[::-1][: signature.state_delays + 1]
+    inputs = (u_history - signature.input_scale.mean)[::-1][1 : signature.input_delays + 1]
     return np.concatenate([states.ravel(), inputs.ravel()])
 
 
-def to_control(model: HankelDMDcModel) -> control.StateSpace:
+def to_control(system: System, signature: Signature) -> control.StateSpace:
     """The system for python-control, with the names of inputs and outputs."""
     try:
         import control
@@ -96,28 +89,28 @@ def to_control(model: HankelDMDcModel) -> control.StateSpace:
             "python-control is not installed. Install it with: pip install 'seakeep[control]'"
         ) from error
     return control.ss(
-        *matrices(model), model.dt, inputs=model.inputs, outputs=model.states, name="seakeep"
+        *system, signature.dt, inputs=signature.inputs, outputs=signature.states, name="seakeep"
     )
 
 
-def to_mat(model: HankelDMDcModel, path: str | Path) -> Path:
+def to_mat(system: System, signature: Signature, path: str | Path) -> Path:
     """Write the system as a MATLAB v5 file; see ``HankelDMDcModel.to_mat``."""
     from scipy import io
 
-    A, B, C, D = matrices(model)
+    A, B, C, D = system
     content = {
         "A": A,
         "B": B,
         "C": C,
         "D": D,
-        "Ts": model.dt,
-        "InputOffset": model.input_mean[:, None],
-        "OutputOffset": model.state_mean[:, None],
-        "InputName": _cell([label.name for label in model.input_labels]),
-        "OutputName": _cell([label.name for label in model.state_labels]),
-        "InputUnit": _cell([label.units for label in model.input_labels]),
-        "OutputUnit": _cell([label.units for label in model.state_labels]),
-        "StateName": _cell(_state_names(model)),
+        "Ts": signature.dt,
+        "InputOffset": signature.input_scale.mean[:, None],
+        "OutputOffset": signature.state_scale.mean[:, None],
+        "InputName": _cell([label.name for label in signature.input_labels]),
+        "OutputName": _cell([label.name for label in signature.state_labels]),
+        "InputUnit": _cell([label.units for label in signature.input_labels]),
+        "OutputUnit": _cell([label.units for label in signature.state_labels]),
+        "StateName": _cell(_state_names(signature)),
         "Notes": "seakeep: x(k+1) = A x(k) + B (u(k) - InputOffset), "
         "y(k) = C x(k) + D (u(k) - InputOffset) + OutputOffset",
     }
@@ -126,10 +119,11 @@ def to_mat(model: HankelDMDcModel, path: str | Path) -> Path:
     return Path(path)
 
 
-def _state_names(model: HankelDMDcModel) -> list[str]:
+def _state_names(signature: Signature) -> list[str]:
     """Names of the entries of the state, in the order of :func:`matrices`."""
-    delayed = [(name, back) for back in range(model.state_delays + 1) for name in model.states]
-    delayed += [(name, back) for back in range(1, model.input_delays + 1) for name in model.inputs]
+    states, inputs = signature.states, signature.inputs
+    delayed = [(name, back) for back in range(signature.state_delays + 1) for name in states]
+    delayed += [(name, back) for back in range(1, signature.input_delays + 1) for name in inputs]
     return [f"{name}(k-{back})" if back else f"{name}(k)" for name, back in delayed]
 
 

@@ -1,431 +1,800 @@
-"""From the measured inputs of a run to the columns that drive a model.
+"""Input maps: how measured inputs become what drives a model.
 
-The map has up to four links: the elevation is carried to the vessel (alignment), observables of the
-carried inputs stand beside them, and a lead shifts those that take the model's delays. It is fitted
-once and frozen; :meth:`FittedInputs.open` applies it to a run, whose record is carried once for all
-windows, members and passes.
+A :class:`Chain` of maps is fitted with a model, and opened once per run: its :class:`Drive` then
+serves all members, windows and steps. Three maps are here: none at all (a chain without maps),
+:class:`Lead`, by which waves that have not yet arrived drive a step, and :class:`ProbeAlignment`,
+which carries the elevation to a vessel that moves:
+
+    distance = surge + offset + (position of the probe in training − its position in the run) + the
+    run's own ``attrs["probe_offset"]``,
+
+positive downstream, so that one linear model holds wherever the vessel has drifted to.
 """
 
 from __future__ import annotations
 
+import math
+import numbers
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from functools import cached_property
-from typing import Any, NamedTuple, Self
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 import xarray as xr
-from scipy import signal
 
-from seakeep.arrays import FloatArray
-from seakeep.errors import DataError, RequestError
-from seakeep.models import labelled, observables
-from seakeep.models.alignment import FittedAlignment, ProbeAlignment, fit_alignment
+from seakeep.arrays import FloatArray, IntArray
+from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.models import labelled
+from seakeep.models.checks import check_choice
+from seakeep.models.interface import Drive, InputMap, Json, Regressors, Span, plain
 from seakeep.models.labelled import ChannelLabel
-from seakeep.models.observables import Bound, Observable
-from seakeep.signals.propagation import CarriedElevation
-from seakeep.signals.waves import encounter_period
+from seakeep.signals.propagation import (
+    CarriedElevation,
+    band_limit,
+    carry_by_celerity,
+    carry_by_dispersion,
+    effective_celerity,
+)
+from seakeep.waves import group_speed
 
-__all__ = ["Drive", "FittedInputs", "Rows", "fit_inputs"]
+__all__ = ["MAPS", "Chain", "FittedAlignment", "Lead", "Measured", "ProbeAlignment"]
 
-SURGE_CUTOFF = 0.2
-"""A predicted surge is followed below this frequency, per encounter period.
+Mode = Literal["effective", "dispersion"]
+Surge = Literal["measured", "predicted", "none"]
 
-Surge at wave frequency is part of the response that the model learns from the wave; following its
-prediction too feeds its error back. Between 0.1 and 0.33 the skill on the virtual tank is flat."""
-
-
-class Rows(NamedTuple):
-    """Columns that drive a model, row by row.
-
-    Attributes
-    ----------
-    delayed : ndarray, shape (time, Q')
-        Columns that take the input delays of the model.
-    direct : ndarray, shape (time, D)
-        Columns without delays.
-    """
-
-    delayed: FloatArray
-    direct: FloatArray
+BEYOND = 0.5
+"""A predicted surge is followed this part of the trained range beyond either end of it."""
 
 
 @dataclass(frozen=True, eq=False)
-class FittedInputs:
-    """The input map of a model.
+class Measured:
+    """Inputs as they are: shape (time, Q), physical units, from the sample `first` of a run on."""
+
+    values: FloatArray
+    first: int = 0
+
+    def rows(self, first: int, stop: int, known: int | None = None) -> Regressors:
+        """Inputs of a stretch."""
+        values = self.values[first - self.first : stop - self.first]
+        return Regressors(values, np.empty((stop - first, 0)))
+
+    def at(self, samples: IntArray, states: FloatArray) -> Regressors:
+        """Inputs of one sample of each window, the same for all members."""
+        shape = (*states.shape[:2], self.values.shape[1])
+        delayed = np.broadcast_to(self.values[samples - self.first][:, None], shape)
+        return Regressors(delayed, np.empty((*shape[:2], 0)))
+
+
+@dataclass(frozen=True)
+class Lead:
+    """Look-ahead: the input up to `samples` after an instant drives the step from it.
+
+    It moves the regressors that take the model's delays; direct ones bring a lead of their own.
 
     Parameters
     ----------
-    measured : tuple of ChannelLabel
-        Measured inputs.
-    dt : float
-        Time step, s.
-    alignment : FittedAlignment, optional
-        How the elevation is carried to the vessel.
-    lead : int
-        Samples by which the delayed columns look ahead: row j holds them at j + lead.
-    observables : tuple of Observable
-        Functions of the (carried) inputs that stand beside them.
-    period : float or None
-        Encounter period, samples; observables and a predicted surge need it.
+    samples : int
+        Zero or more.
     """
 
-    measured: tuple[ChannelLabel, ...]
-    dt: float
-    alignment: FittedAlignment | None = None
-    lead: int = 0
-    observables: tuple[Observable, ...] = ()
-    period: float | None = None
-
-    @cached_property
-    def bound(self) -> tuple[Bound, ...]:
-        """The observables, ready for these inputs."""
-        return tuple(
-            each.bind(self.measured, self.period or 1.0, self.dt) for each in self.observables
-        )
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the measured inputs."""
-        return [label.name for label in self.measured]
-
-    @property
-    def delayed(self) -> tuple[ChannelLabel, ...]:
-        """Columns that take the input delays of the model: the inputs, then observables."""
-        return self.measured + tuple(label for b in self.bound if b.delayed for label in b.labels)
-
-    @property
-    def direct(self) -> tuple[ChannelLabel, ...]:
-        """Columns without delays."""
-        return tuple(label for b in self.bound if not b.delayed for label in b.labels)
+    kind: ClassVar[str] = "lead"
+    samples: int
 
     @property
     def lead_samples(self) -> int:
-        """Samples beyond instant j that row j reads."""
-        return max([self.lead] + [b.ahead + (self.lead if b.delayed else 0) for b in self.bound])
-
-    def history(self, input_delays: int) -> int:
-        """Samples before instant j that a model with these delays reads at instant j."""
-        before = max([0, *(b.before for b in self.bound if b.delayed)])
-        direct = max([0, *(b.before for b in self.bound if not b.delayed)])
-        return max(input_delays + before, direct)
+        """The look-ahead."""
+        return self.samples
 
     @property
-    def follows_prediction(self) -> bool:
-        """Whether the elevation is carried to the surge that the model predicts."""
-        return self.alignment is not None and self.alignment.settings.surge == "predicted"
+    def extra_history(self) -> int:
+        """None."""
+        return 0
 
-    def arrays(self, values: FloatArray) -> Rows:
-        """Rows of inputs that are aligned already.
+    @property
+    def reads_states(self) -> str:
+        """No states are read."""
+        return "no"
 
-        Parameters
-        ----------
-        values : ndarray, shape (time, Q)
-            Inputs.
+    def fit(
+        self,
+        runs: dict[str, xr.Dataset],
+        states: Sequence[str],
+        inputs: Sequence[str],
+        window: int | None,
+    ) -> Self:
+        """Nothing is fitted."""
+        return self
 
-        Returns
-        -------
-        Rows
-            As long as `values`; NaN where a row needs samples that are not there.
-        """
-        parts = [(b.delayed, b.columns(values)) for b in self.bound]
-        delayed = np.concatenate([values, *(part for yes, part in parts if yes)], axis=1)
-        if self.lead:
-            shifted = np.full_like(delayed, np.nan)
-            shifted[: max(len(values) - self.lead, 0)] = delayed[self.lead :]
-            delayed = shifted
-        none = np.empty((len(values), 0))
-        return Rows(delayed, np.concatenate([none, *(p for yes, p in parts if not yes)], axis=1))
+    def regressors(
+        self, inputs: tuple[ChannelLabel, ...]
+    ) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
+        """Return the inputs themselves, delayed."""
+        return inputs, ()
 
-    def open(self, run: xr.Dataset, name: str, needed: Sequence[slice]) -> Drive:
-        """Apply the map to a run.
+    def reads(self, span: Span) -> Span:
+        """Samples of input, up to the look-ahead later."""
+        return Span(span.first, span.known, span.stop + self.samples)
 
-        Parameters
-        ----------
-        run : Dataset
-            The run.
-        name : str
-            What messages call it.
-        needed : sequence of slice
-            Instants whose rows will be asked for, as samples of the run. Nothing is read beyond
-            ``lead_samples`` after the last of them.
+    def wrap(self, drive: Drive, run: xr.Dataset | None, spans: Sequence[Span]) -> Drive:
+        """Drive that reads ahead."""
+        return _Ahead(drive, self.samples)
 
-        Returns
-        -------
-        Drive
+    def look_ahead(self, run: xr.Dataset | None, dt: float) -> float:
+        """The look-ahead in seconds."""
+        return self.samples * dt
 
-        Raises
-        ------
-        RequestError, DataError
-            If the run lacks an input or what the alignment needs, or has gaps where it is needed.
-        """
-        last = max(samples.stop for samples in needed) + self.lead_samples
-        values = labelled.channel_matrix(run, self.names, name)[:last]
-        drive = Drive(self, run, name, values)
-        alignment = self.alignment
-        if alignment is not None and alignment.settings.surge == "measured":
-            surges = [drive.surge(drive.reach(samples)) for samples in needed]
-            low, high = drive.surge_range
-            drive.surge_range = (
-                min(low, *(float(surge.min()) for surge in surges)),
-                max(high, *(float(surge.max()) for surge in surges)),
-            )
-        return drive
+    def notes(self, run: xr.Dataset) -> dict[str, str | float]:
+        """Nothing beside the look-ahead, which every forecast reports."""
+        return {}
 
-    def to_json(self) -> dict[str, Any]:
-        """The map as JSON values, less the labels of the measured inputs."""
-        return {
-            "alignment": None if self.alignment is None else asdict(self.alignment),
-            "lead": self.lead,
-            "observables": [observables.to_json(each) for each in self.observables],
-            "period": self.period,
-        }
+    def describe(self, dt: float) -> list[str]:
+        """One line."""
+        return [
+            f"  lead          {self.samples} samples ({self.samples * dt:g} s): a step is driven "
+            "by waves up to that much later"
+        ]
+
+    def to_json(self) -> Json:
+        """Return the number of samples."""
+        return {"samples": self.samples}
 
     @classmethod
-    def from_json(
-        cls, table: Mapping[str, Any], measured: Sequence[ChannelLabel], dt: float
-    ) -> Self:
-        """Rebuild a map from :meth:`to_json`."""
-        alignment = table["alignment"]
-        return cls(
-            measured=tuple(measured),
-            dt=dt,
-            alignment=None if alignment is None else FittedAlignment.from_dict(alignment),
-            lead=int(table["lead"]),
-            observables=tuple(observables.from_json(each) for each in table["observables"]),
-            period=table["period"],
-        )
+    def from_json(cls, content: Json) -> Self:
+        """Rebuild from :meth:`to_json`."""
+        return cls(int(content["samples"]))
 
 
-class Drive:
-    """The inputs of a run, ready to drive a model; made by :meth:`FittedInputs.open`.
+@dataclass(frozen=True, eq=False)
+class _Ahead:
+    inner: Drive
+    samples: int
 
-    Parameters
-    ----------
-    inputs : FittedInputs
-        The map.
-    run : Dataset
-        The run.
-    name : str
-        What messages call it.
-    values : ndarray, shape (time, Q)
-        Its measured inputs, up to the last sample that may be read.
-    """
+    def rows(self, first: int, stop: int, known: int | None = None) -> Regressors:
+        found = self.inner.rows(first + self.samples, stop + self.samples, known)
+        if not found.direct.shape[1]:
+            return found
+        return Regressors(found.delayed, self.inner.rows(first, stop, known).direct)
 
-    def __init__(
-        self, inputs: FittedInputs, run: xr.Dataset, name: str, values: FloatArray
-    ) -> None:
-        self.inputs = inputs
-        self.run = run
-        self.name = name
-        self.values = values
-        self.time = np.asarray(run["time"].values, dtype=float)
-        alignment = inputs.alignment
-        self.surge_range = (0.0, 0.0) if alignment is None else alignment.surge_range
-        self._gaps = np.flatnonzero(~np.all(np.isfinite(values), axis=1))
-        self._carried: dict[tuple[int, int], list[CarriedElevation | None]] = {}
-
-    def rows(self, samples: slice, surge: FloatArray | None = None) -> Rows:
-        """Columns that drive the model at some instants.
-
-        Parameters
-        ----------
-        samples : slice
-            Instants, as samples of the run.
-        surge : ndarray, optional
-            Surge over :meth:`reach` of the samples, m; by default the measured one (below
-            ``SURGE_CUTOFF`` where the model follows its prediction).
-
-        Returns
-        -------
-        Rows
-            NaN where a row needs inputs that the run does not hold.
-
-        Raises
-        ------
-        DataError
-            If an input, or a surge that is needed, has gaps at these instants.
-        """
-        whole = self.reach(samples)
-        ready = self.inputs.arrays(self._aligned(whole, surge))
-        first, count = samples.start - whole.start, min(samples.stop, whole.stop) - samples.start
-        out = []
-        for part in ready:
-            padded = np.full((samples.stop - samples.start, part.shape[1]), np.nan)
-            padded[:count] = part[first : first + count]
-            out.append(padded)
-        return Rows(*out)
-
-    def reach(self, samples: slice) -> slice:
-        """Samples of the run that the rows of `samples` read, as far as there is no gap."""
-        stretch = self._stretch(samples)
-        return slice(
-            max(samples.start - self.inputs.history(0), stretch.start),
-            min(samples.stop + self.inputs.lead_samples, stretch.stop),
-        )
-
-    def path(self, at: int, samples: slice, predicted: FloatArray | None = None) -> FloatArray:
-        """Surge that a forecast follows: measured up to its start, then held or predicted.
-
-        Parameters
-        ----------
-        at : int
-            Sample of the start; no surge after it is read.
-        samples : slice
-            Instants of the rows.
-        predicted : ndarray, shape (steps,), optional
-            Surge after the start as the pass before predicted it, m; by default it is held at its
-            mean over the last encounter period.
-
-        Returns
-        -------
-        ndarray
-            Over :meth:`reach` of the samples, m.
-        """
-        whole, period = self.reach(samples), self.inputs.period
-        assert period is not None
-        known = self.surge(slice(whole.start, at + 1))
-        if predicted is None:
-            future = np.full(whole.stop - at - 1, known[-max(round(period), 1) :].mean())
-        else:
-            future = np.clip(np.nan_to_num(predicted, nan=known[-1]), *self.surge_range)
-            future = np.pad(future, (0, max(whole.stop - at - 1 - len(future), 0)), mode="edge")
-        return _slow(np.concatenate([known, future[: whole.stop - at - 1]]), period)
-
-    def surge(self, samples: slice) -> FloatArray:
-        """Measured surge, m; zeros where the alignment does not use it."""
-        alignment = self.inputs.alignment
-        if alignment is None or alignment.settings.surge == "none":
-            return np.zeros(samples.stop - samples.start)
-        channel = alignment.settings.surge_channel
-        values = labelled.channel_matrix(self.run, [channel], self.name, samples)
-        labelled.check_finite(values, [channel], self.name, samples.start, self.time)
-        return values[:, 0]
-
-    def _aligned(self, samples: slice, surge: FloatArray | None) -> FloatArray:
-        values = self.values[samples]
-        labelled.check_finite(values, self.inputs.names, self.name, samples.start, self.time)
-        alignment = self.inputs.alignment
-        if alignment is None:
-            return values
-        if surge is None:
-            surge = self.surge(samples)
-            if self.inputs.follows_prediction:
-                assert self.inputs.period is not None
-                surge = _slow(surge, self.inputs.period)
-        stretch = self._stretch(samples)
-        inside = slice(samples.start - stretch.start, samples.stop - stretch.start)
-        out = values.copy()
-        offsets = alignment.offsets(self.run, self.inputs.names)
-        for column, carrier in enumerate(self._carriers(stretch)):
-            if carrier is not None:
-                out[:, column] = carrier.at(surge + offsets[column], inside)[:, 0]
-        return out
-
-    def _stretch(self, samples: slice) -> slice:
-        """Longest stretch of the record without gaps around samples that have none."""
-        gaps = self._gaps
-        before, after = gaps[gaps < samples.start], gaps[gaps >= samples.stop]
-        return slice(
-            int(before[-1]) + 1 if before.size else 0,
-            int(after[0]) if after.size else len(self.values),
-        )
-
-    def _carriers(self, stretch: slice) -> list[CarriedElevation | None]:
-        """Elevations ready to be read anywhere: made once per stretch of the record."""
-        key = (stretch.start, stretch.stop)
-        if key not in self._carried:
-            alignment = self.inputs.alignment
-            assert alignment is not None
-            values = self.values[stretch]
-            self._carried[key] = alignment.carry(
-                self.run, self.inputs.names, self.name, values, self.surge_range
-            )
-        return self._carried[key]
+    def at(self, samples: IntArray, states: FloatArray) -> Regressors:
+        found = self.inner.at(samples + self.samples, states)
+        if not found.direct.shape[2]:
+            return found
+        return Regressors(found.delayed, self.inner.at(samples, states).direct)
 
 
-def _slow(surge: FloatArray, period: float) -> FloatArray:
-    """Surge below ``SURGE_CUTOFF``, without delay; `period` in samples."""
-    sections = signal.butter(4, 2 * SURGE_CUTOFF / period, output="sos")
-    padding = min(len(surge) - 1, round(5 * period))
-    result: FloatArray = signal.sosfiltfilt(sections, surge, padlen=padding)
-    return result
-
-
-def fit_inputs(
-    runs: Mapping[str, xr.Dataset],
-    states: Sequence[str],
-    inputs: Sequence[str],
-    window: int | None,
-    *,
-    alignment: ProbeAlignment | None,
-    lead: int,
-    chosen: Sequence[Observable],
-) -> FittedInputs:
-    """Complete an input map from training runs.
+@dataclass(frozen=True)
+class ProbeAlignment:
+    r"""How the wave input is aligned to the vessel.
 
     Parameters
     ----------
-    runs : mapping of str to Dataset
-        Training runs, cut at the end of their training windows.
-    states, inputs : sequence of str
-        Channels of the model.
-    window : int or None
-        Samples of the training windows; None for all of the runs.
-    alignment : ProbeAlignment or None
-        How the elevation is carried to the vessel.
-    lead : int
-        Samples by which the delayed columns look ahead.
-    chosen : sequence of Observable
-        Functions of the inputs.
-
-    Returns
-    -------
-    FittedInputs
+    mode : {"effective", "dispersion"}, optional
+        One celerity for all waves, :math:`\eta(t) = \eta_{kn}(t - (x(t) - x_0)/c)` as in the
+        paper, or linear dispersion, frequency by frequency.
+    surge : {"measured", "predicted", "none"}, optional
+        Position that the elevation is carried to: the measured surge (an output read during the
+        forecast, which is then conditional on it), the surge that the model itself predicts, or
+        none, the place at rest.
+    celerity : float, optional
+        c of mode "effective", m/s; by default estimated at fit from the two probes among the
+        inputs that stand farthest apart.
+    offset : float, optional
+        Constant distance, m, by which the elevation is carried in all runs, positive downstream;
+        the paper's :math:`-x_0` where surge does not count from the place at rest.
+    surge_channel : str, optional
+        Name of the surge channel, m, positive downstream.
+    channels : sequence of str, optional
+        Inputs that are elevations; by default those with an ``attrs["x_position"]``, else those
+        whose name starts with "eta".
+    highest_frequency : float, optional
+        Highest frequency of the waves in mode "dispersion", Hz; by default the one below which
+        99.9 % of the variance of the training input lies.
 
     Raises
     ------
     RequestError
-        If an observable or the alignment does not go with the inputs.
-    DataError
-        As :func:`seakeep.models.alignment.fit_alignment`.
+        If a setting is out of range or does not go with the mode.
     """
-    name, first = next(iter(runs.items()))
-    measured = labelled.channel_labels(first, inputs) if inputs else ()
-    fitted = None
-    if alignment is not None:
-        fitted = fit_alignment(alignment, runs, states, inputs, window)
-    follows = alignment is not None and alignment.surge == "predicted"
-    period = _period(runs, inputs) if follows or chosen else None
-    dt = labelled.run_step(first, name)
-    made = FittedInputs(measured, dt, fitted, lead, tuple(chosen), period)
-    names = [label.name for label in (*made.delayed, *made.direct)]
-    for name in names:
-        if names.count(name) > 1:
+
+    mode: Mode = "effective"
+    surge: Surge = "measured"
+    celerity: float | None = None
+    offset: float = 0.0
+    surge_channel: str = "surge"
+    channels: tuple[str, ...] | None = None
+    highest_frequency: float | None = None
+
+    def __post_init__(self) -> None:
+        check_choice("alignment: mode", self.mode, ("effective", "dispersion"))
+        check_choice("alignment: surge", self.surge, ("measured", "predicted", "none"))
+        _check_number("celerity", self.celerity, "m/s", "a positive number or None")
+        _check_number(
+            "highest_frequency", self.highest_frequency, "Hz", "a positive number or None"
+        )
+        if not _is_number(self.offset):
             raise RequestError(
-                f"two inputs or observables make a column '{name}'. Give an expression another "
-                "name, or leave one of the observables out."
+                f"alignment: offset must be a number (m, positive downstream); received "
+                f"{self.offset!r}."
             )
-    return made
+        for key, mode in (("celerity", "effective"), ("highest_frequency", "dispersion")):
+            if getattr(self, key) is not None and self.mode != mode:
+                raise RequestError(
+                    f"alignment: {key} = {getattr(self, key)!r} belongs to mode = '{mode}'; "
+                    f"received mode = '{self.mode}'. Leave it out, or change the mode."
+                )
+        if isinstance(self.channels, str):
+            raise RequestError(
+                f"alignment: channels must be a list of names; received the string "
+                f"'{self.channels}'. Write channels=['{self.channels}']."
+            )
+        if self.channels is not None:
+            object.__setattr__(self, "channels", tuple(self.channels))
+
+    @classmethod
+    def of(cls, value: object) -> Self | None:
+        """Return settings as they are, or made of a table of their keys; None stays None.
+
+        Parameters
+        ----------
+        value : ProbeAlignment, mapping or None
+            What was given as ``alignment``.
+
+        Returns
+        -------
+        ProbeAlignment or None
+
+        Raises
+        ------
+        RequestError
+            If it is something else, or a key is not known.
+        """
+        if value is None or isinstance(value, cls):
+            return value
+        if not isinstance(value, Mapping):
+            raise RequestError(
+                f"alignment must be a seakeep.ProbeAlignment or None; received {value!r}. Write "
+                "alignment=seakeep.ProbeAlignment(mode='effective', surge='measured')."
+            )
+        known = list(cls.__dataclass_fields__)
+        for key in value:
+            if key not in known:
+                raise RequestError(
+                    f"alignment: unknown key '{key}'.{did_you_mean(str(key), known)} Keys: "
+                    f"{', '.join(known)}."
+                )
+        return cls(**value)
+
+    def fit(
+        self,
+        runs: Mapping[str, xr.Dataset],
+        states: Sequence[str],
+        inputs: Sequence[str],
+        window: int | None,
+    ) -> FittedAlignment:
+        """Complete the settings from training runs that end where training ends.
+
+        Parameters
+        ----------
+        runs : mapping of str to Dataset
+            Training runs, cut at the end of their training windows.
+        states, inputs : sequence of str
+            Channels of the model.
+        window : int or None
+            Samples of the training windows; None for all of the runs.
+
+        Returns
+        -------
+        FittedAlignment
+            With celerity, depth, band and positions.
+
+        Raises
+        ------
+        RequestError
+            If the runs do not carry what the settings need.
+        DataError
+            If a record has gaps in the window, is constant, or the probes' records do not
+            correlate.
+        """
+        first_name, first = next(iter(runs.items()))
+        labelled.channel_matrix(first, inputs, first_name, slice(0, 0))  # refuses unknown names
+        carried = _elevations(self, first, inputs)
+        if self.surge == "predicted" and self.surge_channel not in states:
+            raise RequestError(
+                f"alignment: surge = 'predicted' needs '{self.surge_channel}' among the states; "
+                f"received {', '.join(states)}. Add it, or choose surge = 'measured' or 'none'."
+            )
+        last = slice(None if window is None else -window, None)
+        windows = {name: run.isel(time=last) for name, run in runs.items()}
+        depth = _common_depth(runs)
+        celerity, spread, limit = self.celerity, None, self.highest_frequency
+        elevations = [channel for channel, yes in zip(inputs, carried, strict=True) if yes]
+        if self.mode == "dispersion":
+            depth = _depth(first, first_name, depth)
+            if limit is None:
+                limit = float(
+                    np.median([_band(run, name, elevations) for name, run in windows.items()])
+                )
+        elif celerity is None:
+            celerity, spread = _celerity(windows, elevations, depth)
+        return FittedAlignment(
+            settings=self,
+            inputs=tuple(inputs),
+            states=tuple(states),
+            carried=carried,
+            positions=tuple(_position(first, channel) for channel in inputs),
+            celerity=celerity,
+            celerity_spread=spread,
+            water_depth=depth,
+            highest_frequency=limit,
+            surge_range=(0.0, 0.0)
+            if self.surge == "none"
+            else _surge_range(windows, self.surge_channel),
+        )
+
+    def to_json(self) -> Json:
+        """Settings as JSON values."""
+        made: Json = plain({each.name: getattr(self, each.name) for each in fields(self)})
+        return made
 
 
-def _period(runs: Mapping[str, xr.Dataset], inputs: Sequence[str]) -> float:
-    """Mean encounter period of the training runs, samples: stated by them, or counted."""
-    found = []
-    for name, run in runs.items():
+@dataclass(frozen=True)
+class FittedAlignment:
+    """What a model keeps of its alignment.
+
+    Parameters
+    ----------
+    settings : ProbeAlignment
+        As it was asked for.
+    inputs, states : tuple of str
+        Channels of the model.
+    carried : tuple of bool
+        Which inputs are elevations.
+    positions : tuple of float or None
+        Position of each input's probe in training, m; None where the run did not state it.
+    celerity : float or None
+        The one given, or the one estimated from the training windows, m/s (mode "effective").
+    celerity_spread : float or None
+        Standard deviation of its estimates over the training runs, m/s.
+    water_depth : float or None
+        m, of the training runs.
+    highest_frequency : float or None
+        Hz (mode "dispersion").
+    surge_range : (float, float)
+        Range within which a predicted surge is followed, m.
+    """
+
+    kind: ClassVar[str] = "probe_alignment"
+    lead_samples: ClassVar[int] = 0
+    extra_history: ClassVar[int] = 0
+    settings: ProbeAlignment
+    inputs: tuple[str, ...]
+    states: tuple[str, ...]
+    carried: tuple[bool, ...]
+    positions: tuple[float | None, ...]
+    celerity: float | None = None
+    celerity_spread: float | None = None
+    water_depth: float | None = None
+    highest_frequency: float | None = None
+    surge_range: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def reads_states(self) -> str:
+        """Whether surge is read after the start, measured or predicted."""
+        return "no" if self.settings.surge == "none" else self.settings.surge
+
+    def fit(
+        self,
+        runs: dict[str, xr.Dataset],
+        states: Sequence[str],
+        inputs: Sequence[str],
+        window: int | None,
+    ) -> FittedAlignment:
+        """Fit the settings anew."""
+        return self.settings.fit(runs, states, inputs, window)
+
+    def regressors(
+        self, inputs: tuple[ChannelLabel, ...]
+    ) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
+        """Return the inputs, carried to the vessel."""
+        return inputs, ()
+
+    def reads(self, span: Span) -> Span:
+        """Return the same samples: what surrounds them is read where there is some."""
+        return span
+
+    def wrap(self, drive: Drive, run: xr.Dataset | None, spans: Sequence[Span]) -> Drive:
+        """Carry the elevations of a run, each probe once; plain arrays are aligned already."""
+        if run is None:
+            return drive
+        return _Carried.of(self, run, spans)
+
+    def look_ahead(self, run: xr.Dataset | None, dt: float) -> float:
+        """Time that the slowest waves take over the distance by which they are carried upstream."""
+        if run is None:
+            return 0.0
+        low, high = self.surge_range
+        if self.settings.surge == "measured":  # the trained range is half of the one followed
+            low += 0.25 * (high - low)
+        farthest = min(
+            (d for d, yes in zip(self.offsets(run), self.carried, strict=True) if yes), default=0.0
+        )
+        return max(0.0, -(farthest + low)) / self._speed(run)
+
+    def _speed(self, run: xr.Dataset) -> float:
+        if self.celerity is not None:
+            return self.celerity
+        assert self.highest_frequency is not None
+        depth = _depth(run, "the run", self.water_depth)
+        return float(group_speed(2 * np.pi * self.highest_frequency, depth))
+
+    def notes(self, run: xr.Dataset) -> dict[str, str | float]:
+        """Mode, surge, the run's probe offset, and with measured surge ``conditional_on``."""
+        settings = self.settings
+        out: dict[str, str | float] = {
+            "alignment_mode": settings.mode,
+            "alignment_surge": settings.surge,
+        }
+        if settings.surge == "measured":
+            out["conditional_on"] = settings.surge_channel
+        for key in ("probe_offset", "probe_offset_spread"):
+            if key in run.attrs:
+                out[key] = float(run.attrs[key])
+        return out
+
+    def describe(self, dt: float) -> list[str]:
+        """One line, and one more where the waves are read upstream."""
+        speed = "" if self.celerity is None else f", celerity {self.celerity:.4g} m/s"
+        settings = self.settings
+        lines = [f"  alignment     mode {settings.mode}{speed}; surge {settings.surge}"]
+        if settings.offset < 0:
+            lines.append(
+                f"    offset {settings.offset:g} m carries the waves upstream: a forecast reads "
+                "them before they reach the probe"
+            )
+        return lines
+
+    def to_json(self) -> Json:
+        """Settings and what was fitted."""
+        content = {each.name: getattr(self, each.name) for each in fields(self)}
+        made: Json = plain(content | {"settings": self.settings.to_json()})
+        return made
+
+    @classmethod
+    def from_json(cls, content: Json) -> Self:
+        """Rebuild from :meth:`to_json`."""
+        known: dict[str, Any] = {
+            key: tuple(value) if isinstance(value, list) else value
+            for key, value in content.items()
+        }
+        settings = ProbeAlignment.of(content["settings"])
+        assert settings is not None
+        return cls(**known | {"settings": settings})
+
+    def offsets(self, run: xr.Dataset) -> FloatArray:
+        """Constant distance by which each input of a run is carried, m."""
+        own = float(run.attrs.get("probe_offset", 0.0))
+        out = np.full(len(self.inputs), self.settings.offset + own)
+        for column, channel in enumerate(self.inputs):
+            here, reference = run[channel].attrs.get("x_position"), self.positions[column]
+            if here is not None and reference is not None:
+                out[column] += reference - float(here)
+        return out
+
+    def carry(
+        self, run: xr.Dataset, name: str, samples: slice, surges: tuple[float, float]
+    ) -> tuple[CarriedElevation | None, ...]:
+        """Prepare the elevations of a stretch to be read at surge + offset; None for others."""
+        values = labelled.channel_matrix(run, self.inputs, name, samples)
         dt = labelled.run_step(run, name)
-        stated = run.attrs.get("encounter_period")
-        if stated is not None:
-            found.append(float(stated) / dt)
-            continue
-        wave = labelled.channel_matrix(run, inputs[:1], name)[:, 0]
-        wave = wave[np.isfinite(wave)]
+        out: list[CarriedElevation | None] = []
+        for column, offset in enumerate(self.offsets(run)):
+            reach = (surges[0] + offset, surges[1] + offset)
+            if not self.carried[column]:
+                out.append(None)
+            elif self.settings.mode == "effective":
+                assert self.celerity is not None
+                out.append(carry_by_celerity(values[:, column], dt, reach, self.celerity))
+            else:
+                depth = _depth(run, name, self.water_depth)
+                limit = self.highest_frequency
+                out.append(carry_by_dispersion(values[:, column], dt, reach, depth, limit))
+        return tuple(out)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """Carried elevations of a stretch of a run without gaps, from sample `first` on."""
+
+    first: int
+    stop: int
+    carriers: tuple[CarriedElevation | None, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Carried:
+    """Inputs of a run carried to the vessel; elevations before and after what is wanted count."""
+
+    values: FloatArray
+    surge: FloatArray
+    offsets: FloatArray
+    stretches: tuple[_Stretch, ...]
+    column: int
+    followed: tuple[float, float]
+
+    @classmethod
+    def of(cls, map_: FittedAlignment, run: xr.Dataset, spans: Sequence[Span]) -> Self:
+        name = labelled.run_name(run, "the run")
+        settings = map_.settings
+        values = labelled.channel_matrix(run, map_.inputs, name)
+        size, is_predicted = len(values), settings.surge == "predicted"
+        surge = np.zeros(size)
+        reach = map_.surge_range if is_predicted else (np.inf, -np.inf)
+        if settings.surge != "none":
+            time = np.asarray(run["time"].values, dtype=float)
+            surge = labelled.channel_matrix(run, [settings.surge_channel], name)[:, 0]
+            for span in spans:  # read where it is allowed, and no further
+                stop = min(span.stop, span.known + 1 if is_predicted else span.stop)
+                read = slice(min(span.first, stop - 1), stop)
+                labelled.check_finite(
+                    surge[read][:, None], [settings.surge_channel], name, read.start, time
+                )
+                reach = (
+                    min(reach[0], float(surge[read].min())),
+                    max(reach[1], float(surge[read].max())),
+                )
+        else:
+            reach = (0.0, 0.0)
+        sound = np.all(np.isfinite(values), axis=1)
+        gaps = np.flatnonzero(~sound)
+        found: list[_Stretch] = []
+        for span in spans:
+            if any(each.first <= span.first and span.stop <= each.stop for each in found):
+                continue
+            before, after = gaps[gaps < span.first], gaps[gaps >= span.stop]
+            first = int(before[-1]) + 1 if before.size else 0
+            stop = int(after[0]) if after.size else size
+            carriers = map_.carry(run, name, slice(first, stop), reach)
+            found.append(_Stretch(first, stop, carriers))
+        column = map_.states.index(settings.surge_channel) if is_predicted else 0
+        return cls(values, surge, map_.offsets(run), tuple(found), column, map_.surge_range)
+
+    def rows(self, first: int, stop: int, known: int | None = None) -> Regressors:
+        last = stop - 1 if known is None else known
+        surge = self.surge[np.minimum(np.arange(first, stop), last)]
+        stretch = self._stretch(first)
+        out = self.values[first:stop].copy()
+        inside = slice(first - stretch.first, stop - stretch.first)
+        for column, carrier in enumerate(stretch.carriers):
+            if carrier is not None:
+                out[:, column] = carrier.at(surge + self.offsets[column], inside)[:, 0]
+        return Regressors(out, np.empty((stop - first, 0)))
+
+    def at(self, samples: IntArray, states: FloatArray) -> Regressors:
+        surge = np.clip(states[..., self.column], *self.followed)
+        out = np.repeat(self.values[samples][:, None], states.shape[1], axis=1)
+        for stretch in {id(each): each for each in map(self._stretch, samples)}.values():
+            mine = (stretch.first <= samples) & (samples < stretch.stop)
+            for column, carrier in enumerate(stretch.carriers):
+                if carrier is not None:
+                    places = surge[mine] + self.offsets[column]
+                    out[mine, :, column] = _carried_to(
+                        carrier, samples[mine] - stretch.first, places
+                    )
+        return Regressors(out, np.empty((*states.shape[:2], 0)))
+
+    def _stretch(self, sample: int) -> _Stretch:
+        return next(each for each in self.stretches if each.first <= sample < each.stop)
+
+
+def _carried_to(carrier: CarriedElevation, samples: IntArray, places: FloatArray) -> FloatArray:
+    """Elevation of one sample of each window at places (window, member), shape of `places`."""
+    half = 0.5 * (carrier.highest - carrier.lowest)
+    terms = carrier.terms[:, samples, 0][:, :, None]
+    if half == 0:
+        return np.broadcast_to(terms[0], places.shape)
+    scaled = np.clip((places - 0.5 * (carrier.highest + carrier.lowest)) / half, -1.0, 1.0)
+    orders = np.arange(len(terms))[:, None, None]
+    total: FloatArray = (terms * np.cos(orders * np.arccos(scaled))).sum(axis=0)
+    return total
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Input maps one after the other, the first one nearest to the measurement.
+
+    Parameters
+    ----------
+    maps : tuple of InputMap
+        Any number; none leaves the inputs as they are.
+    """
+
+    kind: ClassVar[str] = "chain"
+    maps: tuple[InputMap, ...] = ()
+
+    @property
+    def lead_samples(self) -> int:
+        """Sum of those of the maps."""
+        return sum(each.lead_samples for each in self.maps)
+
+    @property
+    def extra_history(self) -> int:
+        """Sum of those of the maps."""
+        return sum(each.extra_history for each in self.maps)
+
+    @property
+    def reads_states(self) -> str:
+        """That of the map which reads most."""
+        found = {each.reads_states for each in self.maps}
+        return next((word for word in ("predicted", "measured") if word in found), "no")
+
+    @property
+    def alignment(self) -> FittedAlignment | None:
+        """The alignment among the maps."""
+        return next((each for each in self.maps if isinstance(each, FittedAlignment)), None)
+
+    def fit(
+        self,
+        runs: dict[str, xr.Dataset],
+        states: Sequence[str],
+        inputs: Sequence[str],
+        window: int | None,
+    ) -> Chain:
+        """Fit each map."""
+        return Chain(tuple(each.fit(runs, states, inputs, window) for each in self.maps))
+
+    def regressors(
+        self, inputs: tuple[ChannelLabel, ...]
+    ) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
+        """Labels after the last map."""
+        direct: tuple[ChannelLabel, ...] = ()
+        for each in self.maps:
+            inputs, more = each.regressors(inputs)
+            direct += more
+        return inputs, direct
+
+    def reads(self, span: Span) -> Span:
+        """Samples of the measured inputs that are read."""
+        for each in reversed(self.maps):
+            span = each.reads(span)
+        return span
+
+    def wrap(self, drive: Drive, run: xr.Dataset | None, spans: Sequence[Span]) -> Drive:
+        """Drive of the last map, opened on those before it."""
+        for number, each in enumerate(self.maps):
+            after = Chain(self.maps[number + 1 :])
+            drive = each.wrap(drive, run, [after.reads(span) for span in spans])
+        return drive
+
+    def look_ahead(self, run: xr.Dataset | None, dt: float) -> float:
+        """Sum of those of the maps, s."""
+        return sum(each.look_ahead(run, dt) for each in self.maps)
+
+    def notes(self, run: xr.Dataset) -> dict[str, str | float]:
+        """Those of all maps."""
+        return {key: value for each in self.maps for key, value in each.notes(run).items()}
+
+    def describe(self, dt: float) -> list[str]:
+        """Lines of all maps."""
+        return [line for each in self.maps for line in each.describe(dt)]
+
+    def to_json(self) -> Json:
+        """Maps with their kinds."""
+        return {"maps": [{"kind": each.kind, **each.to_json()} for each in self.maps]}
+
+    @classmethod
+    def from_json(cls, content: Json) -> Self:
+        """Rebuild from :meth:`to_json`; an unknown kind raises a DataError."""
+        maps = []
+        for each in content["maps"]:
+            rest = {key: value for key, value in each.items() if key != "kind"}
+            if each["kind"] not in MAPS:
+                raise DataError(
+                    f"the input map '{each['kind']}' is not known here. Update seakeep, or import "
+                    "the module that adds it to seakeep.models.inputs.MAPS."
+                )
+            maps.append(MAPS[each["kind"]].from_json(rest))
+        return cls(tuple(maps))
+
+
+MAPS: dict[str, type[InputMap]] = {Lead.kind: Lead, FittedAlignment.kind: FittedAlignment}
+"""Input maps by their kind, as files name them."""
+
+
+def _is_number(value: object) -> bool:
+    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    return real and math.isfinite(value)  # type: ignore[arg-type]
+
+
+def _check_number(name: str, value: object, unit: str, meant: str) -> None:
+    if value is not None and not (_is_number(value) and value > 0):  # type: ignore[operator]
+        raise RequestError(f"alignment: {name} must be {meant} ({unit}); received {value!r}.")
+
+
+def _elevations(
+    settings: ProbeAlignment, run: xr.Dataset, inputs: Sequence[str]
+) -> tuple[bool, ...]:
+    if settings.channels is not None:
+        strangers = [channel for channel in settings.channels if channel not in inputs]
+        if strangers:
+            raise RequestError(
+                f"alignment: channels names '{strangers[0]}', which is not among the inputs "
+                f"({', '.join(inputs) or 'none'}). Name inputs of the model."
+            )
+        chosen = tuple(channel in settings.channels for channel in inputs)
+    else:
+        chosen = tuple(_position(run, channel) is not None for channel in inputs)
+        if not any(chosen):
+            chosen = tuple(channel.startswith("eta") for channel in inputs)
+    if not any(chosen):
+        raise RequestError(
+            f"alignment: none of the inputs ({', '.join(inputs) or 'none'}) is known as a wave "
+            "elevation. Give the channels an attribute x_position ([rig.positions] of the "
+            "campaign), or name them: alignment channels = ['…']."
+        )
+    return chosen
+
+
+def _position(run: xr.Dataset, channel: str) -> float | None:
+    value = run[channel].attrs.get("x_position")
+    return None if value is None else float(value)
+
+
+def _depth(run: xr.Dataset, name: str, otherwise: float | None) -> float:
+    depth = run.attrs.get("water_depth", otherwise)
+    if depth is None:
+        raise RequestError(
+            f"alignment: mode = 'dispersion' needs the water depth and {name} has no attribute "
+            "'water_depth'. State water_depth (m, inf for deep water) in [rig], or set "
+            "run.attrs['water_depth']."
+        )
+    return float(depth)
+
+
+def _common_depth(runs: Mapping[str, xr.Dataset]) -> float | None:
+    stated = [run.attrs["water_depth"] for run in runs.values() if "water_depth" in run.attrs]
+    return float(stated[0]) if stated else None
+
+
+def _sound(run: xr.Dataset, name: str, channels: Sequence[str]) -> FloatArray:
+    values = labelled.channel_matrix(run, channels, name)
+    labelled.check_finite(values, channels, name, 0, np.asarray(run["time"].values, dtype=float))
+    return values
+
+
+def _band(run: xr.Dataset, name: str, elevations: Sequence[str]) -> float:
+    return band_limit(_sound(run, name, elevations), labelled.run_step(run, name))
+
+
+def _surge_range(windows: Mapping[str, xr.Dataset], channel: str) -> tuple[float, float]:
+    surges = np.concatenate([_sound(run, name, [channel])[:, 0] for name, run in windows.items()])
+    low, high = float(surges.min()), float(surges.max())
+    return low - BEYOND * (high - low), high + BEYOND * (high - low)
+
+
+def _celerity(
+    windows: Mapping[str, xr.Dataset], elevations: Sequence[str], depth: float | None
+) -> tuple[float, float | None]:
+    """Celerity from the mean lag over the runs, and its standard deviation over them."""
+    lags, apart = [], 0.0
+    for name, run in windows.items():
+        placed = {c: x for c in elevations if (x := _position(run, c)) is not None}
+        if len(set(placed.values())) < 2 or depth is None:
+            raise RequestError(
+                f"alignment: the celerity cannot be estimated from {name}: it takes the water "
+                f"depth ({'missing' if depth is None else f'{depth:g} m'}) and two probes at "
+                f"different positions among the inputs (positions stated: {len(placed)}). State "
+                "celerity (m/s), or water_depth and positions in [rig]."
+            )
+        first, last = min(placed, key=placed.__getitem__), max(placed, key=placed.__getitem__)
+        apart = placed[last] - placed[first]
+        values = _sound(run, name, [first, last])
         try:
-            found.append(encounter_period(wave, dt) / dt)
-        except (DataError, RequestError) as error:
-            raise DataError(
-                f"{name}: observables and a predicted surge need the encounter period, and it "
-                f"cannot be counted in '{inputs[0]}': {error} Set "
-                "run.attrs['encounter_period'] (s)."
-            ) from None
-    return float(np.mean(found))
+            found = effective_celerity(
+                values[:, 0], values[:, 1], labelled.run_step(run, name), apart, depth
+            )
+        except DataError as error:
+            raise DataError(f"{name}, '{first}' and '{last}': {error}") from None
+        lags.append(found.lag / apart)
+    speeds = 1.0 / np.array(lags)
+    spread = float(speeds.std(ddof=1)) if len(lags) > 1 else None
+    return float(1.0 / np.mean(lags)), spread

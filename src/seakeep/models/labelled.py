@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 from seakeep.signals import uniform_step
 from seakeep.signals.time_axis import instant_text, span_text
 
@@ -19,6 +20,8 @@ __all__ = ["ChannelLabel", "as_runs", "channel_labels", "channel_matrix", "neare
 
 FloatArray = npt.NDArray[np.float64]
 Runs = xr.Dataset | Sequence[xr.Dataset] | Mapping[str, xr.Dataset]
+Stop = float | Sequence[float] | Mapping[str, float] | Mapping[str, float | None] | None
+"""Last instant of the training window, s: one for all runs, or one per run."""
 
 
 @dataclass(frozen=True)
@@ -211,6 +214,58 @@ def channel_labels(run: xr.Dataset, names: Sequence[str]) -> tuple[ChannelLabel,
         )
         for channel, attrs in zip(names, attributes, strict=True)
     )
+
+
+def common_step(runs: Mapping[str, xr.Dataset]) -> float:
+    """Time step that all runs have, s."""
+    first_name, first_run = next(iter(runs.items()))
+    dt = run_step(first_run, first_name)
+    for name, run in runs.items():
+        if run is not first_run:
+            check_step(run, name, dt)
+    return dt
+
+
+def common_labels(runs: Mapping[str, xr.Dataset], names: Sequence[str]) -> tuple[ChannelLabel, ...]:
+    """Labels of channels, with the unit that all runs which state one agree on.
+
+    Warns
+    -----
+    SeakeepWarning
+        If some of the runs state the unit of a channel and others do not.
+    """
+    for name, run in runs.items():
+        channel_matrix(run, names, name, slice(0, 0))  # refuses unknown names
+    labels = channel_labels(next(iter(runs.values())), names)
+    for number, label in enumerate(labels):
+        stated = {
+            name: str(units)
+            for name, run in runs.items()
+            if (units := run.variables[label.name].attrs.get("units"))
+        }
+        if len(set(stated.values())) > 1:
+            (one, unit), *others = stated.items()
+            other = next(each for each in others if each[1] != unit)
+            raise DataError(
+                f"channel '{label.name}' is in '{unit}' in {one} and in '{other[1]}' in "
+                f"{other[0]}. Convert one of them, and its units attribute."
+            )
+        if stated and len(stated) < len(runs):
+            silent = next(name for name in runs if name not in stated)
+            warnings.warn(
+                f"channel '{label.name}' of {silent} states no unit; it is taken to be in "
+                f"'{next(iter(stated.values()))}', as in {next(iter(stated))}. Set its units "
+                "attribute.",
+                SeakeepWarning,
+                stacklevel=4,
+            )
+        if stated:
+            labels = (
+                *labels[:number],
+                replace(label, units=next(iter(stated.values()))),
+                *labels[number + 1 :],
+            )
+    return labels
 
 
 def check_units(run: xr.Dataset, labels: Sequence[ChannelLabel], name: str) -> None:

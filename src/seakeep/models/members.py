@@ -3,37 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from seakeep.arrays import FloatArray
 from seakeep.core.embedding import TrainingWindow, training_window
 from seakeep.core.solve import Solution, identify
-from seakeep.errors import RequestError
 from seakeep.models.draws import Draw
-from seakeep.models.identification import Scale, moments
-from seakeep.models.model import HankelDMDcModel
+from seakeep.models.engine import Dynamics
+from seakeep.models.interface import InputMap
 from seakeep.models.settings import HankelSettings
-from seakeep.models.training import Training
-from seakeep.models.windows import free_runs
+from seakeep.models.training import lengthened, moments
 
-if TYPE_CHECKING:
-    from seakeep.models.fitted_ensemble import HankelEnsemble
-
-__all__ = [
-    "Member",
-    "Task",
-    "TrainingArrays",
-    "forecast_member",
-    "identify_member",
-    "member_model",
-    "member_radius",
-    "window_ends",
-]
-
-FloatArray = npt.NDArray[np.float64]
+__all__ = ["Member", "TrainingArrays", "identify_member", "reach", "window_ends"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,23 +27,24 @@ class TrainingArrays:
     ----------
     names : tuple of str
         Runs.
-    states, inputs : tuple of ndarray, each (time, channel)
-        Samples from the earliest that a member reaches to the run's stop.
+    states, delayed, direct : tuple of ndarray, each (time, channel)
+        States and both kinds of regressors, from the earliest sample that a member reaches on.
+        Regressors end before the run's stop by what the model looks ahead.
     offsets : tuple of int
-        Sample of the run at which its arrays begin.
+        Sample of the run at which its arrays start.
     begins : tuple of float
         Instant of the first sample of the arrays, s.
-    state_names, input_names : tuple of str
-        Channels, for messages.
+    channels : tuple of tuple of str
+        Names of the states, the delayed and the direct regressors, for messages.
     """
 
     names: tuple[str, ...]
     states: tuple[FloatArray, ...]
-    inputs: tuple[FloatArray, ...]
+    delayed: tuple[FloatArray, ...]
+    direct: tuple[FloatArray, ...]
     offsets: tuple[int, ...]
     begins: tuple[float, ...]
-    state_names: tuple[str, ...]
-    input_names: tuple[str, ...]
+    channels: tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,133 +53,78 @@ class Member:
 
     Parameters
     ----------
-    draw : Draw
-        What is its own.
+    dynamics : Dynamics
+        What its free runs need.
     solution : Solution
         Coefficients and the form of the regression.
     runs : tuple of int
         Runs that trained it.
     windows : tuple of TrainingWindow
         Their windows, in samples of the training arrays.
-    state_scale, input_scale : Scale
-        Moments over these windows.
     """
 
-    draw: Draw
+    dynamics: Dynamics
     solution: Solution
     runs: tuple[int, ...]
     windows: tuple[TrainingWindow, ...]
-    state_scale: Scale
-    input_scale: Scale
-
-    @property
-    def coefficients(self) -> FloatArray:
-        """Regressed rows of [Â B̂]."""
-        return self.solution.coefficients
-
-    @property
-    def state_delays(self) -> int:
-        """Delayed copies of the states, s."""
-        return self.draw.state_delays
-
-    @property
-    def input_delays(self) -> int:
-        """Delayed copies of the inputs, z."""
-        return self.draw.input_delays
-
-
-@dataclass(frozen=True, eq=False)
-class Task:
-    """What a worker needs to forecast members: sent once, whatever their number.
-
-    Parameters
-    ----------
-    arrays : TrainingArrays
-        Training data.
-    settings : HankelSettings
-        What all members share; delays, window and λ are the draw's.
-    histories, inputs : ndarray, shapes (window, time, N) and (window, time + steps − 1, Q)
-        Measured samples up to each start, and the inputs from the same sample on.
-    steps : int
-        Instants forecast.
-    """
-
-    arrays: TrainingArrays
-    settings: HankelSettings
-    histories: FloatArray
-    inputs: FloatArray
-    steps: int
 
 
 def identify_member(
-    arrays: TrainingArrays,
-    settings: HankelSettings,
-    draw: Draw,
+    arrays: TrainingArrays, settings: HankelSettings, input_map: InputMap, draw: Draw
 ) -> Member:
     """Identify one member, as :meth:`HankelDMDc.fit` does with its settings.
 
-    Parameters
-    ----------
-    arrays : TrainingArrays
-        Training data.
-    settings : HankelSettings
-        What all members share.
-    draw : Draw
-        What is the member's own.
-
-    Returns
-    -------
-    Member
-        With means and standard deviations of its own windows (paper, section System
-        identification setup: the z-score is taken on the training signal).
+    Means and standard deviations are those of its own windows (paper, section System
+    identification setup: the z-score is taken on the training signal).
     """
     chosen = range(len(arrays.states)) if draw.run is None else (draw.run,)
-    windows, states, inputs = [], [], []
+    back = max(draw.state_delays, draw.input_delays + input_map.extra_history)
+    windows, parts = [], []
     for run in chosen:
         end = len(arrays.states[run]) - 1 if draw.last is None else draw.last - arrays.offsets[run]
-        place = training_window(
-            end, draw.window, draw.state_delays, draw.input_delays, settings.history
-        )
-        begin = min(place.first, place.first_column - max(draw.state_delays, draw.input_delays))
-        begin = max(begin, 0)
+        place = training_window(end, draw.window, draw.state_delays, back, settings.history)
+        begin = max(min(place.first, place.first_column - back), 0)
+        final = end - max(input_map.lead_samples - 1, 0)
         windows.append(
-            TrainingWindow(place.first - begin, place.last - begin, place.first_column - begin)
+            TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
         )
-        states.append(arrays.states[run][begin : end + 1])
-        inputs.append(arrays.inputs[run][begin : end + 1])
-    state_scale = moments(states, windows, arrays.state_names, settings.standardize)
-    input_scale = moments(inputs, windows, arrays.input_names, settings.standardize)
+        parts.append(
+            [
+                lengthened(series[run][begin : final + 1], final + 1 - begin)
+                for series in (arrays.states, arrays.delayed, arrays.direct)
+            ]
+        )
+    groups = list(zip(*parts, strict=True))
+    scales = [
+        moments(series, windows, names, settings.standardize)
+        for series, names in zip(groups, arrays.channels, strict=True)
+    ]
+    states, delayed, direct = (
+        [scale.deviations(values) for values in series]
+        for scale, series in zip(scales, groups, strict=True)
+    )
     solution = identify(
-        [state_scale.deviations(values) for values in states],
-        [input_scale.deviations(values) for values in inputs],
+        states,
+        delayed,
         windows,
         state_delays=draw.state_delays,
         input_delays=draw.input_delays,
+        direct=direct if direct[0].shape[1] else None,
         ridge=draw.ridge,
         per_snapshot=settings.ridge_scale == "per_snapshot",
         rank=settings.rank,
         all_rows=settings.delay_rows == "ridge",
     )
-    return Member(draw, solution, tuple(chosen), tuple(windows), state_scale, input_scale)
+    dynamics = Dynamics(solution.coefficients, draw.state_delays, draw.input_delays, *scales)
+    return Member(dynamics, solution, tuple(chosen), tuple(windows))
 
 
-def forecast_member(task: Task, draw: Draw) -> FloatArray:
-    """Identify one member and run it freely over all windows side by side.
-
-    Parameters
-    ----------
-    task : Task
-        Training data and what a forecast reads.
-    draw : Draw
-        The member.
-
-    Returns
-    -------
-    ndarray, shape (window, steps, N)
-        States in physical units; NaN from where a window diverges on.
-    """
-    member = identify_member(task.arrays, task.settings, draw)
-    return free_runs(member, task.histories, task.inputs, task.steps)
+def spectral_radius(dynamics: Dynamics) -> float:
+    """Largest modulus of an eigenvalue of Â."""
+    top, _ = dynamics.matrices
+    size, states = top.shape[1], len(dynamics.state_scale.mean)
+    square = top if len(top) == size else np.concatenate([top, np.eye(size - states, size)])
+    return float(np.abs(np.linalg.eigvals(square)).max())
 
 
 def window_ends(arrays: TrainingArrays, draw: Draw, run: int, dt: float) -> tuple[float, float]:
@@ -206,89 +135,15 @@ def window_ends(arrays: TrainingArrays, draw: Draw, run: int, dt: float) -> tupl
     return stop - (samples - 1) * dt, stop
 
 
-def member_model(ensemble: HankelEnsemble, number: int) -> HankelDMDcModel:
-    """One member as a model of its own; see :meth:`HankelEnsemble.member`."""
-    arrays = ensemble.arrays
-    if not 0 <= number < ensemble.n_members:
-        raise RequestError(
-            f"there is no member {number!r}: the ensemble has {ensemble.n_members}, counted from "
-            f"0 to {ensemble.n_members - 1}."
-        )
-    draw = ensemble.members[number]
-    found = identify_member(arrays, ensemble.settings, draw)
-    settings = replace(
-        ensemble.settings,
-        state_delays=draw.state_delays,
-        input_delays=draw.input_delays,
-        ridge=draw.ridge,
-        window=draw.window,
-    )
-    ends = [window_ends(arrays, draw, run, ensemble.dt) for run in found.runs]
-    return HankelDMDcModel(
-        settings=settings,
-        coefficients=found.solution.coefficients,
-        dt=ensemble.dt,
-        state_labels=ensemble.state_labels,
-        input_labels=ensemble.input_labels,
-        state_scale=found.state_scale,
-        input_scale=found.input_scale,
-        training=Training(
-            runs=tuple(arrays.names[run] for run in found.runs),
-            first=tuple(first for first, _ in ends),
-            stop=tuple(stop for _, stop in ends),
-            columns=tuple(window.columns for window in found.windows),
-            method=found.solution.method,
-            ridge=found.solution.ridge,
-            rank=found.solution.rank,
-        ),
-        alignment=ensemble.alignment,
-    )
-
-
-def member_radius(data: tuple[TrainingArrays, HankelSettings], draw: Draw) -> float:
-    """Identify one member and find the largest modulus of an eigenvalue of its Â.
-
-    Parameters
-    ----------
-    data : (TrainingArrays, HankelSettings)
-        Training data, and what all members share.
-    draw : Draw
-        The member.
-
-    Returns
-    -------
-    float
-        The spectral radius.
-    """
-    arrays, settings = data
-    N = len(arrays.state_names)
-    size = N * (draw.state_delays + 1)
-    top = identify_member(arrays, settings, draw).solution.coefficients[:, :size]
-    square = top if len(top) == size else np.concatenate([top, np.eye(size - N, size)])
-    return float(np.abs(np.linalg.eigvals(square)).max())
-
-
-def reach(draws: Sequence[Draw], samples: Sequence[int], inside: bool) -> list[int]:
-    """Earliest sample of each run that a member reads.
-
-    Parameters
-    ----------
-    draws : sequence of Draw
-        Members.
-    samples : sequence of int
-        Samples of each run up to its stop.
-    inside : bool
-        Whether the delay history lies inside the window.
-
-    Returns
-    -------
-    list of int
-        One a run; the run's end where no member reads it.
-    """
+def reach(
+    draws: Sequence[Draw], samples: Sequence[int], inside: bool, input_map: InputMap
+) -> list[int]:
+    """Earliest sample of each run that a member reads; the run's end where none reads it."""
     earliest = list(samples)
+    extra, lead = input_map.extra_history, input_map.lead_samples
     for draw in draws:
         for run in range(len(samples)) if draw.run is None else (draw.run,):
             last = samples[run] - 1 if draw.last is None else draw.last
-            first = 0 if draw.window is None else last + 1 - draw.needed(inside)
+            first = 0 if draw.window is None else last + 1 - draw.needed(inside, extra, lead)
             earliest[run] = min(earliest[run], first)
     return earliest

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -12,11 +11,9 @@ import xarray as xr
 
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled
+from seakeep.models.linear import HankelDMDcModel
 from seakeep.signals import encounter_period
 from seakeep.waves import phase_speed
-
-if TYPE_CHECKING:
-    from seakeep.models.model import HankelDMDcModel
 
 __all__ = ["ProbeOffset", "estimate_probe_offset"]
 

@@ -13,9 +13,9 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from seakeep.errors import RequestError
+from seakeep.errors import DataError, RequestError
 
-__all__ = ["Fixed", "LogUniform", "Prior", "Uniform", "check_prior", "describe"]
+__all__ = ["Fixed", "LogUniform", "Prior", "Uniform", "check_prior", "describe", "from_description"]
 
 
 @runtime_checkable
@@ -171,3 +171,21 @@ def describe(prior: Prior | None) -> dict[str, Any] | None:
     args = [float(value) for value in getattr(prior, "args", ())]
     kwds = {key: float(value) for key, value in getattr(prior, "kwds", {}).items()}
     return {"prior": f"scipy.stats.{distribution}", "args": args, "kwds": kwds}
+
+
+def from_description(content: dict[str, Any] | None) -> Prior | None:
+    """Rebuild a prior from :func:`describe`; what it does not know raises a DataError."""
+    if content is None:
+        return None
+    name = str(content["prior"])
+    own = {each.__name__: each for each in (Uniform, LogUniform, Fixed)}
+    if name in own:
+        made: Prior = own[name](**{key: value for key, value in content.items() if key != "prior"})
+        return made
+    from scipy import stats
+
+    distribution = getattr(stats, name.removeprefix("scipy.stats."), None)
+    if not isinstance(distribution, stats.rv_continuous | stats.rv_discrete):
+        raise DataError(f"the prior '{name}' is not known here. Update seakeep or SciPy.")
+    frozen: Prior = distribution(*content["args"], **content["kwds"])
+    return frozen

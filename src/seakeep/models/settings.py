@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 import numbers
 import warnings
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, fields
+from typing import Literal, Self
 
 import numpy as np
 
 from seakeep.core.embedding import History
-from seakeep.errors import RequestError, SeakeepWarning
-from seakeep.models.alignment import ProbeAlignment
+from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models.checks import check_choice
+from seakeep.models.inputs import Chain, Lead, ProbeAlignment
+from seakeep.models.interface import Fittable, InputMap, Json, plain
 
 __all__ = [
     "DelayRows",
@@ -104,6 +105,8 @@ class HankelSettings:
     rank: int | None = None
     standardize: bool = True
     alignment: ProbeAlignment | None = None
+    lead: int = 0
+    observables: tuple[InputMap, ...] = ()
 
     def __post_init__(self) -> None:
         check_integer("state_delays", self.state_delays, 0)
@@ -116,7 +119,9 @@ class HankelSettings:
         check_choice("ridge_scale", self.ridge_scale, ("absolute", "per_snapshot"))
         if not isinstance(self.standardize, bool | np.bool_):
             raise RequestError(f"standardize must be True or False; received {self.standardize!r}.")
+        check_integer("lead", self.lead, 0)
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
+        object.__setattr__(self, "observables", tuple(self.observables))
         if self.rank is not None and self.ridge > 0:
             warnings.warn(
                 f"rank = {self.rank} truncates singular values instead of regularising, so "
@@ -126,6 +131,42 @@ class HankelSettings:
             )
 
     @property
+    def maps(self) -> tuple[Fittable, ...]:
+        """Input maps, not fitted yet: the alignment, the observables of it, and the lead."""
+        alignment = () if self.alignment is None else (self.alignment,)
+        lead = (Lead(int(self.lead)),) if self.lead else ()
+        return (*alignment, *self.observables, *lead)
+
+    @property
+    def extra_history(self) -> int:
+        """Samples of input before the input delays that the observables need."""
+        return sum(each.extra_history for each in self.observables)
+
+    @property
     def history_samples(self) -> int:
         """Samples up to and including the start that a forecast needs: max(s, z) + 1."""
-        return max(self.state_delays, self.input_delays) + 1
+        return max(self.state_delays, self.input_delays + self.extra_history) + 1
+
+    def to_json(self) -> Json:
+        """Settings as JSON values."""
+        content = {each.name: getattr(self, each.name) for each in fields(HankelSettings)}
+        made: Json = plain(
+            content
+            | {
+                "alignment": None if self.alignment is None else self.alignment.to_json(),
+                "observables": Chain(self.observables).to_json()["maps"],
+            }
+        )
+        return made
+
+    @classmethod
+    def from_json(cls, content: Json) -> Self:
+        """Settings from JSON values; an unknown key or a value out of range raises an error."""
+        known = [each.name for each in fields(HankelSettings)]
+        for key in content:
+            if key not in known:
+                raise RequestError(f"unknown key '{key}'.{did_you_mean(key, known)}")
+        observables = Chain.from_json({"maps": content.get("observables", [])}).maps
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SeakeepWarning)  # given when the settings were made
+            return cls(**{**content, "observables": observables})

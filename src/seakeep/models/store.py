@@ -4,120 +4,130 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, is_dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError
 from seakeep.files import MARK, replacing, write_netcdf
-from seakeep.models.identification import Scale
+from seakeep.models.inputs import Chain
+from seakeep.models.interface import Json, Scale, Signature
 from seakeep.models.labelled import ChannelLabel
 
 __all__ = [
     "FORMAT_VERSION",
-    "HANKEL_DMDC",
     "as_json",
     "checksum",
-    "pack",
+    "content",
+    "labels",
+    "numbers",
+    "pack_signature",
     "read",
-    "unpack",
+    "rebuilt",
+    "signature_json",
+    "unpack_signature",
     "write",
 ]
 
-FloatArray = npt.NDArray[np.float64]
+FORMAT_VERSION = 3
+"""Version of the layout. Files of another one are refused: models are quickly fitted again."""
+SCALES = ("state", "input", "direct")
+MOMENTS = ("mean", "std", "spread", "centre", "reach")
 
-HANKEL_DMDC = "hankel_dmdc"
-FORMAT_VERSION = 2
-"""Version of the layout; raised when an older seakeep could not read a new file rightly. From 2 on
-files carry a checksum."""
-
-
-@dataclass(frozen=True, eq=False)
-class Parts:
-    """What :func:`unpack` finds in a file."""
-
-    settings: dict[str, Any]
-    training: dict[str, Any]
-    labels: dict[str, tuple[ChannelLabel, ...]]
-    scales: dict[str, Scale]
-    dt: float
-    coefficients: FloatArray
-    alignment: dict[str, Any] | None
+Value = TypeVar("Value")
 
 
-def pack(
-    *,
-    settings: object,
-    training: object,
-    labels: Mapping[str, tuple[ChannelLabel, ...]],
-    scales: Mapping[str, Scale],
-    dt: float,
-    coefficients: FloatArray,
-    alignment: object | None = None,
-) -> xr.Dataset:
-    """Put the parts of a model into a Dataset of arrays and JSON texts."""
-    variables: dict[str, Any] = {
-        "coefficients": (
-            ("row", "regressor"),
-            coefficients,
-            {"long_name": "regressed rows of [A B] on standardised deviations", "units": "1"},
-        )
+def pack_signature(signature: Signature) -> dict[str, Any]:
+    """Moments of a signature as variables of a file."""
+    return {
+        f"{group}_{name}": (group, getattr(getattr(signature, f"{group}_scale"), name))
+        for group in SCALES
+        for name in MOMENTS
     }
-    for group, scale in scales.items():
-        for name in ("mean", "std", "spread"):
-            variables[f"{group}_{name}"] = (group, getattr(scale, name))
-    attrs = {
-        "dt": dt,
-        "settings": as_json(settings),
-        "training": as_json(training),
-        "labels": json.dumps({k: [asdict(label) for label in v] for k, v in labels.items()}),
-    }
-    if alignment is not None:
-        attrs["alignment"] = as_json(alignment)
-    return xr.Dataset(variables, attrs=attrs)
 
 
-def unpack(dataset: xr.Dataset) -> Parts:
-    """Take the parts of a model out of a Dataset; the inverse of :func:`pack`."""
-    labels = {
-        group: tuple(ChannelLabel(**label) for label in entries)
-        for group, entries in json.loads(dataset.attrs["labels"]).items()
+def signature_json(signature: Signature) -> Json:
+    """What a signature holds beside the moments, as JSON values."""
+    return {
+        "dt": float(signature.dt),
+        "states": [asdict(label) for label in signature.state_labels],
+        "inputs": [asdict(label) for label in signature.input_labels],
+        "state_delays": int(signature.state_delays),
+        "input_delays": int(signature.input_delays),
+        "input_map": signature.input_map.to_json(),
     }
+
+
+def unpack_signature(dataset: xr.Dataset) -> Signature:
+    """Rebuild a signature; a file whose parts do not fit together raises a ValueError."""
+    kept = content(dataset, "signature")
+    state_labels, input_labels = labels(dataset, "states"), labels(dataset, "inputs")
+    input_map = Chain.from_json(kept["input_map"])
+    dt = float(kept["dt"])
+    delays = {key: kept[key] for key in ("state_delays", "input_delays")}
+    for key, value in delays.items():
+        if type(value) is not int or value < 0:
+            raise ValueError(f"{key} is {value!r}, not a number of samples")
+    if not (np.isfinite(dt) and dt > 0) or not state_labels:
+        raise ValueError(f"dt is {dt!r} and there are {len(state_labels)} states")
+    delayed, direct = input_map.regressors(input_labels)
+    sizes = {"state": len(state_labels), "input": len(delayed), "direct": len(direct)}
     scales = {
-        group: Scale(*(_values(dataset, f"{group}_{name}") for name in ("mean", "std", "spread")))
-        for group in labels
+        group: Scale(*(numbers(dataset, f"{group}_{name}", (size,)) for name in MOMENTS))
+        for group, size in sizes.items()
     }
-    training = {
-        key: tuple(value) if isinstance(value, list) else value
-        for key, value in json.loads(dataset.attrs["training"]).items()
-    }
-    settings = json.loads(dataset.attrs["settings"])
-    return Parts(
-        settings=settings,
-        training=training,
-        labels=labels,
-        scales=scales,
-        dt=float(dataset.attrs["dt"]),
-        coefficients=_values(dataset, "coefficients"),
-        alignment=json.loads(dataset.attrs.get("alignment", "null")),
+    return Signature(
+        dt=dt,
+        state_labels=state_labels,
+        input_labels=input_labels,
+        **delays,
+        input_map=input_map,
+        state_scale=scales["state"],
+        input_scale=scales["input"],
+        direct_scale=scales["direct"],
     )
 
 
-def _values(dataset: xr.Dataset, name: str) -> FloatArray:
-    return np.ascontiguousarray(dataset[name].values, dtype=float)
+def labels(dataset: xr.Dataset, group: str) -> tuple[ChannelLabel, ...]:
+    """Labels of the states or inputs that a file names."""
+    return tuple(
+        ChannelLabel(*(str(each[key]) for key in ("name", "units", "long_name")))
+        for each in content(dataset, "signature")[group]
+    )
+
+
+def content(dataset: xr.Dataset, name: str) -> Json:
+    """JSON table that a file keeps in an attribute."""
+    found = json.loads(dataset.attrs[name])
+    if not isinstance(found, dict):
+        raise ValueError(f"{name} is no table")
+    return found
+
+
+def numbers(dataset: xr.Dataset, name: str, shape: Sequence[int | None]) -> FloatArray:
+    """Array of finite numbers of a shape; None stands for any length."""
+    values = np.ascontiguousarray(dataset[name].values, dtype=np.float64)
+    fits = values.ndim == len(shape) and all(
+        wanted in (None, found) for wanted, found in zip(shape, values.shape, strict=True)
+    )
+    if not fits:
+        expected = tuple("any" if each is None else each for each in shape)
+        raise ValueError(f"{name} has shape {values.shape}, not {expected}")
+    if not np.all(np.isfinite(values)):
+        raise ValueError(f"{name} holds values that are not finite")
+    values.flags.writeable = False
+    return values
 
 
 def as_json(value: object) -> str:
-    """Write a dataclass as JSON; numbers of numpy become plain ones."""
-    assert is_dataclass(value)
-    assert not isinstance(value, type)
-    return json.dumps(asdict(value), default=_plain)
+    """Write JSON values as text; numbers of numpy become plain ones."""
+    return json.dumps(value, default=_plain)
 
 
 def _plain(value: object) -> object:
@@ -126,13 +136,26 @@ def _plain(value: object) -> object:
     raise TypeError(type(value).__name__)
 
 
+def rebuilt(source: str | Path, build: Callable[[], Value]) -> Value:
+    """What `build` makes of a file's content; whatever does not fit becomes one DataError."""
+    try:
+        return build()
+    except DataError:
+        raise
+    except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
+        missing = "a part is missing: " if isinstance(error, LookupError) else ""
+        raise DataError(
+            f"{source} is incomplete: {missing}{error}. Fit the model again."
+        ) from error
+
+
 def write(dataset: xr.Dataset, path: str | Path, kind: str) -> Path:
     """Write a Dataset as a model file.
 
     Parameters
     ----------
     dataset : Dataset
-        From :func:`pack`.
+        What a model's ``to_dataset`` gives.
     path : str or Path
         File, overwritten if it exists.
     kind : str
@@ -217,13 +240,17 @@ def read(path: str | Path) -> xr.Dataset:
         raise DataError(
             f"{source} has layout {version}, written by seakeep "
             f"{dataset.attrs.get('seakeep_version', '?')}; this seakeep "
-            f"({metadata.version('seakeep')}) reads up to {FORMAT_VERSION}. Update seakeep, or "
-            "save the model again with this version."
+            f"({metadata.version('seakeep')}) reads layout {FORMAT_VERSION}. Update seakeep, or "
+            "fit the model again with this version."
         )
-    if version < 1 or (version > 1 and dataset.attrs.get("checksum") != checksum(dataset)):
+    if 0 < version < FORMAT_VERSION:
+        raise DataError(
+            f"{source} has the old layout {version}, which is no longer read. Fit the model again."
+        )
+    if version < 1 or dataset.attrs.get("checksum") != checksum(dataset):
         raise DataError(
             f"{source} does not hold what was written into it (its checksum differs): it was "
-            "damaged or altered. Copy it again, or save the model again."
+            "damaged or altered. Copy it again, or fit the model again."
         )
     return dataset
 

@@ -9,13 +9,14 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.errors import RequestError
-from seakeep.models.shelf import Shelf
 
-__all__ = ["STATISTICS", "first_lost", "reduce_members", "summarize"]
+__all__ = ["STATISTICS", "reduce_members", "summarize"]
 
 FloatArray = npt.NDArray[np.float64]
 
 STATISTICS = ("mean", "std", "lower", "upper")
+CHUNK = 8 * 2**20
+"""Bytes of all members that are reduced at a time."""
 SORTED = 512
 """Members up to which sorting them all is faster than selecting the few that are asked for."""
 
@@ -85,16 +86,7 @@ def statistic_coordinate(level: float, calibrated: bool = False) -> xr.Variable:
     return xr.Variable(("statistic",), list(STATISTICS), attrs)
 
 
-def first_lost(values: FloatArray) -> npt.NDArray[np.int64]:
-    """First instant at which a channel is NaN, or −1, of values (…, steps, N)."""
-    if not np.isnan(values.sum()):
-        return np.full(values.shape[:-2], -1)
-    gone: npt.NDArray[np.bool_] = np.isnan(values.sum(axis=-1))
-    first = np.argmax(gone, axis=-1)
-    return np.where(np.take_along_axis(gone, first[..., None], axis=-1)[..., 0], first, -1)
-
-
-def reduce_members(shelf: Shelf, lost: npt.NDArray[np.int64], level: float) -> FloatArray:
+def reduce_members(series: FloatArray, lost: npt.NDArray[np.int64], level: float) -> FloatArray:
     """Reduce members to statistics, piece by piece in time.
 
     A member that is lost (NaN) anywhere in a window is left out of that window's statistics from
@@ -103,8 +95,8 @@ def reduce_members(shelf: Shelf, lost: npt.NDArray[np.int64], level: float) -> F
 
     Parameters
     ----------
-    shelf : Shelf
-        Series of the members.
+    series : ndarray, shape (member, window, steps, N)
+        Series of the members, from :func:`seakeep.models.engine.member_series`.
     lost : ndarray of int, shape (member, window)
         First instant lost, or −1.
     level : float
@@ -115,12 +107,14 @@ def reduce_members(shelf: Shelf, lost: npt.NDArray[np.int64], level: float) -> F
     ndarray, shape (window, 4, steps, N)
         As :func:`statistics_of`.
     """
-    layout = shelf.layout
-    out = np.empty((layout.windows, 4, layout.steps, layout.channels))
-    for window in range(layout.windows):
-        for piece in range(layout.pieces):
-            block = shelf.get(window, piece)[lost[:, window] < 0]
-            out[window, :, layout.instants(piece)] = statistics_of(block, level)
+    members, windows, steps, channels = series.shape
+    out = np.empty((windows, 4, steps, channels))
+    length = max(1, CHUNK // (8 * members * channels))
+    for window in range(windows):
+        kept = np.flatnonzero(lost[:, window] < 0)
+        for first in range(0, steps, length):
+            piece = slice(first, first + length)
+            out[window, :, piece] = statistics_of(np.asarray(series[kept, window, piece]), level)
     return out
 
 

@@ -1,12 +1,38 @@
-"""What a model was identified from, and how."""
+"""From runs to what the regression needs: windows, regressors, moments, standardised arrays."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import reprlib
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Self, cast, get_args
 
+import numpy as np
+import xarray as xr
+
+from seakeep.arrays import BoolArray, FloatArray
+from seakeep.core.embedding import History, TrainingWindow, training_window
 from seakeep.core.solve import Method
+from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+from seakeep.models import labelled
+from seakeep.models.inputs import Chain, Measured
+from seakeep.models.interface import Fittable, Json, Regressors, Scale, Span
+from seakeep.models.labelled import ChannelLabel, Stop
 
-__all__ = ["Training"]
+__all__ = [
+    "Training",
+    "TrainingData",
+    "check_names",
+    "gather",
+    "is_constant",
+    "last_sample",
+    "lengthened",
+    "moments",
+    "run_regressors",
+    "stop_instants",
+    "until",
+]
 
 
 @dataclass(frozen=True)
@@ -36,3 +62,387 @@ class Training:
     method: Method
     ridge: float
     rank: int
+
+    def to_json(self) -> Json:
+        """As JSON values."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, content: Json) -> Self:
+        """Rebuild from :meth:`to_json`."""
+        made = cls(
+            runs=tuple(str(each) for each in content["runs"]),
+            first=tuple(float(each) for each in content["first"]),
+            stop=tuple(float(each) for each in content["stop"]),
+            columns=tuple(int(each) for each in content["columns"]),
+            method=content["method"],
+            ridge=float(content["ridge"]),
+            rank=int(content["rank"]),
+        )
+        lengths = {len(made.runs), len(made.first), len(made.stop), len(made.columns)}
+        if len(lengths) != 1 or made.method not in get_args(Method):
+            raise ValueError("training names runs, instants and columns of unequal number")
+        return made
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingData:
+    """Standardised arrays of the training runs, cut to what the windows reach.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Runs.
+    states, delayed, direct : tuple of ndarray, each (time, channel)
+        Standardised deviations of the states and of both kinds of regressors.
+    windows : tuple of TrainingWindow
+        In samples of these arrays.
+    first_instants, last_instants : tuple of float
+        First and last instant of each window, s.
+    dt : float
+        Time step, s.
+    state_labels, input_labels : tuple of ChannelLabel
+        Names and units.
+    state_scale, input_scale, direct_scale : Scale
+        Moments over the windows.
+    input_map : Chain
+        As fitted.
+    inputs : tuple of ndarray, each (time, Q)
+        Measured inputs of the windows, physical units.
+    """
+
+    names: tuple[str, ...]
+    states: tuple[FloatArray, ...]
+    delayed: tuple[FloatArray, ...]
+    direct: tuple[FloatArray, ...]
+    windows: tuple[TrainingWindow, ...]
+    first_instants: tuple[float, ...]
+    last_instants: tuple[float, ...]
+    dt: float
+    state_labels: tuple[ChannelLabel, ...]
+    input_labels: tuple[ChannelLabel, ...]
+    state_scale: Scale
+    input_scale: Scale
+    direct_scale: Scale
+    input_map: Chain
+    inputs: tuple[FloatArray, ...]
+
+
+def gather(
+    runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+    stop: Stop,
+    *,
+    maps: Sequence[Fittable],
+    state_delays: int,
+    input_delays: int,
+    window: int | None,
+    history: History,
+    standardize: bool,
+) -> TrainingData:
+    """Fit the input map, and collect the training windows of the runs.
+
+    Parameters
+    ----------
+    runs : mapping of str to Dataset
+        Runs, at least one.
+    states, inputs : sequence of str
+        Channels.
+    stop : float, sequence or mapping of float, optional
+        Last instants, s.
+    maps : sequence of Fittable
+        Input maps, not fitted yet.
+    state_delays, input_delays, window, history, standardize
+        As in :class:`seakeep.HankelDMDc`.
+
+    Returns
+    -------
+    TrainingData
+        What the regression needs.
+
+    Raises
+    ------
+    RequestError
+        If names are unknown, repeated or missing, or a stop lies outside its run.
+    DataError
+        If a run is too short, has gaps, another time step, other units, or a constant channel.
+    """
+    check_names(states, inputs)
+    states, inputs = list(states), list(inputs)  # arrays of names are welcome too
+    stops = stop_instants(stop, list(runs))
+    dt = labelled.common_step(runs)
+    labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
+    if maps:
+        runs = until(runs, stops)
+    input_map = Chain(tuple(each.fit(dict(runs), states, inputs, window) for each in maps))
+    lead, reach = input_map.lead_samples, max(state_delays, input_delays + input_map.extra_history)
+    pieces = []
+    for name, run in runs.items():
+        time = np.asarray(run.variables["time"].values, dtype=float)
+        last = last_sample(time, stops[name], name)
+        place = training_window(last, window, state_delays, reach, history)
+        # A step from j reads the input up to j + lead, and none after the window.
+        final = last - max(lead - 1, 0)
+        _check_length(place, final, name, window, reach, history)
+        begin = min(place.first, place.first_column - reach)
+        here = labelled.channel_matrix(run, states, name, slice(begin, final + 1))
+        needed = min(place.first, place.first_column - state_delays)
+        labelled.check_finite(here[needed - begin :], states, name, needed, time)
+        needed = min(place.first, place.first_column - input_delays)
+        span = Span(begin, last, last + 1 - lead)
+        found = run_regressors(input_map, run, inputs, name, span, needed)
+        u, v = (lengthened(values, len(here)) for values in found)
+        shifted = TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
+        read = labelled.channel_matrix(run, inputs, name, slice(place.first, last + 1))
+        pieces.append(((here, u, v), shifted, read, time[place.first], time[last]))
+
+    groups, windows, trained, first, end = zip(*pieces, strict=True)
+    series = [tuple(each) for each in zip(*groups, strict=True)]
+    names = tuple(runs)
+    delayed_labels, direct_labels = input_map.regressors(labels[1])
+    channels = [
+        [label.name for label in group] for group in (labels[0], delayed_labels, direct_labels)
+    ]
+    scales = [
+        moments(each, windows, made, standardize)
+        for each, made in zip(series, channels, strict=True)
+    ]
+    if len(names) > 1:
+        _warn_of_dead(names, series[0], windows, scales[0], channels[0])
+        _warn_of_dead(names, series[1], windows, scales[1], channels[1])
+    x, delayed, direct = (
+        tuple(scale.deviations(values) for values in each)
+        for scale, each in zip(scales, series, strict=True)
+    )
+    return TrainingData(
+        names=names,
+        states=x,
+        delayed=delayed,
+        direct=direct,
+        windows=windows,
+        first_instants=first,
+        last_instants=end,
+        dt=dt,
+        state_labels=labels[0],
+        input_labels=labels[1],
+        state_scale=scales[0],
+        input_scale=scales[1],
+        direct_scale=scales[2],
+        input_map=input_map,
+        inputs=trained,
+    )
+
+
+def run_regressors(
+    input_map: Chain,
+    run: xr.Dataset,
+    inputs: Sequence[str],
+    name: str,
+    span: Span,
+    needed: int | None = None,
+) -> Regressors:
+    """Regressors of a training run; inputs as they are may have gaps before `needed`."""
+    read = input_map.reads(span)
+    values = labelled.channel_matrix(run, inputs, name)
+    time = np.asarray(run.variables["time"].values, dtype=float)
+    first = read.first if needed is None or input_map.maps else needed
+    labelled.check_finite(values[first : read.stop], inputs, name, first, time)
+    return input_map.wrap(Measured(values), run, [span]).rows(span.first, span.stop)
+
+
+def lengthened(values: FloatArray, length: int) -> FloatArray:
+    """Rows with the last one repeated where a look-ahead leaves one without: it is no column."""
+    missing = length - len(values)
+    return np.concatenate([values, values[-1:]]) if missing > 0 else values
+
+
+def until(runs: Mapping[str, xr.Dataset], stop: Stop) -> dict[str, xr.Dataset]:
+    """Cut runs at the last instants of their training windows.
+
+    Parameters
+    ----------
+    runs : mapping of str to Dataset
+        Runs.
+    stop : float, sequence or mapping of float, optional
+        Last instants, s.
+
+    Returns
+    -------
+    dict of str to Dataset
+        The runs up to and including these instants.
+
+    Raises
+    ------
+    RequestError
+        If a stop lies outside its run.
+    DataError
+        If the times of a run are not uniform.
+    """
+    stops = stop_instants(stop, list(runs))
+    out = {}
+    for name, run in runs.items():
+        labelled.run_step(run, name)
+        last = last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name)
+        out[name] = run.isel(time=slice(0, last + 1))
+    return out
+
+
+def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
+    """Refuse lists of channels that are strings, empty, repeated or overlapping."""
+    for what, names in (("states", states), ("inputs", inputs)):
+        if isinstance(names, str):
+            raise RequestError(
+                f"{what} must be a list of channel names; received the string '{names}'. "
+                f"Write {what}=['{names}']."
+            )
+        listed = isinstance(cast("object", names), Iterable)
+        if not listed or not all(isinstance(cast("object", name), str) for name in names):
+            raise RequestError(
+                f"{what} must be a list of channel names; received {reprlib.repr(names)}. A "
+                "model without input takes inputs=[]."
+            )
+        double = {name for name in names if list(names).count(name) > 1}
+        if double:
+            raise RequestError(
+                f"{what} names {', '.join(sorted(double))} more than once. Name each channel once."
+            )
+    if len(states) == 0:
+        raise RequestError("states is empty: name at least one channel to forecast.")
+    both = set(states) & set(inputs)
+    if both:
+        raise RequestError(
+            f"{', '.join(sorted(both))} is both a state and an input. A state is forecast and an "
+            "input is given: choose one."
+        )
+
+
+def stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
+    """Last instant of each run's window as the user gave it; None for the run's end."""
+    if stop is None:
+        return dict.fromkeys(names)
+    if isinstance(stop, Mapping):
+        unknown = [name for name in stop if name not in names]
+        if unknown:
+            raise RequestError(
+                f"stop names the run '{unknown[0]}', which is not among the runs "
+                f"({', '.join(names)}).{did_you_mean(unknown[0], names)}"
+            )
+        return {name: _one_stop(stop.get(name), f"stop of '{name}'") for name in names}
+    if np.ndim(stop) > 0:  # a scalar array, such as an instant of a run, is one for all
+        values = [_one_stop(value, "each stop") for value in cast("list[Any]", stop)]
+        if len(values) != len(names):
+            raise RequestError(
+                f"stop has {len(values)} instants for {len(names)} runs; give one for all, or "
+                "one a run."
+            )
+        return dict(zip(names, values, strict=True))
+    return dict.fromkeys(names, labelled.as_instant(stop, "stop"))
+
+
+def _one_stop(value: object, what: str) -> float | None:
+    return None if value is None else labelled.as_instant(value, what)
+
+
+def last_sample(time: FloatArray, stop: float | None, name: str) -> int:
+    """Last sample up to and including `stop`."""
+    if stop is None:
+        return time.size - 1
+    nearest = labelled.nearest_sample(time, stop, name, "stop")
+    step = (time[-1] - time[0]) / (time.size - 1)
+    # "up to and including": a sample later than the stop by more than rounding is not included.
+    return nearest if time[nearest] <= stop + 1e-3 * step else max(nearest - 1, 0)
+
+
+def _warn_of_dead(
+    runs: Sequence[str],
+    series: Sequence[FloatArray],
+    windows: Sequence[TrainingWindow],
+    scale: Scale,
+    names: Sequence[str],
+) -> None:
+    """Warn of channels that move in some runs and stand still in others."""
+    for run, values, window in zip(runs, series, windows, strict=True):
+        seen = values[window.samples]
+        for column in np.flatnonzero(is_constant(seen) & (scale.spread > 0)).tolist():
+            warnings.warn(
+                f"channel '{names[column]}' of {run} is constant ({seen[0, column]:.6g}) over its "
+                "training window, and moves in other runs. If its sensor was dead, leave this run "
+                "out: the model would learn that nothing moves.",
+                SeakeepWarning,
+                stacklevel=4,
+            )
+
+
+def is_constant(values: FloatArray) -> BoolArray:
+    """Channels, shape (channel,), that do not move; values are (time, channel)."""
+    # A constant that is not a binary fraction has a spread of rounding, not of zero.
+    largest = np.abs(values).max(axis=0, initial=0.0)
+    still: BoolArray = np.ptp(values, axis=0) <= 1e-12 * largest
+    return still
+
+
+def _check_length(
+    place: TrainingWindow, final: int, name: str, window: int | None, reach: int, history: History
+) -> None:
+    if window is not None and place.first < 0:
+        raise DataError(
+            f"{name} has {place.last + 1} samples up to the end of the training window, which asks "
+            f"for {window}: {-place.first} are missing. Shorten the window (window, or "
+            "train_length of an ensemble), or give a longer run (span or train in [runs.NAME])."
+        )
+    if final - place.first_column < 1:
+        needed = reach + 2 + place.last - final
+        received = (place.last + 1) if window is None or history == "before" else window
+        raise DataError(
+            f"{name} is too short for its delays: {needed} samples are needed (delay history of "
+            f"{reach}, one snapshot and its successor{', lead' if final < place.last else ''}), "
+            f"{received} were received, "
+            f"{needed - received} are missing. Reduce the delays, or give a longer "
+            f"{'window' if history == 'inside' and window is not None else 'run'}."
+        )
+
+
+def moments(
+    series: Sequence[FloatArray],
+    windows: Sequence[TrainingWindow] | None,
+    names: Sequence[str],
+    standardize: bool,
+) -> Scale:
+    """Means and standard deviations (ddof = 1) over the windows of all runs, or all of them.
+
+    Raises
+    ------
+    DataError
+        If a channel is constant there and `standardize` is set.
+    """
+    pooled = np.concatenate(
+        list(series)
+        if windows is None
+        else [values[window.samples] for values, window in zip(series, windows, strict=True)]
+    )
+    with np.errstate(over="ignore"):
+        mean = pooled.sum(axis=0) / len(pooled)
+        centred = pooled - mean
+        spread = np.sqrt(np.einsum("tc,tc->c", centred, centred) / (len(pooled) - 1))
+    if not np.all(np.isfinite(spread)):
+        column = int(np.flatnonzero(~np.isfinite(spread))[0])
+        raise DataError(
+            f"channel '{names[column]}' has a standard deviation that is not finite over the "
+            f"training window: its largest value is {np.abs(pooled[:, column]).max():.3g}. Look "
+            "for a fault of the sensor or of its conversion."
+        )
+    # A constant that is not a binary fraction has a spread of rounding, not of zero.
+    constant = spread <= 1e-12 * np.abs(mean)
+    spread = np.where(constant, 0.0, spread)
+    reach = np.where(constant, 0.0, np.abs(centred).max(axis=0))
+    if not standardize:
+        return Scale(np.zeros(mean.size), np.ones(mean.size), spread, mean, reach)
+    if np.any(constant):
+        column = int(np.flatnonzero(constant)[0])
+        raise DataError(
+            f"channel '{names[column]}' is constant ({pooled[0, column]:g}) over the training "
+            "window, so it cannot be standardised. Look for a dead sensor, choose another window, "
+            "leave the channel out, or set standardize=False."
+        )
+    return Scale(mean, spread, spread, mean, reach)

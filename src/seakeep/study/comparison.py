@@ -16,10 +16,10 @@ from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
-from seakeep.models import HankelDMDcModel, HankelEnsemble
+from seakeep.models import HankelEnsemble, Model
 from seakeep.models.calibration import Band
-from seakeep.models.forecasting import status_at_clock
-from seakeep.models.identification import is_constant
+from seakeep.models.forecasts import status_at_clock
+from seakeep.models.training import is_constant
 from seakeep.quality import warn_of_runs
 from seakeep.signals import froude_factor
 from seakeep.signals.time_axis import span_text
@@ -201,7 +201,7 @@ def with_degrees(run: xr.Dataset) -> xr.Dataset:
 
 
 def compare(
-    model: HankelDMDcModel | HankelEnsemble,
+    model: Model,
     campaign: Campaign,
     runs: Sequence[str] = (),
     start: float | str | None = None,
@@ -274,7 +274,7 @@ def compare(
 
 
 def compare_models(
-    models: Mapping[str, HankelDMDcModel | HankelEnsemble],
+    models: Mapping[str, Model],
     campaign: Campaign,
     runs: Sequence[str] = (),
     start: float | str | None = None,
@@ -343,12 +343,9 @@ def compare_models(
         count = None if steps is None else samples_of(steps, campaign, known_runs, dt, "steps")
 
         def forecast_run(
-            run: xr.Dataset,
-            start: float,
-            steps: int,
-            model: HankelDMDcModel | HankelEnsemble = model,
+            run: xr.Dataset, start: float, steps: int, model: Model = model
         ) -> xr.Dataset:
-            if isinstance(model, HankelDMDcModel):
+            if not isinstance(model, HankelEnsemble):
                 return model.forecast(run, start=start, steps=steps)
             tell = None if members is None else _named(members, str(run.attrs["run"]))
             return model.forecast_summary(
@@ -367,7 +364,7 @@ def compare_models(
     return found
 
 
-def _warn_of_known(model: HankelDMDcModel | HankelEnsemble, compared: Comparison) -> None:
+def _warn_of_known(model: Model, compared: Comparison) -> None:
     """Warn where a forecast lies in what the model, or its calibrated band, was made from."""
     name, first, last = compared.run, compared.start, float(compared.measured["time"][-1])
 
@@ -394,7 +391,7 @@ def _named(tell: Progress, run: str) -> Progress:
 
 
 def _compare_run(
-    model: HankelDMDcModel | HankelEnsemble,
+    model: Model,
     forecast_run: Callable[[xr.Dataset, float, int], xr.Dataset],
     run: xr.Dataset,
     name: str,

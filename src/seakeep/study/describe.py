@@ -12,7 +12,6 @@ from seakeep.campaign import Campaign
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
 from seakeep.models import HankelDMDc, ProbeAlignment
-from seakeep.models.alignment import fit_alignment
 from seakeep.signals import significant_height, wave_spectrum
 from seakeep.study.judge import wave_frequency
 from seakeep.study.plan import Plan, between, whole_span
@@ -146,7 +145,7 @@ def _celerities(spec: Spec, plan: Plan, runs: Runs) -> list[float]:
     out = []
     for each in plan.training:
         parts = {name: between(runs[name], (begin, stop)) for name, begin, stop in each.spans}
-        fitted = fit_alignment(wanted, parts, plan.states, plan.inputs, spec.window)
+        fitted = wanted.fit(parts, plan.states, plan.inputs, spec.window)
         out.append(float(fitted.celerity or np.nan))
     return out
 

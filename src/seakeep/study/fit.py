@@ -11,7 +11,7 @@ import xarray as xr
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError, SeakeepWarning
-from seakeep.models import HankelDMDc, HankelDMDcModel, HankelEnsemble
+from seakeep.models import HankelDMDc, HankelDMDcModel, HankelEnsemble, Model
 from seakeep.models.slow import warn_of_slow_motions
 from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, find_leakage
@@ -128,9 +128,7 @@ def _longest_window(spec: Spec, dt: float) -> int | None:
     return needs_of([spec], dt).snapshots
 
 
-def _warn_of_slow_model(
-    model: HankelDMDcModel | HankelEnsemble, runs: Mapping[str, xr.Dataset]
-) -> None:
+def _warn_of_slow_model(model: Model, runs: Mapping[str, xr.Dataset]) -> None:
     """Warn of slow motions that the training windows of a model hold fewer than five periods of."""
     spans = model.training_spans
     first = runs[next(iter(spans))]
@@ -145,9 +143,7 @@ def _warn_of_slow_model(
     warn_of_slow_motions(parts, model.states, trained, float(period))
 
 
-def warn_of_repeats(
-    model: HankelDMDcModel | HankelEnsemble, campaign: Campaign, tested: Mapping[str, xr.Dataset]
-) -> None:
+def warn_of_repeats(model: Model, campaign: Campaign, tested: Mapping[str, xr.Dataset]) -> None:
     """Warn where a test run's input repeats the model's training input, up to a constant phase.
 
     Training runs that the campaign marks as regular waves are left out: regular waves repeat by

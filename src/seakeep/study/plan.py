@@ -16,7 +16,6 @@ import xarray as xr
 from seakeep.campaign import load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import DataError, RequestError
-from seakeep.models import HankelDMDc
 from seakeep.models.settings import periods_to_samples
 from seakeep.models.slow import warn_of_slow_motions
 from seakeep.study.resolve import ResolvedModel, Spec, resolve_model
@@ -329,24 +328,12 @@ def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
 
 def needs_of(specs: Sequence[Spec], dt: float) -> Needs:
     """Samples of the greediest of several models."""
-    windows, histories = [1], [0]
-    for spec in specs:
-        if isinstance(spec, HankelDMDc):
-            windows.append(spec.window or 1)
-            histories.append(spec.history_samples - 1)
-            continue
-
-        def samples(prior: object, period: float = spec.encounter_period) -> int:
-            # The last quantile of a prior without an upper end is its 1 − 1e-6 quantile.
-            top = float(prior.ppf(1.0))  # type: ignore[attr-defined]
-            if top == float("inf"):
-                top = float(prior.ppf(1.0 - 1e-6))  # type: ignore[attr-defined]
-            return periods_to_samples(top, period, dt)
-
-        windows.append(1 if spec.train_length is None else samples(spec.train_length))
-        histories.append(max(samples(spec.state_delay), samples(spec.input_delay)))
-    inside = all(spec.history == "inside" for spec in specs)
-    return Needs(max(windows), max(histories), inside)
+    each = [spec.needs(dt) for spec in specs]
+    return Needs(
+        max(needs.snapshots for needs in each),
+        max(needs.history for needs in each),
+        all(needs.inside for needs in each),
+    )
 
 
 @dataclass(frozen=True, eq=False)

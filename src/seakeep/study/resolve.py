@@ -12,8 +12,7 @@ from typing import Any, Literal
 
 from seakeep.campaign import ModelSettings, PriorSettings
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.models import HankelDMDc, ProbeAlignment
-from seakeep.models.ensemble import BayesianHankelDMDc
+from seakeep.models import BayesianHankelDMDc, HankelDMDc, ProbeAlignment
 from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform, describe
 from seakeep.models.settings import periods_to_samples
 from seakeep.toml import Length, lengths
@@ -57,7 +56,7 @@ class ResolvedModel:
     @property
     def is_ensemble(self) -> bool:
         """Whether the model has members."""
-        return hasattr(self.spec, "n_members")
+        return self.spec.is_ensemble
 
     @property
     def n_members(self) -> int:
@@ -140,7 +139,7 @@ def resolve_model(
 ) -> ResolvedModel:
     """Fill in, key by key, what the table of a model does not state."""
     kind = _kind_of(settings)
-    ensemble = "n_members" in _names(kind)
+    ensemble = kind.is_ensemble
     if settings.preset is not None and not hasattr(kind, settings.preset):
         raise RequestError(
             f"kind = '{settings.kind}' has no preset. Remove preset = '{settings.preset}', and "
@@ -199,7 +198,7 @@ def _made(
         as_priors = " as priors, such as { uniform = [0.5, 1.5] }"
         raise RequestError(
             f"the [model] table states no {missing[0]}. Add {', '.join(missing)}"
-            f"{as_priors if 'n_members' in _names(kind) else ''}, or a preset: preset = "
+            f"{as_priors if kind.is_ensemble else ''}, or a preset: preset = "
             "'recommended' or 'paper'."
         )
     of_data = {each.name: data[each.name] for each in fields(kind) if each.name in data}

@@ -6,8 +6,7 @@ bit whether or not a study was interrupted, and whatever the number of workers.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -20,13 +19,10 @@ from seakeep.core import metrics
 from seakeep.core.bands import band_error_over_time
 from seakeep.core.calibration import conformal_margin
 from seakeep.errors import DataError, SeakeepError
-from seakeep.models import HankelDMDcModel
-from seakeep.models.alignment import FittedAlignment
+from seakeep.models import HankelDMDcModel, HankelEnsemble
 from seakeep.models.calibration import held_out_scores
-from seakeep.models.fitted_ensemble import HankelEnsemble
-from seakeep.models.shelf import Layout, Shelf, open_shelf
-from seakeep.models.summaries import STATISTICS, first_lost, reduce_members
-from seakeep.models.windows import free_runs
+from seakeep.models.engine import group_series, read_groups
+from seakeep.models.summaries import STATISTICS, reduce_members
 from seakeep.study.judge import BAND_ERRORS
 from seakeep.study.plan import Plan, TestWindow, TrainingSet, between
 from seakeep.study.settings import Study
@@ -36,6 +32,7 @@ __all__ = ["Unit", "collect", "compute", "fit_training", "units_of"]
 Runs = Mapping[str, xr.Dataset]
 Arrays = dict[str, npt.NDArray[Any]]
 Read = Callable[["Unit"], Arrays]
+Fitted = HankelDMDcModel | HankelEnsemble
 
 DIMS = {
     "mean": ("time", "channel"),
@@ -85,103 +82,98 @@ def compute(plan: Plan, runs: Runs, unit: Unit) -> Arrays:
         fitted = fit_training(plan, runs, unit.model, training)
     except SeakeepError as error:
         raise DataError(f"training set '{training.name}', model '{unit.model}': {error}") from error
-    groups = {
-        test: window_arrays(plan, runs, plan.tests[test], numbers, fitted.alignment)
+    out: Arrays = {}
+    tested = {
+        test: numbers
         for test in plan.tests
         if (numbers := tested_windows(plan, unit.training, test))
     }
-    out: Arrays = {}
-    if isinstance(fitted, HankelDMDcModel):
-        for test, windows in groups.items():
-            out[f"tests/{test}/mean"] = _forecast(fitted, runs, windows)
-    else:
-        spread = training_moments(plan, runs, training)[1]
-        out |= _ensemble_arrays(plan, runs, fitted, unit, groups, spread)
-        if plan.calibrated_on:
-            found = calibration_arrays(plan, runs, unit, fitted)
-            out |= {f"calibration/{key}": np.asarray(value) for key, value in found.items()}
+    spread = training_moments(plan, runs, training)[1]
+    for test, numbers, series, lost in _series(plan, runs, fitted, tested):
+        if plan.models[unit.model].is_ensemble:
+            measured = measured_windows(plan, runs, plan.tests[test], numbers)
+            shown = [k for k, n in enumerate(numbers) if plan.is_shown(unit.training, test, n)]
+            found = _judged(series, lost, measured, spread, shown, plan.level)
+            found |= {"shown": np.array([numbers[k] for k in shown])} if shown else {}
+            out |= {f"tests/{test}/{key}": each for key, each in found.items()}
+        else:
+            out[f"tests/{test}/mean"] = np.array(series[0])
+    if plan.calibrated_on and isinstance(fitted, HankelEnsemble):
+        margins = calibration_arrays(plan, runs, unit, fitted)
+        out |= {f"calibration/{key}": np.asarray(value) for key, value in margins.items()}
     if plan.eigenvalues and unit.training == units_of(plan)[0].training:
         values = _eigenvalues(fitted)
         out |= {"eigenvalues/real": values.real, "eigenvalues/imag": values.imag}
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class Windows:
-    """Measured samples of the windows of a test set, side by side.
+def _series(
+    plan: Plan, runs: Runs, fitted: Fitted, tested: Mapping[str, tuple[int, ...]]
+) -> Iterator[tuple[str, tuple[int, ...], FloatArray, npt.NDArray[np.int64]]]:
+    """Free runs of all members over each test set, (member, window, steps, N), and where lost.
 
-    Parameters
-    ----------
-    numbers : tuple of int
-        Windows of the set.
-    places : tuple of (str, float)
-        Run and start of each, s.
-    histories : ndarray, shape (window, history, N)
-        States up to each start.
-    inputs : ndarray, shape (window, history + steps − 1, Q)
-        Inputs from the first of these on.
-    measured : ndarray, shape (window, steps, N)
-        States to be forecast.
+    Test sets of one length run side by side: what a free run prepares serves all of them.
     """
+    batches: dict[int, list[str]] = {}
+    for test in tested:
+        batches.setdefault(plan.tests[test][0].steps, []).append(test)
+    places = {
+        test: [(plan.tests[test][k].run, plan.tests[test][k].start) for k in numbers]
+        for test, numbers in tested.items()
+    }
+    groups = [([p for test in tests for p in places[test]], n) for n, tests in batches.items()]
+    windows = read_groups(fitted.signature, runs, groups)
+    with group_series(fitted, windows) as found:
+        for (series, lost), tests in zip(found, batches.values(), strict=True):
+            first = 0
+            for test in tests:
+                mine = slice(first, first + len(tested[test]))
+                yield test, tested[test], series[:, mine], lost[:, mine]
+                first = mine.stop
 
-    numbers: tuple[int, ...]
-    places: tuple[tuple[str, float], ...]
-    histories: FloatArray
-    inputs: FloatArray
-    measured: FloatArray
+
+def _judged(
+    series: FloatArray,
+    lost: npt.NDArray[np.int64],
+    measured: FloatArray,
+    spread: FloatArray,
+    shown: Sequence[int],
+    level: float,
+) -> Arrays:
+    """Statistics of the members of a test set, their errors, and those that figures show."""
+    pair = {"measured": measured, "training_std": spread}
+    reduced = reduce_members(series, lost, level)
+    out: Arrays = {key: reduced[:, row] for row, key in enumerate(STATISTICS)}
+    out["lost"] = lost.T
+    for key, error in (
+        ("member_nrmse", metrics.nrmse),
+        ("member_nammae", metrics.normalised_extremes_error),
+    ):
+        each = [error(predicted=np.array(values), **pair) for values in series]
+        out[key] = np.stack(each, axis=1).astype(np.float32)
+    if shown:
+        out["members"] = np.stack([series[:, row] for row in shown]).astype(np.float32)
+    return out
 
 
-def window_arrays(
-    plan: Plan,
-    runs: Runs,
-    windows: tuple[TestWindow, ...],
-    numbers: tuple[int, ...],
-    alignment: FittedAlignment | None = None,
-) -> Windows:
-    """Cut the windows of a test set out of the runs."""
-    histories, inputs, measured, places = [], [], [], []
-    reach = plan.needs.history
+def measured_windows(
+    plan: Plan, runs: Runs, windows: tuple[TestWindow, ...], numbers: Sequence[int]
+) -> FloatArray:
+    """Measured states of windows of a test set, shape (window, steps, N)."""
+    out = []
     for number in numbers:
         window = windows[number]
         run = runs[window.run]
         at = int(np.argmin(np.abs(run["time"].values - window.start)))
-        x, u = (
-            np.stack([run[n].values for n in names], axis=-1).astype(float)
-            if names
-            else np.zeros((run.sizes["time"], 0))
-            for names in (plan.states, plan.inputs)
-        )
-        histories.append(x[at - reach : at + 1])
-        needed = slice(at - reach, at + window.steps)
-        if alignment is None or alignment.settings.surge == "predicted":
-            inputs.append(u[needed])
-        else:
-            inputs.append(alignment.aligned(run, list(plan.inputs), window.run, needed))
-        places.append((window.run, window.start))
-        measured.append(x[at + 1 : at + 1 + window.steps])
-    return Windows(
-        numbers, tuple(places), np.stack(histories), np.stack(inputs), np.stack(measured)
-    )
+        after = slice(at + 1, at + 1 + window.steps)
+        out.append(np.stack([run[n].values[after] for n in plan.states], axis=-1).astype(float))
+    return np.stack(out)
 
 
-def fit_training(
-    plan: Plan, runs: Runs, model: str, training: TrainingSet
-) -> HankelDMDcModel | HankelEnsemble:
+def fit_training(plan: Plan, runs: Runs, model: str, training: TrainingSet) -> Fitted:
     """Fit a model of the study to a training set."""
     parts = {name: between(runs[name], (begin, stop)) for name, begin, stop in training.spans}
     return plan.specs[model].fit(parts, list(plan.states), list(plan.inputs))
-
-
-def _forecast(model: HankelDMDcModel, runs: Runs, windows: Windows) -> FloatArray:
-    """Free runs over all windows, shape (window, steps, N), physical units."""
-    if model.alignment is not None and model.alignment.settings.surge == "predicted":
-        steps = windows.measured.shape[1]
-        forecasts = [model.forecast(runs[run], start, steps) for run, start in windows.places]
-        return np.stack(
-            [np.stack([each[n].values for n in model.states], axis=-1) for each in forecasts]
-        )
-    steps = windows.measured.shape[1]
-    return free_runs(model, windows.histories, windows.inputs, steps)
 
 
 def training_moments(plan: Plan, runs: Runs, training: TrainingSet) -> FloatArray:
@@ -194,118 +186,9 @@ def training_moments(plan: Plan, runs: Runs, training: TrainingSet) -> FloatArra
     return np.stack([pooled.mean(axis=1), pooled.std(axis=1, ddof=1)])
 
 
-def _batches(groups: Mapping[str, Windows]) -> list[tuple[list[str], Windows]]:
-    """Test sets of the same length side by side: what a free run prepares serves all of them."""
-    lengths: dict[int, list[str]] = {}
-    for test, windows in groups.items():
-        lengths.setdefault(windows.measured.shape[1], []).append(test)
-    return [
-        (
-            tests,
-            Windows(
-                tuple(n for test in tests for n in groups[test].numbers),
-                tuple(place for test in tests for place in groups[test].places),
-                np.concatenate([groups[test].histories for test in tests]),
-                np.concatenate([groups[test].inputs for test in tests]),
-                np.concatenate([groups[test].measured for test in tests]),
-            ),
-        )
-        for tests in lengths.values()
-    ]
-
-
-def _ensemble_arrays(
-    plan: Plan,
-    runs: Runs,
-    ensemble: HankelEnsemble,
-    unit: Unit,
-    groups: Mapping[str, Windows],
-    spread: FloatArray,
-) -> Arrays:
-    """Each member is identified once and forecasts all windows; then each window is reduced."""
-    count, batches = ensemble.n_members, _batches(groups)
-    out: Arrays = {}
-    with ExitStack() as stack:
-        tables = {
-            test: stack.enter_context(_table(plan, unit, test, windows, spread, count))
-            for test, windows in groups.items()
-        }
-        for number in range(count):
-            member = ensemble.member(number)
-            for tests, windows in batches:
-                values = _forecast(member, runs, windows)
-                edges = np.cumsum([len(groups[test].numbers) for test in tests])[:-1]
-                for test, part in zip(tests, np.split(values, edges), strict=True):
-                    tables[test].put(number, part)
-        for test, table in tables.items():
-            out |= {f"tests/{test}/{key}": each for key, each in table.arrays(plan.level).items()}
-    return out
-
-
-@dataclass(frozen=True)
-class _Table:
-    """What becomes of the members of a test set, one after the other; their series on a shelf."""
-
-    windows: Windows
-    spread: FloatArray
-    shown: Mapping[int, int]
-    shelf: Shelf
-    lost: npt.NDArray[np.int64]
-    judged: Mapping[str, npt.NDArray[np.float32]]
-    members: npt.NDArray[np.float32]
-
-    def put(self, number: int, values: FloatArray) -> None:
-        """Judge a member's free runs, shape (window, steps, N), and put them away."""
-        pair = {"measured": self.windows.measured, "training_std": self.spread}
-        self.lost[number] = first_lost(values)
-        self.judged["member_nrmse"][number] = metrics.nrmse(predicted=values, **pair)
-        self.judged["member_nammae"][number] = metrics.normalised_extremes_error(
-            predicted=values, **pair
-        )
-        for place, row in enumerate(self.shown):
-            self.members[place, number] = values[row]
-        self.shelf.put(number, values)
-
-    def arrays(self, level: float) -> Arrays:
-        """All of the windows, by what they are."""
-        reduced = reduce_members(self.shelf, self.lost, level)
-        out: Arrays = {key: reduced[:, row] for row, key in enumerate(STATISTICS)}
-        out["lost"] = self.lost.T
-        out |= {key: np.swapaxes(each, 0, 1) for key, each in self.judged.items()}
-        if self.shown:
-            out["members"] = self.members
-            out["shown"] = np.array([self.windows.numbers[row] for row in self.shown])
-        return out
-
-
-@contextmanager
-def _table(
-    plan: Plan, unit: Unit, test: str, windows: Windows, spread: FloatArray, members: int
-) -> Iterator[_Table]:
-    count, *size = windows.measured.shape
-    rows = [k for k, n in enumerate(windows.numbers) if plan.is_shown(unit.training, test, n)]
-    with open_shelf(Layout.in_pieces(count, members, *size)) as shelf:
-        yield _Table(
-            windows=windows,
-            spread=spread,
-            shown={row: place for place, row in enumerate(rows)},
-            shelf=shelf,
-            lost=np.empty((members, count), dtype=np.int64),
-            judged={
-                key: np.empty((members, count, size[1]), dtype=np.float32)
-                for key in ("member_nrmse", "member_nammae")
-            },
-            members=np.empty((len(rows), members, *size), dtype=np.float32),
-        )
-
-
-def _eigenvalues(fitted: HankelDMDcModel | HankelEnsemble) -> npt.NDArray[np.complex128]:
+def _eigenvalues(fitted: Fitted) -> npt.NDArray[np.complex128]:
     """Eigenvalues of a model, or of each member, in descending order of modulus."""
-    if isinstance(fitted, HankelDMDcModel):
-        matrices: Iterator[FloatArray] = iter([fitted.A])
-    else:
-        matrices = (fitted.member(k).A for k in range(fitted.n_members))
-    values = [np.linalg.eigvals(matrix) for matrix in matrices]
+    values = [np.linalg.eigvals(matrix) for matrix in fitted.system_matrices()]
     padded = np.full((len(values), max(each.size for each in values)), complex(np.nan, np.nan))
     for row, each in enumerate(values):
         padded[row, : each.size] = each[np.argsort(-np.abs(each), kind="stable")]
@@ -391,8 +274,7 @@ def _collect_test(
     study: Study, plan: Plan, runs: Runs, found: Mapping[Unit, Arrays], test: str
 ) -> xr.Dataset:
     windows, training = plan.tests[test], plan.training
-    everything = tuple(range(len(windows)))
-    measured = window_arrays(plan, runs, windows, everything).measured
+    measured = measured_windows(plan, runs, windows, range(len(windows)))
     judged = np.array([[each.may_test(w.run) for w in windows] for each in training])
     moments = np.stack([training_moments(plan, runs, each) for each in training])
     dims = ("window", "time", "channel")
@@ -414,7 +296,7 @@ def _collect_test(
         variables,
         coords={
             "training": [each.name for each in training],
-            "window": list(everything),
+            "window": list(range(len(windows))),
             "time": ("time", plan.dt * np.arange(1, steps + 1), {"units": "s"}),
             "channel": list(plan.states),
         },

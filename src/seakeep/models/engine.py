@@ -1,0 +1,582 @@
+"""Free runs of many members over many windows: the one engine of models, ensembles and studies.
+
+:func:`read_windows` reads what forecasts from several starts in several runs need, the inputs of
+each run once. A model's ``free_runs(windows, members)`` gives arrays; :func:`run_members` hands
+members to an executor, and :func:`group_series` collects them, in a file where they are many.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.arrays import FloatArray, IntArray
+from seakeep.core.rollout import rollout
+from seakeep.errors import RequestError
+from seakeep.models import labelled
+from seakeep.models.executor import Progress, in_order
+from seakeep.models.inputs import Measured
+from seakeep.models.interface import Drive, Scale, Signature, Span
+from seakeep.signals.time_axis import instant_text
+
+__all__ = [
+    "Dynamics",
+    "Windows",
+    "array_windows",
+    "first_lost",
+    "group_series",
+    "linear_runs",
+    "member_series",
+    "read_groups",
+    "read_windows",
+    "run_members",
+]
+
+GROWTH = 10.0
+"""A free run is lost where a state is this many times as far from the training mean as training,
+or the history of the forecast, ever was, in waves as high as those of training.
+
+A linear model answers waves twice as high by twice the motion, so the limit grows with the ratio of
+the highest deviation of the input to that in training. What is left for the factor are transients
+and resonances that training did not show: a tenfold answer is no forecast of a vessel any more, and
+members that go on from there would make up the mean of an ensemble."""
+PIECE = 2**18
+"""Numbers that are looked at together, so that a long run takes little beside its result."""
+SIDE_BY_SIDE = 25
+"""Members that run side by side where they drive their own input; the same for any executor."""
+HELD = 32 * 2**20
+"""Bytes of member series that are held in memory; more is put into a temporary file."""
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Measured samples that forecasts read, and the instants they give, window by window.
+
+    Parameters
+    ----------
+    places : tuple of (str, float)
+        Run and start of each window, s.
+    steps : int
+        Instants forecast from each start.
+    time : tuple of Variable, each of shape (steps,)
+        These instants.
+    histories : ndarray, shape (window, s + 1, N)
+        Measured states up to each start, physical units.
+    delayed : ndarray, shape (window, z + steps, n)
+        Delayed regressors that drive these steps; (window, z + 1, n), up to the start alone, where
+        states that are predicted drive them.
+    direct : ndarray, shape (window, steps, m)
+        Direct regressors from the start on; likewise.
+    look_ahead : tuple of float
+        Seconds of input after the instant a step starts from that drive it.
+    notes : dict
+        What a forecast's attributes report of the input map, for the first run.
+    drives : tuple of Drive
+        One per window where predicted states drive the input, else none; runs share theirs.
+    samples : ndarray of int, shape (window,)
+        Sample of each start in its run.
+    """
+
+    places: tuple[tuple[str, float], ...]
+    steps: int
+    time: tuple[xr.Variable, ...]
+    histories: FloatArray
+    delayed: FloatArray
+    direct: FloatArray
+    look_ahead: tuple[float, ...] = ()
+    notes: Mapping[str, str | float] = field(default_factory=dict)
+    drives: tuple[Drive, ...] = ()
+    samples: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+
+    def __len__(self) -> int:
+        return len(self.histories)
+
+
+@dataclass(frozen=True, eq=False)
+class Dynamics:
+    """What a free run needs of a linear model, or of a member.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (N(s+1) or N, N(s+1) + n(z+1) + m)
+        Regressed rows of [Â B̂], on standardised deviations.
+    state_delays, input_delays : int
+        s and z.
+    state_scale, input_scale, direct_scale : Scale
+        Moments of the states and of both kinds of regressors.
+    """
+
+    coefficients: FloatArray
+    state_delays: int
+    input_delays: int
+    state_scale: Scale
+    input_scale: Scale
+    direct_scale: Scale
+
+    @property
+    def matrices(self) -> tuple[FloatArray, FloatArray]:
+        """Regressed rows of Â and B̂."""
+        size = len(self.state_scale.mean) * (self.state_delays + 1)
+        return self.coefficients[:, :size], self.coefficients[:, size:]
+
+
+class Runs(Protocol):
+    """What makes free runs: a model, an ensemble, or members that are held."""
+
+    @property
+    def signature(self) -> Signature: ...
+    @property
+    def n_members(self) -> int: ...
+    def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
+        """Free runs of members over groups of windows, each (member, window, steps, N).
+
+        Physical units, NaN from where a run is lost.
+        """
+        ...
+
+
+Place = tuple[str, float]
+"""Name of a run, and the instant of the last measured state, s."""
+
+
+def read_windows(
+    signature: Signature,
+    runs: Mapping[str, xr.Dataset],
+    places: Sequence[Place],
+    steps: int | None,
+) -> Windows:
+    """Read what forecasts from several starts need; arguments and errors as ``forecast``."""
+    return read_groups(signature, runs, [(places, steps)])[0]
+
+
+def read_groups(
+    signature: Signature,
+    runs: Mapping[str, xr.Dataset],
+    groups: Sequence[tuple[Sequence[Place], int | None]],
+) -> list[Windows]:
+    """Windows of several lengths; each probe is carried once per run for all of them."""
+    opened: dict[str, _Opened] = {}
+    spans: list[list[Span]] = []
+    for places, steps in groups:
+        if not places:
+            raise RequestError("starts is empty: name at least one instant to forecast from.")
+        if steps is None and len(places) > 1:
+            raise RequestError(
+                f"steps is None, which is the end of the run, at another distance from each of the "
+                f"{len(places)} starts. Give the number of instants to forecast from all of them."
+            )
+        mine = []
+        for name, start in places:
+            if name not in opened:
+                opened[name] = _Opened.of(signature, runs[name], name)
+            mine.append(opened[name].span(signature, start, steps))
+        spans.append(mine)
+    wanted: dict[str, list[Span]] = {name: [] for name in opened}
+    for (places, _), each in zip(groups, spans, strict=True):
+        for (name, _), span in zip(places, each, strict=True):
+            wanted[name].append(span)
+    drives = {name: each.drive(signature, wanted[name]) for name, each in opened.items()}
+    return [
+        _windows(signature, [(opened[name], drives[name]) for name, _ in places], each)
+        for (places, _), each in zip(groups, spans, strict=True)
+    ]
+
+
+def _windows(
+    signature: Signature, sources: Sequence[tuple[_Opened, Drive]], spans: Sequence[Span]
+) -> Windows:
+    """Windows of one length from their runs."""
+    input_map = signature.input_map
+    is_closed = input_map.reads_states == "predicted"
+    rows = [
+        drive.rows(
+            span.first,
+            span.known + 1 if is_closed or not signature.inputs else span.stop,
+            span.known if is_closed else None,
+        )
+        for (_, drive), span in zip(sources, spans, strict=True)
+    ]
+    runs = [run for run, _ in sources]
+    return Windows(
+        places=tuple(
+            (run.name, float(run.time[span.known])) for run, span in zip(runs, spans, strict=True)
+        ),
+        steps=spans[0].stop - spans[0].known,
+        time=tuple(run.instants(signature.dt, span) for run, span in zip(runs, spans, strict=True)),
+        histories=np.stack(
+            [run.history(signature, span) for run, span in zip(runs, spans, strict=True)]
+        ),
+        delayed=np.stack([each.delayed for each in rows]),
+        direct=np.stack([each.direct[signature.input_delays :] for each in rows]),
+        look_ahead=tuple(input_map.look_ahead(run.run, signature.dt) for run in runs),
+        notes=input_map.notes(runs[0].run),
+        drives=tuple(drive for _, drive in sources) if is_closed else (),
+        samples=np.array([span.known for span in spans], dtype=np.intp),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Opened:
+    """A run that was checked."""
+
+    run: xr.Dataset
+    name: str
+    time: FloatArray
+
+    @classmethod
+    def of(cls, signature: Signature, run: xr.Dataset, key: str) -> _Opened:
+        name = labelled.run_name(run, key)
+        labelled.check_run(run, name)
+        labelled.check_step(run, name, signature.dt)
+        labelled.check_units(run, signature.state_labels + signature.input_labels, name)
+        return cls(run, name, np.asarray(run.variables["time"].values, dtype=float))
+
+    def span(self, signature: Signature, start: float, steps: int | None) -> Span:
+        """Samples of input that a forecast reads, before the map."""
+        time, dt, name = self.time, signature.dt, self.name
+        at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
+        needed, lead = signature.history_samples, signature.lead_samples
+
+        def told(instant: float) -> str:
+            return instant_text(instant, dt)
+
+        if at + 1 < needed:
+            near = abs(float(start) - time[at]) <= 1e-6 * dt
+            snapped = "" if near else f" (nearest sample {told(time[at])} s)"
+            raise RequestError(
+                f"start = {told(float(start))} s{snapped} leaves {at + 1} samples of history in "
+                f"{name} and the model needs {needed} (the start included): {needed - at - 1} are "
+                f"missing. Start at {told(time[0] + (needed - 1) * dt)} s or later."
+            )
+        available = time.size - 1 - at
+        # The last input needed is the one an instant before the last state, and the lead after it.
+        most = available + 1 - lead if signature.inputs else None
+        count = (available - max(lead - 1, 0)) if steps is None else steps
+        if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
+            raise RequestError(
+                f"steps must be a positive integer; received {steps!r}"
+                f"{' at the end of the run' if steps is None else ''}. It counts the instants "
+                "after start."
+            )
+        count = int(count)
+        if most is not None and count > most:
+            ahead = f", of which the model's lead takes {lead}" if lead else ""
+            raise RequestError(
+                f"{count} steps from {told(time[at])} s need the input up to "
+                f"{told(time[at] + (count - 1 + lead) * dt)} s and {name} ends at "
+                f"{told(time[-1])} s{ahead}. At most {max(most, 0)} steps can be forecast from "
+                "there."
+            )
+        return Span(at - signature.input_delays, at, at + count)
+
+    def drive(self, signature: Signature, spans: Sequence[Span]) -> Drive:
+        """Regressors of the run, made once for all windows."""
+        read = [signature.input_map.reads(span) for span in spans]
+        first = min(each.first for each in read)
+        stop = max(each.stop for each in read) if signature.inputs else first
+        names = signature.inputs
+        values = labelled.channel_matrix(self.run, names, self.name, slice(first, stop))
+        for each in read:
+            wanted = values[each.first - first : max(each.stop - first, 0)]
+            labelled.check_finite(wanted, names, self.name, each.first, self.time)
+        return signature.input_map.wrap(Measured(values, first), self.run, spans)
+
+    def history(self, signature: Signature, span: Span) -> FloatArray:
+        """States up to the start."""
+        first = span.known - signature.state_delays
+        samples = slice(first, span.known + 1)
+        states = labelled.channel_matrix(self.run, signature.states, self.name, samples)
+        labelled.check_finite(states, signature.states, self.name, first, self.time)
+        return states
+
+    def instants(self, dt: float, span: Span) -> xr.Variable:
+        """Instants that are forecast; the last ones may lie beyond the record."""
+        inside = self.time[span.known + 1 : span.stop + 1]
+        beyond = self.time[-1] + dt * np.arange(1, span.stop - span.known - inside.size + 1)
+        attrs = dict(self.run.variables["time"].attrs) or {"units": "s", "long_name": "time"}
+        return xr.Variable(("time",), np.concatenate([inside, beyond]), attrs)
+
+
+def array_windows(
+    signature: Signature, histories: FloatArray, inputs: FloatArray, steps: int
+) -> Windows:
+    """Windows of plain arrays, inputs aligned already.
+
+    Parameters
+    ----------
+    signature : Signature
+        Of what forecasts.
+    histories : ndarray, shape (window, history, N)
+        States up to each start.
+    inputs : ndarray, shape (window, history + steps − 1 + lead, Q)
+        Inputs from the same sample on; the history of at least z + 1 samples.
+    steps : int
+        Instants forecast.
+
+    Returns
+    -------
+    Windows
+        Their times count from the start.
+    """
+    history = inputs.shape[1] - (steps - 1) - signature.lead_samples
+    span = Span(history - 1 - signature.input_delays, history - 1, history - 1 + steps)
+    rows = [
+        signature.input_map.wrap(Measured(each), None, [span]).rows(span.first, span.stop)
+        for each in inputs
+    ]
+    time = xr.Variable(("time",), signature.dt * np.arange(1, steps + 1))
+    return Windows(
+        places=(("these arrays", 0.0),) * len(histories),
+        steps=steps,
+        time=(time,) * len(histories),
+        histories=histories,
+        delayed=np.stack([each.delayed for each in rows]),
+        direct=np.stack([each.direct[signature.input_delays :] for each in rows]),
+    )
+
+
+def linear_runs(members: Sequence[Dynamics], groups: Sequence[Windows]) -> list[FloatArray]:
+    """Free runs of linear members, each of shape (member, window, steps, N), physical units."""
+    out = []
+    for windows in groups:
+        if windows.drives:
+            out.append(_closed_runs(members, windows))
+            continue
+        found = [_open_runs(member, windows) for member in members]
+        out.append(found[0][None] if len(found) == 1 else np.stack(found))
+    return out
+
+
+def _open_runs(member: Dynamics, windows: Windows) -> FloatArray:
+    """Free runs over all windows as products of matrices."""
+    histories, steps = windows.histories, windows.steps
+    driving = windows.delayed[:, windows.delayed.shape[1] - member.input_delays - steps :]
+    if not driving.shape[2]:
+        driving = np.zeros((len(driving), steps, 0))
+    a, b = member.matrices
+    more = {}
+    if windows.direct.shape[2]:
+        more = {"direct": member.direct_scale.deviations(windows.direct)}
+    deviations = rollout(
+        a,
+        b,
+        member.state_scale.deviations(histories[:, -1 - member.state_delays :]),
+        member.input_scale.deviations(driving),
+        n_states=histories.shape[2],
+        **more,
+    )
+    with np.errstate(over="ignore"):  # a run that is lost is cut just below
+        values = member.state_scale.physical(deviations, out=deviations)
+    excess = np.maximum(
+        _excess(member.input_scale, driving), _excess(member.direct_scale, windows.direct)
+    )
+    return _cut_lost(values, member.state_scale, histories, excess)
+
+
+def _closed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
+    """Free runs that drive their own input: all members and windows side by side, step by step."""
+    count, steps, N = len(windows), windows.steps, windows.histories.shape[2]
+    out = np.empty((len(members), count, steps, N))
+    x, u = [], []
+    for member in members:
+        history = member.state_scale.deviations(windows.histories[:, -1 - member.state_delays :])
+        x.append(history[:, ::-1].reshape(count, -1))
+        inputs = member.input_scale.deviations(windows.delayed[:, -1 - member.input_delays :])
+        u.append(inputs[:, ::-1].reshape(count, -1))
+    direct = np.repeat(windows.direct[:, None, 0], len(members), axis=1)
+    excess = np.stack(
+        [
+            _excess(each.input_scale, windows.delayed[:, -1 - each.input_delays :])
+            for each in members
+        ]
+    )
+    groups: dict[int, tuple[Drive, list[int]]] = {}
+    for row, drive in enumerate(windows.drives):
+        groups.setdefault(id(drive), (drive, []))[1].append(row)
+    width = windows.delayed.shape[2]
+    for step in range(steps):
+        for number, member in enumerate(members):
+            x[number] = _stepped(member, x[number], u[number], direct[:, number])
+            out[number, :, step] = member.state_scale.physical(x[number][:, :N])
+        if step == steps - 1:
+            break
+        for drive, rows in groups.values():
+            states = np.nan_to_num(out[:, rows, step].swapaxes(0, 1))
+            found = drive.at(windows.samples[rows] + step + 1, states)
+            direct[rows] = found.direct
+            for number, member in enumerate(members):
+                newest = member.input_scale.deviations(found.delayed[:, number])
+                u[number][rows] = np.hstack([newest, u[number][rows][:, :-width]])
+                beyond = _excess(member.input_scale, found.delayed[:, number, None])
+                excess[number, rows] = np.maximum(excess[number, rows], beyond)
+    for number, member in enumerate(members):
+        _cut_lost(out[number], member.state_scale, windows.histories, excess[number])
+    return out
+
+
+def _stepped(member: Dynamics, x: FloatArray, u: FloatArray, direct: FloatArray) -> FloatArray:
+    """Extended states (window, N(s+1)) one step later."""
+    a, b = member.matrices
+    if direct.shape[1]:
+        u = np.hstack([u, member.direct_scale.deviations(direct)])
+    with np.errstate(over="ignore", invalid="ignore"):  # a lost run is cut by the caller
+        reached: FloatArray = x @ a.T + u @ b.T
+    is_exact = len(a) < a.shape[1]
+    return np.hstack([reached, x[:, : -len(a)]]) if is_exact else reached
+
+
+def _excess(scale: Scale, values: FloatArray) -> FloatArray:
+    """How far inputs (window, time, channel) deviate, in the largest deviations of training."""
+    if not values.size:
+        return np.zeros(len(values))
+    reach = np.where(scale.reach > 0, scale.reach, np.inf)
+    farthest = np.maximum(values.max(axis=1) - scale.centre, scale.centre - values.min(axis=1))
+    out: FloatArray = (farthest / reach).max(axis=1)
+    return out
+
+
+def _cut_lost(
+    values: FloatArray, scale: Scale, histories: FloatArray, excess: FloatArray
+) -> FloatArray:
+    """NaN from the instant on at which a state is lost; `values` (window, steps, N) are changed."""
+    start = np.abs(histories - scale.centre).max(axis=1, initial=0.0)
+    reach = np.maximum(np.where(scale.reach > 0, scale.reach, np.inf), start)
+    limit = GROWTH * reach * np.maximum(excess, 1.0)[:, None]
+    length = max(1, PIECE // max(1, values[:, 0].size))
+    before = np.zeros((len(values), 1), dtype=bool)
+    for first in range(0, values.shape[1], length):
+        piece = values[:, first : first + length]
+        with np.errstate(invalid="ignore", over="ignore"):
+            kept = np.abs(piece - scale.centre) <= limit[:, None]
+        lost = ~np.all(kept, axis=-1)
+        lost[:, :1] |= before
+        if np.any(lost):
+            piece[np.logical_or.accumulate(lost, axis=-1)] = np.nan
+            before = np.any(lost, axis=-1, keepdims=True)
+    return values
+
+
+def run_members(
+    model: Runs,
+    groups: Sequence[Windows],
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> Iterator[list[FloatArray]]:
+    """Free runs member by member: of each group an array of shape (window, steps, N)."""
+    size = SIDE_BY_SIDE if any(windows.drives for windows in groups) else 1
+    members = list(range(model.n_members))
+    blocks = [members[first : first + size] for first in range(0, len(members), size)]
+    done = 0
+    for found in in_order(_run_block, (model, groups), blocks, executor):
+        for number in range(len(found[0])):
+            done += 1
+            if progress is not None:
+                progress(done, len(members), f"member {done}")
+            yield [each[number] for each in found]
+
+
+def _run_block(data: tuple[Runs, Sequence[Windows]], members: Sequence[int]) -> list[FloatArray]:
+    model, groups = data
+    return model.free_runs(groups, members)
+
+
+Series = tuple[FloatArray, npt.NDArray[np.int64]]
+
+
+@contextmanager
+def member_series(
+    model: Runs,
+    windows: Windows,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Series]:
+    """Free runs of all members, in a temporary file where they take more than ``HELD`` bytes.
+
+    Parameters
+    ----------
+    model : Runs
+        A model, an ensemble, or members that are held.
+    windows : Windows
+        From :func:`read_windows`.
+    executor, progress
+        As in :meth:`HankelEnsemble.forecast`.
+
+    Yields
+    ------
+    series : ndarray, shape (member, window, steps, N)
+        States in physical units; NaN from where a window is lost on. Gone when the block is left.
+    lost : ndarray of int, shape (member, window)
+        First instant lost, or −1.
+
+    Raises
+    ------
+    RequestError
+        If the temporary folder has no room.
+    """
+    with group_series(model, [windows], executor, progress) as found:
+        yield found[0]
+
+
+@contextmanager
+def group_series(
+    model: Runs,
+    groups: Sequence[Windows],
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> Iterator[list[Series]]:
+    """:func:`member_series` of several groups of windows; each member is identified once."""
+    count, channels = model.n_members, len(model.signature.states)
+    with ExitStack() as stack:
+        found: list[Series] = [
+            (
+                stack.enter_context(_room((count, len(each), each.steps, channels))),
+                np.empty((count, len(each)), dtype=np.int64),
+            )
+            for each in groups
+        ]
+        for number, values in enumerate(run_members(model, groups, executor, progress)):
+            for (series, lost), each in zip(found, values, strict=True):
+                series[number] = each
+                lost[number] = first_lost(each)
+        yield found
+
+
+@contextmanager
+def _room(shape: tuple[int, ...]) -> Iterator[FloatArray]:
+    """Array for member series, in a file without a name where it is large."""
+    size = 8 * math.prod(shape)
+    if size <= HELD:
+        yield np.empty(shape)
+        return
+    with ExitStack() as stack:
+        try:
+            file = stack.enter_context(tempfile.TemporaryFile(prefix="seakeep-"))
+            if hasattr(os, "posix_fallocate"):  # a full disk is reported now, not by a signal
+                os.posix_fallocate(file.fileno(), 0, size)
+        except OSError as error:
+            raise RequestError(
+                f"cannot keep {size / 2**20:.0f} MiB of members in the temporary folder "
+                f"{tempfile.gettempdir()}: {error.strerror or error}. Free space there, name a "
+                "folder on another disk in the environment variable TMPDIR, or ask for fewer "
+                "steps, windows or members at a time."
+            ) from error
+        yield np.memmap(file, dtype=np.float64, mode="w+", shape=shape)
+
+
+def first_lost(values: FloatArray) -> npt.NDArray[np.int64]:
+    """First instant at which a channel is NaN, or −1, of values (…, steps, N)."""
+    if not np.isnan(values.sum()):
+        return np.full(values.shape[:-2], -1)
+    gone: npt.NDArray[np.bool_] = np.isnan(values.sum(axis=-1))
+    first = np.argmax(gone, axis=-1)
+    return np.where(np.take_along_axis(gone, first[..., None], axis=-1)[..., 0], first, -1)

@@ -1,0 +1,342 @@
+"""Forecasts as Datasets: names, units, status; and the door for plain arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.arrays import FloatArray, as_real
+from seakeep.errors import RequestError
+from seakeep.models import engine
+from seakeep.models.engine import Windows, first_lost
+from seakeep.models.executor import Progress
+from seakeep.models.interface import Signature
+from seakeep.models.labelled import ChannelLabel, run_name
+from seakeep.signals.time_axis import fixed, instant_text
+
+__all__ = [
+    "SingleModel",
+    "check_arrays",
+    "label_channels",
+    "one_run",
+    "status_at_clock",
+    "status_text",
+    "statuses",
+    "verdict",
+    "window_coords",
+]
+
+DIVERGED_AT = "diverged at t = "
+"""How the status of a free run that was given up starts."""
+
+
+class SingleModel:
+    """What every model of one member offers; it brings a signature and ``free_runs``."""
+
+    kind: ClassVar[str]
+    n_members: ClassVar[int] = 1
+    signature: Signature
+
+    def free_runs(
+        self, groups: Sequence[Windows], members: Sequence[int] = (0,)
+    ) -> list[FloatArray]:
+        """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
+        raise NotImplementedError
+
+    @property
+    def dt(self) -> float:
+        """Time step, s."""
+        return self.signature.dt
+
+    @property
+    def states(self) -> list[str]:
+        """Names of the states, in the order of the model."""
+        return self.signature.states
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of the measured inputs, in the order of the model."""
+        return self.signature.inputs
+
+    @property
+    def regressors(self) -> list[str]:
+        """Names of what the inputs become: the delayed regressors, then the direct ones."""
+        return self.signature.regressors
+
+    @property
+    def state_labels(self) -> tuple[ChannelLabel, ...]:
+        """Names, units and long names of the states."""
+        return self.signature.state_labels
+
+    @property
+    def input_labels(self) -> tuple[ChannelLabel, ...]:
+        """Names, units and long names of the measured inputs."""
+        return self.signature.input_labels
+
+    @property
+    def state_delays(self) -> int:
+        """Number of delayed copies of the states, s."""
+        return self.signature.state_delays
+
+    @property
+    def input_delays(self) -> int:
+        """Number of delayed copies of the inputs, z."""
+        return self.signature.input_delays
+
+    @property
+    def history_samples(self) -> int:
+        """Samples a forecast needs up to its start, that one included: max(s, z) + 1."""
+        return self.signature.history_samples
+
+    @property
+    def lead_samples(self) -> int:
+        """Samples of input after the one a step starts from that drive the step."""
+        return self.signature.lead_samples
+
+    def read_windows(
+        self,
+        runs: Mapping[str, xr.Dataset],
+        places: Sequence[tuple[str, float]],
+        steps: int | None,
+    ) -> Windows:
+        """What forecasts from several starts, in several runs, read: (run, start in s) each."""
+        return engine.read_windows(self.signature, runs, places, steps)
+
+    def forecast(self, run: xr.Dataset, start: float, steps: int | None = None) -> xr.Dataset:
+        """Free run driven by the measured input of `run`.
+
+        States are read up to `start` and not after; inputs up to the instant before the last, and
+        as much later as the model looks ahead (``attrs["reads_input_until"]``). The one exception
+        is an alignment with ``surge="measured"``: it reads the surge after `start` too, and writes
+        ``conditional_on`` into the result's attributes.
+
+        Parameters
+        ----------
+        run : Dataset
+            Channels of the model over ``time``; the order does not matter, further ones neither.
+        start : float
+            Instant of the last measured state, s; the nearest sample is taken. The
+            ``history_samples`` samples up to it are needed.
+        steps : int, optional
+            Number of instants forecast; by default to the end of the run.
+
+        Returns
+        -------
+        Dataset
+            States at the `steps` instants after `start`, with units; ``attrs["start"]`` is the
+            instant taken, ``attrs["status"]`` "ok" or from when on the forecast diverged (NaN
+            from there), ``attrs["reads_input_until"]`` how long after the last instant the last
+            input that was read lies, s: negative where it lies before.
+
+        Raises
+        ------
+        RequestError
+            If a channel is missing, or `start` and `steps` do not fit the run.
+        DataError
+            If the step or the units are not the model's, or needed samples are missing.
+        """
+        windows = self.read_windows(*one_run(run, [start]), steps)
+        values = self.free_runs([windows])[0][0]
+        signature = self.signature
+        variables = label_channels(signature, values[0], ("time",))
+        lost = first_lost(values)
+        status = status_text(int(lost[0]), windows.time[0].values, signature.dt)
+        attrs = {**forecast_notes(signature, windows), "start": windows.places[0][1]}
+        # The instants stand among the variables: given as coords, xarray would merge twice.
+        return xr.Dataset({"time": windows.time[0], **variables}, attrs=attrs | {"status": status})
+
+    def forecast_windows(
+        self,
+        run: xr.Dataset,
+        starts: Sequence[float],
+        steps: int,
+        *,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+    ) -> xr.Dataset:
+        """Free runs from several starts, side by side: much faster than one after the other.
+
+        Parameters
+        ----------
+        run, steps
+            As in :meth:`forecast`; `steps` holds for all.
+        starts : sequence of float
+            Instants of the last measured state, s.
+        executor, progress
+            As in :meth:`HankelEnsemble.forecast`; one model has no work to share.
+
+        Returns
+        -------
+        Dataset
+            States with dimensions (window, lead), ``lead`` in s after each ``start`` (over
+            ``window``), and ``status`` over ``window``.
+
+        Raises
+        ------
+        RequestError, DataError
+            As :meth:`forecast`, or if there is no start.
+        """
+        windows = self.read_windows(*one_run(run, starts), steps)
+        ((values,),) = engine.run_members(self, [windows], executor, progress)
+        signature = self.signature
+        variables = label_channels(signature, values, ("window", "lead"))
+        status = [
+            status_text(int(at), time.values, signature.dt)
+            for at, time in zip(first_lost(values), windows.time, strict=True)
+        ]
+        variables["status"] = xr.Variable(("window",), status)
+        return xr.Dataset(
+            variables,
+            coords=window_coords(windows, signature.dt),
+            attrs=forecast_notes(signature, windows),
+        )
+
+
+def one_run(
+    run: xr.Dataset, starts: Sequence[float]
+) -> tuple[dict[str, xr.Dataset], list[tuple[str, float]]]:
+    """A run and the places in it, as :func:`engine.read_windows` takes them."""
+    if np.ndim(starts) == 0:
+        raise RequestError(
+            f"starts must be a list of instants; received {starts!r}. Write [{starts}]."
+        )
+    name = run_name(run, "the run")
+    return {name: run}, [(name, start) for start in starts]
+
+
+def forecast_notes(signature: Signature, windows: Windows) -> dict[str, Any]:
+    """Attributes of a forecast: its run, what its input map reads, and how far ahead."""
+    ahead = max(windows.look_ahead) - signature.dt
+    notes = {"reads_input_until": ahead} if signature.inputs else {}
+    return {"run": windows.places[0][0], **windows.notes, **notes}
+
+
+def label_channels(
+    signature: Signature, values: FloatArray, dims: tuple[str, ...]
+) -> dict[str, xr.Variable]:
+    """Variables of values of shape (…, N), with units and spread in training."""
+    return {
+        label.name: xr.Variable(
+            dims,
+            values[..., column],
+            {
+                "units": label.units,
+                "long_name": label.long_name,
+                "training_std": float(signature.state_scale.spread[column]),
+            },
+        )
+        for column, label in enumerate(signature.state_labels)
+    }
+
+
+def window_coords(windows: Windows, dt: float) -> dict[str, xr.Variable]:
+    """Start of each of several windows, and the time after it."""
+    lead = dt * np.arange(1, windows.steps + 1)
+    starts = np.array([start for _, start in windows.places])
+    return {
+        "start": xr.Variable(("window",), starts, {"units": "s", "long_name": "start"}),
+        "lead": xr.Variable(("lead",), lead, {"units": "s", "long_name": "time after start"}),
+    }
+
+
+def status_text(lost: int, time: FloatArray, dt: float) -> str:
+    """What ``status`` says of a free run whose first lost instant is `lost`, or −1 for none."""
+    return "ok" if lost < 0 else f"{DIVERGED_AT}{instant_text(time[lost], dt)} s"
+
+
+def status_at_clock(status: str, clock: float) -> str:
+    """The same status where time runs by a factor `clock`, as at full scale."""
+    if not status.startswith(DIVERGED_AT):
+        return status
+    instant = status.removeprefix(DIVERGED_AT).removesuffix(" s")
+    decimals = max(3, len(instant.partition(".")[2]))
+    return f"{DIVERGED_AT}{fixed(clock * float(instant), decimals)} s"
+
+
+def statuses(lost: npt.NDArray[np.int64], time: FloatArray, dt: float) -> npt.NDArray[np.str_]:
+    """Status of each member from its first lost instant, or −1."""
+    return np.array([status_text(int(at), time, dt) for at in lost], dtype=str)
+
+
+def verdict(lost: npt.NDArray[np.int64]) -> dict[str, Any]:
+    """Attributes that count the members that were lost."""
+    diverged = int(np.count_nonzero(lost >= 0))
+    status = f"{diverged} of {len(lost)} members diverged" if diverged else "ok"
+    return {"status": status, "diverged": diverged}
+
+
+def check_arrays(
+    signature: Signature,
+    x_history: npt.ArrayLike,
+    u_history: npt.ArrayLike,
+    u_future: npt.ArrayLike,
+    steps: int,
+    ahead: str = "refuse",
+) -> Windows:
+    """Windows of plain arrays; arguments as ``forecast_arrays``.
+
+    Columns that have names (a pandas DataFrame, a DataArray) are taken by name.
+    """
+    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
+        raise RequestError(f"steps must be a positive integer; received {steps!r}.")
+    if ahead != "refuse":
+        raise RequestError(f"ahead must be 'refuse'; received {ahead!r}.")
+    states, inputs, count = signature.states, signature.inputs, int(steps)
+    s = signature.state_delays
+    z = signature.input_delays + signature.input_map.extra_history
+    x = _finite("x_history", _rows("x_history", x_history, s + 1, states, "s + 1")[-s - 1 :])
+    if not inputs:
+        return engine.array_windows(signature, x[None], np.zeros((1, z + count, 0)), count)
+    u = _finite("u_history", _rows("u_history", u_history, z + 1, inputs, "z + 1")[-z - 1 :])
+    future = np.zeros((0, len(inputs))) if np.size(u_future) == 0 else u_future
+    needed = count - 1 + signature.lead_samples
+    meaning = "steps − 1 + lead_samples" if signature.lead_samples else "steps − 1"
+    after = _rows("u_future", future, needed, inputs, meaning)
+    driving = np.concatenate([u, _finite("u_future", after[:needed])])
+    return engine.array_windows(signature, x[None], driving[None], count)
+
+
+def _rows(
+    name: str, value: npt.ArrayLike, least: int, names: Sequence[str], meaning: str
+) -> FloatArray:
+    array = as_real(_by_name(name, value, names), name)
+    channels = len(names)
+    if array.ndim != 2 or array.shape[1] != channels or array.shape[0] < least:
+        turned = array.ndim == 2 and array.shape[0] == channels and array.shape[1] >= least
+        raise RequestError(
+            f"{name} has shape {array.shape}; expected (time, channel) with at least {least} rows "
+            f"({meaning}) and {channels} columns.{' It looks transposed.' if turned else ''}"
+        )
+    return array
+
+
+def _by_name(name: str, value: npt.ArrayLike, names: Sequence[str]) -> Any:
+    """Columns in the order of the model, where they have names."""
+    table: Any = value
+    columns = getattr(table, "columns", None)
+    if isinstance(table, xr.DataArray) and table.ndim == 2 and table.dims[1] in table.coords:
+        columns = table.indexes[table.dims[1]]
+    if columns is None or not all(isinstance(each, str) for each in columns):
+        return value
+    missing = [each for each in names if each not in list(columns)]
+    if missing:
+        raise RequestError(
+            f"{name} has no column '{missing[0]}'; its columns: {', '.join(columns)}."
+        )
+    if isinstance(table, xr.DataArray):
+        return table.sel({table.dims[1]: list(names)}).values
+    return table[list(names)].to_numpy()
+
+
+def _finite(name: str, needed: FloatArray) -> FloatArray:
+    if not np.all(np.isfinite(needed)):
+        raise RequestError(
+            f"{name} holds {int(np.sum(~np.isfinite(needed)))} values that are not finite in the "
+            f"{len(needed)} rows needed. Fill the gap first."
+        )
+    return needed

@@ -1,0 +1,406 @@
+"""The contracts of this room: what is fitted, what forecasts, and what drives a forecast.
+
+Helpers take a :class:`Signature`, never a whole model. Whoever adds a model writes a ``Spec`` and a
+``Model`` and adds one line to :data:`seakeep.models.registry.KINDS`; whoever adds an input map
+writes an ``InputMap`` and adds one line to :data:`seakeep.models.inputs.MAPS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
+
+import numpy as np
+import xarray as xr
+
+from seakeep.arrays import FloatArray, IntArray
+from seakeep.models.labelled import ChannelLabel, Runs, Stop
+
+__all__ = [
+    "Drive",
+    "Fittable",
+    "InputMap",
+    "Json",
+    "Model",
+    "Needs",
+    "Regressors",
+    "Scale",
+    "Signature",
+    "Span",
+    "Spec",
+    "plain",
+]
+
+Json = dict[str, Any]
+"""Settings as JSON values."""
+
+
+def plain(value: Any) -> Any:
+    """Return JSON values with numbers of numpy and tuples in them as plain ones."""
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Mapping):
+        return {str(key): plain(each) for key, each in value.items()}
+    return [plain(each) for each in value] if isinstance(value, list | tuple) else value
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """Moments of channels over the training windows.
+
+    Parameters
+    ----------
+    mean, std : ndarray, shape (channel,)
+        What is subtracted, and what is divided by (0 and 1 without standardisation).
+    spread : ndarray, shape (channel,)
+        Standard deviation over the training windows, with standardisation or without.
+    centre, reach : ndarray, shape (channel,)
+        Mean over the training windows, and the largest deviation from it.
+    """
+
+    mean: FloatArray
+    std: FloatArray
+    spread: FloatArray
+    centre: FloatArray
+    reach: FloatArray
+
+    def __post_init__(self) -> None:
+        for array in (self.mean, self.std, self.spread, self.centre, self.reach):
+            array.flags.writeable = False
+
+    def deviations(self, values: FloatArray) -> FloatArray:
+        """Standardised deviations of physical values, shape (…, channel)."""
+        return (values - self.mean) / self.std
+
+    def physical(self, deviations: FloatArray, out: FloatArray | None = None) -> FloatArray:
+        """Physical values of standardised deviations, shape (…, channel); `out` may be these."""
+        values = np.multiply(deviations, self.std, out=out)
+        values += self.mean
+        return values
+
+
+class Span(NamedTuple):
+    """Samples of a run that are wanted: from `first` to before `stop`.
+
+    States may be read up to the sample `known`, that one included, and not after.
+    """
+
+    first: int
+    known: int
+    stop: int
+
+
+class Regressors(NamedTuple):
+    """What drives the step from each of several samples, in physical units.
+
+    `delayed` regressors enter with the model's input delays; `direct` ones bring their own and
+    enter as they are.
+    """
+
+    delayed: FloatArray
+    direct: FloatArray
+
+
+class Drive(Protocol):
+    """Regressors of one run, made once and shared by members, windows and steps."""
+
+    def rows(self, first: int, stop: int, known: int | None = None) -> Regressors:
+        """Regressors of the samples from `first` to before `stop`, shape (sample, channel).
+
+        States are taken as they were at sample `known` where they lie after it.
+        """
+        ...
+
+    def at(self, samples: IntArray, states: FloatArray) -> Regressors:
+        """Regressors of one sample of each window, where members have reached these states.
+
+        Parameters
+        ----------
+        samples : ndarray of int, shape (window,)
+            Samples of the run.
+        states : ndarray, shape (window, member, N)
+            Predicted states, physical units.
+
+        Returns
+        -------
+        Regressors
+            Of shape (window, member, channel).
+        """
+        ...
+
+
+class InputMap(Protocol):
+    """How measured inputs become regressors; frozen, with settings as JSON values.
+
+    Attributes
+    ----------
+    kind : str
+        Its word in :data:`seakeep.models.inputs.MAPS`.
+    lead_samples : int
+        Samples of input after the one a step starts from that drive the step.
+    extra_history : int
+        Samples of input before the model's own input delays that it needs.
+    reads_states : {"no", "measured", "predicted"}
+        Whether regressors depend on states, and on which after the start.
+    """
+
+    kind: ClassVar[str]
+
+    @property
+    def lead_samples(self) -> int:
+        """Samples of input after the one a step starts from that drive the step."""
+        ...
+
+    @property
+    def extra_history(self) -> int:
+        """Samples of input before the model's input delays that it needs."""
+        ...
+
+    @property
+    def reads_states(self) -> str:
+        """Which states are read: "no", "measured" or "predicted"."""
+        ...
+
+    def fit(
+        self,
+        runs: dict[str, xr.Dataset],
+        states: Sequence[str],
+        inputs: Sequence[str],
+        window: int | None,
+    ) -> InputMap:
+        """Complete the map from training runs that end where training ends."""
+        ...
+
+    def regressors(
+        self, inputs: tuple[ChannelLabel, ...]
+    ) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
+        """Labels of the delayed and of the direct regressors made of these inputs."""
+        ...
+
+    def reads(self, span: Span) -> Span:
+        """Samples of its input that the map reads for samples of its output."""
+        ...
+
+    def wrap(self, drive: Drive, run: xr.Dataset | None, spans: Sequence[Span]) -> Drive:
+        """Drive made of that of its input; `run` is None where plain arrays are the input."""
+        ...
+
+    def look_ahead(self, run: xr.Dataset | None, dt: float) -> float:
+        """Seconds of input after the one a step starts from that drive the step, in this run."""
+        ...
+
+    def notes(self, run: xr.Dataset) -> dict[str, str | float]:
+        """What a forecast's attributes report of the map."""
+        ...
+
+    def describe(self, dt: float) -> list[str]:
+        """Lines of a model's summary."""
+        ...
+
+    def to_json(self) -> Json:
+        """Settings and what was fitted, as JSON values."""
+        ...
+
+    @classmethod
+    def from_json(cls, content: Json) -> Self:
+        """Rebuild from :meth:`to_json`."""
+        ...
+
+
+class Fittable(Protocol):
+    """What completes itself to an input map from training runs: settings, or a map itself."""
+
+    def fit(
+        self,
+        runs: dict[str, xr.Dataset],
+        states: Sequence[str],
+        inputs: Sequence[str],
+        window: int | None,
+    ) -> InputMap:
+        """Return the map, from training runs that end where training ends."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Signature:
+    """What a forecast must know of a model, or of an ensemble.
+
+    Parameters
+    ----------
+    dt : float
+        Time step, s.
+    state_labels, input_labels : tuple of ChannelLabel
+        Names, units and long names of the states and of the measured inputs.
+    state_delays, input_delays : int
+        s and z; of an ensemble the longest of a member.
+    input_map : InputMap
+        How measured inputs become regressors, as fitted.
+    state_scale, input_scale, direct_scale : Scale
+        Moments of the states, of the delayed and of the direct regressors over the training
+        windows; of an ensemble over all that its members learn from.
+    """
+
+    dt: float
+    state_labels: tuple[ChannelLabel, ...]
+    input_labels: tuple[ChannelLabel, ...]
+    state_delays: int
+    input_delays: int
+    input_map: InputMap = field(repr=False)
+    state_scale: Scale = field(repr=False)
+    input_scale: Scale = field(repr=False)
+    direct_scale: Scale = field(repr=False)
+
+    @property
+    def states(self) -> list[str]:
+        """Names of the states, in the order of the model."""
+        return [label.name for label in self.state_labels]
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of the measured inputs, in the order of the model."""
+        return [label.name for label in self.input_labels]
+
+    @property
+    def regressors(self) -> list[str]:
+        """Names of what the inputs become: the delayed regressors, then the direct ones."""
+        return [
+            label.name for group in self.input_map.regressors(self.input_labels) for label in group
+        ]
+
+    @property
+    def history_samples(self) -> int:
+        """Samples a forecast needs up to its start, that one included."""
+        return max(self.state_delays, self.input_delays + self.input_map.extra_history) + 1
+
+    @property
+    def lead_samples(self) -> int:
+        """Samples of input after the one a step starts from that drive the step."""
+        return self.input_map.lead_samples
+
+
+@dataclass(frozen=True)
+class Needs:
+    """Samples that a spec asks of its runs.
+
+    Parameters
+    ----------
+    snapshots : int
+        Of the longest training window; 1 where all of a run trains.
+    history : int
+        Before the start of a forecast, that one not counted.
+    inside : bool
+        Whether the delay history of training lies inside the window.
+    lead : int
+        Input after the last instant but one that a forecast reads.
+    """
+
+    snapshots: int
+    history: int
+    inside: bool = False
+    lead: int = 0
+
+
+class Model(Protocol):
+    """What compare, study, report and check know of a fitted model; arrays are ``engine``'s."""
+
+    kind: ClassVar[str]
+
+    @property
+    def signature(self) -> Signature:
+        """What helpers take."""
+        ...
+
+    @property
+    def n_members(self) -> int:
+        """1 of a single model."""
+        ...
+
+    @property
+    def dt(self) -> float:
+        """Time step, s."""
+        ...
+
+    @property
+    def states(self) -> list[str]:
+        """Names of the states."""
+        ...
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of the measured inputs."""
+        ...
+
+    @property
+    def history_samples(self) -> int:
+        """Samples a forecast needs up to its start."""
+        ...
+
+    @property
+    def training_spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant of the training windows of each run, s."""
+        ...
+
+    def forecast(self, run: xr.Dataset, start: float, steps: int | None = None) -> xr.Dataset:
+        """Free run from an instant on."""
+        ...
+
+    def forecast_windows(
+        self,
+        run: xr.Dataset,
+        starts: Sequence[float],
+        steps: int,
+        *,
+        executor: Executor | None = None,
+    ) -> xr.Dataset:
+        """Free runs from several instants, side by side."""
+        ...
+
+    def summary(self) -> str:
+        """Text that says what the model is."""
+        ...
+
+    def save(self, path: str | Path) -> Path:
+        """Write the model as NetCDF."""
+        ...
+
+
+class Spec(Protocol):
+    """Settings that are fitted to runs; frozen, with JSON values.
+
+    Attributes
+    ----------
+    kind : str
+        Its word in TOML files and in :data:`seakeep.models.registry.KINDS`.
+    is_ensemble : bool
+        Whether what it fits has several members.
+    """
+
+    kind: ClassVar[str]
+    is_ensemble: ClassVar[bool]
+
+    def needs(self, dt: float) -> Needs:
+        """Samples that it asks of its runs at a time step."""
+        ...
+
+    def fit(
+        self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
+    ) -> Model:
+        """Identify a model from training runs."""
+        ...
+
+    def to_json(self) -> Json:
+        """Settings as JSON values."""
+        ...
+
+    @classmethod
+    def from_json(cls, content: Json) -> Self:
+        """Settings from JSON values; unknown or missing ones raise an error."""
+        ...
+
+    @classmethod
+    def restore(cls, dataset: xr.Dataset) -> Model:
+        """Rebuild the model that a file holds."""
+        ...

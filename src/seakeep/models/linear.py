@@ -1,0 +1,523 @@
+"""An identified model: forecast, stability, export, and its file."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.arrays import ComplexArray, FloatArray
+from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.models import export, labelled, store
+from seakeep.models.engine import Dynamics, Windows, linear_runs
+from seakeep.models.forecasts import SingleModel, check_arrays, one_run
+from seakeep.models.inputs import Chain, FittedAlignment, Measured
+from seakeep.models.interface import Scale, Signature, Span
+from seakeep.models.settings import HankelSettings
+from seakeep.models.training import Training
+from seakeep.models.validity import Coverage
+from seakeep.signals.time_axis import span_text
+
+if TYPE_CHECKING:
+    import control
+    from scipy import signal
+
+__all__ = ["HankelDMDcModel", "counted", "modes", "with_units"]
+
+
+@dataclass(frozen=True, eq=False)
+class HankelDMDcModel(SingleModel):
+    """An identified model; made by :meth:`HankelDMDc.fit` or :func:`seakeep.load_model`.
+
+    Parameters
+    ----------
+    settings : HankelSettings
+        The settings it was identified with.
+    coefficients : ndarray, shape (N(s+1) or N, N(s+1) + n(z+1) + m)
+        Regressed rows of [Â B̂], on standardised deviations.
+    signature : Signature
+        Time step, names and units, delays, moments, and how inputs drive the model.
+    training : Training
+        Runs, windows and form of the regression.
+    coverage : Coverage
+        Waves that it was trained in.
+    """
+
+    kind: ClassVar[str] = "hankel_dmdc"
+    settings: HankelSettings
+    coefficients: FloatArray = field(repr=False)
+    signature: Signature = field(repr=False)
+    training: Training
+    coverage: Coverage = field(repr=False)
+
+    def __post_init__(self) -> None:
+        self.coefficients.flags.writeable = False
+
+    def __repr__(self) -> str:
+        return (
+            f"{type(self).__name__}(states={self.states}, inputs={self.inputs}, "
+            f"state_delays={self.state_delays}, input_delays={self.input_delays}, "
+            f"dt={self.dt:g}; print(model.summary()) says more)"
+        )
+
+    @property
+    def alignment(self) -> FittedAlignment | None:
+        """How the wave input is aligned to the vessel, as completed from the training runs."""
+        input_map = self.signature.input_map
+        return input_map.alignment if isinstance(input_map, Chain) else None
+
+    @property
+    def state_scale(self) -> Scale:
+        """Moments of the states over the training windows."""
+        return self.signature.state_scale
+
+    @property
+    def input_scale(self) -> Scale:
+        """Moments of the inputs over the training windows."""
+        return self.signature.input_scale
+
+    @property
+    def state_mean(self) -> FloatArray:
+        """What is subtracted from the states, shape (N,)."""
+        return self.state_scale.mean
+
+    @property
+    def state_std(self) -> FloatArray:
+        """What the states are divided by, shape (N,)."""
+        return self.state_scale.std
+
+    @property
+    def input_mean(self) -> FloatArray:
+        """What is subtracted from the inputs, shape (Q,)."""
+        return self.input_scale.mean
+
+    @property
+    def input_std(self) -> FloatArray:
+        """What the inputs are divided by, shape (Q,)."""
+        return self.input_scale.std
+
+    @property
+    def training_spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant of the training window of each run, s."""
+        training = self.training
+        return dict(
+            zip(training.runs, zip(training.first, training.stop, strict=True), strict=True)
+        )
+
+    @property
+    def top(self) -> tuple[FloatArray, FloatArray]:
+        """Regressed rows of Â and B̂: N of them with exact delay rows, else all."""
+        size = len(self.states) * (self.state_delays + 1)
+        return self.coefficients[:, :size], self.coefficients[:, size:]
+
+    @cached_property
+    def A(self) -> FloatArray:
+        """Â, shape (N(s+1), N(s+1)), on standardised deviations, newest block first."""
+        a = self.top[0].astype(float, copy=False)
+        size, count = a.shape[1], len(self.states)
+        if a.shape[0] == size:
+            return _read_only(a)
+        return _read_only(np.concatenate([a, np.eye(size - count, size)]))
+
+    @cached_property
+    def B(self) -> FloatArray:
+        """B̂, shape (N(s+1), Q(z+1)), on standardised deviations, newest block first."""
+        b = self.top[1].astype(float, copy=False)
+        missing = self.A.shape[0] - b.shape[0]
+        return _read_only(np.concatenate([b, np.zeros((missing, b.shape[1]))]))
+
+    @cached_property
+    def eigenvalues(self) -> ComplexArray:
+        """Eigenvalues of Â, largest modulus first.
+
+        Warns
+        -----
+        SeakeepWarning
+            If the spectral radius is one or more, with what to do.
+        """
+        values = np.linalg.eigvals(self.A).astype(np.complex128)
+        values = values[np.argsort(-np.abs(values), kind="stable")]
+        values.flags.writeable = False
+        if abs(values[0]) >= 1.0:
+            warnings.warn(
+                f"the spectral radius of the model is {abs(values[0]):.6f}: a free run grows by "
+                f"{100 * (abs(values[0]) - 1):.2g} % a step in its worst mode and will diverge if "
+                "it is long. Raise ridge, train on more data, use fewer state delays, or look for "
+                "transients at the ends of the training runs.",
+                SeakeepWarning,
+                stacklevel=3,  # past the cached property
+            )
+        return values
+
+    @property
+    def spectral_radius(self) -> float:
+        """Largest modulus of an eigenvalue of Â; a model is stable below one."""
+        return float(np.abs(self.eigenvalues[0]))
+
+    def modes(self) -> xr.Dataset:
+        """Natural frequency and damping of each mode, slowest decay first.
+
+        Returns
+        -------
+        Dataset
+            Over ``mode`` (one of each conjugate pair): ``eigenvalue``, ``modulus``,
+            ``frequency`` and ``natural_frequency`` (Hz), ``period`` (s), ``damping_ratio``,
+            ``decay_time`` (s, to 1/e).
+        """
+        return modes(self.eigenvalues, self.dt)
+
+    def free_runs(
+        self, groups: Sequence[Windows], members: Sequence[int] = (0,)
+    ) -> list[FloatArray]:
+        """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
+        return linear_runs([self.dynamics], groups)
+
+    def system_matrices(self) -> Iterator[FloatArray]:
+        """Â of each member."""
+        yield self.A
+
+    @cached_property
+    def dynamics(self) -> Dynamics:
+        """What a free run needs."""
+        signature = self.signature
+        return Dynamics(
+            self.coefficients,
+            signature.state_delays,
+            signature.input_delays,
+            signature.state_scale,
+            signature.input_scale,
+            signature.direct_scale,
+        )
+
+    def aligned_inputs(self, run: xr.Dataset) -> xr.Dataset:
+        """Inputs of a run as the model wants them: carried to the measured position.
+
+        What :meth:`forecast_arrays` and the exported systems take. Without an alignment, the
+        inputs as they are.
+
+        Parameters
+        ----------
+        run : Dataset
+            Inputs, and surge if the alignment reads it, without gaps.
+
+        Returns
+        -------
+        Dataset
+            The inputs over ``time``.
+
+        Raises
+        ------
+        RequestError, DataError
+            As :meth:`forecast`.
+        """
+        name = labelled.run_name(run, "the run")
+        labelled.check_run(run, name)
+        values = labelled.channel_matrix(run, self.inputs, name)
+        if (alignment := self.alignment) is not None:
+            time = np.asarray(run["time"].values, dtype=float)
+            labelled.check_finite(values, self.inputs, name, 0, time)
+            span = Span(0, len(values) - 1, len(values))
+            values = alignment.wrap(Measured(values), run, [span]).rows(0, len(values)).delayed
+        variables = {
+            channel: ("time", values[:, column], run[channel].attrs)
+            for column, channel in enumerate(self.inputs)
+        }
+        return xr.Dataset(variables, coords={"time": run["time"]}, attrs=run.attrs)
+
+    def forecast_arrays(
+        self,
+        x_history: npt.ArrayLike,
+        u_history: npt.ArrayLike,
+        u_future: npt.ArrayLike,
+        steps: int,
+        *,
+        ahead: str = "refuse",
+    ) -> FloatArray:
+        """Free run from arrays, for use in a loop or on board.
+
+        Parameters
+        ----------
+        x_history : array_like, shape (at least s + 1, N)
+            States up to and including instant k, oldest first, physical units, in the order of
+            ``model.states``; columns with names (a DataFrame) are taken by name.
+        u_history : array_like, shape (at least z + 1, Q)
+            Inputs up to and including instant k, in the order of ``model.inputs``, aligned already
+            if the model aligns them (:meth:`aligned_inputs`).
+        u_future : array_like, shape (at least steps − 1 + lead_samples, Q)
+            Inputs at k + 1, k + 2, …; shape (0, 0) for a model without input.
+        steps : int
+            Number of instants.
+        ahead : {"refuse"}, optional
+            What to do where `u_future` ends before the look-ahead does.
+
+        Returns
+        -------
+        ndarray, shape (steps, N)
+            States at k + 1 … k + steps, physical units; NaN from where the run diverged on.
+
+        Raises
+        ------
+        RequestError
+            If a shape does not fit (a transposed array is refused, not turned), a column is
+            missing, or a value that is needed is not finite or masked.
+        """
+        windows = check_arrays(self.signature, x_history, u_history, u_future, steps, ahead)
+        values: FloatArray = self.free_runs([windows])[0][0, 0]
+        return values
+
+    def to_state_space(self) -> signal.StateSpace:
+        """Discrete state-space system in physical deviations from the means.
+
+        The delay line of the inputs is part of the state, D = 0, ``dt`` is set. Its input is
+        u − ``input_mean`` and its output x − ``state_mean``; u is aligned already
+        (:meth:`aligned_inputs`) if the model has an alignment.
+
+        Returns
+        -------
+        scipy.signal.StateSpace
+            N(s+1) + Qz states, Q inputs, N outputs.
+
+        Raises
+        ------
+        RequestError
+            If the model has no input: scipy cannot represent it.
+        """
+        from scipy import signal
+
+        return signal.StateSpace(*self._system(), dt=self.dt)
+
+    def to_control(self) -> control.StateSpace:
+        """The system of :meth:`to_state_space` for python-control, with names.
+
+        Returns
+        -------
+        control.StateSpace
+            Needs the extra ``control``.
+        """
+        return export.to_control(self._system(), self.signature)
+
+    def to_mat(self, path: str | Path) -> Path:
+        """Write A, B, C, D, Ts, offsets, names (of the state's entries too) and units for MATLAB.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write; its suffix should be ``.mat``.
+
+        Returns
+        -------
+        Path
+            The file. In MATLAB: ``m = load('rom.mat'); sys = idss(m.A, m.B, m.C, m.D, 'Ts',
+            m.Ts, 'InputName', m.InputName, 'OutputName', m.OutputName);``
+        """
+        return export.to_mat(self._system(), self.signature, path)
+
+    def initial_state(self, run: xr.Dataset, start: float) -> FloatArray:
+        """State of the exported system that continues a measured run.
+
+        Parameters
+        ----------
+        run : Dataset
+            As for :meth:`forecast`.
+        start : float
+            Instant of the last measured state, s.
+
+        Returns
+        -------
+        ndarray, shape (N(s+1) + Qz,)
+            State at `start`; the first output is the measured state there. Inputs in it are
+            aligned with the measured surge up to `start`.
+
+        Raises
+        ------
+        RequestError, DataError
+            As :meth:`forecast`.
+        """
+        windows = self.read_windows(*one_run(run, [start]), 1)
+        return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
+
+    def initial_state_arrays(
+        self, x_history: npt.ArrayLike, u_history: npt.ArrayLike
+    ) -> FloatArray:
+        """State of the exported system from arrays, for use in a loop or on board.
+
+        Parameters
+        ----------
+        x_history, u_history : array_like, shapes (at least s + 1, N) and (at least z + 1, Q)
+            As for :meth:`forecast_arrays`.
+
+        Returns
+        -------
+        ndarray, shape (N(s+1) + Qz,)
+            :math:`[x_k; x_{k-1}; …; x_{k-s}; u_{k-1}; …; u_{k-z}]`, less their means.
+
+        Raises
+        ------
+        RequestError
+            As :meth:`forecast_arrays`.
+        """
+        lead: npt.ArrayLike = []
+        if self.inputs:  # what comes later is not part of the state
+            lead = np.asarray(u_history)[-1:].repeat(self.lead_samples, axis=0)
+        windows = check_arrays(self.signature, x_history, u_history, lead, 1)
+        return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
+
+    def _system(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        if self.signature.direct_scale.mean.size:
+            raise RequestError(
+                "the model is driven by regressors that bring delays of their own "
+                f"({', '.join(self.regressors[len(self.inputs) :])}), which a state-space system "
+                "in its inputs cannot represent. Use forecast_arrays."
+            )
+        return export.matrices(self.A, self.B, self.signature)
+
+    def summary(self) -> str:
+        """Text that says what the model is and how it was identified.
+
+        Returns
+        -------
+        str
+            A few lines; reading it computes the eigenvalues.
+        """
+        signature, training = self.signature, self.training
+        states, inputs, dt = len(self.states), len(self.inputs), self.dt
+        named = ", ".join(with_units(signature.input_labels))
+        rows = "exact" if self.settings.delay_rows == "exact" else "regressed"
+        lines = [
+            f"Hankel DMD with control: {counted(states, 'state')}, "
+            f"{counted(inputs, 'input')}, dt {dt:g} s",
+            f"  states        {', '.join(with_units(signature.state_labels))}",
+            f"  inputs        {named or 'none (autonomous)'}",
+            f"  delays        {self.state_delays} of the states ({self.state_delays * dt:g} s),"
+            f" {self.input_delays} of the inputs ({self.input_delays * dt:g} s)",
+            f"  history       {self.history_samples} samples up to the start of a forecast",
+            f"  regression    {_regression(self.settings, training)}; delay rows {rows}",
+            *signature.input_map.describe(dt),
+            f"  training      {sum(training.columns)} snapshot pairs of "
+            f"{counted(len(training.runs), 'run')}",
+        ]
+        lines += [
+            f"    {name}: {columns} pairs, {span_text(first, stop, dt)}"
+            for name, columns, first, stop in zip(
+                training.runs, training.columns, training.first, training.stop, strict=True
+            )
+        ]
+        radius = self.spectral_radius
+        verdict = "stable" if radius < 1 else "UNSTABLE: long forecasts diverge"
+        lines.append(f"  stability     spectral radius {radius:.6f} ({verdict})")
+        table = self.modes()
+        for mode in range(min(5, table.sizes["mode"])):
+            at = table.isel(mode=mode)
+            lines.append(
+                f"    mode {mode + 1}: {float(at.natural_frequency):.4g} Hz, damping ratio "
+                f"{float(at.damping_ratio):.3g}, |eigenvalue| {float(at.modulus):.6f}"
+            )
+        return "\n".join(lines)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the model as NetCDF, to a temporary name first.
+
+        Parameters
+        ----------
+        path : str or Path
+            File, overwritten if it exists.
+
+        Returns
+        -------
+        Path
+            The file; :func:`seakeep.load_model` reads it, running no code from it.
+        """
+        return store.write(self.to_dataset(), path, self.kind)
+
+    def to_dataset(self) -> xr.Dataset:
+        """The model as a Dataset: what :meth:`save` writes."""
+        label = {"long_name": "regressed rows of [A B] on standardised deviations", "units": "1"}
+        return xr.Dataset(
+            {
+                "coefficients": (("row", "regressor"), self.coefficients, label),
+                **store.pack_signature(self.signature),
+                **self.coverage.to_variables(),
+            },
+            attrs={
+                "settings": store.as_json(self.settings.to_json()),
+                "training": store.as_json(self.training.to_json()),
+                "signature": store.as_json(store.signature_json(self.signature)),
+            },
+        )
+
+    @classmethod
+    def from_dataset(cls, dataset: xr.Dataset, settings: HankelSettings) -> HankelDMDcModel:
+        """Rebuild a model from :meth:`to_dataset`; it is equal to the last bit."""
+        signature = store.unpack_signature(dataset)
+        states = len(signature.states) * (signature.state_delays + 1)
+        rows = states if settings.delay_rows == "ridge" else len(signature.states)
+        width = states + signature.input_scale.mean.size * (signature.input_delays + 1)
+        shape = (rows, width + signature.direct_scale.mean.size)
+        return cls(
+            settings=settings,
+            coefficients=store.numbers(dataset, "coefficients", shape),
+            signature=signature,
+            training=Training.from_json(store.content(dataset, "training")),
+            coverage=Coverage.from_dataset(dataset),
+        )
+
+
+def modes(eigenvalues: ComplexArray, dt: float) -> xr.Dataset:
+    """Modes of a discrete system from its eigenvalues; see ``HankelDMDcModel.modes``."""
+    kept = eigenvalues[eigenvalues.imag >= 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        poles = np.log(kept.astype(complex)) / dt
+        natural = np.abs(poles)
+        frequency = np.abs(poles.imag) / (2 * np.pi)
+        # An eigenvalue of zero is gone after a step: overdamped, not undefined.
+        oscillating = (natural > 0) & np.isfinite(natural)
+        damping = np.where(oscillating, -poles.real / natural, 1.0)
+        decay = np.where(poles.real < 0, -1.0 / poles.real, np.inf)
+        period = np.where(frequency > 0, 1.0 / frequency, np.inf)
+    table = {
+        "eigenvalue": (kept, "1", "eigenvalue of the discrete system"),
+        "modulus": (np.abs(kept), "1", "modulus of the eigenvalue"),
+        "frequency": (frequency, "Hz", "damped frequency"),
+        "natural_frequency": (natural / (2 * np.pi), "Hz", "natural frequency"),
+        "period": (period, "s", "damped period"),
+        "damping_ratio": (damping, "1", "damping ratio"),
+        "decay_time": (decay, "s", "time to decay to 1/e"),
+    }
+    return xr.Dataset(
+        {
+            name: ("mode", values, {"units": units, "long_name": label})
+            for name, (values, units, label) in table.items()
+        }
+    )
+
+
+def counted(number: int, thing: str) -> str:
+    """A number and a word, in the plural where it must be."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def with_units(labels: tuple[labelled.ChannelLabel, ...]) -> list[str]:
+    """Names of channels with their units."""
+    return [f"{label.name} [{label.units or '?'}]" for label in labels]
+
+
+def _regression(settings: HankelSettings, training: Training) -> str:
+    if settings.rank is not None:
+        return f"truncated SVD of rank {training.rank}"
+    form = {"primal": "primal form", "dual": "dual form", "svd": "singular values"}
+    per = ""
+    if settings.ridge_scale == "per_snapshot":
+        per = f" ({settings.ridge:g} per snapshot pair)"
+    return f"ridge {training.ridge:g}{per}, {form[training.method]}"
+
+
+def _read_only(array: FloatArray) -> FloatArray:
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,64 @@
+"""Kinds of models, and the files that hold them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypeVar, overload
+
+from seakeep.errors import DataError, RequestError
+from seakeep.models import store
+from seakeep.models.interface import Model, Spec
+from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
+
+__all__ = ["KINDS", "load_model"]
+
+KINDS: dict[str, type[Spec]] = {each.kind: each for each in (HankelDMDc, BayesianHankelDMDc)}
+"""Specs by the word that TOML tables and files call their kind; one line adds a model."""
+
+Kind = TypeVar("Kind")
+
+
+@overload
+def load_model(path: str | Path) -> Model: ...
+@overload
+def load_model(path: str | Path, kind: type[Kind]) -> Kind: ...
+def load_model(path: str | Path, kind: type[Kind] | None = None) -> Model | Kind:
+    """Read a model or an ensemble that was saved; no code from the file is run.
+
+    Parameters
+    ----------
+    path : str or Path
+        File written by ``model.save`` or ``seakeep fit``.
+    kind : type, optional
+        What is expected, such as :class:`seakeep.HankelEnsemble`: type checkers know the result
+        then, and another kind of model is refused.
+
+    Returns
+    -------
+    Model
+        The model, equal to the last bit: a :class:`seakeep.HankelDMDcModel`, a
+        :class:`seakeep.HankelEnsemble`, or what its kind in :data:`KINDS` fits.
+
+    Raises
+    ------
+    RequestError
+        If there is no such file, or it holds another kind of model.
+    DataError
+        If it is damaged, not a model, or of another layout.
+    """
+    dataset = store.read(path)
+    word = dataset.attrs["seakeep_kind"]
+    if word not in KINDS:
+        raise DataError(
+            f"{path} holds a model of kind '{word}', which this version does not know. Update "
+            "seakeep."
+        )
+    model = store.rebuilt(path, lambda: KINDS[word].restore(dataset))
+    if kind is None:
+        return model
+    if not isinstance(model, kind):
+        raise RequestError(
+            f"{path} holds a {type(model).__name__}, and a {kind.__name__} is expected. Name "
+            "another file, or fit one."
+        )
+    return model

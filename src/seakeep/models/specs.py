@@ -1,0 +1,646 @@
+"""What a user sets: the Hankel model and the ensemble of them, and how each is fitted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import xarray as xr
+
+from seakeep.core.solve import identify
+from seakeep.errors import RequestError, did_you_mean
+from seakeep.models import labelled, store
+from seakeep.models.checks import check_choice
+from seakeep.models.draws import Sampling, TrainOn, draw_members
+from seakeep.models.ensemble import HankelEnsemble
+from seakeep.models.inputs import Chain, ProbeAlignment
+from seakeep.models.interface import InputMap, Json, Needs, Signature, Span, plain
+from seakeep.models.labelled import Runs, Stop, as_runs
+from seakeep.models.linear import HankelDMDcModel
+from seakeep.models.members import TrainingArrays, reach
+from seakeep.models.priors import (
+    LogUniform,
+    Prior,
+    Uniform,
+    check_prior,
+    describe,
+    from_description,
+)
+from seakeep.models.settings import (
+    DelayRows,
+    HankelSettings,
+    History,
+    RidgeScale,
+    check_integer,
+    periods_to_samples,
+)
+from seakeep.models.training import (
+    Training,
+    check_names,
+    gather,
+    last_sample,
+    moments,
+    run_regressors,
+    stop_instants,
+    until,
+)
+from seakeep.models.validity import Coverage
+
+__all__ = ["BayesianHankelDMDc", "HankelDMDc"]
+
+PAPER_RIDGE = 100.0
+PAPER_SNAPSHOTS = 640
+
+
+@dataclass(frozen=True)
+class HankelDMDc(HankelSettings):
+    r"""Settings of a Hankel dynamic mode decomposition with control.
+
+    The model is :math:`\hat x_{j+1} = \hat A \hat x_j + \hat B \hat u_j` with
+    :math:`\hat x_j = [x_j; …; x_{j-s}]`, :math:`\hat u_j = [u_j; …; u_{j-z}]`, and
+    :math:`[\hat A\; \hat B] = \hat X' \hat Y^T (\hat Y \hat Y^T + \lambda I)^{-1}` on
+    standardised deviations (paper, section HDMDc).
+
+    Parameters
+    ----------
+    state_delays : int
+        s, number of delayed copies of the states.
+    input_delays : int
+        z, number of delayed copies of the inputs.
+    ridge : float
+        λ ≥ 0; zero takes the solution of least norm.
+    window : int, optional
+        m, snapshots a run; None takes all up to ``stop``.
+    history : {"before", "inside"}, optional
+        Whether the delay history of the first snapshot lies before the window or inside it.
+    delay_rows : {"ridge", "exact"}, optional
+        Whether the rows of Â that shift the delayed states are regressed like the others (the
+        paper), or are the exact shift that they stand for.
+    ridge_scale : {"absolute", "per_snapshot"}, optional
+        Whether λ is what is added to the diagonal, or that divided by the number of columns.
+    rank : int, optional
+        Number of singular values kept, for exact DMD by truncated SVD instead of λ.
+    standardize : bool, optional
+        Whether channels are centred and scaled by mean and standard deviation (ddof = 1) over
+        the training windows, pooled over the runs.
+    alignment : ProbeAlignment, optional
+        Alignment of the wave input to the moving vessel, the same in fit and forecast; a mapping
+        of its keys is taken too.
+    lead : int, optional
+        Look-ahead in samples: the input up to j + lead drives the step from j to j + 1.
+    observables : sequence of InputMap, optional
+        Further regressors, made of the aligned inputs.
+
+    Raises
+    ------
+    RequestError
+        If a setting is out of range.
+
+    Notes
+    -----
+    With more delays than the system has states the regressors are linearly dependent (or nearly,
+    with noise): many pairs of Â and B̂ continue the data equally well, and which one is found is
+    decided by λ, or by least norm at λ = 0. Forecasts then compare with another method's;
+    coefficients, and the eigenvalues that the surplus delays bring, do not.
+
+    Whether a model is stable is found when its eigenvalues are asked for (``summary()``,
+    ``spectral_radius``, ``modes()``), and an unstable one warns then: no bound that is cheaper
+    than the eigenvalues tells a slowly decaying mode from a slowly growing one. A forecast that
+    is lost says so in its ``status`` either way.
+
+    Examples
+    --------
+    >>> HankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32).window
+    640
+    """
+
+    kind: ClassVar[str] = "hankel_dmdc"
+    is_ensemble: ClassVar[bool] = False
+    n_members: ClassVar[int] = 1
+
+    def needs(self, dt: float) -> Needs:
+        """Samples that it asks of its runs."""
+        return Needs(
+            self.window or 1,
+            self.history_samples - 1,
+            self.history == "inside",
+            self.lead + sum(each.lead_samples for each in self.observables),
+        )
+
+    @classmethod
+    def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
+        """Rebuild the model that a file holds."""
+        settings = cls.from_json(json.loads(dataset.attrs["settings"]))
+        return HankelDMDcModel.from_dataset(dataset, settings)
+
+    @classmethod
+    def paper(cls, encounter_period: float, dt: float) -> Self:
+        """Settings of the paper: m 20, s 1 and z 5 encounter periods, λ = 100.
+
+        Parameters
+        ----------
+        encounter_period : float
+            Mean encounter period, s.
+        dt : float
+            Time step, s.
+
+        Returns
+        -------
+        HankelDMDc
+            At 32 samples a period: m = 640, s = 32, z = 160.
+        """
+        return cls(
+            state_delays=periods_to_samples(1, encounter_period, dt),
+            input_delays=periods_to_samples(5, encounter_period, dt),
+            ridge=PAPER_RIDGE,
+            window=periods_to_samples(20, encounter_period, dt),
+        )
+
+    @classmethod
+    def recommended(cls, encounter_period: float, dt: float) -> Self:
+        """Settings we recommend: as the paper, but all of the runs, exact rows, λ per snapshot.
+
+        Parameters
+        ----------
+        encounter_period : float
+            Mean encounter period, s.
+        dt : float
+            Time step, s.
+
+        Returns
+        -------
+        HankelDMDc
+            s one period, z five periods, λ = 100/640 times the number of columns.
+        """
+        return cls(
+            state_delays=periods_to_samples(1, encounter_period, dt),
+            input_delays=periods_to_samples(5, encounter_period, dt),
+            ridge=PAPER_RIDGE / PAPER_SNAPSHOTS,
+            delay_rows="exact",
+            ridge_scale="per_snapshot",
+        )
+
+    def fit(
+        self,
+        runs: Runs,
+        states: Sequence[str],
+        inputs: Sequence[str],
+        stop: Stop = None,
+    ) -> HankelDMDcModel:
+        """Identify a model; the settings are not changed by it.
+
+        Parameters
+        ----------
+        runs : Dataset, sequence of Dataset, or mapping of names to Datasets
+            Runs with the dimension ``time`` (s, uniform, the same step in all) and one variable
+            a channel. Several are pooled.
+        states : sequence of str
+            Channels to forecast.
+        inputs : sequence of str
+            Channels that drive them; may be empty (autonomous Hankel DMD).
+        stop : float, sequence or mapping of float, optional
+            Last instant of the training window, s; one for all runs, or one a run. By default
+            each run's end.
+
+        Returns
+        -------
+        HankelDMDcModel
+            The model, immutable.
+
+        Raises
+        ------
+        RequestError
+            If a channel is unknown, or `stop` lies outside a run.
+        DataError
+            If a run is too short, has gaps or times that are not uniform, another step than the
+            first, or a constant channel while ``standardize`` is set.
+        """
+        data = gather(
+            as_runs(runs),
+            states,
+            inputs,
+            stop,
+            maps=self.maps,
+            state_delays=self.state_delays,
+            input_delays=self.input_delays,
+            window=self.window,
+            history=self.history,
+            standardize=self.standardize,
+        )
+        solution = identify(
+            data.states,
+            data.delayed,
+            data.windows,
+            state_delays=self.state_delays,
+            input_delays=self.input_delays,
+            direct=data.direct if data.direct[0].shape[1] else None,
+            ridge=float(self.ridge),
+            per_snapshot=self.ridge_scale == "per_snapshot",
+            rank=self.rank,
+            all_rows=self.delay_rows == "ridge",
+        )
+        signature = Signature(
+            dt=data.dt,
+            state_labels=data.state_labels,
+            input_labels=data.input_labels,
+            state_delays=self.state_delays,
+            input_delays=self.input_delays,
+            input_map=data.input_map,
+            state_scale=data.state_scale,
+            input_scale=data.input_scale,
+            direct_scale=data.direct_scale,
+        )
+        return HankelDMDcModel(
+            settings=self,
+            coefficients=solution.coefficients,
+            signature=signature,
+            training=Training(
+                runs=data.names,
+                first=tuple(float(value) for value in data.first_instants),
+                stop=tuple(float(value) for value in data.last_instants),
+                columns=tuple(window.columns for window in data.windows),
+                method=solution.method,
+                ridge=solution.ridge,
+                rank=solution.rank,
+            ),
+            coverage=Coverage.of(signature.inputs, data.inputs, data.dt),
+        )
+
+
+PAPER_RIDGE_PER_SNAPSHOT = 100.0 / 640
+PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
+
+
+@dataclass(frozen=True)
+class BayesianHankelDMDc:
+    r"""Settings of a Bayesian ensemble of Hankel models (paper, section UQ through ensembling).
+
+    Priors over training length, delays and ridge are pushed forward: each member is a
+    :class:`HankelDMDc` with settings drawn from them, and the spread of the members' forecasts is
+    the uncertainty (paper, equations of :math:`\mu[x(t)]` and :math:`\sigma[x(t)]`). There is no
+    likelihood: "Bayesian" is the paper's word, and a band holds what the members differ in, not
+    noise or model error: judge its coverage before you trust it. With ``train_on`` members also,
+    or only, differ in the data they saw: a frequentist ensemble.
+
+    Parameters
+    ----------
+    encounter_period : float
+        Mean encounter period, s.
+    train_length : prior or None
+        Length of the training window, encounter periods; None takes all of a run up to ``stop``.
+    state_delay, input_delay : prior
+        Longest delay of states and inputs, encounter periods.
+    ridge : prior
+        λ.
+    n_members : int, optional
+        Number of members.
+    seed : int, SeedSequence or Generator, optional
+        Root of the members' generators. A Generator gives one number, when the settings are made.
+    sampling : {"monte_carlo", "sobol"}, optional
+        Independent points, or a scrambled Sobol net.
+    train_on : {"all", "runs", "windows"}, optional
+        What a member learns from: the windows at ``stop`` in all runs together (the paper); that
+        in one run, drawn for each member; or a window that ends anywhere up to ``stop`` in one run.
+    dt : float, optional
+        Time step the runs must have, s; None takes theirs.
+    lead : int or float, optional
+        Look-ahead of the waves: samples as an integer, encounter periods as a float.
+    history, delay_rows, ridge_scale, rank, standardize, alignment, observables
+        As in :class:`HankelDMDc`. What an alignment estimates, it estimates once for all members,
+        from all that is given up to ``stop``: no member's draw moves another's input.
+
+    Raises
+    ------
+    RequestError
+        If a setting is out of range, or not a prior.
+
+    Examples
+    --------
+    >>> spec = BayesianHankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32)
+    >>> spec.n_members, spec.train_length
+    (100, Uniform(low=10, high=30))
+    """
+
+    kind: ClassVar[str] = "bayesian_hankel_dmdc"
+    is_ensemble: ClassVar[bool] = True
+    encounter_period: float
+    train_length: Prior | None
+    state_delay: Prior
+    input_delay: Prior
+    ridge: Prior
+    n_members: int = 100
+    seed: int | np.random.SeedSequence | np.random.Generator = 0
+    sampling: Sampling = "monte_carlo"
+    train_on: TrainOn = "all"
+    dt: float | None = None
+    history: History = "before"
+    delay_rows: DelayRows = "ridge"
+    ridge_scale: RidgeScale = "absolute"
+    rank: int | None = None
+    standardize: bool = True
+    alignment: ProbeAlignment | None = None
+    lead: int | float = 0
+    observables: tuple[InputMap, ...] = ()
+    seed_sequence: np.random.SeedSequence = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        for name in ("train_length", "state_delay", "input_delay", "ridge"):
+            if name != "train_length" or self.train_length is not None:
+                check_prior(name, getattr(self, name))
+        check_integer("n_members", self.n_members, 1)
+        period = self.encounter_period
+        # Without dt any step shorter than the period will do; the runs' own is checked at fit.
+        periods_to_samples(1, period, 0.5 * period if self.dt is None else self.dt)
+        _check_lead(self.lead)
+        check_choice("sampling", self.sampling, ("monte_carlo", "sobol"))
+        check_choice("train_on", self.train_on, ("all", "runs", "windows"))
+        object.__setattr__(self, "observables", tuple(self.observables))
+        object.__setattr__(self, "alignment", self.shared(0.5 * period).alignment)
+        object.__setattr__(self, "seed_sequence", _seed_sequence(self.seed))
+
+    def shared(self, dt: float) -> HankelSettings:
+        """What all members share; delays, window and λ in it stand for nothing."""
+        lead = self.lead
+        if not isinstance(lead, int):
+            lead = periods_to_samples(lead, self.encounter_period, dt) if lead else 0
+        return HankelSettings(
+            state_delays=0,
+            input_delays=0,
+            ridge=0.0,
+            history=self.history,
+            delay_rows=self.delay_rows,
+            ridge_scale=self.ridge_scale,
+            rank=self.rank,
+            standardize=self.standardize,
+            alignment=self.alignment,
+            lead=lead,
+            observables=self.observables,
+        )
+
+    def needs(self, dt: float) -> Needs:
+        """Samples that its greediest draw asks of its runs: the upper ends of the priors count."""
+        shared = self.shared(dt)
+
+        def samples(prior: Prior) -> int:
+            # The last quantile of a prior without an upper end is its 1 − 1e-6 quantile.
+            top = float(prior.ppf(1.0))
+            if not np.isfinite(top):
+                top = float(prior.ppf(1.0 - 1e-6))
+            return periods_to_samples(top, self.encounter_period, dt)
+
+        return Needs(
+            1 if self.train_length is None else samples(self.train_length),
+            max(samples(self.state_delay), samples(self.input_delay) + shared.extra_history),
+            self.history == "inside",
+            shared.lead + sum(each.lead_samples for each in self.observables),
+        )
+
+    def to_json(self) -> Json:
+        """Settings as JSON values; the seed as entropy and spawn key."""
+        content = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
+        seed = self.seed_sequence
+        made: Json = plain(
+            content
+            | {
+                **{name: describe(getattr(self, name)) for name in PRIORS},
+                "encounter_period": float(self.encounter_period),
+                "n_members": int(self.n_members),
+                "seed": str(seed.entropy),
+                "spawn_key": [int(key) for key in seed.spawn_key],
+                "alignment": None if self.alignment is None else self.alignment.to_json(),
+                "observables": Chain(self.observables).to_json()["maps"],
+            }
+        )
+        return made
+
+    @classmethod
+    def from_json(cls, content: Json) -> Self:
+        """Settings from :meth:`to_json`; an unknown key or a value out of range raises an error."""
+        known = [each.name for each in fields(cls) if each.init] + ["spawn_key"]
+        for key in content:
+            if key not in known:
+                raise RequestError(f"unknown key '{key}'.{did_you_mean(key, known)}")
+        stated = dict(content)
+        seed = np.random.SeedSequence(
+            int(stated.pop("seed")), spawn_key=[int(key) for key in stated.pop("spawn_key")]
+        )
+        stated |= {name: from_description(stated[name]) for name in PRIORS}
+        stated["observables"] = Chain.from_json({"maps": stated.get("observables", [])}).maps
+        return cls(**stated, seed=seed)
+
+    @classmethod
+    def restore(cls, dataset: xr.Dataset) -> HankelEnsemble:
+        """Rebuild the ensemble that a file holds."""
+        spec = cls.from_json(json.loads(dataset.attrs["ensemble"]))
+        signature = store.unpack_signature(dataset)
+        return HankelEnsemble.from_dataset(
+            dataset, signature, spec.shared(signature.dt), spec.to_json()
+        )
+
+    @classmethod
+    def paper(
+        cls,
+        encounter_period: float,
+        dt: float | None = None,
+        n_members: int = 100,
+        seed: int | np.random.SeedSequence | np.random.Generator = 0,
+    ) -> Self:
+        """Priors of the paper: ±50 % around its deterministic settings, uniform.
+
+        Parameters
+        ----------
+        encounter_period : float
+            Mean encounter period, s.
+        dt : float, optional
+            Time step the runs must have, s.
+        n_members, seed
+            As in the class.
+
+        Returns
+        -------
+        BayesianHankelDMDc
+            Lengths of 10–30, 0.5–1.5 and 2.5–7.5 encounter periods, λ of 50–150, all else as in
+            :meth:`HankelDMDc.paper`.
+        """
+        return cls(
+            encounter_period=encounter_period,
+            train_length=Uniform(10, 30),
+            state_delay=Uniform(0.5, 1.5),
+            input_delay=Uniform(2.5, 7.5),
+            ridge=Uniform(50, 150),
+            n_members=n_members,
+            seed=seed,
+            dt=dt,
+        )
+
+    @classmethod
+    def recommended(
+        cls,
+        encounter_period: float,
+        dt: float | None = None,
+        n_members: int = 100,
+        seed: int | np.random.SeedSequence | np.random.Generator = 0,
+    ) -> Self:
+        """Priors around :meth:`HankelDMDc.recommended`.
+
+        Parameters
+        ----------
+        encounter_period, dt, n_members, seed
+            As in :meth:`paper`.
+
+        Returns
+        -------
+        BayesianHankelDMDc
+            All of the runs, the paper's delays, exact delay rows, and a ridge per snapshot,
+            log-uniform over 0.3 to 3 times 100/640.
+        """
+        return cls(
+            encounter_period=encounter_period,
+            train_length=None,
+            state_delay=Uniform(0.5, 1.5),
+            input_delay=Uniform(2.5, 7.5),
+            ridge=LogUniform(0.3 * PAPER_RIDGE_PER_SNAPSHOT, 3 * PAPER_RIDGE_PER_SNAPSHOT),
+            n_members=n_members,
+            seed=seed,
+            dt=dt,
+            delay_rows="exact",
+            ridge_scale="per_snapshot",
+        )
+
+    def fit(
+        self,
+        runs: Runs,
+        states: Sequence[str],
+        inputs: Sequence[str],
+        stop: Stop = None,
+    ) -> HankelEnsemble:
+        """Draw the members and gather what they learn from; their matrices are made on demand.
+
+        Parameters
+        ----------
+        runs, states, inputs, stop
+            As in :meth:`HankelDMDc.fit`.
+
+        Returns
+        -------
+        HankelEnsemble
+            The ensemble, immutable. The same settings give the same draws for every training
+            window that all of them fit into.
+
+        Raises
+        ------
+        RequestError, DataError
+            As :meth:`HankelDMDc.fit`; DataError too if no draw fits the runs.
+        """
+        named = as_runs(runs)
+        check_names(states, inputs)
+        stops = stop_instants(stop, list(named))
+        dt = labelled.common_step(named)
+        if self.dt is not None:
+            labelled.check_step(*next((run, name) for name, run in named.items()), self.dt)
+        shared = self.shared(dt)
+        labels = labelled.common_labels(named, states), labelled.common_labels(named, inputs)
+        if shared.maps:
+            named, stops = until(named, stops), dict.fromkeys(named)
+        states, inputs = list(states), list(inputs)
+        input_map = Chain(tuple(each.fit(named, states, inputs, None) for each in shared.maps))
+        samples = [
+            last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name) + 1
+            for name, run in named.items()
+        ]
+        members = draw_members(self, dt, samples, input_map)
+        earliest = reach(members, samples, self.history == "inside", input_map)
+        arrays, trained = _training_arrays(named, states, inputs, samples, earliest, input_map)
+        series = (arrays.states, arrays.delayed, arrays.direct)
+        scales = [
+            moments(each, None, channels, standardize=False)
+            for each, channels in zip(series, arrays.channels, strict=True)
+        ]
+        signature = Signature(
+            dt=dt,
+            state_labels=labels[0],
+            input_labels=labels[1],
+            state_delays=max(draw.state_delays for draw in members),
+            input_delays=max(draw.input_delays for draw in members),
+            input_map=input_map,
+            state_scale=scales[0],
+            input_scale=scales[1],
+            direct_scale=scales[2],
+        )
+        return HankelEnsemble(
+            settings=shared,
+            origin=self.to_json(),
+            members=tuple(members),
+            arrays=arrays,
+            signature=signature,
+            coverage=Coverage.of(inputs, trained, dt),
+        )
+
+
+def _seed_sequence(seed: object) -> np.random.SeedSequence:
+    if isinstance(seed, np.random.SeedSequence):
+        return seed
+    if isinstance(seed, np.random.Generator):
+        return np.random.SeedSequence(int(seed.integers(2**63)))
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise RequestError(
+            f"seed must be an integer, zero or more, a SeedSequence or a Generator of numpy; "
+            f"received {seed!r}."
+        )
+    return np.random.SeedSequence(int(seed))
+
+
+def _check_lead(lead: object) -> None:
+    if isinstance(lead, bool) or not isinstance(lead, int | float) or not 0 <= lead < np.inf:
+        raise RequestError(
+            f"lead must be zero or more, an integer of samples or a float of encounter periods; "
+            f"received {lead!r}."
+        )
+
+
+def _training_arrays(
+    runs: dict[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+    samples: Sequence[int],
+    earliest: Sequence[int],
+    input_map: Chain,
+) -> tuple[TrainingArrays, list[np.ndarray[Any, np.dtype[np.float64]]]]:
+    """States and regressors that members learn from, and the measured inputs, physical units."""
+    read, trained = [], []
+    for (name, run), first, end in zip(runs.items(), earliest, samples, strict=True):
+        time = np.asarray(run["time"].values, dtype=float)
+        x = labelled.channel_matrix(run, states, name, slice(first, end))
+        labelled.check_finite(x, states, name, first, time)
+        span = Span(first, end - 1, max(end - input_map.lead_samples, first))
+        found = run_regressors(input_map, run, inputs, name, span)
+        for values in (x, *found):
+            values.flags.writeable = False
+        read.append((x, *found))
+        trained.append(labelled.channel_matrix(run, inputs, name, slice(first, end)))
+    begins = [
+        float(np.asarray(run["time"].values, dtype=float)[min(first, run.sizes["time"] - 1)])
+        for run, first in zip(runs.values(), earliest, strict=True)
+    ]
+    groups = [tuple(each) for each in zip(*read, strict=True)]
+    arrays = TrainingArrays(
+        names=tuple(runs),
+        states=groups[0],
+        delayed=groups[1],
+        direct=groups[2],
+        offsets=tuple(earliest),
+        begins=tuple(begins),
+        channels=(tuple(states), *_regressor_names(input_map, runs, inputs)),
+    )
+    return arrays, [each for each in trained if len(each)]
+
+
+def _regressor_names(
+    input_map: Chain, runs: dict[str, xr.Dataset], inputs: Sequence[str]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    made = input_map.regressors(labelled.channel_labels(next(iter(runs.values())), inputs))
+    delayed, direct = (tuple(label.name for label in group) for group in made)
+    return delayed, direct
