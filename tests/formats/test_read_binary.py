@@ -240,3 +240,11 @@ def test_a_struct_with_its_rate_and_a_note_beside_it(tmp_path):
     table = read_table(path)
     np.testing.assert_array_equal(table["heave"].values, heave)
     assert float(table["time"][1]) == pytest.approx(0.1)
+
+
+def test_cells_of_unlike_vectors_are_left_out(tmp_path):
+    cells = np.empty(2, dtype=object)
+    cells[:] = [np.arange(3.0), np.arange(5.0)]
+    run = {"time": T, "heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}, "fits": cells}
+    io.savemat(tmp_path / "run.mat", {"run": run, "note": "run 7"})
+    check(read_table(tmp_path / "run.mat"))

@@ -70,7 +70,7 @@ def _loaded(path: Path) -> dict[str, Any]:
             "Save it again from MATLAB."
         ) from None
     # HDF5 keeps no order, and pymatreader hands names on as a set.
-    content = _in_order(content) if hdf5 else content
+    content = _tidy(content, in_order=hdf5)
     if opaque and not content:
         listed = ", ".join(f"{name} ({kind})" for name, kind in opaque.items())
         raise DataError(
@@ -80,8 +80,16 @@ def _loaded(path: Path) -> dict[str, Any]:
     return content
 
 
-def _in_order(content: Mapping[str, Any]) -> dict[str, Any]:
-    return {k: _in_order(v) if isinstance(v, dict) else v for k, v in sorted(content.items())}
+def _tidy(value: Any, in_order: bool) -> Any:
+    """Structs with their fields in an order, cells as arrays of objects."""
+    if isinstance(value, dict):
+        items = sorted(value.items()) if in_order else value.items()
+        return {key: _tidy(each, in_order) for key, each in items}
+    if isinstance(value, list):
+        cells = np.empty(len(value), dtype=object)
+        cells[:] = [_tidy(each, in_order) for each in value]
+        return cells
+    return value
 
 
 def _opaque(path: Path) -> dict[str, str]:

@@ -5,6 +5,7 @@ Needs nptdms, the extra ``tdms`` (its licence is the LGPL, so it is never instal
 
 from __future__ import annotations
 
+import logging
 import struct
 from collections import Counter
 from collections.abc import Sequence
@@ -40,6 +41,7 @@ def read_tdms(path: Path, options: Options) -> Columns:
             "Install the extra: pip install 'seakeep[tdms]'."
         ) from error
     _check_whole(path)
+    logging.getLogger("nptdms").setLevel(logging.ERROR)  # the error below says what is wrong
     try:
         # Opened here, since nptdms leaves a file open whose head it cannot read.
         with path.open("rb") as raw, nptdms.TdmsFile.open(raw) as file:
