@@ -70,14 +70,14 @@ def _loaded(path: Path) -> dict[str, Any]:
             "Save it again from MATLAB."
         ) from None
     # HDF5 keeps no order, and pymatreader hands names on as a set.
-    content = _tidy(content, in_order=hdf5)
-    if opaque and not content:
+    tidy: dict[str, Any] = _tidy(content, in_order=hdf5)
+    if opaque and not tidy:
         listed = ", ".join(f"{name} ({kind})" for name, kind in opaque.items())
         raise DataError(
             f"{path} holds only variables that MATLAB alone can read: {listed}. Save the columns "
             "as a struct of vectors: run = table2struct(T, 'ToScalar', true)."
         )
-    return content
+    return tidy
 
 
 def _tidy(value: Any, in_order: bool) -> Any:
