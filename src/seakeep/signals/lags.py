@@ -217,9 +217,13 @@ def parabola_peak(before: float, here: float, after: float) -> tuple[float, floa
     return float(shift), float(here - 0.25 * (before - after) * shift)
 
 
-def as_pair(first: npt.ArrayLike, second: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    a, b = as_series(first, minimum=8), as_series(second, minimum=8)
-    if a.ndim != 1 or a.shape != b.shape:
+def as_pair(
+    first: npt.ArrayLike, second: npt.ArrayLike, minimum: int = 8
+) -> tuple[FloatArray, FloatArray]:
+    """Two records of one length without their means; refuse one that is constant."""
+    a = as_series(first, "the first record", minimum=minimum)
+    b = as_series(second, "the second record", minimum=minimum)
+    if a.shape != b.shape:
         raise RequestError(
             f"two records of the same length are needed, shape (time,); received {a.shape} and "
             f"{b.shape}. Cut them to their common time."

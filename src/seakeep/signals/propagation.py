@@ -238,6 +238,8 @@ ENERGY = 0.01
 """Frequencies with less than this part of the greatest cross-spectrum are noise."""
 PLACES, FINER = 16, 20
 """Places tried in a shortest wavelength, and again between two of them around the best."""
+MOST_PLACES = 100_000
+"""Places tried at most: some 6,000 of the shortest wavelengths."""
 LEAST_WAVES = 20
 """Fewer waves in a record cover too few of the sea's frequencies."""
 LEAST_CORRELATION = 0.8
@@ -276,11 +278,6 @@ class ProbeSeparation:
     stated: float
     input_error: float
 
-    @property
-    def excess(self) -> float:
-        """Measured less stated separation, m."""
-        return self.separation - self.stated
-
     def reversed(self) -> ProbeSeparation:
         """Return the same from the second probe to the first."""
         return replace(self, separation=-self.separation, stated=-self.stated)
@@ -294,7 +291,9 @@ class ProbeSeparation:
     def disagrees(self) -> bool:
         """Whether the stated separation is surely wrong, and by as much as matters to a model."""
         doubt = SURELY * self.spread + BEYOND_THEORY * abs(self.separation)
-        return self.known and abs(self.excess) > doubt and self.input_error > MATTERS
+        return (
+            self.known and abs(self.separation - self.stated) > doubt and self.input_error > MATTERS
+        )
 
 
 @dataclass(frozen=True)
@@ -315,16 +314,6 @@ class Misplaced:
     other: str
     found: ProbeSeparation
     sure: bool
-
-    def describe(self) -> str:
-        """What was stated, what the waves say, and what it would do."""
-        found = self.found
-        whose = "" if self.sure else ", or the other probe is misplaced"
-        return (
-            f"stated to stand {found.stated:+.3f} m from {self.other}, and the phases of the waves "
-            f"fit {found.separation:+.3f} ± {found.spread:.3f} m{whose}; an elevation carried by "
-            f"the stated distance is wrong by {found.input_error:.2f} of its standard deviation"
-        )
 
 
 def misplaced_probes(
@@ -463,26 +452,18 @@ def probe_separation(
     >>> round(found.separation, 2)
     3.85
     """
-    a, b = as_series(first, minimum=64), as_series(second, minimum=64)
-    if a.ndim != 1 or a.shape != b.shape:
-        raise RequestError(
-            f"two records of the same length are needed, shape (time,); received {a.shape} and "
-            f"{b.shape}. Cut them to their common time."
-        )
+    a, b = as_pair(first, second, minimum=64)
     interval, place = positive(dt, "the time step", "s"), number(stated, "the stated separation")
-    if not np.isfinite(place):
-        raise RequestError(f"the stated separation must be a number (m); received {stated!r}.")
-    for name, each in (("first", a), ("second", b)):
-        if np.ptp(each) == 0:
-            raise DataError(
-                f"the {name} record is constant ({each[0]:g}): no wave passes it. Look for a dead "
-                "probe."
-            )
     cross, power, k = _spectra(a, b, interval, depth)
     period = encounter_period(a, interval)
     reach = float(group_speed(2 * np.pi / period, depth)) * REACH * a.size * interval
     reach = max(reach, abs(place) + np.pi / float(k[np.argmax(np.abs(cross))]))
     step = 2 * np.pi / float(k[-1]) / PLACES
+    if not 2 * reach / step <= MOST_PLACES:
+        raise RequestError(
+            f"the stated separation of {place:g} m is too far for waves of {16 * step:.3g} m and a "
+            f"record of {a.size * interval:.4g} s. Correct the positions of the probes (m)."
+        )
     coarse = np.arange(-reach, reach, step)
     scores = _scores(cross, power, k, coarse)
     best = coarse[_chosen(scores, int(np.argmin(np.abs(coarse - place))))]
