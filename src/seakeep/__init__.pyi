@@ -1,4 +1,4 @@
-from . import campaign, core, metrics, models, report, signals, statistics, study, tank
+from . import campaign, core, metrics, models, quality, report, signals, statistics, study, tank
 from .campaign import Campaign, read_campaign
 from .errors import DataError, RequestError, SeakeepError, SeakeepWarning
 from .models import (
@@ -37,6 +37,7 @@ __all__ = [
     "load_model",
     "metrics",
     "models",
+    "quality",
     "read_campaign",
     "report",
     "signals",

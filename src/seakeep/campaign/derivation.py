@@ -39,31 +39,7 @@ AXES = {"surge": 0, "sway": 1, "heave": 2, "x": 0, "y": 1, "z": 2}
 def derive(
     dataset: xr.Dataset, name: str, settings: CampaignSettings, dt: float, run: str
 ) -> xr.Dataset:
-    """Add a derived channel to channels on one axis.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        Channels in SI units, uniform in time, without gaps.
-    name : str
-        Name of the channel.
-    settings : CampaignSettings
-        The campaign.
-    dt : float
-        Time step, s.
-    run : str
-        Name of the run, for messages.
-
-    Returns
-    -------
-    Dataset
-        The same with the channel; samples that rest on missing or bridged ones are flagged.
-
-    Raises
-    ------
-    RequestError, DataError
-        What the step raises, with run and channel named.
-    """
+    """Add a derived channel to channels on one axis."""
     own = settings.derived[name]
     try:
         channel = _derived(dataset, name, own, dt)

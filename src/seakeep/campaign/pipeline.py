@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -749,3 +750,56 @@ def _refuse_empty(
 
 def _texts(span: tuple[float, float], dt: float) -> tuple[str, str]:
     return instant_text(span[0], dt), instant_text(span[1], dt)
+
+
+def attributes_of(
+    name: str, run: xr.Dataset, dt: float, clocks: Mapping[str, Clock], campaign: CampaignSettings
+) -> dict[str, Any]:
+    """Attributes that settings (lengths in seconds) and clocks give to a run that was cut."""
+    settings, rig, general = campaign.runs[name], campaign.rig, campaign.campaign
+    time = run["time"].to_numpy()
+    attributes: dict[str, Any] = {
+        "run": name,
+        "seakeep_version": version(),
+        "file": settings.file or ", ".join(settings.files.values()),
+        "preparation_preset": campaign.preparation.preset,
+        "dt": float(dt),
+        "scale_factor": general.scale_factor,
+        "sea_state": settings.sea_state,
+        "role": settings.serves,
+        "waves": settings.waves,
+        "water_depth": rig.water_depth,
+        "wave_direction": rig.wave_direction,
+        "frame": rig.frame,
+        "encounter_period": general.encounter_period,
+        "probe_offset": settings.probe_offset,
+        "probe_offset_span": settings.probe_offset_span,
+    }
+    whole = (float(time[0]), float(time[-1]))
+    for use in ("train", "test"):
+        span = getattr(settings, use)
+        if span is None and settings.serves == use:
+            span = whole
+        if span is not None:
+            kept = time[inside(time, span, dt)]
+            if kept.size:
+                attributes[f"{use}_span"] = (float(kept[0]), float(kept[-1]))
+    for logger, clock in list(clocks.items())[1:]:
+        attributes |= {
+            f"clock_{logger}": clock.describe(),
+            f"clock_{logger}_method": clock.method,
+            f"clock_{logger}_count": clock.count,
+            f"clock_{logger}_offset": clock.offset,
+            f"clock_{logger}_offset_error": clock.offset_error,
+            f"clock_{logger}_drift_ppm": 1e6 * clock.drift,
+            f"clock_{logger}_drift_error_ppm": 1e6 * clock.drift_error,
+        }
+    return {key: value for key, value in attributes.items() if value is not None}
+
+
+def version() -> str:
+    """Version of seakeep, "unknown" where it is not installed."""
+    try:
+        return metadata.version("seakeep")
+    except metadata.PackageNotFoundError:
+        return "unknown"

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.campaign.labels import attributes_of, role_of
 from seakeep.campaign.pipeline import (
     Run,
+    attributes_of,
     checked,
     cleaned,
     cropped,
@@ -90,12 +90,12 @@ class Campaign:
     @property
     def training_runs(self) -> list[str]:
         """Names of the runs of which all or a part trains."""
-        return [n for n in self.runs if "train" in role_of(self.settings.runs[n])]
+        return [n for n in self.runs if "train" in self.settings.runs[n].serves]
 
     @property
     def test_runs(self) -> list[str]:
         """Names of the runs of which all or a part tests."""
-        return [n for n in self.runs if "test" in role_of(self.settings.runs[n])]
+        return [n for n in self.runs if "test" in self.settings.runs[n].serves]
 
     @property
     def models(self) -> list[str]:

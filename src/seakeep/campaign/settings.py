@@ -522,6 +522,15 @@ class RunSettings(Table):
         description="[begin, end] in s or periods, from which a model estimates the offset",
     )
 
+    @property
+    def serves(self) -> str:
+        """What the run serves for: "train", "test", "train and test" or "unused"."""
+        if self.train and self.test:
+            return "train and test"
+        if self.train or self.test:
+            return "train" if self.train else "test"
+        return self.role or "train"
+
     @model_validator(mode="after")
     def _one_use(self) -> RunSettings:
         if (self.file is None) == (not self.files):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.campaign.labels import version
+from seakeep.campaign.pipeline import version
 from seakeep.campaign.prepare import Campaign, Progress
 from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepError, SeakeepWarning

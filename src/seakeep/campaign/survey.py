@@ -68,22 +68,7 @@ class Survey:
 
 
 def spare(failures: Failures | None, run: str, error: SeakeepError) -> None:
-    """Note the error of a run whose files cannot be read, or raise it.
-
-    Parameters
-    ----------
-    failures : dict of str to SeakeepError, or None
-        Takes the error; None raises it.
-    run : str
-        Name of the run.
-    error : SeakeepError
-        What was wrong. A request that is wrong is so for all runs, and raised anyway.
-
-    Raises
-    ------
-    SeakeepError
-        The error, if it is not to be noted.
-    """
+    """Note the error of a run whose files cannot be read, or raise it."""
     if failures is None or not isinstance(error, DataError | MissingFileError):
         raise error
     failures[run] = error
@@ -112,37 +97,9 @@ def survey(
 ) -> Survey:
     """Read each run once for its clocks and its period.
 
-    Parameters
-    ----------
-    settings : CampaignSettings
-        The campaign.
-    files_of : callable
-        Gives the files of a run by logger.
-    clock_runs, period_runs : sequence of str
-        Runs whose clocks, and whose periods, are wanted.
-    channel : str
-        The wave channel.
-    reader : callable
-        Gives the columns of a file.
-    progress : callable, optional
-        Called as ``progress(0, total, words)`` before each run.
-    asked : collection of str, optional
-        Runs that are wanted for themselves. Of the others, those that cannot be read are left out
-        of what is pooled, with a warning.
-    failures : dict of str to SeakeepError, optional
-        Takes the errors of runs in `asked` that cannot be read, in place of raising them.
-
-    Returns
-    -------
-    Survey
-        Drifts are pooled over the runs that can be read, where the campaign does not say
-        otherwise, and one that is not certain is left out.
-
-    Raises
-    ------
-    RequestError, DataError
-        If a file of a run in `asked` cannot be read, a clock not found, or its record holds fewer
-        than two waves; or if that is so of every run.
+    Of runs that are not `asked` for, those that cannot be read are left out of what is pooled, with
+    a warning; of the others, `failures` takes the errors, or they are raised. Drifts are pooled
+    where the campaign does not say otherwise, and one that is not certain is left out.
     """
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
     clocks: dict[str, dict[str, Clock]] = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from seakeep.campaign.settings import CampaignSettings, ChannelSettings, DerivedSettings
@@ -20,23 +21,7 @@ __all__ = [
 
 
 def read_settings(path: Path) -> CampaignSettings:
-    """Read and validate a campaign file.
-
-    Parameters
-    ----------
-    path : Path
-        The TOML file.
-
-    Returns
-    -------
-    CampaignSettings
-        Its contents.
-
-    Raises
-    ------
-    RequestError
-        If the file is missing, is no TOML, or says something that a campaign cannot say.
-    """
+    """Read and validate a campaign file."""
     content = read_toml(path, "campaign", " Draft one with 'seakeep init FILE…'.")
     return validated(CampaignSettings, content, path, "campaign", _cross_checks)
 
@@ -44,65 +29,29 @@ def read_settings(path: Path) -> CampaignSettings:
 def derivation_order(
     derived: Mapping[str, DerivedSettings], channels: Collection[str] = ()
 ) -> list[str]:
-    """Order derived channels so that each finds what it needs.
-
-    Parameters
-    ----------
-    derived : mapping of str to DerivedSettings
-        The tables ``[derived.NAME]``.
-    channels : collection of str, optional
-        All channels there are.
-
-    Returns
-    -------
-    list of str
-        Their names, sources first.
-
-    Raises
-    ------
-    RequestError
-        If they need one another in a circle; the message prints it.
-    """
-    order: list[str] = []
-
-    def visit(name: str, trail: tuple[str, ...]) -> None:
-        if name in trail:
-            circle = " -> ".join((*trail[trail.index(name) :], name))
-            raise RequestError(
-                f"derived channels need one another in a circle: {circle}. Make one of them from "
-                "measured channels."
-            )
-        if name in order or name not in derived:
-            return
-        for source in sources_of(name, derived[name], channels):
-            visit(source, (*trail, name))
-        order.append(name)
-
-    for name in derived:
-        visit(name, ())
-    return order
+    """Order derived channels so that each finds what it needs."""
+    graph = {
+        name: [source for source in sources_of(name, each, channels) if source in derived]
+        for name, each in derived.items()
+    }
+    try:
+        return list(TopologicalSorter(graph).static_order())
+    except CycleError as error:
+        circle = error.args[1][:0:-1]
+        first = min(map(list(derived).index, circle))
+        at = circle.index(list(derived)[first])
+        shown = " -> ".join((*circle[at:], *circle[: at + 1]))
+        raise RequestError(
+            f"derived channels need one another in a circle: {shown}. Make one of them from "
+            "measured channels."
+        ) from None
 
 
 _TURNS = ("roll", "pitch", "yaw")
 
 
 def sources_of(name: str, settings: DerivedSettings, channels: Collection[str]) -> tuple[str, ...]:
-    """Channels that a derived channel needs.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-    settings : DerivedSettings
-        Its table.
-    channels : collection of str
-        All channels there are: a step of the rigid body takes the angles it finds among them.
-
-    Returns
-    -------
-    tuple of str
-        Names, each once.
-    """
+    """Channels that a derived channel needs."""
     if settings.expression is not None:
         return parse(settings.expression).channels
     sources = [str(settings.source)]
