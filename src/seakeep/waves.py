@@ -18,18 +18,23 @@ GRAVITY = 9.81
 """Acceleration of gravity, m/s²."""
 
 
-def _checked(name: str, value: npt.ArrayLike) -> FloatArray:
+SMALLEST, LARGEST = 1e-9, 1e9
+"""Frequencies (rad/s), lengths and depths (m) other than zero that are taken for meant."""
+
+
+def _checked(name: str, value: npt.ArrayLike, infinite: bool = False) -> FloatArray:
     array = as_real(value, name)
-    if np.any(~np.isfinite(array) & ~np.isposinf(array)) or np.any(array < 0):
+    sound = (array == 0) | ((array >= SMALLEST) & (array <= LARGEST))
+    if not np.all(sound | (np.isposinf(array) & infinite)):
         raise RequestError(
-            f"{name} must be zero or positive; received {value!r}. "
-            "Check its sign and its unit (rad/s for frequencies, m for lengths)."
+            f"{name} must be zero or positive, and between {SMALLEST:g} and {LARGEST:g}; received "
+            f"{value!r}. Check its sign and its unit (rad/s for frequencies, m for lengths)."
         )
     return array
 
 
 def _checked_depth(depth: npt.ArrayLike) -> FloatArray:
-    array = _checked("the water depth", depth)
+    array = _checked("the water depth", depth, infinite=True)
     if np.any(array == 0):
         raise RequestError(
             "the water depth must be positive; received 0. "
