@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.core.calibration import ConformalMargin, band_scores, conformal_margin
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import labelled
@@ -33,7 +33,6 @@ __all__ = [
     "widened",
 ]
 
-FloatArray = npt.NDArray[np.float64]
 Band = Literal["members", "calibrated"]
 NUMBERS = ("margin", "block_length", "blocks", "warranted")
 

@@ -19,16 +19,15 @@ from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import DataError
 from seakeep.models.interface import InputMap
 from seakeep.models.settings import History, periods_to_samples
 
 __all__ = ["Draw", "Sampling", "TrainOn", "draw_members"]
 
-FloatArray = npt.NDArray[np.float64]
 Sampling = Literal["monte_carlo", "sobol"]
 TrainOn = Literal["all", "runs", "windows"]
 

@@ -9,16 +9,15 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 from seakeep.signals import uniform_step
 from seakeep.signals.time_axis import instant_text, span_text
 
 __all__ = ["ChannelLabel", "as_runs", "channel_labels", "channel_matrix", "nearest_sample"]
 
-FloatArray = npt.NDArray[np.float64]
 Runs = xr.Dataset | Sequence[xr.Dataset] | Mapping[str, xr.Dataset]
 Stop = float | Sequence[float] | Mapping[str, float] | Mapping[str, float | None] | None
 """Last instant of the training window, s: one for all runs, or one per run."""

@@ -6,9 +6,9 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled
 from seakeep.models.linear import HankelDMDcModel
@@ -17,7 +17,6 @@ from seakeep.waves import phase_speed
 
 __all__ = ["ProbeOffset", "estimate_probe_offset"]
 
-FloatArray = npt.NDArray[np.float64]
 
 COARSE = 20  # distances on either side of zero
 FINE = 24  # distances on either side of the best, a sixth as far apart

@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError
 
 __all__ = ["STATISTICS", "reduce_members", "summarize"]
 
-FloatArray = npt.NDArray[np.float64]
 
 STATISTICS = ("mean", "std", "lower", "upper")
 CHUNK = 8 * 2**20
