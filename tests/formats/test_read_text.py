@@ -2,7 +2,7 @@
 
 import gzip
 import io
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 import pandas as pd
@@ -469,9 +469,10 @@ def test_an_open_quotation_mark(tmp_path):
         read_table(path)
 
 
-def test_a_gzip_that_unpacks_without_end(tmp_path):
-    path = write(tmp_path, gzip.compress(b"0" * 2**28 + b"0", 1, mtime=0), "run.csv.gz")
-    with pytest.raises(DataError, match=r"unpacks to more than 256 MiB, over 100 times its size"):
+def test_a_gzip_that_unpacks_without_end(tmp_path, monkeypatch):
+    monkeypatch.setattr("seakeep.formats.limits.FREE", 2**20)
+    path = write(tmp_path, gzip.compress(bytes(2**24), mtime=0), "run.csv.gz")
+    with pytest.raises(DataError, match=r"unpacks to more than 2 MiB, over 100 times its size"):
         read_table(path)
 
 
@@ -490,9 +491,9 @@ def test_a_header_without_end(tmp_path):
 def test_many_columns_take_a_time_that_grows_with_them(tmp_path):
     """Twenty thousand names, which a search through all of them for each takes a minute."""
     names = [f"x{i}" for i in range(20_000)]
-    start = perf_counter()
+    start = process_time()
     assert unique_names(names)[0] == names
-    assert perf_counter() - start < 2.0  # 0.1 s; 5 s where it grows with the square
+    assert process_time() - start < 2.0  # 0.1 s; 5 s where it grows with the square
 
 
 def test_a_text_is_parsed_once(tmp_path, monkeypatch):

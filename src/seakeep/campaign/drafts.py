@@ -334,34 +334,22 @@ def _preparation(
 ) -> Iterator[str]:
     """One step for all, no finer than that of the fastest logger, and what to do about gaps."""
     yield from ("", "[preparation]")
-    rates = {file.logger: file.rate for file in reversed(files)}
-    known = [rate for rate in rates.values() if rate]
-    shortest = min((sea.period for sea in seas.values()), default=None)
-    usual = f"sampling_rate = {min([25.0, *known]):.6g}  # Hz"
-    fine = shortest is not None and STEPS / shortest > max(known, default=float("inf"))
-    if len(rates) > 1:
-        if shortest is not None and not fine:
-            yield f"steps_per_period = {STEPS} # guessed: samples per mean period"
-            yield f"# {usual}; instead of it"
-        else:
-            yield (
-                f"sampling_rate = {min(known, default=25.0):#.6g} # Hz; guessed: that of the "
-                "slowest logger"
-            )
+    several = bool(files[0].logger)
+    rates = [file.rate for file in files if file.rate]
+    shortest = min((sea.period for sea in seas.values()), default=0.0)
+    every = int(max(rates, default=0.0) * shortest / STEPS)
+    if rates and not several:
+        yield f"# the files have {rates[0]:.6g} samples per second"
+    if every > 1:
+        yield (
+            f"sampling_rate = {max(rates) / every:#.6g} # Hz; guessed: about {STEPS} samples per "
+            f"wave of {shortest:.3g} s, the shortest"
+        )
+    elif several:
+        rate = min(rates, default=25.0)
+        yield f"sampling_rate = {rate:#.6g} # Hz; guessed: that of the slowest logger"
     else:
-        rate = known[0] if known else None
-        if rate:
-            yield f"# the files have {rate:.6g} samples per second"
-        every = int(shortest * rate / STEPS) if rate and shortest else 1
-        if rate and shortest and every > 1:
-            yield (
-                f"sampling_rate = {rate / every:#.6g} # Hz; guessed: about "
-                f"{STEPS} samples per wave of {shortest:.3g} s, the shortest"
-            )
-        else:
-            yield f"# {usual}; left out, the files' own"
-        if not fine:
-            yield f"# steps_per_period = {STEPS}  # instead: samples per mean period"
+        yield f"# sampling_rate = {min([25.0, *rates]):.6g}  # Hz; left out, the files' own"
     if gapped := [str(guess.channel) for guess in guesses if guess.channel and guess.gaps]:
         short = any(guess.gaps == "short" for guess in guesses if guess.channel)
         yield (
