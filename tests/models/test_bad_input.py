@@ -149,9 +149,9 @@ def test_gaps_in_arrays_are_refused(model, name):
 
 @pytest.mark.parametrize("steps", [0, -1, 2.0, True, "5"])
 def test_steps_must_be_a_positive_integer(model, run, steps):
-    with pytest.raises(RequestError, match=r"steps must be a positive integer; received"):
+    with pytest.raises(RequestError, match=r"steps must be a whole number of at least 1; received"):
         model.forecast(run, start=5.0, steps=steps)
-    with pytest.raises(RequestError, match=r"steps must be a positive integer; received"):
+    with pytest.raises(RequestError, match=r"steps must be a whole number of at least 1; received"):
         model.forecast_arrays(**{key: np.zeros(size) for key, size in ARRAYS.items()}, steps=steps)
 
 

@@ -211,7 +211,9 @@ def test_what_is_refused(ensemble, calibrated, run):
         match=r"no window of 400 steps .* is free in sea, as given here: members have read",
     ):
         ensemble.calibrate(run.sel(time=slice(None, 62.0)), steps=400)
-    with pytest.raises(RequestError, match="steps must be a positive integer; received 0"):
+    with pytest.raises(
+        RequestError, match="steps must be a whole number of at least 1; received 0"
+    ):
         ensemble.calibrate(run, steps=0)
     with pytest.raises(RequestError, match="level must lie between 0 and 1"):
         ensemble.calibrate(run, steps=40, level=95)

@@ -12,7 +12,7 @@ from typing import Any, Literal, Protocol, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, fraction, whole_number
 from seakeep.core.calibration import ConformalMargin, band_scores, conformal_margin
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import labelled
@@ -21,7 +21,7 @@ from seakeep.models.engine import Runs as FreeRuns
 from seakeep.models.engine import member_series, read_windows
 from seakeep.models.executor import Progress
 from seakeep.models.members import TrainingArrays
-from seakeep.models.summaries import STATISTICS, check_level, reduce_members
+from seakeep.models.summaries import STATISTICS, reduce_members
 
 __all__ = [
     "Band",
@@ -97,7 +97,7 @@ def calibrate(
 ) -> Calibration:
     """Find the margins of an ensemble; see :meth:`HankelEnsemble.calibrate`."""
     named = labelled.as_runs(runs)
-    level = check_level(level)
+    level = fraction(level, "level")
     free = _free_starts(ensemble, named, steps)
     scores = _scores(ensemble, named, free, steps, level, executor, progress)
     history = ensemble.signature.history_samples
@@ -148,7 +148,7 @@ def held_out_scores(
     dict of str to ndarray, each of shape (window, steps, N)
         Runs in which there is such a window.
     """
-    level = check_level(level)
+    level = fraction(level, "level")
     return _scores(ensemble, runs, _free_starts(ensemble, runs, steps), steps, level, executor)
 
 
@@ -195,8 +195,7 @@ def _counted(progress: Progress, before: int, runs: int, name: str) -> Progress:
 
 def _unread_starts(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) -> list[float]:
     """Starts of windows end to end in a run, clear of what members have read of it."""
-    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
-        raise RequestError(f"steps must be a positive integer; received {steps!r}.")
+    whole_number(steps, "steps")
     time = np.asarray(run["time"].values, dtype=float)
     slack = 1e-6 * ensemble.signature.dt
     read = _read_span(ensemble, name, run)

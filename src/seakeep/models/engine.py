@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, IntArray
+from seakeep.arrays import FloatArray, IntArray, whole_number
 from seakeep.core.rollout import rollout
 from seakeep.errors import RequestError
 from seakeep.models import labelled
@@ -261,14 +261,10 @@ class _Opened:
         available = time.size - 1 - at
         # The last input needed is the one an instant before the last state, and the lead after it.
         most = available + 1 - lead if signature.inputs else None
-        count = (available - max(lead - 1, 0)) if steps is None else steps
-        if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
-            raise RequestError(
-                f"steps must be a positive integer; received {steps!r}"
-                f"{' at the end of the run' if steps is None else ''}. It counts the instants "
-                "after start."
-            )
-        count = int(count)
+        count = whole_number(
+            available - max(lead - 1, 0) if steps is None else steps,
+            "steps (to the end of the run)" if steps is None else "steps",
+        )
         if most is not None and count > most:
             ahead = f", of which the model's lead takes {lead}" if lead else ""
             raise RequestError(

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, fraction
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import engine, store
 from seakeep.models.calibration import (
@@ -50,7 +50,6 @@ from seakeep.models.members import (
 )
 from seakeep.models.settings import HankelSettings
 from seakeep.models.summaries import (
-    check_level,
     reduce_members,
     statistic_coordinate,
     statistics_of,
@@ -347,7 +346,7 @@ class _Forecasts:
         progress: Progress | None,
     ) -> tuple[Windows, FloatArray, npt.NDArray[np.int64]]:
         """Windows, statistics (window, 4, steps, N), and where members were lost."""
-        level = check_level(level)
+        level = fraction(level, "level")
         check_band(self.calibration, level, band)
         windows = self.read_windows(*one_run(run, starts), steps)
         if band == "calibrated":
@@ -883,7 +882,7 @@ class HeldEnsemble(_Forecasts):
         RequestError
             If a shape or name does not fit, or there is no such band.
         """
-        level = check_level(level)
+        level = fraction(level, "level")
         check_band(self.calibration, level, band)
         windows = check_arrays(self.signature, x_history, u_history, u_future, steps, ahead)
         if band == "calibrated":

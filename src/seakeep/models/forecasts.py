@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, as_real
+from seakeep.arrays import FloatArray, as_real, whole_number
 from seakeep.errors import RequestError
 from seakeep.models import engine
 from seakeep.models.engine import Windows, first_lost
@@ -282,8 +282,7 @@ def check_arrays(
 
     Columns that have names (a pandas DataFrame, a DataArray) are taken by name.
     """
-    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
-        raise RequestError(f"steps must be a positive integer; received {steps!r}.")
+    whole_number(steps, "steps")
     if ahead != "refuse":
         raise RequestError(f"ahead must be 'refuse'; received {ahead!r}.")
     states, inputs, count = signature.states, signature.inputs, int(steps)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, fraction
 from seakeep.errors import RequestError
 
 __all__ = ["STATISTICS", "reduce_members", "summarize"]
@@ -19,15 +19,6 @@ CHUNK = 8 * 2**20
 """Bytes of all members that are reduced at a time."""
 SORTED = 512
 """Members up to which sorting them all is faster than selecting the few that are asked for."""
-
-
-def check_level(level: object) -> float:
-    """Refuse a level that is not between 0 and 1."""
-    if isinstance(level, bool) or not isinstance(level, int | float) or not 0 < level < 1:
-        raise RequestError(
-            f"level must lie between 0 and 1; received {level!r}. 0.95 is the 95 % band."
-        )
-    return float(level)
 
 
 def statistics_of(values: FloatArray, level: float) -> FloatArray:
@@ -147,7 +138,7 @@ def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
     >>> summarize(two).heave.sel(statistic="mean").values
     array([2., 3.])
     """
-    level = check_level(level)
+    level = fraction(level, "level")
     if not isinstance(forecast, xr.Dataset) or "member" not in forecast.dims:
         received = (
             f"dimensions {', '.join(map(str, forecast.dims))}"
