@@ -11,6 +11,7 @@ from scipy import stats
 import seakeep
 from seakeep import BayesianHankelDMDc, Fixed, LogUniform, Uniform
 from seakeep.campaign import ModelSettings
+from seakeep.campaign.store import write_prepared
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.study import (
     build_spec,
@@ -83,7 +84,10 @@ def test_a_dead_probe_in_a_test_run_is_told(halves):
     table = np.loadtxt(halves / "run.csv", delimiter=",", skiprows=1)
     table[1001:, 1] = 0.0
     np.savetxt(halves / "run.csv", table, delimiter=",", header="t [s],eta [m],z [m]", comments="")
-    with pytest.warns(SeakeepWarning, match=r"channel 'eta_fwd' of all is constant \(0\) over the"):
+    with (
+        pytest.warns(SeakeepWarning, match="eta_fwd stuck"),
+        pytest.warns(SeakeepWarning, match=r"channel 'eta_fwd' of all is constant \(0\) over the"),
+    ):
         compare(model, whole)
 
 
@@ -363,9 +367,13 @@ def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halve
         + text.replace("test = [100.0, 200.0]", "test = [100.0, 200.0]\nprobe_offset = 0.1")
     )
     whole = seakeep.read_campaign(halves / "campaign.toml")
-    model = fit_campaign(whole)
+    with pytest.warns(
+        SeakeepWarning, match=r"up to 1\.14 s after the instant"
+    ):  # a probe downstream
+        model = fit_campaign(whole)
     assert model.alignment.settings == seakeep.ProbeAlignment(mode="dispersion", surge="measured")
-    found = comparison_table(compare(model, whole)).isel(run=0)
+    with pytest.warns(SeakeepWarning, match="needs these waves ahead of time"):
+        found = comparison_table(compare(model, whole)).isel(run=0)
     assert str(found["conditional_on"].values) == "surge"
     assert float(found["probe_offset"]) == 0.1
 
@@ -437,3 +445,45 @@ def test_an_unknown_kind_or_key_is_named():
         build_spec(ModelSettings(states=("heave",), kind="hankel"), 2.0, 0.1)
     with pytest.raises(RequestError, match=r"has no key 'riddge'.*mean 'ridge'"):
         build_spec(ModelSettings(states=("heave",), preset="paper", riddge=1.0), 2.0, 0.1)
+
+
+def sines(folder: Path, periods: dict[str, tuple[float, ...]]) -> str:
+    """Runs of regular waves, one file each; the last one tests."""
+    time = np.arange(1501) / RATE
+    text = ""
+    for number, (name, each) in enumerate(periods.items()):
+        eta = sum(np.sin(2 * np.pi * time / period) for period in each)
+        table = np.column_stack([time, eta, 0.5 * np.roll(eta, 2)])
+        np.savetxt(folder / f"{name}.csv", table, delimiter=",", header="t [s],eta [m],z [m]",
+                   comments="")  # fmt: skip
+        role = "test" if number == len(periods) - 1 else "train"
+        text += f'[runs.{name}]\nfile = "{name}.csv"\nrole = "{role}"\n'
+    return text
+
+
+@pytest.mark.parametrize(
+    ("period", "words"), [(2.0, "in a gap of the periods"), (8.0, "outside the periods")]
+)
+def test_waves_of_periods_that_were_not_trained_are_warned_of(tmp_path, period, words):
+    runs = sines(tmp_path, {"short": (1.0,), "long": (4.0,), "new": (period,)})
+    asked = campaign(tmp_path, EXACT, runs)
+    model = fit_campaign(asked)
+    with pytest.warns(SeakeepWarning, match=rf"new: eta_fwd: .* lies {words}.*Train in such"):
+        compare(model, asked)
+    write_prepared(asked)
+    with pytest.warns(SeakeepWarning, match=rf"new: eta_fwd: .* lies {words}"):
+        fit_campaign(asked)
+
+
+def test_waves_of_trained_periods_are_not_warned_of(tmp_path, recwarn):
+    asked = campaign(tmp_path, EXACT, sines(tmp_path, {"a": (1.0, 4.0), "new": (4.0,)}))
+    compare(fit_campaign(asked), asked)
+    assert not [each for each in recwarn if "periods" in str(each.message)]
+
+
+def test_a_lead_reads_waves_ahead_of_time(halves):
+    asked = campaign(halves, f"{EXACT}\nlead = 8")
+    with pytest.warns(SeakeepWarning, match=r"read the waves up to 0\.7 s after the instant that"):
+        model = fit_campaign(asked)
+    with pytest.warns(SeakeepWarning, match=r"of all reads the waves up to 0\.7 s after"):
+        compare(model, asked, steps=20)

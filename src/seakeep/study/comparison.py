@@ -23,7 +23,7 @@ from seakeep.models.training import is_constant
 from seakeep.quality import warn_of_runs
 from seakeep.signals import froude_factor
 from seakeep.signals.time_axis import span_text
-from seakeep.study.fit import warn_of_repeats
+from seakeep.study.fit import warn_of_repeats, warn_of_waves
 from seakeep.study.full_scale import to_full_scale
 from seakeep.toml import parse_length
 
@@ -358,6 +358,9 @@ def compare_models(
         ]
         for each in found[label]:
             _warn_of_known(model, each)
+            steps_of = each.measured.sizes["time"]
+            warn_of_waves(model, prepared[each.run], each.run, each.start, steps_of)
+            _warn_of_look_ahead(each)
     for of_run in zip(*found.values(), strict=True):
         parts = [part for each in of_run for part in (each.measured, each.inputs)]
         _warn_of_dead(xr.merge(parts, compat="override"), of_run[0].run)
@@ -384,6 +387,17 @@ def _warn_of_known(model: Model, compared: Comparison) -> None:
         told.append(f"the band was calibrated on a part of this forecast {part}: {memory}")
     for text in told:
         warnings.warn(text, SeakeepWarning, stacklevel=3)
+
+
+def _warn_of_look_ahead(compared: Comparison) -> None:
+    until = float(compared.forecast.attrs.get("reads_input_until", -1.0))
+    if until > 0.0:
+        warnings.warn(
+            f"the forecast of {compared.run} reads the waves up to {until:.3g} s after the instant "
+            "that it forecasts: the model needs these waves ahead of time.",
+            SeakeepWarning,
+            stacklevel=4,
+        )
 
 
 def _named(tell: Progress, run: str) -> Progress:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
+from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepWarning
-from seakeep.models import HankelDMDc, HankelDMDcModel, HankelEnsemble, Model
+from seakeep.models import HankelDMDc, HankelDMDcModel, HankelEnsemble, Model, compare_waves
 from seakeep.models.slow import warn_of_slow_motions
 from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, find_leakage
@@ -19,8 +20,10 @@ from seakeep.study.plan import between, needs_of
 from seakeep.study.resolve import Spec, build_spec, counts_in_periods
 from seakeep.toml import Length
 
-__all__ = ["fit_campaign", "training_runs", "warn_of_repeats"]
+__all__ = ["fit_campaign", "training_runs", "warn_of_repeats", "warn_of_waves"]
 
+CYCLES = 5.0
+"""Periods of a test from which on its spectrum tells which waves it holds."""
 NOTHING_TRAINS = (
     "no run of the campaign trains a model. Give one role = 'train', or a span "
     "train = [begin, end]."
@@ -94,8 +97,9 @@ def fit_campaign(
     -----
     SeakeepWarning
         If the test part of a training run repeats the model's training input, or the training
-        windows (of an ensemble the longest) hold fewer than five periods of a slow motion; also of
-        what the quality checks found in the model's channels.
+        windows (of an ensemble the longest) hold fewer than five periods of a slow motion; of what
+        the quality checks found in the model's channels; of test waves whose periods were not
+        trained; and where the model reads waves after the instant that it forecasts.
     """
     settings = campaign.model(model)
     prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
@@ -112,9 +116,47 @@ def fit_campaign(
     identified = spec.fit(runs, list(settings.states), list(settings.inputs), stop=stop)
     both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
     warn_of_repeats(identified, campaign, both)
+    for name, run in (both | _prepared_tests(campaign, both)).items():
+        begin, end = run.attrs.get("test_span", (run["time"].values[0], run["time"].values[-1]))
+        warn_of_waves(identified, run, name, float(begin), round((end - begin) / dt))
+    until = max(_reads_ahead(identified, run) for run in runs.values())
+    if until > 0.5 * dt:
+        warnings.warn(
+            f"forecasts of this model read the waves up to {until:.3g} s after the instant that "
+            "they forecast: it needs these waves ahead of time.",
+            SeakeepWarning,
+            stacklevel=2,
+        )
     if spec.standardize:
         _warn_of_slow_model(identified, runs)
     return identified
+
+
+def _reads_ahead(model: Model, run: xr.Dataset) -> float:
+    """How long after the instant forecast a model reads its input, s; negative: before it."""
+    signature = model.signature
+    return signature.input_map.look_ahead(run, signature.dt) - signature.dt
+
+
+def _prepared_tests(campaign: Campaign, known: Collection[str]) -> dict[str, xr.Dataset]:
+    """Test runs that `seakeep prepare` has written; the others are not prepared for a warning."""
+    folder = prepared_folder(campaign)
+    names = [name for name in campaign.test_runs if name not in known]
+    names = [name for name in names if (folder / f"{name}.nc").exists()]
+    return load_prepared(campaign, names=names) if names else {}
+
+
+def warn_of_waves(model: Model, run: xr.Dataset, name: str, start: float, steps: int) -> None:
+    """Warn where the waves of a test have periods in which the model was not trained."""
+    found = compare_waves(model, run, start, steps)
+    length = steps * model.dt
+    told = [each.text for each in found if each.text and length > CYCLES * each.period]
+    if told:
+        warnings.warn(
+            f"{name}: {'; '.join(told)}. Train in such waves too: errors may be large.",
+            SeakeepWarning,
+            stacklevel=3,
+        )
 
 
 def _longest_window(spec: Spec, dt: float) -> int | None:
