@@ -305,7 +305,9 @@ class DerivedSettings(Table):
     """``[derived.NAME]``: a channel made from others, by an expression or by a named step."""
 
     expression: str | None = Field(
-        default=None, description="such as '0.5*(acc_sb + acc_ps)', on SI values"
+        default=None,
+        description="such as '0.5*(acc_sb + acc_ps)', on SI values; knows + - * / **, square, abs, "
+        "sqrt, sin, cos, mean (over time) and average (of several channels)",
     )
     source: str | None = Field(
         default=None, alias="from", description="the channel that the step works on"
