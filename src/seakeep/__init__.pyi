@@ -1,4 +1,16 @@
-from . import campaign, core, metrics, models, quality, report, signals, statistics, study, tank
+from . import (
+    baselines,
+    campaign,
+    core,
+    metrics,
+    models,
+    quality,
+    report,
+    signals,
+    statistics,
+    study,
+    tank,
+)
 from .campaign import Campaign, read_campaign
 from .errors import DataError, RequestError, SeakeepError, SeakeepWarning
 from .models import (
@@ -31,6 +43,7 @@ __all__ = [
     "SeakeepError",
     "SeakeepWarning",
     "Uniform",
+    "baselines",
     "campaign",
     "core",
     "estimate_probe_offset",

@@ -84,7 +84,7 @@ def calibrate(
     check_place(out, ".nc")
     from seakeep.campaign import load_prepared, read_campaign
     from seakeep.models import HankelEnsemble, load_model
-    from seakeep.models.linear import counted
+    from seakeep.models.forecasts import counted
     from seakeep.signals.time_axis import instant_text, span_text
     from seakeep.study.comparison import samples_of
 
@@ -174,7 +174,7 @@ def _part(run: xr.Dataset, start: float | None, stop: float | None) -> xr.Datase
 
 def _table(ensemble: HankelEnsemble) -> Table:
     """Margins of the channels, and what they were found on."""
-    from seakeep.models.linear import counted
+    from seakeep.models.forecasts import counted
     from seakeep.report.tables import Table
 
     assert ensemble.calibration is not None

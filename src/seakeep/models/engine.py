@@ -33,6 +33,7 @@ __all__ = [
     "Dynamics",
     "Windows",
     "array_windows",
+    "cut_lost",
     "first_lost",
     "group_series",
     "linear_runs",
@@ -373,10 +374,7 @@ def _open_runs(member: Dynamics, windows: Windows) -> FloatArray:
     )
     with np.errstate(over="ignore"):  # a run that is lost is cut just below
         values = member.state_scale.physical(deviations, out=deviations)
-    excess = np.maximum(
-        _excess(member.input_scale, driving), _excess(member.direct_scale, windows.direct)
-    )
-    return _cut_lost(values, member.state_scale, histories, excess)
+    return cut_lost(values, member, windows)
 
 
 def _closed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
@@ -439,6 +437,16 @@ def _excess(scale: Scale, values: FloatArray) -> FloatArray:
     farthest = np.maximum(values.max(axis=1) - scale.centre, scale.centre - values.min(axis=1))
     out: FloatArray = (farthest / reach).max(axis=1)
     return out
+
+
+def cut_lost(values: FloatArray, scales: Dynamics | Signature, windows: Windows) -> FloatArray:
+    """NaN from where free runs (window, steps, N) are lost, in physical units; they are changed."""
+    first = windows.delayed.shape[1] - scales.input_delays - windows.steps
+    excess = np.maximum(
+        _excess(scales.input_scale, windows.delayed[:, first:]),
+        _excess(scales.direct_scale, windows.direct),
+    )
+    return _cut_lost(values, scales.state_scale, windows.histories, excess)
 
 
 def _cut_lost(

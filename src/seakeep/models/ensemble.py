@@ -31,17 +31,19 @@ from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
 from seakeep.models.executor import Progress, in_order, one_blas_thread
 from seakeep.models.forecasts import (
     check_arrays,
+    counted,
     forecast_notes,
     label_channels,
     one_run,
     statuses,
     verdict,
     window_coords,
+    with_units,
 )
 from seakeep.models.inputs import Chain, FittedAlignment
 from seakeep.models.interface import Json, Signature
 from seakeep.models.labelled import ChannelLabel, Runs
-from seakeep.models.linear import HankelDMDcModel, counted, with_units
+from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.members import (
     TrainingArrays,
     identify_member,

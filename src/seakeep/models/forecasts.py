@@ -17,11 +17,13 @@ from seakeep.models.engine import Windows, first_lost
 from seakeep.models.executor import Progress
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import ChannelLabel, run_name
-from seakeep.signals.time_axis import fixed, instant_text
+from seakeep.models.training import Training
+from seakeep.signals.time_axis import fixed, instant_text, span_text
 
 __all__ = [
     "SingleModel",
     "check_arrays",
+    "counted",
     "label_channels",
     "one_run",
     "status_at_clock",
@@ -29,6 +31,7 @@ __all__ = [
     "statuses",
     "verdict",
     "window_coords",
+    "with_units",
 ]
 
 DIVERGED_AT = "diverged at t = "
@@ -41,6 +44,7 @@ class SingleModel:
     kind: ClassVar[str]
     n_members: ClassVar[int] = 1
     signature: Signature
+    training: Training
 
     def free_runs(
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)
@@ -97,6 +101,38 @@ class SingleModel:
     def lead_samples(self) -> int:
         """Samples of input after the one a step starts from that drive the step."""
         return self.signature.lead_samples
+
+    @property
+    def training_spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant of the training window of each run, s."""
+        training = self.training
+        spans = zip(training.first, training.stop, strict=True)
+        return dict(zip(training.runs, spans, strict=True))
+
+    def lines(self, regression: str = "") -> list[str]:
+        """Lines of a summary: channels, delays, history, regression, input map and training."""
+        signature, training, dt = self.signature, self.training, self.dt
+        states, inputs = (
+            ", ".join(with_units(labels))
+            for labels in (signature.state_labels, signature.input_labels)
+        )
+        lines = [
+            f"  states        {states}",
+            f"  inputs        {inputs or 'none (autonomous)'}",
+            f"  delays        {self.state_delays} of the states ({self.state_delays * dt:g} s),"
+            f" {self.input_delays} of the inputs ({self.input_delays * dt:g} s)",
+            f"  history       {self.history_samples} samples up to the start of a forecast",
+            *([f"  regression    {regression}"] if regression else []),
+            *signature.input_map.describe(dt),
+            f"  training      {sum(training.columns)} snapshot pairs of "
+            f"{counted(len(training.runs), 'run')}",
+        ]
+        return lines + [
+            f"    {name}: {columns} pairs, {span_text(first, stop, dt)}"
+            for name, columns, first, stop in zip(
+                training.runs, training.columns, training.first, training.stop, strict=True
+            )
+        ]
 
     def read_windows(
         self,
@@ -268,6 +304,16 @@ def verdict(lost: npt.NDArray[np.int64]) -> dict[str, Any]:
     diverged = int(np.count_nonzero(lost >= 0))
     status = f"{diverged} of {len(lost)} members diverged" if diverged else "ok"
     return {"status": status, "diverged": diverged}
+
+
+def counted(number: int, thing: str) -> str:
+    """A number and a word, in the plural where it must be."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def with_units(labels: tuple[ChannelLabel, ...]) -> list[str]:
+    """Names of channels with their units."""
+    return [f"{label.name} [{label.units or '?'}]" for label in labels]
 
 
 def check_arrays(

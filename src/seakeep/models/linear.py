@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -17,19 +17,18 @@ from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import export, labelled, store
 from seakeep.models.engine import Dynamics, Windows, linear_runs
-from seakeep.models.forecasts import SingleModel, check_arrays, one_run
+from seakeep.models.forecasts import SingleModel, check_arrays, counted, one_run
 from seakeep.models.inputs import Chain, FittedAlignment, Measured
 from seakeep.models.interface import Scale, Signature, Span
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import Training
 from seakeep.models.validity import Coverage
-from seakeep.signals.time_axis import span_text
 
 if TYPE_CHECKING:
     import control
     from scipy import signal
 
-__all__ = ["HankelDMDcModel", "counted", "modes", "with_units"]
+__all__ = ["HankelDMDcModel", "modes"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,14 +101,6 @@ class HankelDMDcModel(SingleModel):
     def input_std(self) -> FloatArray:
         """What the inputs are divided by, shape (Q,)."""
         return self.input_scale.std
-
-    @property
-    def training_spans(self) -> dict[str, tuple[float, float]]:
-        """First and last instant of the training window of each run, s."""
-        training = self.training
-        return dict(
-            zip(training.runs, zip(training.first, training.stop, strict=True), strict=True)
-        )
 
     @property
     def top(self) -> tuple[FloatArray, FloatArray]:
@@ -386,28 +377,11 @@ class HankelDMDcModel(SingleModel):
         str
             A few lines; reading it computes the eigenvalues.
         """
-        signature, training = self.signature, self.training
-        states, inputs, dt = len(self.states), len(self.inputs), self.dt
-        named = ", ".join(with_units(signature.input_labels))
         rows = "exact" if self.settings.delay_rows == "exact" else "regressed"
         lines = [
-            f"Hankel DMD with control: {counted(states, 'state')}, "
-            f"{counted(inputs, 'input')}, dt {dt:g} s",
-            f"  states        {', '.join(with_units(signature.state_labels))}",
-            f"  inputs        {named or 'none (autonomous)'}",
-            f"  delays        {self.state_delays} of the states ({self.state_delays * dt:g} s),"
-            f" {self.input_delays} of the inputs ({self.input_delays * dt:g} s)",
-            f"  history       {self.history_samples} samples up to the start of a forecast",
-            f"  regression    {_regression(self.settings, training)}; delay rows {rows}",
-            *signature.input_map.describe(dt),
-            f"  training      {sum(training.columns)} snapshot pairs of "
-            f"{counted(len(training.runs), 'run')}",
-        ]
-        lines += [
-            f"    {name}: {columns} pairs, {span_text(first, stop, dt)}"
-            for name, columns, first, stop in zip(
-                training.runs, training.columns, training.first, training.stop, strict=True
-            )
+            f"Hankel DMD with control: {counted(len(self.states), 'state')}, "
+            f"{counted(len(self.inputs), 'input')}, dt {self.dt:g} s",
+            *self.lines(f"{_regression(self.settings, self.training)}; delay rows {rows}"),
         ]
         radius = self.spectral_radius
         verdict = "stable" if radius < 1 else "UNSTABLE: long forecasts diverge"
@@ -453,7 +427,7 @@ class HankelDMDcModel(SingleModel):
         )
 
     @classmethod
-    def from_dataset(cls, dataset: xr.Dataset, settings: HankelSettings) -> HankelDMDcModel:
+    def from_dataset(cls, dataset: xr.Dataset, settings: HankelSettings) -> Self:
         """Rebuild a model from :meth:`to_dataset`; it is equal to the last bit."""
         signature = store.unpack_signature(dataset)
         states = len(signature.states) * (signature.state_delays + 1)
@@ -496,16 +470,6 @@ def modes(eigenvalues: ComplexArray, dt: float) -> xr.Dataset:
             for name, (values, units, label) in table.items()
         }
     )
-
-
-def counted(number: int, thing: str) -> str:
-    """A number and a word, in the plural where it must be."""
-    return f"{number} {thing}{'' if number == 1 else 's'}"
-
-
-def with_units(labels: tuple[labelled.ChannelLabel, ...]) -> list[str]:
-    """Names of channels with their units."""
-    return [f"{label.name} [{label.units or '?'}]" for label in labels]
 
 
 def _regression(settings: HankelSettings, training: Training) -> str:

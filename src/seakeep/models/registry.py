@@ -7,12 +7,15 @@ from typing import TypeVar, overload
 
 from seakeep.errors import DataError, RequestError
 from seakeep.models import store
+from seakeep.models.baselines import ARX, FIR, HoldLast, Mean, Subspace
 from seakeep.models.interface import Model, Spec
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
 
 __all__ = ["KINDS", "load_model"]
 
-KINDS: dict[str, type[Spec]] = {each.kind: each for each in (HankelDMDc, BayesianHankelDMDc)}
+KINDS: dict[str, type[Spec]] = {
+    each.kind: each for each in (HankelDMDc, BayesianHankelDMDc, Mean, HoldLast, FIR, ARX, Subspace)
+}
 """Specs by the word that TOML tables and files call their kind; one line adds a model."""
 
 Kind = TypeVar("Kind")

@@ -14,7 +14,7 @@ from seakeep.core.embedding import History
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models.checks import check_choice
 from seakeep.models.inputs import Chain, Lead, ProbeAlignment
-from seakeep.models.interface import Fittable, InputMap, Json, plain
+from seakeep.models.interface import Fittable, InputMap, Json, Needs, plain
 
 __all__ = [
     "DelayRows",
@@ -147,26 +147,35 @@ class HankelSettings:
         """Samples up to and including the start that a forecast needs: max(s, z) + 1."""
         return max(self.state_delays, self.input_delays + self.extra_history) + 1
 
+    def needs(self, dt: float) -> Needs:
+        """Samples that it asks of its runs."""
+        return Needs(
+            self.window or 1,
+            self.history_samples - 1,
+            self.history == "inside",
+            self.lead + sum(each.lead_samples for each in self.observables),
+        )
+
     def to_json(self) -> Json:
         """Settings as JSON values."""
-        content = {each.name: getattr(self, each.name) for each in fields(HankelSettings)}
-        made: Json = plain(
-            content
-            | {
-                "alignment": None if self.alignment is None else self.alignment.to_json(),
-                "observables": Chain(self.observables).to_json()["maps"],
-            }
-        )
+        content = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
+        maps = {
+            "alignment": None if self.alignment is None else self.alignment.to_json(),
+            "observables": Chain(self.observables).to_json()["maps"],
+        }
+        made: Json = plain({key: maps.get(key, value) for key, value in content.items()})
         return made
 
     @classmethod
     def from_json(cls, content: Json) -> Self:
         """Settings from JSON values; an unknown key or a value out of range raises an error."""
-        known = [each.name for each in fields(HankelSettings)]
+        known = [each.name for each in fields(cls) if each.init]
         for key in content:
             if key not in known:
                 raise RequestError(f"unknown key '{key}'.{did_you_mean(key, known)}")
-        observables = Chain.from_json({"maps": content.get("observables", [])}).maps
+        stated = dict(content)
+        if "observables" in stated:
+            stated["observables"] = Chain.from_json({"maps": stated["observables"]}).maps
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeakeepWarning)  # given when the settings were made
-            return cls(**{**content, "observables": observables})
+            return cls(**stated)

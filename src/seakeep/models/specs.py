@@ -38,7 +38,6 @@ from seakeep.models.settings import (
     periods_to_samples,
 )
 from seakeep.models.training import (
-    Training,
     check_names,
     gather,
     last_sample,
@@ -120,15 +119,6 @@ class HankelDMDc(HankelSettings):
     kind: ClassVar[str] = "hankel_dmdc"
     is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
-
-    def needs(self, dt: float) -> Needs:
-        """Samples that it asks of its runs."""
-        return Needs(
-            self.window or 1,
-            self.history_samples - 1,
-            self.history == "inside",
-            self.lead + sum(each.lead_samples for each in self.observables),
-        )
 
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
@@ -218,54 +208,25 @@ class HankelDMDc(HankelSettings):
             If a run is too short, has gaps or times that are not uniform, another step than the
             first, or a constant channel while ``standardize`` is set.
         """
-        data = gather(
-            as_runs(runs),
-            states,
-            inputs,
-            stop,
-            maps=self.maps,
-            state_delays=self.state_delays,
-            input_delays=self.input_delays,
-            window=self.window,
-            history=self.history,
-            standardize=self.standardize,
-        )
+        data = gather(as_runs(runs), states, inputs, stop, self)
         solution = identify(
             data.states,
             data.delayed,
             data.windows,
             state_delays=self.state_delays,
             input_delays=self.input_delays,
-            direct=data.direct if data.direct[0].shape[1] else None,
+            direct=data.direct,
             ridge=float(self.ridge),
             per_snapshot=self.ridge_scale == "per_snapshot",
             rank=self.rank,
             all_rows=self.delay_rows == "ridge",
         )
-        signature = Signature(
-            dt=data.dt,
-            state_labels=data.state_labels,
-            input_labels=data.input_labels,
-            state_delays=self.state_delays,
-            input_delays=self.input_delays,
-            input_map=data.input_map,
-            state_scale=data.state_scale,
-            input_scale=data.input_scale,
-            direct_scale=data.direct_scale,
-        )
+        signature = data.signature(self)
         return HankelDMDcModel(
             settings=self,
             coefficients=solution.coefficients,
             signature=signature,
-            training=Training(
-                runs=data.names,
-                first=tuple(float(value) for value in data.first_instants),
-                stop=tuple(float(value) for value in data.last_instants),
-                columns=tuple(window.columns for window in data.windows),
-                method=solution.method,
-                ridge=solution.ridge,
-                rank=solution.rank,
-            ),
+            training=data.training(solution),
             coverage=Coverage.of(signature.inputs, data.inputs, data.dt),
         )
 

@@ -13,12 +13,13 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray
 from seakeep.core.embedding import History, TrainingWindow, training_window
-from seakeep.core.solve import Method
+from seakeep.core.solve import Method, Solution
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.inputs import Chain, Measured
-from seakeep.models.interface import Fittable, Json, Regressors, Scale, Span
+from seakeep.models.interface import Json, Regressors, Scale, Signature, Span
 from seakeep.models.labelled import ChannelLabel, Stop
+from seakeep.models.settings import HankelSettings
 
 __all__ = [
     "Training",
@@ -127,19 +128,39 @@ class TrainingData:
     input_map: Chain
     inputs: tuple[FloatArray, ...]
 
+    def signature(self, settings: HankelSettings) -> Signature:
+        """What a forecast must know of a model that was fitted to these data."""
+        return Signature(
+            dt=self.dt,
+            state_labels=self.state_labels,
+            input_labels=self.input_labels,
+            state_delays=settings.state_delays,
+            input_delays=settings.input_delays,
+            input_map=self.input_map,
+            state_scale=self.state_scale,
+            input_scale=self.input_scale,
+            direct_scale=self.direct_scale,
+        )
+
+    def training(self, solution: Solution) -> Training:
+        """What a model that was fitted to these data keeps of them."""
+        return Training(
+            runs=self.names,
+            first=tuple(float(value) for value in self.first_instants),
+            stop=tuple(float(value) for value in self.last_instants),
+            columns=tuple(window.columns for window in self.windows),
+            method=solution.method,
+            ridge=solution.ridge,
+            rank=solution.rank,
+        )
+
 
 def gather(
     runs: Mapping[str, xr.Dataset],
     states: Sequence[str],
     inputs: Sequence[str],
     stop: Stop,
-    *,
-    maps: Sequence[Fittable],
-    state_delays: int,
-    input_delays: int,
-    window: int | None,
-    history: History,
-    standardize: bool,
+    settings: HankelSettings,
 ) -> TrainingData:
     """Fit the input map, and collect the training windows of the runs.
 
@@ -151,10 +172,8 @@ def gather(
         Channels.
     stop : float, sequence or mapping of float, optional
         Last instants, s.
-    maps : sequence of Fittable
-        Input maps, not fitted yet.
-    state_delays, input_delays, window, history, standardize
-        As in :class:`seakeep.HankelDMDc`.
+    settings : HankelSettings
+        Input maps, delays, window and scaling.
 
     Returns
     -------
@@ -170,6 +189,8 @@ def gather(
     """
     check_names(states, inputs)
     states, inputs = list(states), list(inputs)  # arrays of names are welcome too
+    maps, window, history = settings.maps, settings.window, settings.history
+    state_delays, input_delays = settings.state_delays, settings.input_delays
     stops = stop_instants(stop, list(runs))
     dt = labelled.common_step(runs)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
@@ -205,7 +226,7 @@ def gather(
         [label.name for label in group] for group in (labels[0], delayed_labels, direct_labels)
     ]
     scales = [
-        moments(each, windows, made, standardize)
+        moments(each, windows, made, settings.standardize)
         for each, made in zip(series, channels, strict=True)
     ]
     if len(names) > 1:

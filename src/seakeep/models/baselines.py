@@ -1,0 +1,470 @@
+"""Models to compare with: what stands still, and classic linear identification.
+
+They fit, forecast, save and load as :class:`seakeep.HankelDMDc` does, take the same runs, and go
+through studies and reports by their ``kind``. :mod:`seakeep.baselines` is the public name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import ClassVar, Self
+
+import numpy as np
+import xarray as xr
+
+from seakeep.arrays import FloatArray
+from seakeep.core.solve import Solution, identify
+from seakeep.core.subspace import StateSpace, identify_subspace
+from seakeep.errors import RequestError
+from seakeep.models import store
+from seakeep.models.engine import Windows, cut_lost
+from seakeep.models.forecasts import SingleModel, counted
+from seakeep.models.inputs import ProbeAlignment
+from seakeep.models.interface import InputMap, Signature
+from seakeep.models.labelled import Runs, Stop, as_runs
+from seakeep.models.linear import HankelDMDcModel
+from seakeep.models.settings import (
+    DelayRows,
+    HankelSettings,
+    History,
+    RidgeScale,
+    check_integer,
+    periods_to_samples,
+)
+from seakeep.models.training import Training, TrainingData, gather
+from seakeep.models.validity import Coverage
+
+__all__ = ["ARX", "FIR", "HoldLast", "LinearModel", "LinearSpec", "Mean", "Subspace"]
+
+
+class LinearModel(HankelDMDcModel):
+    """A linear model whose delayed states shift exactly, under a name of its own."""
+
+    title: ClassVar[str]
+
+    def summary(self) -> str:
+        """Text that says what the model is and what it was fitted to."""
+        return "\n".join([f"{self.title}, dt {self.dt:g} s", *self.lines()])
+
+
+class ARXModel(LinearModel):
+    """What :class:`ARX` fits."""
+
+    kind: ClassVar[str] = "arx"
+    title: ClassVar[str] = "ARX: least squares on past states and inputs"
+
+
+class FIRModel(LinearModel):
+    """What :class:`FIR` fits: a filter of the inputs."""
+
+    kind: ClassVar[str] = "fir"
+    title: ClassVar[str] = "FIR: a filter of the inputs, without states"
+
+
+class MeanModel(LinearModel):
+    """What :class:`Mean` fits: the means of the states."""
+
+    kind: ClassVar[str] = "mean"
+    title: ClassVar[str] = "Mean of the training windows"
+
+
+class HoldLastModel(LinearModel):
+    """What :class:`HoldLast` fits: nothing but the spread of the states."""
+
+    kind: ClassVar[str] = "hold_last"
+    title: ClassVar[str] = "Hold last: the state at the start, for ever"
+
+
+@dataclass(frozen=True)
+class LinearSpec(HankelSettings):
+    """A baseline that is a linear model: it finds coefficients, the rest is common."""
+
+    is_ensemble: ClassVar[bool] = False
+    n_members: ClassVar[int] = 1
+    model: ClassVar[type[LinearModel]]
+    delay_rows: DelayRows = field(default="exact", init=False, repr=False)
+    rank: int | None = field(default=None, init=False, repr=False)
+
+    def fit(
+        self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
+    ) -> LinearModel:
+        """Fit the model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
+        data = gather(as_runs(runs), states, inputs, stop, self)
+        solution = self.solve(data)
+        signature = data.signature(self)
+        return self.model(
+            settings=self,
+            coefficients=solution.coefficients,
+            signature=signature,
+            training=data.training(solution),
+            coverage=Coverage.of(signature.inputs, data.inputs, data.dt),
+        )
+
+    def solve(self, data: TrainingData) -> Solution:
+        """Coefficients on standardised deviations, shape (N, N(s+1) + n(z+1) + m)."""
+        raise NotImplementedError
+
+    @classmethod
+    def restore(cls, dataset: xr.Dataset) -> LinearModel:
+        """Rebuild the model that a file holds."""
+        settings = cls.from_json(store.content(dataset, "settings"))
+        return cls.model.from_dataset(dataset, settings)
+
+
+@dataclass(frozen=True)
+class Mean(LinearSpec):
+    """The mean of each state over the training windows, at all instants (climatology).
+
+    No model of a stationary response should be worse over a long horizon; its NRMSE is one where
+    the test has the mean and the spread of the training. Inputs are not read.
+
+    Parameters
+    ----------
+    window : int, optional
+        Snapshots per run; None takes all up to ``stop``.
+
+    Examples
+    --------
+    >>> from seakeep.baselines import Mean
+    >>> Mean().needs(0.05).history
+    0
+    """
+
+    kind: ClassVar[str] = "mean"
+    model: ClassVar[type[LinearModel]] = MeanModel
+    state_delays: int = field(default=0, init=False, repr=False)
+    input_delays: int = field(default=0, init=False, repr=False)
+    ridge: float = field(default=0.0, init=False, repr=False)
+    window: int | None = None
+    history: History = field(default="inside", init=False, repr=False)
+    ridge_scale: RidgeScale = field(default="absolute", init=False, repr=False)
+    standardize: bool = field(default=True, init=False, repr=False)
+    alignment: ProbeAlignment | None = field(default=None, init=False, repr=False)
+    lead: int = field(default=0, init=False, repr=False)
+    observables: tuple[InputMap, ...] = field(default=(), init=False, repr=False)
+
+    def fit(
+        self, runs: Runs, states: Sequence[str], inputs: Sequence[str] = (), stop: Stop = None
+    ) -> LinearModel:
+        """Take the means; `inputs` are accepted and not read."""
+        return super().fit(runs, states, [], stop)
+
+    def solve(self, data: TrainingData) -> Solution:
+        """No deviation from the mean."""
+        size = len(data.state_labels)
+        return Solution(np.zeros((size, size)), "svd", 0.0, 0)
+
+
+@dataclass(frozen=True)
+class HoldLast(Mean):
+    """The measured state at the start, at all instants (persistence).
+
+    Hard to beat over a small part of a period. Inputs are not read.
+
+    Parameters
+    ----------
+    window : int, optional
+        Snapshots per run, from which the spread is taken; None takes all up to ``stop``.
+    """
+
+    kind: ClassVar[str] = "hold_last"
+    model: ClassVar[type[LinearModel]] = HoldLastModel
+
+    def solve(self, data: TrainingData) -> Solution:
+        """The next state is the state."""
+        size = len(data.state_labels)
+        return Solution(np.eye(size), "svd", 0.0, size)
+
+
+@dataclass(frozen=True)
+class ARX(LinearSpec):
+    r"""Autoregression with exogenous inputs: the classic least squares.
+
+    :math:`x_{j+1} = \sum_{l=0}^s A_l x_{j-l} + \sum_{l=0}^z B_l u_{j-l}` (Ljung, System
+    Identification, 1999, section 4.2), on standardised deviations. It is the Hankel model with
+    exact delay rows and without ridge.
+
+    Parameters
+    ----------
+    state_delays, input_delays : int
+        s and z. A forecast needs max(s, z) + 1 samples of history.
+    ridge : float, optional
+        λ added to the diagonal; zero is least squares, of least norm where it is not unique.
+    ridge_scale : {"absolute", "per_snapshot"}, optional
+        Whether λ is multiplied by the number of columns.
+    window, history, standardize, alignment, lead, observables
+        As in :class:`seakeep.HankelDMDc`.
+    """
+
+    kind: ClassVar[str] = "arx"
+    model: ClassVar[type[LinearModel]] = ARXModel
+    ridge: float = 0.0
+
+    @classmethod
+    def recommended(cls, encounter_period: float, dt: float) -> Self:
+        """One encounter period of the states, three of the inputs, least squares."""
+        s, z = (periods_to_samples(periods, encounter_period, dt) for periods in (1, 3))
+        return cls(state_delays=s, input_delays=z)
+
+    def solve(self, data: TrainingData) -> Solution:
+        """Rows of the next states."""
+        return identify(
+            data.states,
+            data.delayed,
+            data.windows,
+            state_delays=self.state_delays,
+            input_delays=self.input_delays,
+            direct=data.direct,
+            ridge=float(self.ridge),
+            per_snapshot=self.ridge_scale == "per_snapshot",
+            all_rows=False,
+        )
+
+
+@dataclass(frozen=True)
+class FIR(LinearSpec):
+    r"""Finite impulse response: the states are a filter of the inputs.
+
+    :math:`x_{j+1} = \sum_{l=0}^z B_l u_{j-l}` on standardised deviations: what the waves decide
+    alone, without memory of the states. The delays must cover the memory of the response.
+
+    Parameters
+    ----------
+    input_delays : int
+        z. A forecast needs z + 1 samples of history.
+    ridge : float, optional
+        λ, for inputs of a narrow band, whose past and present tell nearly the same.
+    ridge_scale : {"absolute", "per_snapshot"}, optional
+        Whether λ is multiplied by the number of columns.
+    window, history, standardize, alignment, lead, observables
+        As in :class:`seakeep.HankelDMDc`.
+    """
+
+    kind: ClassVar[str] = "fir"
+    model: ClassVar[type[LinearModel]] = FIRModel
+    state_delays: int = field(default=0, init=False, repr=False)
+    ridge: float = 1e-3
+    ridge_scale: RidgeScale = "per_snapshot"
+
+    @classmethod
+    def recommended(cls, encounter_period: float, dt: float) -> Self:
+        """Three encounter periods of the inputs."""
+        return cls(input_delays=periods_to_samples(3, encounter_period, dt))
+
+    def solve(self, data: TrainingData) -> Solution:
+        """Filters of the inputs, beside zeros for the states."""
+        if not data.input_labels:
+            raise RequestError(
+                "a FIR model is a filter of its inputs and has none; name at least one input."
+            )
+        found = identify(
+            data.states,
+            data.delayed,
+            data.windows,
+            state_delays=None,
+            input_delays=self.input_delays,
+            direct=data.direct,
+            ridge=float(self.ridge),
+            per_snapshot=self.ridge_scale == "per_snapshot",
+            all_rows=False,
+        )
+        size = len(found.coefficients)
+        return replace(found, coefficients=np.hstack([np.zeros((size, size)), found.coefficients]))
+
+
+@dataclass(frozen=True)
+class Subspace(HankelSettings):
+    r"""State-space model by subspace identification (N4SID).
+
+    :math:`z_{j+1} = A z_j + B u_j`, :math:`x_{j+1} = C z_j + D u_j` with a latent state that is a
+    filter of the past, :mod:`seakeep.core.subspace` (Van Overschee and De Moor, Automatica 30,
+    1994).
+
+    Parameters
+    ----------
+    state_delays, input_delays : int
+        s and z, how far back the past reaches. A forecast needs max(s, z) + 1 samples of history.
+    order : int
+        Number of latent states.
+    future : int, optional
+        Instants of the future that the state has to tell; by default s + 1.
+    ridge : float, optional
+        λ per snapshot of the first regression, for inputs that tell their own future.
+    window, history, standardize, alignment, lead, observables
+        As in :class:`seakeep.HankelDMDc`; an alignment to the predicted surge is refused.
+    """
+
+    kind: ClassVar[str] = "subspace"
+    is_ensemble: ClassVar[bool] = False
+    n_members: ClassVar[int] = 1
+    ridge: float = 1e-3
+    delay_rows: DelayRows = field(default="exact", init=False, repr=False)
+    ridge_scale: RidgeScale = field(default="per_snapshot", init=False, repr=False)
+    rank: int | None = field(default=None, init=False, repr=False)
+    order: int = field(kw_only=True)
+    future: int | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_integer("order", self.order, 1)
+        check_integer("future", self.future, 1, optional=True)
+        if self.alignment is not None and self.alignment.surge == "predicted":
+            raise RequestError(
+                "a subspace model cannot be aligned to the surge that it predicts itself. Use "
+                "alignment surge = 'measured' or 'none'."
+            )
+
+    @classmethod
+    def recommended(cls, encounter_period: float, dt: float) -> Self:
+        """One encounter period of the states, three of the inputs, 40 latent states."""
+        s, z = (periods_to_samples(periods, encounter_period, dt) for periods in (1, 3))
+        return cls(state_delays=s, input_delays=z, order=40)
+
+    def fit(
+        self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
+    ) -> SubspaceModel:
+        """Identify a model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
+        data = gather(as_runs(runs), states, inputs, stop, self)
+        future = self.state_delays + 1 if self.future is None else self.future
+        most = future * len(data.state_labels)
+        if self.order > most:
+            raise RequestError(
+                f"order = {self.order} is more than the {most} values of {future} future instants "
+                f"of {counted(len(data.state_labels), 'state')}. Lower order, or raise future."
+            )
+        space = identify_subspace(
+            data.states,
+            data.delayed,
+            data.windows,
+            order=self.order,
+            output_delays=self.state_delays,
+            input_delays=self.input_delays,
+            future=future,
+            ridge=float(self.ridge),
+            direct=data.direct,
+        )
+        columns = sum(window.columns for window in data.windows)
+        solution = Solution(space.A, "svd", float(self.ridge) * columns, self.order)
+        signature = data.signature(self)
+        return SubspaceModel(
+            settings=self,
+            space=space,
+            signature=signature,
+            training=data.training(solution),
+            coverage=Coverage.of(signature.inputs, data.inputs, data.dt),
+        )
+
+    @classmethod
+    def restore(cls, dataset: xr.Dataset) -> SubspaceModel:
+        """Rebuild the model that a file holds."""
+        return SubspaceModel.from_dataset(
+            dataset, cls.from_json(store.content(dataset, "settings"))
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SubspaceModel(SingleModel):
+    """What :class:`Subspace` fits.
+
+    Parameters
+    ----------
+    settings : Subspace
+        The settings it was identified with.
+    space : StateSpace
+        Matrices on standardised deviations, and the filter that finds the latent state.
+    signature : Signature
+        Time step, names and units, delays, moments, and how inputs drive the model.
+    training : Training
+        Runs and windows.
+    coverage : Coverage
+        Waves that it was trained in.
+    """
+
+    kind: ClassVar[str] = "subspace"
+    settings: Subspace
+    space: StateSpace = field(repr=False)
+    signature: Signature = field(repr=False)
+    training: Training
+    coverage: Coverage = field(repr=False)
+
+    def free_runs(
+        self, groups: Sequence[Windows], members: Sequence[int] = (0,)
+    ) -> list[FloatArray]:
+        """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
+        return [self._free_run(windows)[None] for windows in groups]
+
+    def _free_run(self, windows: Windows) -> FloatArray:
+        signature, histories = self.signature, windows.histories
+        driving = windows.delayed[:, -signature.input_delays - windows.steps :]
+        if not driving.shape[2]:
+            driving = np.zeros((len(histories), signature.input_delays + windows.steps, 0))
+        values = self.space.free_runs(
+            signature.state_scale.deviations(histories[:, -1 - signature.state_delays :]),
+            signature.input_scale.deviations(driving),
+            windows.steps,
+            signature.direct_scale.deviations(windows.direct),
+        )
+        with np.errstate(over="ignore"):  # a run that is lost is cut just below
+            values = signature.state_scale.physical(values, out=values)
+        return cut_lost(values, signature, windows)
+
+    def system_matrices(self) -> Iterator[FloatArray]:
+        """A."""
+        yield self.space.A
+
+    def summary(self) -> str:
+        """Text that says what the model is and how it was identified."""
+        radius = float(np.abs(np.linalg.eigvals(self.space.A)).max())
+        verdict = "stable" if radius < 1 else "UNSTABLE: long forecasts diverge"
+        return "\n".join(
+            [
+                f"Subspace model (N4SID): {self.settings.order} latent states, dt {self.dt:g} s",
+                *self.lines(),
+                f"  stability     spectral radius {radius:.6f} ({verdict})",
+            ]
+        )
+
+    def save(self, path: str | Path) -> Path:
+        """Write the model as NetCDF; :func:`seakeep.load_model` reads it."""
+        space = self.space
+        dataset = xr.Dataset(
+            {
+                "A": (("latent", "latent_before"), space.A),
+                "B": (("latent", "regressor"), space.B),
+                "C": (("state", "latent"), space.C),
+                "D": (("state", "regressor"), space.D),
+                "filter": (("latent", "past"), space.filter),
+                **store.pack_signature(self.signature),
+                **self.coverage.to_variables(),
+            },
+            attrs={
+                "settings": store.as_json(self.settings.to_json()),
+                "training": store.as_json(self.training.to_json()),
+                "signature": store.as_json(store.signature_json(self.signature)),
+            },
+        )
+        return store.write(dataset, path, self.kind)
+
+    @classmethod
+    def from_dataset(cls, dataset: xr.Dataset, settings: Subspace) -> SubspaceModel:
+        """Rebuild a model from what :meth:`save` wrote; it is equal to the last bit."""
+        signature = store.unpack_signature(dataset)
+        n, N = settings.order, len(signature.states)
+        delayed, direct = signature.input_scale.mean.size, signature.direct_scale.mean.size
+        past = N * (settings.state_delays + 1) + delayed * settings.input_delays
+        shapes = {
+            "A": (n, n),
+            "B": (n, delayed + direct),
+            "C": (N, n),
+            "D": (N, delayed + direct),
+            "filter": (n, past),
+        }
+        return cls(
+            settings=settings,
+            space=StateSpace(*(store.numbers(dataset, key, at) for key, at in shapes.items())),
+            signature=signature,
+            training=Training.from_json(store.content(dataset, "training")),
+            coverage=Coverage.from_dataset(dataset),
+        )

@@ -1,0 +1,193 @@
+"""Baselines: what they are, against other packages and known systems; files; runs of any kind."""
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import seakeep
+from seakeep.baselines import ARX, FIR, HoldLast, Mean, Subspace
+from seakeep.core import Solution
+from seakeep.errors import RequestError
+from seakeep.models import KINDS
+from seakeep.models.baselines import LinearModel, LinearSpec
+
+DT = 0.1
+STATES, INPUTS = ["heave", "pitch"], ["eta_fwd", "eta_aft"]
+SPECS = {
+    "mean": Mean(),
+    "hold_last": HoldLast(window=200),
+    "fir": FIR(input_delays=20),
+    "arx": ARX(state_delays=3, input_delays=4),
+    "subspace": Subspace(state_delays=6, input_delays=6, order=4),
+}
+
+
+def linear_run(seed, samples=600, noise=0.0):
+    """Two damped oscillators that two waves drive."""
+    rng = np.random.default_rng(seed)
+    u = rng.normal(size=(samples, 2))
+    a = np.array([[1.6, 0.1, -0.75, 0.0], [0.0, 1.4, 0.05, -0.6]])
+    b = np.array([[0.5, 0.1, 0.2, 0.0], [0.0, 0.3, 0.1, -0.2]])
+    x = np.zeros((samples, 2))
+    for j in range(2, samples - 1):
+        x[j + 1] = a @ np.r_[x[j], x[j - 1]] + b @ np.r_[u[j], u[j - 1]]
+    x += noise * rng.normal(size=x.shape)
+    variables = {
+        name: ("time", values + offset, {"units": unit, "long_name": name})
+        for name, values, unit, offset in zip(
+            STATES + INPUTS,
+            np.c_[x, u].T,
+            ["m", "rad", "m", "m"],
+            [3.0, -1.0, 0.5, 0.0],
+            strict=True,
+        )
+    }
+    time = ("time", np.arange(samples) * DT, {"units": "s"})
+    return xr.Dataset(variables, coords={"time": time}, attrs={"run": f"run {seed}"})
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return [linear_run(1), linear_run(2)]
+
+
+def values(dataset, names=STATES):
+    return np.stack([dataset[name].values for name in names], axis=-1)
+
+
+@pytest.mark.parametrize("kind", SPECS)
+def test_each_is_registered_forecasts_windows_and_comes_back_from_its_file(kind, runs, tmp_path):
+    spec, test = SPECS[kind], linear_run(3)
+    assert KINDS[kind] is type(spec)
+    assert type(spec).from_json(spec.to_json()) == spec
+    model = spec.fit(runs, STATES, INPUTS, stop=50.0)
+    assert (model.kind, model.n_members) == (kind, 1)
+    assert model.history_samples == spec.needs(DT).history + 1
+    one = model.forecast(test, start=20.0, steps=40)
+    assert one.attrs["status"] == "ok"
+    assert one.heave.attrs["units"] == "m"
+    several = model.forecast_windows(test, [20.0, 30.0], 40)
+    np.testing.assert_allclose(values(several)[0], values(one), atol=1e-10)
+    loaded = seakeep.load_model(model.save(tmp_path / "model.nc"))
+    assert type(loaded) is type(model)
+    np.testing.assert_array_equal(values(loaded.forecast(test, 20.0, 40)), values(one))
+    assert "run 1: " in model.summary()
+
+
+def test_mean_and_hold_last_are_what_they_say_and_read_no_input(runs):
+    test = linear_run(3)
+    model = Mean().fit(runs, STATES, INPUTS, stop=50.0)
+    pooled = np.concatenate([values(run)[:501] for run in runs])
+    forecast = model.forecast(test.drop_vars(INPUTS), start=20.0, steps=5)
+    np.testing.assert_allclose(values(forecast), np.tile(pooled.mean(axis=0), (5, 1)), rtol=1e-12)
+    assert "reads_input_until" not in forecast.attrs
+    held = HoldLast().fit(runs, STATES, INPUTS).forecast(test.drop_vars(INPUTS), 20.0, 5)
+    np.testing.assert_allclose(values(held), np.tile(values(test)[200], (5, 1)), rtol=1e-12)
+
+
+def hankel(run, names, delays, columns):
+    rows = values(run, names)
+    return np.concatenate([rows[columns - lag] for lag in range(delays + 1)], axis=1)
+
+
+def test_arx_is_the_least_squares_of_another_package():
+    sm = pytest.importorskip("statsmodels.api", reason="a test dependency")
+    runs = [linear_run(1, noise=0.05), linear_run(2, noise=0.05)]
+    model = ARX(state_delays=3, input_delays=4, standardize=False).fit(runs, STATES, INPUTS)
+    columns = np.arange(4, 599)
+    known = np.concatenate(
+        [np.c_[hankel(r, STATES, 3, columns), hankel(r, INPUTS, 4, columns)] for r in runs]
+    )
+    after = np.concatenate([values(run)[columns + 1] for run in runs])
+    for state in range(2):
+        expected = sm.OLS(after[:, state], known).fit().params
+        np.testing.assert_allclose(model.coefficients[state], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["arx", "subspace"])
+def test_a_linear_vessel_is_forecast_to_rounding(kind, runs):
+    test = linear_run(3)
+    # Four states, and one for the constant by which the means of the samples are off.
+    change = {"ridge": 0.0} | ({"order": 5} if kind == "subspace" else {})
+    spec = dataclasses.replace(SPECS[kind], **change)
+    forecast = spec.fit(runs, STATES, INPUTS).forecast(test, start=20.0, steps=300)
+    np.testing.assert_allclose(values(forecast), values(test)[201:501], atol=1e-7)
+
+
+def test_fir_finds_a_known_impulse_response():
+    rng = np.random.default_rng(5)
+    response, u = rng.normal(size=(2, 12)), rng.normal(size=(2000, 1))
+    x = np.stack([np.convolve(u[:, 0], h)[:2000] for h in response], axis=1)
+    x = np.concatenate([np.zeros((1, 2)), x[:-1]])  # x at j + 1 comes from u at j and before
+    run = xr.Dataset(
+        {
+            n: ("time", v, {"units": "m"})
+            for n, v in zip([*STATES, "eta"], np.c_[x, u].T, strict=True)
+        },
+        coords={"time": ("time", np.arange(2000) * DT, {"units": "s"})},
+    )
+    model = FIR(input_delays=15, ridge=0.0, standardize=False).fit(run, STATES, ["eta"])
+    found = model.coefficients[:, 2:]
+    np.testing.assert_allclose(found, np.c_[response, np.zeros((2, 4))], atol=1e-10)
+    assert model.spectral_radius == 0.0
+    with pytest.raises(RequestError, match=r"FIR model is a filter of its inputs and has none"):
+        FIR(input_delays=15).fit(run, STATES, [])
+
+
+@pytest.mark.parametrize("kind", ["fir", "arx", "subspace"])
+def test_waves_that_have_not_arrived_drive_where_a_lead_is_set(kind, runs):
+    spec = dataclasses.replace(SPECS[kind], lead=3)
+    late = [
+        run.assign({name: run[name].roll(time=3, roll_coords=False) for name in INPUTS})
+        for run in runs
+    ]
+    model = spec.fit([run.isel(time=slice(3, None)) for run in late], STATES, INPUTS)
+    plain = SPECS[kind].fit([run.isel(time=slice(3, None)) for run in runs], STATES, INPUTS)
+    test = linear_run(3)
+    shifted = test.assign({name: test[name].roll(time=3, roll_coords=False) for name in INPUTS})
+    found = model.forecast(shifted, start=20.0, steps=40)
+    expected = plain.forecast(test, start=20.0, steps=40)
+    # The last three pairs of each training run have no look-ahead left.
+    np.testing.assert_allclose(values(found), values(expected), atol=0.02)
+    assert found.attrs["reads_input_until"] == pytest.approx(2 * DT)
+
+
+class FadingModel(LinearModel):
+    kind, title = "fading", "The state at the start, fading to the mean"
+
+
+@dataclasses.dataclass(frozen=True)
+class Fading(LinearSpec):
+    """The state at the start, fading to the mean: the example of CONTRIBUTING.md."""
+
+    kind: ClassVar[str] = "fading"
+    model: ClassVar[type[LinearModel]] = FadingModel
+
+    def solve(self, data):
+        return Solution(0.99 * np.eye(len(data.state_labels)), "svd", 0.0, 0)
+
+
+def test_a_baseline_is_a_class_and_a_line(runs, tmp_path, monkeypatch):
+    monkeypatch.setitem(KINDS, Fading.kind, Fading)
+    model = Fading(0, 0, ridge=0.0).fit(runs, STATES, [])
+    path = model.save(tmp_path / "fading.nc")
+    forecast = seakeep.load_model(path).forecast(linear_run(3), start=20.0, steps=2)
+    start, mean = values(linear_run(3))[200], model.state_mean
+    np.testing.assert_allclose(values(forecast)[1], mean + 0.99**2 * (start - mean), rtol=1e-12)
+    assert model.summary().startswith("The state at the start, fading to the mean, dt 0.1 s")
+
+
+def test_settings_that_a_baseline_does_not_have_are_refused():
+    with pytest.raises(TypeError, match="state_delays"):
+        FIR(state_delays=3, input_delays=4)
+    with pytest.raises(RequestError, match=r"unknown key 'ridge'"):
+        Mean.from_json({"ridge": 1.0})
+    with pytest.raises(RequestError, match=r"order must be an integer of at least 1"):
+        Subspace(state_delays=3, input_delays=4, order=0)
+    with pytest.raises(RequestError, match=r"order = 40 is more than the 8 values of 4 future"):
+        Subspace(state_delays=3, input_delays=4, order=40).fit(linear_run(1), STATES, INPUTS)
+    with pytest.raises(RequestError, match=r"cannot be aligned to the surge that it predicts"):
+        Subspace(state_delays=3, input_delays=4, order=4, alignment={"surge": "predicted"})
