@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import messages, progress_bar, results
+from seakeep.cli.console import messages, print_table, progress_bar
 from seakeep.errors import RequestError
 from seakeep.files import make_folder
 
@@ -104,38 +104,34 @@ def _measured(settings: TankSettings, names: list[str], rig: Rig) -> list[Realis
 
 
 def _print(settings: TankSettings, measured: list[Realised]) -> None:
-    from rich import box
-    from rich.table import Table
-
+    from seakeep.report.tables import Table
     from seakeep.tank.realised import comparison, matrix_rows
 
     matrix = matrix_rows(settings, measured)
-    table = Table(box=box.SIMPLE_HEAD, title="Test matrix", title_justify="left")
-    for heading in matrix[0]:
-        table.add_column(heading, no_wrap=True)
-    for row in matrix:
-        table.add_row(*row.values())
-    results().print(table)
-
-    table = Table(box=box.SIMPLE_HEAD, title="Realised waves, forward probe", title_justify="left")
-    for heading in ("", "unit", "here", "paper", "tolerance", ""):
-        table.add_column(heading, no_wrap=True)
-    for line in comparison(settings, measured):
-        verdict = "within" if line.agrees else "outside"
-        numbers = (f"{line.ours:.3f}", f"{line.paper:.3f}", f"{line.tolerance:.3f}")
-        table.add_row(line.name, line.unit, *numbers, verdict)
-    results().print(table)
-
-    table = Table(box=box.SIMPLE_HEAD, title="True motions and loads", title_justify="left")
-    for heading in ("run", "channel", "mean", "SD", "slack"):
-        table.add_column(heading, no_wrap=True, justify="left" if heading == "run" else "right")
-    for each in measured:
-        for channel, spread in each.spread.items():
-            slack = each.slack.get(channel.removeprefix("mooring_"))
-            shown = "" if slack is None else f"{100 * slack:.0f} %"
-            mean = round(each.mean[channel], 4) + 0.0  # no −0.0000
-            table.add_row(each.run, channel, f"{mean:.4f}", f"{spread:.4f}", shown)
-    results().print(table)
+    rows: tuple[tuple[str, ...], ...] = tuple(tuple(row.values()) for row in matrix)
+    print_table(Table("matrix", "Test matrix", tuple(matrix[0]), rows, numeric=(0, 2, 3, 5)))
+    heads = ("", "unit", "here", "paper", "tolerance", "")
+    rows = tuple(
+        (
+            *(line.name, line.unit),
+            *(f"{value:.3f}" for value in (line.ours, line.paper, line.tolerance)),
+            "within" if line.agrees else "outside",
+        )
+        for line in comparison(settings, measured)
+    )
+    print_table(Table("waves", "Realised waves, forward probe", heads, rows, numeric=(2, 3, 4)))
+    rows = tuple(
+        (
+            *(each.run, channel),
+            *(f"{value + 0.0:.4f}" for value in (round(each.mean[channel], 4), spread)),
+            "" if slack is None else f"{100 * slack:.0f} %",
+        )
+        for each in measured
+        for channel, spread in each.spread.items()
+        for slack in (each.slack.get(channel.removeprefix("mooring_")),)
+    )
+    heads = ("run", "channel", "mean", "SD", "slack")
+    print_table(Table("truth", "True motions and loads", heads, rows, numeric=(2, 3, 4)))
 
 
 def _draw(settings: TankSettings, rig: Rig, measured: list[Realised], folder: Path) -> None:
