@@ -110,7 +110,7 @@ def _print(settings: TankSettings, measured: list[Realised]) -> None:
     matrix = matrix_rows(settings, measured)
     rows: tuple[tuple[str, ...], ...] = tuple(tuple(row.values()) for row in matrix)
     print_table(Table("matrix", "Test matrix", tuple(matrix[0]), rows, numeric=(0, 2, 3, 5)))
-    heads = ("", "unit", "here", "paper", "tolerance", "")
+    heads: tuple[str, ...] = ("", "unit", "here", "paper", "tolerance", "")
     rows = tuple(
         (
             *(line.name, line.unit),
