@@ -78,6 +78,7 @@ def test_the_history_of_a_window_may_come_from_before_the_training_span(halves):
     assert fit_campaign(campaign(halves, without, runs)).training.columns == (440,)
 
 
+@pytest.mark.filterwarnings("ignore:all. eta_fwd stuck")  # what its preparation finds
 def test_a_dead_probe_in_a_test_run_is_told(halves):
     whole = campaign(halves, EXACT)
     model = fit_campaign(whole)

@@ -6,7 +6,7 @@ import xarray as xr
 
 from seakeep.errors import RequestError
 from seakeep.models.settings import periods_to_samples
-from seakeep.study.plan import Needs, choose_tests, choose_training
+from seakeep.study.plan import Needs, choose_tests, choose_training, training_samples
 from seakeep.study.settings import StudySettings
 from seakeep.toml import validated
 
@@ -150,4 +150,4 @@ def test_nothing_is_left_to_learn_from_where_one_sea_state_is_all():
 def test_the_papers_windows_hold_37_5_periods():
     # 30 periods of 32 samples, and the longest delay of 7.5 before them.
     needs = Needs(periods_to_samples(30, 1.64, 1.64 / 32), periods_to_samples(7.5, 1.64, 1.64 / 32))
-    assert needs.training == 37.5 * 32
+    assert training_samples(needs) == 37.5 * 32

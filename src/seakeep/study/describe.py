@@ -11,7 +11,6 @@ import xarray as xr
 from seakeep.campaign import Campaign
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
-from seakeep.models import HankelDMDc, ProbeAlignment
 from seakeep.signals import significant_height, wave_spectrum
 from seakeep.study.judge import wave_frequency
 from seakeep.study.plan import Plan, between, whole_span
@@ -137,15 +136,15 @@ def _training(plan: Plan, runs: Runs) -> xr.Dataset:
 
 def _celerities(spec: Spec, plan: Plan, runs: Runs) -> list[float]:
     """Celerity by which a single model carries the waves to the measured surge, m/s."""
-    wanted = ProbeAlignment.of(spec.alignment)
-    if not isinstance(spec, HankelDMDc) or wanted is None:
+    wanted = getattr(spec, "alignment", None)
+    if spec.is_ensemble or wanted is None:
         return []
     if (wanted.mode, wanted.surge) != ("effective", "measured"):
         return []
     out = []
     for each in plan.training:
         parts = {name: between(runs[name], (begin, stop)) for name, begin, stop in each.spans}
-        fitted = wanted.fit(parts, plan.states, plan.inputs, spec.window)
+        fitted = wanted.fit(parts, plan.states, plan.inputs, getattr(spec, "window", None))
         out.append(float(fitted.celerity or np.nan))
     return out
 

@@ -12,11 +12,11 @@ from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepWarning
-from seakeep.models import HankelDMDc, HankelDMDcModel, HankelEnsemble, Model, compare_waves
+from seakeep.models import Model, compare_waves
 from seakeep.models.slow import warn_of_slow_motions
 from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, find_leakage
-from seakeep.study.plan import between, needs_of
+from seakeep.study.plan import between
 from seakeep.study.resolve import Spec, build_spec, counts_in_periods
 from seakeep.toml import Length
 
@@ -69,7 +69,7 @@ def training_runs(
 
 def fit_campaign(
     campaign: Campaign, model: str | None = None, progress: Progress | None = None
-) -> HankelDMDcModel | HankelEnsemble:
+) -> Model:
     """Identify the model, or the ensemble, that a campaign describes from its training runs.
 
     Parameters
@@ -83,7 +83,7 @@ def fit_campaign(
 
     Returns
     -------
-    HankelDMDcModel or HankelEnsemble
+    Model
         As the table's ``kind`` says.
 
     Raises
@@ -127,7 +127,7 @@ def fit_campaign(
             SeakeepWarning,
             stacklevel=2,
         )
-    if spec.standardize:
+    if getattr(spec, "standardize", False):
         _warn_of_slow_model(identified, runs)
     return identified
 
@@ -161,13 +161,10 @@ def warn_of_waves(model: Model, run: xr.Dataset, name: str, start: float, steps:
 
 def _longest_window(spec: Spec, dt: float) -> int | None:
     """Most snapshots before the end of a span, where the history may lie before them."""
-    if spec.history == "inside":
+    needs = spec.needs(dt)
+    if needs.inside or needs.snapshots == 1 or getattr(spec, "train_on", "") == "windows":
         return None
-    if isinstance(spec, HankelDMDc):
-        return spec.window
-    if spec.train_length is None or spec.train_on == "windows":
-        return None
-    return needs_of([spec], dt).snapshots
+    return needs.snapshots
 
 
 def _warn_of_slow_model(model: Model, runs: Mapping[str, xr.Dataset]) -> None:

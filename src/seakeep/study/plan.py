@@ -16,13 +16,13 @@ import xarray as xr
 from seakeep.campaign import load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import DataError, RequestError
+from seakeep.models import Needs
 from seakeep.models.settings import periods_to_samples
 from seakeep.models.slow import warn_of_slow_motions
 from seakeep.study.resolve import ResolvedModel, Spec, resolve_model
 from seakeep.study.settings import Study, StudySettings, TestSetSettings
 
 __all__ = [
-    "Needs",
     "Plan",
     "TestWindow",
     "TrainingSet",
@@ -32,35 +32,12 @@ __all__ = [
     "make_plan",
     "needs_of",
     "random_stream",
+    "training_samples",
     "warn_of_slow_study",
     "windows_overlap",
 ]
 
 Runs = Mapping[str, xr.Dataset]
-
-
-@dataclass(frozen=True)
-class Needs:
-    """Samples that the greediest of all models and draws asks for.
-
-    Parameters
-    ----------
-    snapshots : int
-        Training snapshots; 1 where models take all there are.
-    history : int
-        Samples before a snapshot or a start that delays reach back.
-    inside : bool
-        Whether the delay history lies inside the training snapshots.
-    """
-
-    snapshots: int
-    history: int
-    inside: bool = False
-
-    @property
-    def training(self) -> int:
-        """Samples up to and including the stop of a training window."""
-        return max(self.snapshots, self.history + 2) + (0 if self.inside else self.history)
 
 
 @dataclass(frozen=True)
@@ -157,7 +134,7 @@ def choose_training(
             _check_span(name, last - first + 1, needs, runs[name])
         return (TrainingSet("pooled", tuple(_of_samples(runs, n, *s) for n, s in spans.items())),)
     rng = random_stream(settings.study.seed, "training")
-    places = _places(spans, needs.training, needs.snapshots, training.placement, rng)
+    places = _places(spans, training_samples(needs), needs.snapshots, training.placement, rng)
     if not places:
         _refuse_training(spans, needs, runs)
     count = len(places) if training.windows is None else training.windows
@@ -202,14 +179,15 @@ def _places(
 
 
 def _check_span(name: str, samples: int, needs: Needs, run: xr.Dataset) -> None:
-    if samples >= needs.training:
+    needed = training_samples(needs)
+    if samples >= needed:
         return
     dt = float(run.attrs["dt"])
     raise RequestError(
         f"training: no window is feasible in '{name}'. Its span holds {samples} samples "
-        f"({samples * dt:g} s), and the largest draw of all models needs {needs.training} "
+        f"({samples * dt:g} s), and the largest draw of all models needs {needed} "
         f"({needs.snapshots} snapshots and {needs.history} of delay history, "
-        f"{needs.training * dt:g} s). Shorten train_length or the delays, or give longer runs."
+        f"{needed * dt:g} s). Shorten train_length or the delays, or give longer runs."
     )
 
 
@@ -263,7 +241,8 @@ def choose_tests(
         run = runs[each]
         span = whole_span(run) if whole or "test_span" not in run.attrs else run.attrs["test_span"]
         first, last = _samples(run, (float(span[0]) + test.startup, float(span[1])))
-        spans[each] = (max(first, needs.history), last)
+        # The last step reads the input `lead` samples after the instant that it starts from.
+        spans[each] = (max(first, needs.history), min(last, run.sizes["time"] - max(needs.lead, 1)))
     # A window of `steps` instants after its start: steps + 1 samples.
     places = _places(spans, steps + 1, steps, test.placement, random_stream(seed, f"tests.{name}"))
     dt = float(runs[names[0]].attrs["dt"])
@@ -327,13 +306,19 @@ def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
 
 
 def needs_of(specs: Sequence[Spec], dt: float) -> Needs:
-    """Samples of the greediest of several models."""
+    """Samples of the greediest of several models: the same windows serve all."""
     each = [spec.needs(dt) for spec in specs]
     return Needs(
         max(needs.snapshots for needs in each),
         max(needs.history for needs in each),
         all(needs.inside for needs in each),
+        max(needs.lead for needs in each),
     )
+
+
+def training_samples(needs: Needs) -> int:
+    """Samples up to and including the stop of a training window."""
+    return max(needs.snapshots, needs.history + 2) + (0 if needs.inside else needs.history)
 
 
 @dataclass(frozen=True, eq=False)
@@ -359,7 +344,7 @@ class Plan:
     shown : int
         Windows of the first test set whose members are kept; one of each further set.
     needs : Needs
-        Samples of the greediest draw.
+        Samples of the largest draw of all models.
     calibrated_on : tuple of str
         Runs that train, if bands are to be calibrated on them.
     eigenvalues : bool
@@ -512,7 +497,7 @@ def warn_of_slow_study(plan: Plan, runs: Mapping[str, xr.Dataset]) -> None:
     for model, spec in plan.specs.items():
         snapshots = needs_of([spec], plan.dt).snapshots
         longest = (snapshots - 1) * plan.dt if snapshots > 1 else float("inf")
-        for training in plan.training if spec.standardize else ():
+        for training in plan.training if getattr(spec, "standardize", False) else ():
             trained = sum(min(stop - begin, longest) for _, begin, stop in training.spans)
             if least is None or trained < least[0]:
                 least = trained, f"the training windows of '{model}' in '{training.name}'"

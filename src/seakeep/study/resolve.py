@@ -7,25 +7,20 @@ else the default of the kind.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, Field, asdict, dataclass, fields, is_dataclass, replace
-from typing import Any, Literal
+from dataclasses import MISSING, dataclass, fields, replace
+from typing import Any, Literal, cast
 
 from seakeep.campaign import ModelSettings, PriorSettings
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.models import BayesianHankelDMDc, HankelDMDc, ProbeAlignment
-from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform, describe
+from seakeep.models import KINDS, ProbeAlignment, Spec
+from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform
 from seakeep.models.settings import periods_to_samples
 from seakeep.toml import Length, lengths
 
 __all__ = ["ResolvedModel", "Spec", "build_spec", "counts_in_periods", "resolve_model"]
 
-Spec = HankelDMDc | BayesianHankelDMDc
 Source = Literal["stated", "preset", "study", "default"]
 
-KINDS: dict[str, type[Spec]] = {
-    "hankel_dmdc": HankelDMDc,
-    "bayesian_hankel_dmdc": BayesianHankelDMDc,
-}
 PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
 OF_THE_DATA = ("dt", "encounter_period")
 """Arguments of a spec that are measured, not set."""
@@ -41,7 +36,7 @@ class ResolvedModel:
         As in TOML.
     preset : str or None
         What filled in the keys that were not stated.
-    spec : HankelDMDc or BayesianHankelDMDc
+    spec : Spec
         The settings.
     sources : mapping of str to str
         Key → "stated", "preset", "study" (its seed) or "default"; keys of an alignment are named
@@ -77,29 +72,27 @@ class ResolvedModel:
         }
 
 
-def _settable(kind: type[Spec] | Spec) -> list[Field[Any]]:
-    return [each for each in fields(kind) if each.init and each.name not in OF_THE_DATA]
-
-
-def _names(kind: type[Spec]) -> list[str]:
-    return [each.name for each in _settable(kind)]
+def _defaults(kind: type[Spec]) -> dict[str, Any]:
+    """Keys that a kind of model has, and their defaults."""
+    settable = [each for each in fields(cast("Any", kind)) if each.init]
+    return {each.name: each.default for each in settable if each.name not in OF_THE_DATA}
 
 
 def _values(spec: Spec) -> dict[str, Any]:
     """Settings of a spec as JSON values; those of an alignment one by one."""
-    out: dict[str, Any] = {}
-    for each in _settable(spec):
-        value = getattr(spec, each.name)
-        if is_dataclass(value) and not isinstance(value, Prior):
-            out |= {f"{each.name}.{k}": v for k, v in asdict(value).items()}  # type: ignore[arg-type]
-        else:
-            out[each.name] = describe(value) if isinstance(value, Prior) else value
+    known = _defaults(type(spec))
+    out = {key: value for key, value in spec.to_json().items() if key in known}
+    if "seed" in out:
+        out["seed"] = int(out["seed"])
+    if (alignment := out.get("alignment")) is not None:
+        del out["alignment"]
+        out |= {f"alignment.{key}": value for key, value in alignment.items()}
     return out
 
 
 def counts_in_periods(settings: ModelSettings) -> bool:
     """Whether a model is stated in encounter periods: by a preset, a key, or as an ensemble."""
-    by_kind = "encounter_period" in [each.name for each in fields(_kind_of(settings))]
+    by_kind = _kind_of(settings).is_ensemble
     return settings.preset is not None or by_kind or any(lengths(settings))
 
 
@@ -117,7 +110,7 @@ def build_spec(settings: ModelSettings, encounter_period: float | None, dt: floa
 
     Returns
     -------
-    HankelDMDc or BayesianHankelDMDc
+    Spec
         The settings.
 
     Raises
@@ -143,15 +136,18 @@ def resolve_model(
     if settings.preset is not None and not hasattr(kind, settings.preset):
         raise RequestError(
             f"kind = '{settings.kind}' has no preset. Remove preset = '{settings.preset}', and "
-            f"state its keys: {', '.join(_names(kind))}."
+            f"state its keys: {', '.join(_defaults(kind))}."
         )
-    preset = settings.preset or (preset if preset and hasattr(kind, preset) else None)
+    if settings.preset is None and preset is not None:  # a baseline may lack the paper's
+        preset = next((p for p in (preset, "recommended") if hasattr(kind, p)), None)
+    preset = settings.preset or preset
     stated = settings.arguments()
     stated.pop("stop", None)
-    if unknown := [key for key in stated if key not in _names(kind)]:
+    known = list(_defaults(kind))
+    if unknown := [key for key in stated if key not in known]:
         raise RequestError(
             f"kind = '{settings.kind}' has no key '{unknown[0]}'."
-            f"{did_you_mean(unknown[0], _names(kind))} Keys: {', '.join(_names(kind))}."
+            f"{did_you_mean(unknown[0], known)} Keys: {', '.join(known)}."
         )
     if encounter_period is None and (preset is not None or counts_in_periods(settings)):
         what = "an ensemble" if ensemble else "the model"
@@ -187,22 +183,22 @@ def _made(
     kind: type[Spec], filled: Spec | None, given: dict[str, Any], data: Mapping[str, float | None]
 ) -> Spec:
     if isinstance(given.get("alignment"), dict):
-        before = ProbeAlignment() if filled is None else filled.alignment or ProbeAlignment()
+        before = getattr(filled, "alignment", None) or ProbeAlignment()
         given = {**given, "alignment": replace(before, **given["alignment"])}
     if filled is not None:
-        return replace(filled, **given)
-    needed = [each.name for each in _settable(kind) if each.default is MISSING]
+        return cast("Spec", replace(cast("Any", filled), **given))
+    needed = [key for key, default in _defaults(kind).items() if default is MISSING]
     if "train_length" in needed:
         given.setdefault("train_length", None)
     if missing := [key for key in needed if key not in given]:
-        as_priors = " as priors, such as { uniform = [0.5, 1.5] }"
+        as_priors = " as priors, such as { uniform = [0.5, 1.5] }" if kind.is_ensemble else ""
+        presets = [f"'{name}'" for name in ("recommended", "paper") if hasattr(kind, name)]
         raise RequestError(
-            f"the [model] table states no {missing[0]}. Add {', '.join(missing)}"
-            f"{as_priors if kind.is_ensemble else ''}, or a preset: preset = "
-            "'recommended' or 'paper'."
+            f"the [model] table states no {missing[0]}. Add {', '.join(missing)}{as_priors}"
+            + (f", or a preset: preset = {' or '.join(presets)}." if presets else ".")
         )
-    of_data = {each.name: data[each.name] for each in fields(kind) if each.name in data}
-    return kind(**{**of_data, **given})
+    of_data = {each.name for each in fields(cast("Any", kind))} & set(OF_THE_DATA)
+    return kind(**{**{key: data[key] for key in of_data}, **given})
 
 
 def _sources(
@@ -211,7 +207,7 @@ def _sources(
     """Where each setting comes from; a preset counts where it differs from the default."""
     alignment = stated.get("alignment") or {}
     known = {*stated, *(f"alignment.{key}" for key in alignment)}
-    defaults = {each.name: each.default for each in _settable(spec)}
+    defaults = _defaults(type(spec))
     by_preset = {} if filled is None else _values(filled)
 
     def source(key: str) -> Source:
@@ -219,8 +215,9 @@ def _sources(
             return "stated"
         if key in from_study:
             return "study"
-        differs = key in by_preset and by_preset[key] != defaults.get(key)
-        return "preset" if differs else "default"
+        default = defaults.get(key)
+        default = list(default) if isinstance(default, tuple) else default
+        return "preset" if key in by_preset and by_preset[key] != default else "default"
 
     return {key: source(key) for key in _values(spec)}
 

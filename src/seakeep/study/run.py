@@ -15,7 +15,7 @@ from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models.executor import WorkerLostError, as_finished
 from seakeep.study.describe import describe_study
 from seakeep.study.judge import judge, words_of_lost
-from seakeep.study.plan import Plan, make_plan, warn_of_slow_study
+from seakeep.study.plan import Plan, make_plan, training_samples, warn_of_slow_study
 from seakeep.study.settings import Study
 from seakeep.study.store import (
     RESULT,
@@ -157,7 +157,7 @@ def _attributes(
         "campaign_digest": study.campaign.digest,
         "encounter_period": plan.encounter_period,
         "dt": plan.dt,
-        "longest_training": plan.needs.training * plan.dt,
+        "longest_training": training_samples(plan.needs) * plan.dt,
         "preparation": study.campaign.settings.preparation.model_dump_json(),
         "models": json.dumps({name: each.to_json() for name, each in plan.models.items()}),
         "conditional_on": _conditional(plan),
@@ -168,8 +168,8 @@ def _attributes(
 
 def _conditional(plan: Plan) -> str:
     """Measured output that a forecast reads after its start, through the alignment."""
-    alignments = [spec.alignment for spec in plan.specs.values() if spec.alignment is not None]
-    read = [each.surge_channel for each in alignments if each.surge == "measured"]
+    alignments = [getattr(spec, "alignment", None) for spec in plan.specs.values()]
+    read = [each.surge_channel for each in alignments if each and each.surge == "measured"]
     return ", ".join(dict.fromkeys(read))
 
 

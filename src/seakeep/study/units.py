@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,6 @@ from seakeep.core import metrics
 from seakeep.core.bands import band_error_over_time
 from seakeep.core.calibration import conformal_margin
 from seakeep.errors import DataError, SeakeepError
-from seakeep.models import HankelDMDcModel, HankelEnsemble
 from seakeep.models.calibration import held_out_scores
 from seakeep.models.engine import group_series, read_groups
 from seakeep.models.summaries import STATISTICS, reduce_members
@@ -32,7 +31,7 @@ __all__ = ["Unit", "collect", "compute", "fit_training", "units_of"]
 Runs = Mapping[str, xr.Dataset]
 Arrays = dict[str, npt.NDArray[Any]]
 Read = Callable[["Unit"], Arrays]
-Fitted = HankelDMDcModel | HankelEnsemble
+
 
 DIMS = {
     "mean": ("time", "channel"),
@@ -98,8 +97,8 @@ def compute(plan: Plan, runs: Runs, unit: Unit) -> Arrays:
             out |= {f"tests/{test}/{key}": each for key, each in found.items()}
         else:
             out[f"tests/{test}/mean"] = np.array(series[0])
-    if plan.calibrated_on and isinstance(fitted, HankelEnsemble):
-        margins = calibration_arrays(plan, runs, unit, fitted)
+    if plan.calibrated_on and plan.models[unit.model].is_ensemble:
+        margins = band_margins(plan, runs, unit, fitted)
         out |= {f"calibration/{key}": np.asarray(value) for key, value in margins.items()}
     if plan.eigenvalues and unit.training == units_of(plan)[0].training:
         values = _eigenvalues(fitted)
@@ -108,7 +107,7 @@ def compute(plan: Plan, runs: Runs, unit: Unit) -> Arrays:
 
 
 def _series(
-    plan: Plan, runs: Runs, fitted: Fitted, tested: Mapping[str, tuple[int, ...]]
+    plan: Plan, runs: Runs, fitted: Any, tested: Mapping[str, tuple[int, ...]]
 ) -> Iterator[tuple[str, tuple[int, ...], FloatArray, npt.NDArray[np.int64]]]:
     """Free runs of all members over each test set, (member, window, steps, N), and where lost.
 
@@ -170,7 +169,7 @@ def measured_windows(
     return np.stack(out)
 
 
-def fit_training(plan: Plan, runs: Runs, model: str, training: TrainingSet) -> Fitted:
+def fit_training(plan: Plan, runs: Runs, model: str, training: TrainingSet) -> Any:
     """Fit a model of the study to a training set."""
     parts = {name: between(runs[name], (begin, stop)) for name, begin, stop in training.spans}
     return plan.specs[model].fit(parts, list(plan.states), list(plan.inputs))
@@ -186,7 +185,7 @@ def training_moments(plan: Plan, runs: Runs, training: TrainingSet) -> FloatArra
     return np.stack([pooled.mean(axis=1), pooled.std(axis=1, ddof=1)])
 
 
-def _eigenvalues(fitted: Fitted) -> npt.NDArray[np.complex128]:
+def _eigenvalues(fitted: Any) -> npt.NDArray[np.complex128]:
     """Eigenvalues of a model, or of each member, in descending order of modulus."""
     values = [np.linalg.eigvals(matrix) for matrix in fitted.system_matrices()]
     padded = np.full((len(values), max(each.size for each in values)), complex(np.nan, np.nan))
@@ -195,9 +194,7 @@ def _eigenvalues(fitted: Fitted) -> npt.NDArray[np.complex128]:
     return padded
 
 
-def calibration_arrays(
-    plan: Plan, runs: Runs, unit: Unit, fitted: HankelEnsemble
-) -> dict[str, Any]:
+def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> dict[str, Any]:
     """Find the margins of an ensemble on windows as long as those of the first test set.
 
     The windows lie in the training spans, clear of what the members have read. Where these read
@@ -235,7 +232,7 @@ def _scores_of_others(plan: Plan, runs: Runs, unit: Unit, steps: int) -> list[Fl
         held = {n: between(runs[n], (b, e)) for n, b, e in training.spans if n in group}
         if rest and held:
             others = TrainingSet(f"{training.name}, calibration", rest)
-            ensemble = cast("HankelEnsemble", fit_training(plan, runs, unit.model, others))
+            ensemble = fit_training(plan, runs, unit.model, others)
             scores += held_out_scores(ensemble, held, steps, plan.level).values()
     return scores
 
@@ -265,9 +262,8 @@ def collect(study: Study, plan: Plan, runs: Runs, read: Read) -> dict[str, xr.Da
 
 def draws_of(plan: Plan, runs: Runs, model: str) -> xr.Dataset:
     """Draws of an ensemble: the same for every training set, all of which hold the largest."""
-    ensemble = fit_training(plan, runs, model, plan.training[0])
-    assert isinstance(ensemble, HankelEnsemble)
-    return ensemble.draws
+    draws: xr.Dataset = fit_training(plan, runs, model, plan.training[0]).draws
+    return draws
 
 
 def _collect_test(
