@@ -90,6 +90,7 @@ def meant_column(wanted: str, tables: Iterable[Columns]) -> str:
 
     Examples
     --------
+    >>> import numpy as np
     >>> table = Columns({"heave": np.zeros(2)}, {"heave": "mm"}, headers={"heave": "heave [mm]"})
     >>> meant_column("heave [m]", [table])
     " There is a column 'heave [mm]', in another unit."
