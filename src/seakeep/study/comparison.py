@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
@@ -16,7 +16,7 @@ from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
-from seakeep.models import HankelEnsemble, Model
+from seakeep.models import KINDS, HankelEnsemble, Model
 from seakeep.models.calibration import Band
 from seakeep.models.forecasts import status_at_clock
 from seakeep.models.training import is_constant
@@ -345,10 +345,10 @@ def compare_models(
         def forecast_run(
             run: xr.Dataset, start: float, steps: int, model: Model = model
         ) -> xr.Dataset:
-            if not isinstance(model, HankelEnsemble):
+            if not KINDS[model.kind].is_ensemble:
                 return model.forecast(run, start=start, steps=steps)
             tell = None if members is None else _named(members, str(run.attrs["run"]))
-            return model.forecast_summary(
+            return cast("HankelEnsemble", model).forecast_summary(
                 run, start, steps, level, band=band, executor=executor, progress=tell
             )
 
@@ -381,7 +381,7 @@ def _warn_of_known(model: Model, compared: Comparison) -> None:
     told = []
     if part := part_in(model.training_spans):
         told.append(f"the forecast of {name} lies in what trained the model {part}: {memory}")
-    calibration = model.calibration if isinstance(model, HankelEnsemble) else None
+    calibration = getattr(model, "calibration", None)
     known = {} if calibration is None else calibration.spans
     if compared.forecast.attrs.get("band") == "calibrated" and (part := part_in(known)):
         told.append(f"the band was calibrated on a part of this forecast {part}: {memory}")
