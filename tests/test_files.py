@@ -123,7 +123,7 @@ import numpy as np, xarray as xr
 from seakeep.campaign import store as campaign
 from seakeep.errors import SeakeepError
 from seakeep.models import store as models
-from seakeep.report import tables
+from seakeep.report import comparison
 from seakeep.study import store as study
 from seakeep.tank import delivery, hydrodynamics
 
@@ -131,7 +131,7 @@ folder, run = Path(sys.argv[1]), xr.Dataset({"heave": ("time", np.random.rand(50
 writers = {
     "campaign": lambda path: campaign._write(run, path),
     "model": lambda path: models.write(run, path, "hankel_dmdc"),
-    "forecast": lambda path: tables.write_forecast(run, path),
+    "forecast": lambda path: comparison.write_forecast(run, path),
     "raw file": lambda path: delivery.write_dataset(run, path),
     "hydrodynamics": lambda path: hydrodynamics.save_hydrodynamics(run, path),
     "study": lambda path: study.write_result(folder, {}, {"prepared": run}),
