@@ -410,6 +410,19 @@ def test_several_models_are_judged_over_the_same_instants(run, place):
     assert (place / "both/unseen_model.png").exists()
 
 
+def test_baselines_stand_beside_a_model_and_their_loss_is_not_its_own(run, place):
+    status, out, err = run(f"compare model.nc {CAMPAIGN} --baselines -o based")
+    assert status == 0, err
+    heads = next(line for line in out.splitlines() if "below hold last" in line)
+    assert "below mean  below best linear" in heads
+    with (place / "based/comparison.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    kinds = {"model", "hold_last", "mean", "fir", "arx", "subspace"}
+    assert {row["model"] for row in rows} == kinds
+    mean = next(row for row in rows if row["model"] == "mean")
+    assert float(mean["nrmse"]) == pytest.approx(1.0, abs=0.01)
+
+
 @pytest.mark.parametrize("model", ["model.nc", "ensemble.nc", "model.nc ensemble.nc"])
 def test_tables_of_compare_fit_a_terminal_of_80_columns(model, run, monkeypatch):
     monkeypatch.setattr("seakeep.cli.console.PIPE_WIDTH", 80)

@@ -105,7 +105,7 @@ def progress_bar(what: str) -> Iterator[Report]:
 @contextmanager
 def tell_warnings() -> Iterator[None]:
     """Print warnings of seakeep as one line each, and leave the others to Python."""
-    told = warnings.showwarning
+    told, seen = warnings.showwarning, set[str]()
 
     def show(
         message: Warning | str,
@@ -116,6 +116,9 @@ def tell_warnings() -> Iterator[None]:
         line: str | None = None,
     ) -> None:
         if issubclass(category, SeakeepWarning):
+            if str(message) in seen:  # of several models, once
+                return
+            seen.add(str(message))
             messages().print(f"Note: {message}", style="yellow")
         else:
             told(message, category, filename, lineno, None, line)

@@ -209,6 +209,14 @@ def compare(
     workers: Workers = None,
     scheduler: Scheduler = None,
     full_scale: FullScale = False,
+    baselines: Annotated[
+        bool,
+        typer.Option(
+            "--baselines",
+            help="Fit hold-last, mean, FIR, ARX and a subspace model to the training runs and "
+            "compare with them.",
+        ),
+    ] = False,
 ) -> None:
     """Judge forecasts of test runs against the measurement.
 
@@ -218,7 +226,7 @@ def compare(
 
     Example: seakeep compare model.nc docs/tutorial/campaign.toml -o comparison
 
-    Two models: seakeep compare model.nc ensemble.nc docs/tutorial/campaign.toml -o judged
+    Two models: seakeep compare model.nc ensemble.nc docs/tutorial/campaign.toml --baselines
     """
     if format_ not in ("png", "svg", "pdf"):
         raise RequestError(f"--format must be png, svg or pdf; received '{format_}'.")
@@ -228,7 +236,8 @@ def compare(
     from seakeep.study import at_full_scale, compare_models, comparison_table, in_degrees
 
     make_folder(out)
-    fitted = {name: load_model(path) for name, path in _named(model).items()}
+    names = _named(model)
+    fitted = {name: load_model(path) for name, path in names.items()}
     shown = _band(fitted, level, band, scheduler)
     read = read_campaign(campaign)
     figures = _figures(fitted, run or read.test_runs, out, format_)
@@ -236,6 +245,8 @@ def compare(
     check_output(out / TABLE, "table", used, "run,channel,channel_units,.*")
     for path in figures.values():
         check_output(path, "figure", used)
+    if baselines:
+        fitted = _with_baselines(fitted, read)
     with member_executor(workers, scheduler) as executor, progress_bar("Comparing") as progress:
         found = compare_models(
             fitted,
@@ -254,10 +265,10 @@ def compare(
     if not radians:
         found = {name: [in_degrees(each) for each in of] for name, of in found.items()}
     tables = {name: comparison_table(of) for name, of in found.items()}
-    _print_comparison(tables)
+    _print_comparison(tables, {name: each.kind for name, each in fitted.items()})
     written = [write_comparison(tables, out / TABLE), *_draw(found, figures)]
     messages().print("Wrote " + ", ".join(map(str, written)))
-    if not all(each.complete for of in found.values() for each in of):
+    if not all(each.complete for name in names for each in found[name]):
         raise typer.Exit(1)
 
 
@@ -285,11 +296,30 @@ def _figures(
     }
 
 
-def _print_comparison(tables: Mapping[str, xr.Dataset]) -> None:
+def _with_baselines(fitted: Mapping[str, Model], campaign: Campaign) -> dict[str, Model]:
+    """Models and baselines of the same channels, by name."""
+    from seakeep.study import fit_baselines
+
+    first = next(iter(fitted.values()))
+    channels = max((each.inputs for each in fitted.values()), key=len)
+    with progress_bar("Baselines") as progress:
+        found = fit_baselines(campaign, first.states, channels, progress)
+    names = {kind: kind if kind not in fitted else f"{kind} (baseline)" for kind in found}
+    return {**fitted, **{names[kind]: each for kind, each in found.items()}}
+
+
+def _print_comparison(tables: Mapping[str, xr.Dataset], kinds: Mapping[str, str]) -> None:
     from seakeep.report.comparison import band_findings, comparison_blocks, model_blocks
+    from seakeep.study.judge import LINEAR
 
     several = len(tables) > 1
-    blocks = model_blocks(tables, {}) if several else comparison_blocks(*tables.values())
+    groups = {"hold last": ("hold_last",), "mean": ("mean",), "best linear": LINEAR}
+    references = {
+        heading: [name for name, kind in kinds.items() if kind in among]
+        for heading, among in groups.items()
+    }
+    known = {heading: names for heading, names in references.items() if names}
+    blocks = model_blocks(tables, known) if several else comparison_blocks(*tables.values())
     for block in blocks:
         print_table(block)
     for name, table in tables.items():

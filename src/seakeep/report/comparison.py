@@ -136,15 +136,16 @@ def model_blocks(
             (
                 name,
                 _text(at["anrmse"], "{:.3f}"),
-                _text(at["fit"].mean(), "{:.1f}"),
+                _text(at["fit"].mean(), "{:z.1f}"),
                 _text(at["mean_nammae"], "{:.3f}"),
-                *(_text(100 * (1 - errors[name] / each), "{:+.0f} %") for each in best.values()),
+                *(_text(100 * (1 - errors[name] / each), "{:+z.0f} %") for each in best.values()),
             )
             for name, at in of_run.items()
         ]
         title = f"{run}: models against measurement"
         numeric = tuple(range(1, len(heads)))
-        note = _note(next(iter(of_run.values())))
+        lost = [f"{n}: {s}" for n, at in of_run.items() if (s := str(at["status"].values)) != "ok"]
+        note = "; ".join(lost)
         yield Table(f"models_{run}", title, heads, tuple(rows), note, numeric)
         channels = [
             (str(name), *(_text(at["nrmse"].sel(channel=name), "{:.3f}") for at in of_run.values()))

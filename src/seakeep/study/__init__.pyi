@@ -8,7 +8,7 @@ from .comparison import (
     in_degrees,
     with_degrees,
 )
-from .fit import fit_campaign, training_runs
+from .fit import fit_baselines, fit_campaign, training_runs
 from .full_scale import to_full_scale
 from .resolve import build_spec
 from .run import run_study
@@ -26,6 +26,7 @@ __all__ = [
     "compare",
     "compare_models",
     "comparison_table",
+    "fit_baselines",
     "fit_campaign",
     "forecast_at_full_scale",
     "in_degrees",

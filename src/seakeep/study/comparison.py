@@ -435,7 +435,7 @@ def _compare_run(
         sea_state=str(run.attrs.get("sea_state", "")),
         forecast=forecast,
         measured=run[model.states].sel(instants),
-        inputs=run[model.inputs].sel(instants),
+        inputs=run.sel(instants)[model.inputs],
         band=band,
     )
 

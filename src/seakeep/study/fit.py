@@ -11,8 +11,8 @@ import xarray as xr
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.campaign.store import prepared_folder
-from seakeep.errors import RequestError, SeakeepWarning
-from seakeep.models import Model, compare_waves
+from seakeep.errors import RequestError, SeakeepError, SeakeepWarning
+from seakeep.models import KINDS, Model, compare_waves
 from seakeep.models.slow import warn_of_slow_motions
 from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, find_leakage
@@ -20,8 +20,9 @@ from seakeep.study.plan import between
 from seakeep.study.resolve import Spec, build_spec, counts_in_periods
 from seakeep.toml import Length
 
-__all__ = ["fit_campaign", "training_runs", "warn_of_repeats", "warn_of_waves"]
+__all__ = ["fit_baselines", "fit_campaign", "training_runs", "warn_of_repeats", "warn_of_waves"]
 
+BASELINES = ("hold_last", "mean", "fir", "arx", "subspace")
 CYCLES = 5.0
 """Periods of a test from which on its spectrum tells which waves it holds."""
 NOTHING_TRAINS = (
@@ -130,6 +131,54 @@ def fit_campaign(
     if getattr(spec, "standardize", False):
         _warn_of_slow_model(identified, runs)
     return identified
+
+
+def fit_baselines(
+    campaign: Campaign,
+    states: Sequence[str],
+    inputs: Sequence[str],
+    progress: Progress | None = None,
+) -> dict[str, Model]:
+    """Fit every baseline, with its recommended settings, to the training runs of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The campaign.
+    states, inputs : sequence of str
+        Channels, those of the model that is compared.
+    progress : callable, optional
+        Called as ``progress(done, total, run)`` while runs are prepared.
+
+    Returns
+    -------
+    dict of str to Model
+        By kind. A baseline that these runs cannot identify is left out.
+
+    Raises
+    ------
+    RequestError
+        If no run trains, or the campaign has no encounter period.
+    DataError
+        If a run cannot be read or used.
+
+    Warns
+    -----
+    SeakeepWarning
+        Of each baseline that is left out, with the reason.
+    """
+    prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
+    runs = training_runs(prepared)
+    period, dt = campaign.encounter_period(), float(next(iter(runs.values())).attrs["dt"])
+    found: dict[str, Model] = {}
+    for kind in BASELINES:
+        recommended = getattr(KINDS[kind], "recommended", None)
+        spec = KINDS[kind]() if recommended is None else recommended(period, dt)
+        try:
+            found[kind] = spec.fit(runs, states, inputs)
+        except SeakeepError as error:
+            warnings.warn(f"baseline '{kind}' is left out: {error}", SeakeepWarning, stacklevel=2)
+    return found
 
 
 def _reads_ahead(model: Model, run: xr.Dataset) -> float:
