@@ -20,7 +20,6 @@ from seakeep.core.gram import (
     primal_system,
     snapshot_gram,
 )
-from seakeep.core.rollout import feedback_rollout
 
 ROLLOUT = sys.modules["seakeep.core.rollout"]
 
@@ -264,20 +263,6 @@ def test_free_runs_are_the_loop_over_the_extended_state(case, piece):
     with patch.object(ROLLOUT, "PIECE", piece):
         found = rollout(a[:rows], b[:rows], histories, driving, n_states=N, **options)
     np.testing.assert_allclose(found, expected, atol=RESULT)
-    followed = [
-        feedback_rollout(
-            a[:rows],
-            b[:rows],
-            history,
-            series[: z + 1],
-            steps,
-            lambda k, _, u=series, d=beside: np.concatenate([u[z + k], d[k]]),
-            beside[0],
-        )
-        for history, series, beside in zip(histories, inputs, direct, strict=True)
-    ]
-    if inputs.shape[2]:
-        np.testing.assert_allclose(followed, expected, atol=RESULT)
 
 
 @pytest.mark.parametrize("windows", [1, 2, 12])

@@ -24,7 +24,6 @@ A long run is taken in pieces, so that what is held beside the result does not g
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,7 +33,7 @@ from scipy.linalg import blas
 from seakeep.arrays import BoolArray, FloatArray, as_real
 from seakeep.errors import RequestError
 
-__all__ = ["feedback_rollout", "rollout"]
+__all__ = ["rollout"]
 
 Arrays = tuple[FloatArray, ...]
 
@@ -158,54 +157,6 @@ def rollout(
         propagator = _propagator(a, matrices, count, channels, len(start), steps)
         out = _run(propagator, start, series, steps)
     _cut_lost(out)
-    return out
-
-
-def feedback_rollout(
-    a: FloatArray,
-    b: FloatArray,
-    states: FloatArray,
-    inputs: FloatArray,
-    steps: int,
-    next_input: Callable[[int, FloatArray], FloatArray],
-    direct: FloatArray | None = None,
-) -> FloatArray:
-    r"""Run :math:`\hat x_{j+1} = \hat A \hat x_j + \hat B \hat u_j` with :math:`u_j(x_j)`.
-
-    Parameters
-    ----------
-    a, b : ndarray, shapes (rows, N(s+1)) and (rows, Q(z+1) + D)
-        Matrices; N rows stand for exact delay rows, else all rows are given.
-    states : ndarray, shape (s + 1, N)
-        History, oldest first.
-    inputs : ndarray, shape (z + 1, Q)
-        History, oldest first, up to the same instant.
-    steps : int
-        Number of instants.
-    next_input : callable
-        ``next_input(k, x)`` gives the input, shape (Q + D,), at the k-th instant after the start
-        (from 1), where the state x, shape (N,), was reached. It is not asked at the last one.
-    direct : ndarray, shape (D,), optional
-        Inputs without delays at the start.
-
-    Returns
-    -------
-    ndarray, shape (steps, N)
-        States after the start.
-    """
-    count, width = states.shape[1], inputs.shape[1]
-    x, u = states[::-1].ravel(), inputs[::-1].ravel()
-    now = np.empty(0) if direct is None else direct
-    exact = a.shape[0] == count < x.size
-    out = np.empty((steps, count))
-    for step in range(steps):
-        with np.errstate(over="ignore", invalid="ignore"):  # a lost run is cut by the caller
-            reached = a @ x + b @ np.concatenate([u, now])
-        x = np.concatenate([reached, x[:-count]]) if exact else reached
-        out[step] = x[:count]
-        if step < steps - 1:
-            newest = next_input(step + 1, out[step])
-            u, now = np.concatenate([newest[:width], u[:-width]]), newest[width:]
     return out
 
 
