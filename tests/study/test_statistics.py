@@ -213,3 +213,31 @@ def test_skill_is_the_change_of_the_median_error_against_the_baselines():
     mine = skill["change"].sel(model="mine", measure="nrmse")
     np.testing.assert_allclose(mine, [-0.6, -0.2], rtol=1e-12)
     assert skill_table(boxes, {"mine": "hankel_dmdc"}) is None
+
+
+BASELINES = """
+[models.still]
+kind = "hold_last"
+[models.average]
+kind = "mean"
+[models.classic]
+kind = "arx"
+"""
+
+
+def test_any_registered_kind_runs_in_a_study_and_is_a_reference(tmp_path, put_study):
+    text = put_study(tmp_path)
+    ensemble = text[text.index("[models.bayesian]") : text.index("[tests.unseen]")]
+    path = tmp_path / "study.toml"
+    path.write_text(text.replace(ensemble, "") + BASELINES, "utf-8")
+    found = run_study(read_study(path), tmp_path / "out")
+    test = found.tests["unseen"]
+    still = test["still_mean"]
+    assert (still == still.isel(time=0)).all()
+    average = test["average_mean"].isel(window=0, time=0)
+    np.testing.assert_allclose(average, test["training_mean"], rtol=1e-9, atol=1e-12)
+    skill = found.groups["statistics/skill/unseen"]
+    assert list(skill["reference_model"].values) == ["still", "average", "classic"]
+    change = skill["change"].sel(model="deterministic", measure="nrmse")
+    assert (change.sel(reference=["hold_last", "mean"]) < -0.5).all()
+    assert found.model_settings["classic"]["preset"] == "recommended"
