@@ -90,7 +90,7 @@ def test_bad_settings_say_what_and_how_to_mend(tmp_path, text, message):
 
 
 def test_what_is_no_settings_file(tmp_path):
-    with pytest.raises(RequestError, match=r"the tank file .*none\.toml does not exist"):
+    with pytest.raises(RequestError, match=r"none\.toml does not exist\. .*A tank file is expected"):
         read_tank(tmp_path / "none.toml")
     with pytest.raises(RequestError, match=r"is a folder; give the tank's TOML file"):
         read_tank(tmp_path)
