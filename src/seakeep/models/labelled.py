@@ -268,15 +268,28 @@ def common_labels(runs: Mapping[str, xr.Dataset], names: Sequence[str]) -> tuple
 
 
 def check_units(run: xr.Dataset, labels: Sequence[ChannelLabel], name: str) -> None:
-    """Refuse a run that states another unit for a channel than the model was trained in."""
-    variables = run.variables
+    """Refuse a run in another unit than the model's, and warn of one that states none."""
+    silent = []
     for label in labels:
-        units = variables[label.name].attrs.get("units") if label.name in variables else None
-        if units and label.units and str(units) != label.units:
+        if label.name not in run.variables or not label.units:
+            continue
+        units = run.variables[label.name].attrs.get("units")
+        if not units:
+            silent.append(label)
+        elif str(units) != label.units:
             raise DataError(
                 f"channel '{label.name}' of {name} is in '{units}' and the model expects "
                 f"'{label.units}'. Convert the channel and its units attribute."
             )
+    if silent:
+        listed = ", ".join(f"'{label.name}'" for label in silent)
+        units = ", ".join(dict.fromkeys(f"'{label.units}'" for label in silent))
+        warnings.warn(
+            f"channel {listed} of {name} states no unit; it is taken to be in the model's {units}. "
+            "Set its units attribute.",
+            SeakeepWarning,
+            stacklevel=5,
+        )
 
 
 def as_instant(value: object, what: str) -> float:

@@ -264,12 +264,18 @@ def run_regressors(
     needed: int | None = None,
 ) -> Regressors:
     """Regressors of a training run; inputs as they are may have gaps before `needed`."""
+    # A map that reaches back has no rows at the start of a run; no column reads those.
+    missing = max(0, -input_map.reads(span).first)
+    span = span._replace(first=span.first + missing)
     read = input_map.reads(span)
     values = labelled.channel_matrix(run, inputs, name)
     time = np.asarray(run.variables["time"].values, dtype=float)
     first = read.first if needed is None or input_map.maps else needed
     labelled.check_finite(values[first : read.stop], inputs, name, first, time)
-    return input_map.wrap(Measured(values), run, [span]).rows(span.first, span.stop)
+    found = input_map.wrap(Measured(values), run, [span]).rows(span.first, span.stop)
+    if not missing:
+        return found
+    return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in found))
 
 
 def lengthened(values: FloatArray, length: int) -> FloatArray:

@@ -1,0 +1,410 @@
+"""The doors of the room: input maps, leads, the registry, and one engine for all forecasts."""
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+import xarray as xr
+from drifting import INPUTS, STATES, drifting_run
+
+import seakeep
+from seakeep import BayesianHankelDMDc, DataError, HankelDMDc, RequestError, SeakeepWarning, Uniform
+from seakeep.models import KINDS, HankelDMDcModel, HankelEnsemble, compare_waves, inputs, load_model
+from seakeep.models.engine import group_series, read_groups
+from seakeep.models.interface import Regressors, Span
+from seakeep.models.labelled import ChannelLabel
+
+DT = 0.1
+PREDICTED = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
+
+
+def sea(samples=600, seed=0, ahead=0, **attrs):
+    """Heave answers the wave `ahead` samples later; the wave is white enough to tell them apart."""
+    rng = np.random.default_rng(seed)
+    eta = rng.standard_normal(samples + ahead + 3)
+    heave = 0.5 * eta[ahead : ahead + samples] - 0.2 * eta[ahead + 1 : ahead + 1 + samples]
+    return xr.Dataset(
+        {
+            "heave": ("time", np.r_[0.0, heave[:-1]], {"units": "m"}),
+            "eta": ("time", eta[:samples], {"units": "m"}),
+        },
+        coords={"time": DT * np.arange(samples)},
+        attrs=attrs,
+    )
+
+
+def ensemble(**changes):
+    settings = {
+        "encounter_period": 1.6,
+        "train_length": None,
+        "state_delay": Uniform(0.2, 0.4),
+        "input_delay": Uniform(0.6, 1.0),
+        "ridge": Uniform(1, 2),
+        "n_members": 5,
+        "delay_rows": "exact",
+    }
+    return BayesianHankelDMDc(**settings | changes)
+
+
+@pytest.fixture(scope="module")
+def drifting():
+    return [drifting_run(seed) for seed in (1, 2)], drifting_run(7)
+
+
+class TestLead:
+    """The input up to j + lead drives the step from j."""
+
+    def test_a_known_lead_is_learnt_and_forecast(self):
+        run, spec = sea(ahead=4), HankelDMDc(0, 8, 1e-9, delay_rows="exact")
+        blind = spec.fit(run, ["heave"], ["eta"])
+        seeing = replace(spec, lead=5).fit(run, ["heave"], ["eta"])
+        test = sea(seed=1, ahead=4)
+        errors = []
+        for model in (blind, seeing):
+            found = model.forecast(test, start=10.0, steps=300)
+            errors.append(float(np.abs(found.heave - test.heave.sel(time=found.time)).max()))
+        assert errors[0] > 0.5
+        assert errors[1] < 1e-6  # a linear law without noise, to the ridge
+        assert (seeing.lead_samples, seeing.history_samples) == (5, 9)
+        assert "lead          5 samples (0.5 s)" in seeing.summary()
+
+    def test_nothing_beyond_the_lead_is_read_and_the_forecast_says_how_far(self):
+        run = sea(ahead=4)
+        model = HankelDMDc(1, 8, 1.0, lead=5).fit(run, ["heave"], ["eta"])
+        expected = model.forecast(run, start=20.0, steps=50)
+        assert expected.attrs["reads_input_until"] == pytest.approx(4 * DT)
+        poisoned = run.copy(deep=True)
+        last = 200 + 49 + 5  # the last step starts 49 samples after the start
+        poisoned.eta.values[last + 1 :] = np.nan
+        poisoned.heave.values[201:] = np.nan
+        xr.testing.assert_identical(model.forecast(poisoned, start=20.0, steps=50), expected)
+        poisoned.eta.values[last] = np.nan
+        with pytest.raises(DataError, match=r"channel 'eta' of .* missing"):
+            model.forecast(poisoned, start=20.0, steps=50)
+
+    def test_training_reads_no_input_after_its_stop(self):
+        run = sea(ahead=4)
+        spec = HankelDMDc(1, 8, 1.0, window=200, lead=5)
+        expected = spec.fit(run, ["heave"], ["eta"], stop=40.0)
+        poisoned = run.copy(deep=True)
+        for name in ("heave", "eta"):
+            poisoned[name].values[401:] = np.nan
+        found = spec.fit(poisoned, ["heave"], ["eta"], stop=40.0)
+        np.testing.assert_array_equal(found.coefficients, expected.coefficients)
+        assert found.training.columns == (200 - 1 - 4,)
+
+    def test_arrays_take_as_many_future_rows_as_the_lead_needs(self):
+        run = sea(ahead=4)
+        model = HankelDMDc(1, 8, 1.0, lead=5).fit(run, ["heave"], ["eta"])
+        x, u = run.heave.values[:, None], run.eta.values[:, None]
+        found = model.forecast_arrays(x[:201], u[:201], u[201:255], steps=50)
+        expected = model.forecast(run, start=20.0, steps=50)
+        np.testing.assert_allclose(found[:, 0], expected.heave, rtol=0, atol=1e-13)
+        with pytest.raises(RequestError, match=r"at least 54 rows \(steps − 1 \+ lead_samples\)"):
+            model.forecast_arrays(x[:201], u[:201], u[201:254], steps=50)
+        with pytest.raises(RequestError, match="ahead must be 'refuse'"):
+            model.forecast_arrays(x[:201], u[:201], u[201:], steps=50, ahead="guess")
+
+    def test_the_end_of_a_run_leaves_room_for_the_lead(self):
+        run = sea(ahead=4)
+        model = HankelDMDc(1, 8, 1.0, lead=5).fit(run, ["heave"], ["eta"])
+        whole = model.forecast(run, start=20.0)
+        assert whole.sizes["time"] == 599 - 200 - 4
+        with pytest.raises(RequestError, match=r"model's lead takes 5\. At most 395 steps"):
+            model.forecast(run, start=20.0, steps=396)
+
+    @pytest.mark.parametrize(("lead", "samples"), [(5, 5), (0.25, 4)])
+    def test_an_ensemble_counts_it_in_samples_or_periods(self, lead, samples, tmp_path):
+        run = sea(ahead=3)
+        fitted = ensemble(lead=lead).fit(run, ["heave"], ["eta"])
+        assert fitted.lead_samples == samples
+        one = fitted.member(2)
+        assert one.lead_samples == samples
+        members = fitted.forecast(run, start=20.0, steps=30)
+        np.testing.assert_allclose(
+            members.heave[2], one.forecast(run, start=20.0, steps=30).heave, atol=1e-12
+        )
+        back = load_model(fitted.save(tmp_path / "e.nc"))
+        xr.testing.assert_identical(back.forecast(run, start=20.0, steps=30), members)
+
+
+@dataclass(frozen=True)
+class Half:
+    """A map of somebody else: half of the first input as a regressor without delays."""
+
+    kind: ClassVar[str] = "half"
+    lead_samples: ClassVar[int] = 0
+    extra_history: ClassVar[int] = 2
+    reads_states: ClassVar[str] = "no"
+
+    def fit(self, runs, states, inputs, window):
+        return self
+
+    def regressors(self, inputs):
+        return inputs, (ChannelLabel("half", inputs[0].units, "half of the wave, two before"),)
+
+    def reads(self, span):
+        return Span(span.first - 2, span.known, span.stop)
+
+    def wrap(self, drive, run, spans):
+        @dataclass(frozen=True)
+        class Halved:
+            inner: object
+
+            def rows(self, first, stop, known=None):
+                found = self.inner.rows(first - 2, stop, known).delayed
+                return Regressors(found[2:], 0.5 * found[:-2, :1])
+
+        return Halved(drive)
+
+    def look_ahead(self, run, dt):
+        return 0.0
+
+    def notes(self, run):
+        return {}
+
+    def describe(self, dt):
+        return ["  half          of the wave"]
+
+    def to_json(self):
+        return {}
+
+    @classmethod
+    def from_json(cls, content):
+        return cls()
+
+
+class TestMapOfAnother:
+    """One file and one line add an input map."""
+
+    def test_it_drives_models_ensembles_arrays_and_files(self, monkeypatch, tmp_path):
+        monkeypatch.setitem(inputs.MAPS, "half", Half)
+        run = sea()
+        run["heave"] = ("time", np.r_[np.zeros(3), run.eta.values[:-3]], {"units": "m"})
+        # x_{j+1} = u_{j−2}: without input delays only the direct regressor holds it.
+        spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=(Half(),))
+        model = spec.fit(run, ["heave"], ["eta"])
+        assert model.regressors == ["eta", "half"]
+        assert model.history_samples == 3
+        forecast = model.forecast(run, start=20.0, steps=40)
+        # Means of the window differ by what its first samples leave out: 2 / 600 of a deviation.
+        np.testing.assert_allclose(forecast.heave, run.heave.sel(time=forecast.time), atol=5e-3)
+        x, u = run.heave.values[:, None], run.eta.values[:, None]
+        arrays = model.forecast_arrays(x[:201], u[:201], u[201:240], steps=40)
+        np.testing.assert_allclose(arrays[:, 0], forecast.heave, atol=1e-12)
+        back = load_model(model.save(tmp_path / "m.nc"))
+        xr.testing.assert_identical(back.forecast(run, start=20.0, steps=40), forecast)
+        assert "half          of the wave" in back.summary()
+        many = ensemble(observables=(Half(),), n_members=2).fit(run, ["heave"], ["eta"])
+        summary = many.forecast_summary(run, start=20.0, steps=40)
+        again = load_model(many.save(tmp_path / "e.nc"))
+        xr.testing.assert_identical(again.forecast_summary(run, start=20.0, steps=40), summary)
+        with pytest.raises(RequestError, match=r"delays of their own \(half\)"):
+            model.to_state_space()
+
+    def test_a_file_with_a_map_that_is_not_known_is_refused(self, monkeypatch, tmp_path):
+        run = sea()
+        monkeypatch.setitem(inputs.MAPS, "half", Half)
+        model = HankelDMDc(0, 0, 1.0, observables=(Half(),)).fit(run, ["heave"], ["eta"])
+        path = model.save(tmp_path / "m.nc")
+        monkeypatch.delitem(inputs.MAPS, "half")
+        with pytest.raises(DataError, match="the input map 'half' is not known here"):
+            load_model(path)
+
+
+class TestOneEngine:
+    """Windows, members and executors share one reading of each run."""
+
+    @pytest.mark.parametrize("surge", ["measured", "predicted"])
+    def test_each_probe_is_carried_once_per_run(self, drifting, monkeypatch, surge):
+        runs, test = drifting
+        alignment = replace(PREDICTED, surge=surge)
+        fitted = ensemble(alignment=alignment).fit(runs, STATES, INPUTS)
+        carries = []
+        real = inputs.carry_by_dispersion
+
+        def counting(*arguments):
+            carries.append(1)
+            return real(*arguments)
+
+        monkeypatch.setattr(inputs, "carry_by_dispersion", counting)
+        fitted.forecast_windows(test, [20.0, 25.0, 30.0], steps=20)
+        assert len(carries) == len(INPUTS)
+        carries.clear()
+        places = [("a", 20.0), ("b", 21.0), ("a", 30.0)]
+        groups = [(places, 20), (places[:1], 30)]
+        windows = read_groups(fitted.signature, {"a": test, "b": runs[0]}, groups)
+        with group_series(fitted, windows) as found:
+            assert [series.shape for series, _ in found] == [(5, 3, 20, 2), (5, 1, 30, 2)]
+        assert len(carries) == 2 * len(INPUTS)
+
+    def test_windows_of_several_runs_are_single_forecasts(self, drifting):
+        runs, test = drifting
+        for alignment in (None, PREDICTED):
+            model = HankelDMDc(4, 12, 1.0, delay_rows="exact", alignment=alignment)
+            model = model.fit(runs, STATES, INPUTS)
+            places = [("a", 20.0), ("b", 21.0), ("a", 30.0)]
+            each = {"a": test, "b": runs[1]}
+            windows = model.read_windows(each, places, 25)
+            (values,) = model.free_runs([windows])
+            for row, (name, start) in enumerate(places):
+                alone = model.forecast(each[name], start, 25)
+                expected = np.stack([alone[state] for state in STATES], axis=1)
+                # Carried over another range of surge: the expansion is cut at 1e-6 or so.
+                np.testing.assert_allclose(values[0, row], expected, atol=1e-6)
+
+    def test_held_members_forecast_runs_by_predicted_surge(self, drifting):
+        runs, test = drifting
+        fitted = ensemble(alignment=PREDICTED).fit(runs, STATES, INPUTS)
+        held = fitted.hold()
+        expected = fitted.forecast_summary(test, 20.0, 40)
+        xr.testing.assert_identical(held.forecast_summary(test, 20.0, 40), expected)
+        with ThreadPoolExecutor(2) as pool:
+            found = fitted.forecast_summary(test, 20.0, 40, executor=pool)
+        xr.testing.assert_identical(found, expected)
+
+    def test_what_was_measured_after_the_start_is_not_read(self, drifting):
+        runs, test = drifting
+        fitted = ensemble(alignment=PREDICTED, lead=3).fit(runs, STATES, INPUTS)
+        expected = fitted.forecast_summary(test, 20.0, 40)
+        poisoned = test.copy(deep=True)
+        after = poisoned["time"].values > 20.0 + 1e-9
+        for state in STATES:
+            poisoned[state].values[after] = np.nan
+        xr.testing.assert_identical(fitted.forecast_summary(poisoned, 20.0, 40), expected)
+
+    def test_a_forecast_upstream_says_how_far_ahead_it_reads(self, drifting):
+        runs, test = drifting
+        here = seakeep.ProbeAlignment(mode="effective", surge="none", celerity=2.0)
+        for offset, ahead in ((0.0, 0.0), (-3.0, 1.5)):
+            spec = HankelDMDc(2, 8, 1.0, alignment=replace(here, offset=offset))
+            model = spec.fit(runs, STATES, INPUTS)
+            attrs = model.forecast(test, 20.0, 30).attrs
+            assert attrs["reads_input_until"] == pytest.approx(ahead - model.dt)
+            assert ("upstream" in model.summary()) == (offset < 0)
+
+
+class TestDivergence:
+    """A forecast is lost where neither training nor the input explain it."""
+
+    @pytest.fixture
+    def growing(self):
+        """A model whose free runs grow by 3 % per step."""
+        model = HankelDMDc(0, 0, 1.0, delay_rows="exact").fit(sea(), ["heave"], ["eta"])
+        return replace(model, coefficients=np.array([[1.03, 0.1]]))
+
+    def test_growth_to_thousands_of_deviations_is_lost_early(self, growing):
+        forecast = growing.forecast(sea(seed=1), start=5.0, steps=400)
+        assert forecast.attrs["status"].startswith("diverged at t = ")
+        largest = float(np.abs(forecast.heave).max() / sea().heave.std())
+        # Ten times the largest deviation of training, which is some three SDs.
+        assert largest < 60
+
+    def test_waves_ten_times_as_high_explain_as_much_motion(self):
+        model = HankelDMDc(1, 4, 1.0).fit(sea(), ["heave"], ["eta"])
+        high = sea(seed=1)
+        high["eta"] = 40 * high["eta"]
+        forecast = model.forecast(high, start=5.0, steps=200)
+        assert forecast.attrs["status"] == "ok"
+        assert float(np.abs(forecast.heave).max()) > 10 * float(np.abs(sea().heave).max())
+
+
+class TestRegistry:
+    """Specs and files by kind."""
+
+    @pytest.mark.parametrize(
+        "spec",
+        [
+            HankelDMDc(3, np.int64(8), 1.0, lead=2, alignment={"mode": "dispersion"}),
+            HankelDMDc.recommended(1.6, 0.1),
+            ensemble(seed=np.random.default_rng(3), lead=0.5, ridge=seakeep.Fixed(2.0)),
+            BayesianHankelDMDc.paper(1.6, n_members=3, seed=np.random.SeedSequence(5).spawn(2)[1]),
+        ],
+    )
+    def test_settings_come_back_from_json(self, spec):
+        kept = json.loads(json.dumps(spec.to_json()))
+        back = KINDS[spec.kind].from_json(kept)
+        assert back.to_json() == spec.to_json()
+        assert type(back) is type(spec)
+        if spec.is_ensemble:
+            assert back.seed_sequence.entropy == spec.seed_sequence.entropy
+            assert back.seed_sequence.spawn_key == spec.seed_sequence.spawn_key
+        with pytest.raises(RequestError, match=r"unknown key 'rigde'\. Did you mean 'ridge'"):
+            KINDS[spec.kind].from_json(kept | {"rigde": 1})
+
+    def test_the_kind_that_is_expected_is_checked(self, tmp_path):
+        model = HankelDMDc(1, 4, 1.0).fit(sea(), ["heave"], ["eta"])
+        path = model.save(tmp_path / "m.nc")
+        assert isinstance(load_model(path, HankelDMDcModel), HankelDMDcModel)
+        with pytest.raises(RequestError, match="holds a HankelDMDcModel, and a HankelEnsemble"):
+            load_model(path, HankelEnsemble)
+
+    def test_needs_of_specs(self):
+        single = HankelDMDc(3, 8, 1.0, window=100, lead=2).needs(0.1)
+        assert (single.snapshots, single.history, single.inside, single.lead) == (100, 8, False, 2)
+        many = ensemble(train_length=Uniform(10, 20), lead=0.5).needs(0.1)
+        assert (many.snapshots, many.history, many.lead) == (320, 16, 8)
+
+    @pytest.mark.parametrize("period", [1.0, 0.5])
+    def test_periods_of_a_second_and_less_need_no_step(self, period):
+        spec = BayesianHankelDMDc.paper(encounter_period=period)
+        assert spec.needs(period / 32).history == 240
+
+
+class TestWaves:
+    """What the training waves say of the waves of a forecast."""
+
+    @staticmethod
+    def regular(*periods, samples=1200):
+        time = DT * np.arange(samples)
+        eta = sum(np.cos(2 * np.pi * time / period) for period in periods)
+        heave = np.r_[0.0, eta[:-1]]
+        return xr.Dataset({"heave": ("time", heave), "eta": ("time", eta)}, coords={"time": time})
+
+    @pytest.mark.parametrize(
+        ("period", "untrained", "gap"), [(2.0, False, False), (2.8, True, True), (8.0, True, False)]
+    )
+    def test_a_period_outside_and_in_a_gap(self, period, untrained, gap, tmp_path):
+        model = HankelDMDc(2, 8, 1.0).fit(self.regular(2.0, 4.0), ["heave"], ["eta"])
+        model = load_model(model.save(tmp_path / "m.nc"))
+        (waves,) = compare_waves(model, self.regular(period), 20.0, 600)
+        assert (waves.is_untrained, waves.is_gap) == (untrained, gap)
+        assert waves.period == pytest.approx(period, rel=0.13)  # a band is 12 % wide
+        assert bool(waves.text) == untrained
+
+    def test_the_sea_of_the_training_is_known(self):
+        fitted = ensemble().fit(sea(), ["heave"], ["eta"])
+        (waves,) = compare_waves(fitted, sea(seed=3), 20.0, 300)
+        assert not waves.is_untrained
+        assert waves.sd_ratio == pytest.approx(1.0, abs=0.2)
+
+
+class TestUnitsAndNumbers:
+    """Units of pooled runs, and values that no standard deviation holds."""
+
+    def test_runs_in_other_units_are_never_pooled(self):
+        plain, centimetres = sea(), sea(seed=1)
+        del plain["heave"].attrs["units"]
+        centimetres["heave"].attrs["units"] = "cm"
+        with pytest.raises(DataError, match=r"'heave' is in 'm' in run 1 and in 'cm' in run 3"):
+            HankelDMDc(1, 4, 1.0).fit([sea(), plain, centimetres], ["heave"], ["eta"])
+        with pytest.raises(DataError, match=r"'heave' is in 'cm' in run 2 and in 'm' in run 3"):
+            HankelDMDc(1, 4, 1.0).fit([plain, centimetres, sea()], ["heave"], ["eta"])
+
+    def test_a_run_that_states_no_unit_is_taken_with_a_warning(self):
+        plain = sea(seed=1)
+        del plain["heave"].attrs["units"]
+        with pytest.warns(SeakeepWarning, match=r"'heave' of run 1 states no unit.*in 'm', as in"):
+            model = HankelDMDc(1, 4, 1.0).fit([plain, sea()], ["heave"], ["eta"])
+        assert model.state_labels[0].units == "m"
+        with pytest.warns(SeakeepWarning, match=r"'heave' of the run states no unit.*model's 'm'"):
+            model.forecast(plain, start=5.0, steps=5)
+
+    def test_a_sample_that_overflows_the_moments_is_refused(self):
+        run = sea()
+        run["heave"].values[7] = 1e155
+        with pytest.raises(DataError, match="'heave' has a standard deviation that is not fin"):
+            HankelDMDc(1, 4, 1.0).fit(run, ["heave"], ["eta"])
