@@ -95,7 +95,7 @@ def test_gaps_in_what_a_forecast_reads_are_refused(model, run):
 
 
 def test_a_variable_with_two_dimensions_is_refused(run, channels, model):
-    both = run.assign(heave=(("time", "sensor"), np.zeros((400, 2))))
+    both = run.assign(heave=(("time", "sensor"), np.zeros((400, 2)), {"units": "m"}))
     message = r"'heave' of run has the dimensions \('time', 'sensor'\) and shape \(400, 2\)"
     with pytest.raises(DataError, match=message):
         SPEC.fit(both, **channels)
