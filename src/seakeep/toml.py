@@ -149,8 +149,8 @@ def _rising(span: tuple[float | Length, float | Length]) -> tuple[float | Length
     known = not (math.isnan(start) or math.isnan(end)) and start < math.inf and end > -math.inf
     if not known or not (start < end or mixed):
         raise ValueError(
-            "a span is [begin, end] in seconds of the file's clock or in encounter periods "
-            "('10 T'), begin before end; 'inf' stands for the end of the record"
+            "a span is [start, end] in seconds of the file's clock or in encounter periods "
+            "('10 T'), start before end; 'inf' stands for the end of the record"
         )
     return span
 
@@ -194,7 +194,7 @@ Window = Annotated[
 """The same, of at least two samples."""
 _Edge = Annotated[Annotated[float, Tag("<number>")] | Annotated[_Length, Tag("<length>")], _PERIODS]
 Span = Annotated[tuple[_Edge, _Edge], Field(strict=False), AfterValidator(_rising)]
-"""Begin and end, each in seconds or a :class:`Length`."""
+"""Start and end, each in seconds or a :class:`Length`."""
 
 
 class Table(BaseModel):

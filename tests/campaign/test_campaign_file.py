@@ -90,8 +90,8 @@ MISTAKES = [
     (
         "span = [2, 18]",
         "span = [18, 2]",
-        "runs.second.span: a span is [begin, end] in seconds of the file's clock or in encounter "
-        "periods ('10 T'), begin before end; 'inf' stands for the end of the record; received",
+        "runs.second.span: a span is [start, end] in seconds of the file's clock or in encounter "
+        "periods ('10 T'), start before end; 'inf' stands for the end of the record; received",
     ),
     (
         "span = [2, 18]",

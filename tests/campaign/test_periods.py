@@ -128,7 +128,7 @@ def test_spans_of_regular_runs_count_in_the_period_that_irregular_ones_give(edit
         ([("state_delays = 4", 'state_delays = "-1 T"')], "finite and not negative"),
         ([("ridge = 1", 'ridge = 1\nwindow = "inf T"')], "this length must be finite and positive"),
         ([("ridge = 1", 'ridge = 1\nstop = "inf T"')], r"model\.stop: this length must be finite"),
-        ([("span = [2, 18]", 'span = ["8 T", "2 T"]')], "begin before end"),
+        ([("span = [2, 18]", 'span = ["8 T", "2 T"]')], "start before end"),
         ([("ridge = 1", 'ridge = "1 T"')], r"model\.ridge: received '1 T', which should be a numb"),
         ([("sampling_rate = 10", 'dt = "0.1 T"')], r"preparation\.dt: received '0\.1 T', which sh"),
     ],

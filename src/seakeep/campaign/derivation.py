@@ -36,33 +36,35 @@ ANGLES = ("roll", "pitch", "yaw")
 AXES = {"surge": 0, "sway": 1, "heave": 2, "x": 0, "y": 1, "z": 2}
 
 
+Channels = Mapping[str, xr.Variable]
+
+
 def derive(
-    dataset: xr.Dataset, name: str, settings: CampaignSettings, dt: float, run: str
-) -> xr.Dataset:
-    """Add a derived channel to channels on one axis."""
+    channels: Channels, name: str, settings: CampaignSettings, dt: float, run: str
+) -> dict[str, xr.Variable]:
+    """Make a derived channel from channels on one axis, with its flags if its sources have any."""
     own = settings.derived[name]
     try:
-        channel = _derived(dataset, name, own, dt)
+        channel = _derived(channels, name, own, dt)
     except SeakeepError as error:
         raise type(error)(f"run '{run}', derived channel '{name}': {error}") from None
     if name in settings.rig.positions:
         channel.attrs["x_position"] = float(settings.rig.positions[name])
-    out = dataset.assign({name: channel})
     flags = np.zeros(channel.size, dtype=np.int16)
-    for source in sources_of(name, own, [str(n) for n in dataset.data_vars]):
-        if f"{source}_flags" in dataset.coords:
-            flags |= dataset[f"{source}_flags"].to_numpy() & (MISSING | BRIDGED)
-    if flags.any():
-        out.coords[f"{name}_flags"] = ("time", flags, flag_attributes(name))
-    return out
+    for source in sources_of(name, own, channels):
+        if (known := channels.get(f"{source}_flags")) is not None:
+            flags |= known.to_numpy() & (MISSING | BRIDGED)
+    if not flags.any():
+        return {name: channel}
+    return {name: channel, f"{name}_flags": xr.Variable("time", flags, flag_attributes(name))}
 
 
-def _derived(dataset: xr.Dataset, name: str, settings: DerivedSettings, dt: float) -> xr.DataArray:
+def _derived(dataset: Channels, name: str, settings: DerivedSettings, dt: float) -> xr.Variable:
     canonical = canonical_channel(name)
     label = f"the derived channel '{name}'"
     if settings.expression is not None:
-        arrays: Mapping[str, FloatArray] = {str(n): each.to_numpy() for n, each in dataset.items()}
-        values = parse(settings.expression).evaluate(arrays)
+        expression = parse(settings.expression)
+        values = expression.evaluate({n: dataset[n].to_numpy() for n in expression.channels})
         unit = settings.unit or (canonical.units if canonical else "-")
         origin = settings.expression
     else:
@@ -79,12 +81,10 @@ def _derived(dataset: xr.Dataset, name: str, settings: DerivedSettings, dt: floa
         "long_name": long_name_of(name, settings.long_name),
         "derived_from": origin,
     }
-    return xr.DataArray(values, dims="time", attrs=attributes)
+    return xr.Variable("time", values, attributes)
 
 
-def _step(
-    source: xr.DataArray, settings: DerivedSettings, dt: float
-) -> tuple[FloatArray, str, str]:
+def _step(source: xr.Variable, settings: DerivedSettings, dt: float) -> tuple[FloatArray, str, str]:
     """Values, unit and description of a named step."""
     series, unit, name = source.to_numpy(), source.attrs["units"], settings.source
     if settings.step == "integrate":
@@ -105,7 +105,7 @@ def _step(
 
 
 def _body_step(
-    dataset: xr.Dataset, name: str, settings: DerivedSettings, dt: float
+    dataset: Channels, name: str, settings: DerivedSettings, dt: float
 ) -> tuple[FloatArray, str, str]:
     """Values, unit and description of a step that needs several channels."""
     source = dataset[str(settings.source)]
@@ -176,17 +176,16 @@ def _axis(name: str, settings: DerivedSettings) -> int:
     )
 
 
-def _present(dataset: xr.Dataset, names: tuple[str, ...] | list[str]) -> list[str]:
+def _present(dataset: Channels, names: tuple[str, ...] | list[str]) -> list[str]:
     return [name for name in names if name in dataset]
 
 
-def _three(dataset: xr.Dataset, names: tuple[str, ...] | list[str]) -> FloatArray:
+def _three(dataset: Channels, names: tuple[str, ...] | list[str]) -> FloatArray:
     """Three channels side by side, zeros where one is not measured; one at least must be."""
     if not _present(dataset, names):
         raise RequestError(
             f"none of the channels {', '.join(names)} is measured. Map or derive those in which "
             "the body turns."
         )
-    size = dataset.sizes["time"]
-    zero = np.zeros(size)
+    zero = np.zeros(next(iter(dataset.values())).size)
     return np.column_stack([dataset[n].to_numpy() if n in dataset else zero for n in names])

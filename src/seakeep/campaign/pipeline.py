@@ -417,7 +417,7 @@ def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
         f"samples, {lengths[0] * step:.4g} s), the longest at t = {worst} s "
         f"({lengths[longest]} samples, {lengths[longest] * step:.4g} s)"
         f"{others}. Repair the file, leave the channel out, or cut the gap off with record = "
-        f"[begin, end] in [runs.{run}]; or state gaps = 'mask' or 'bridge' in [preparation]."
+        f"[start, end] in [runs.{run}]; or state gaps = 'mask' or 'bridge' in [preparation]."
     )
 
 
@@ -509,6 +509,7 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
     settings, groups, late = run.settings, dict(run.groups), []
     needed = needed_channels(settings, settings.channel_names if wanted is None else wanted)
     home = {str(name): key for key, data in groups.items() for name in data.data_vars}
+    channels = {key: variables_of(data) for key, data in groups.items()}
     for name in derivation_order(settings.derived, settings.channel_names):
         if name not in needed:
             continue
@@ -518,10 +519,24 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
         if home[name] == COMMON:
             late.append(name)
             continue
-        data = groups[home[name]]
-        step = uniform_step(data["time"].to_numpy(), f"run '{run.name}'")
-        groups[home[name]] = derive(data, name, settings, step, run.name)
+        own = channels[home[name]]
+        step = uniform_step(groups[home[name]]["time"].to_numpy(), f"run '{run.name}'")
+        own |= derive(own, name, settings, step, run.name)
+    for key, data in groups.items():
+        groups[key] = _with(data, channels[key])
     return replace(run, groups=groups, late=tuple(late))
+
+
+def variables_of(data: xr.Dataset) -> dict[str, xr.Variable]:
+    """Channels of a Dataset and their flags, by name."""
+    return {str(name): each for name, each in data.variables.items() if name != "time"}
+
+
+def _with(data: xr.Dataset, channels: Mapping[str, xr.Variable]) -> xr.Dataset:
+    """Add the channels, and flags, that a Dataset does not have yet."""
+    new = {name: each for name, each in channels.items() if name not in data.variables}
+    flags = {name: new.pop(name) for name in list(new) if name.endswith("_flags")}
+    return data.assign(new).assign_coords(flags) if new else data
 
 
 def resampled(run: Run, dt: float) -> Run:
@@ -538,8 +553,10 @@ def resampled(run: Run, dt: float) -> Run:
             if str(name).endswith("_flags"):
                 flags = _flags_at(group[name].to_numpy(), group["time"].to_numpy(), time, dt)
                 out.coords[str(name)] = ("time", flags, group[name].attrs)
+    channels = variables_of(out)
     for name in run.late:
-        out = derive(out, name, run.settings, dt, run.name)
+        channels |= derive(channels, name, run.settings, dt, run.name)
+    out = _with(out, channels)
     for name in list(out.data_vars):
         if f"{name}_flags" in out.coords:
             lost = (out[f"{name}_flags"].to_numpy() & MISSING) > 0

@@ -501,16 +501,16 @@ class RunSettings(Table):
         default=None, description="'train', 'test' or 'unused'"
     )
     span: Span | None = Field(
-        default=None, description="[begin, end] in s or periods ('10 T'): the part used"
+        default=None, description="[start, end] in s or periods ('10 T'): the part used"
     )
     train: Span | None = Field(
-        default=None, description="[begin, end] in s or periods, used for training"
+        default=None, description="[start, end] in s or periods, used for training"
     )
     test: Span | None = Field(
-        default=None, description="[begin, end] in s or periods, used for testing"
+        default=None, description="[start, end] in s or periods, used for testing"
     )
     record: Span | None = Field(
-        default=None, description="[begin, end] in s or periods: the part read"
+        default=None, description="[start, end] in s or periods: the part read"
     )
     channels: dict[str, ChannelSettings] = Field(
         default_factory=dict, description="keys of [channels.NAME] that differ in this run"
@@ -521,7 +521,7 @@ class RunSettings(Table):
     )
     probe_offset_span: Span | None = Field(
         default=None,
-        description="[begin, end] in s or periods, from which a model estimates the offset",
+        description="[start, end] in s or periods, from which a model estimates the offset",
     )
 
     @property

@@ -161,7 +161,7 @@ def _fresh(campaign: Campaign, name: str, file: Path) -> xr.Dataset | None:
     except (SeakeepError, OSError, ValueError, KeyError, RuntimeError):
         warnings.warn(
             f"{file} was altered since it was written, or cannot be read; the run is prepared "
-            "anew. Write it again with 'seakeep prepare'.",
+            "anew. Remove the file, and 'seakeep prepare' writes it again.",
             SeakeepWarning,
             stacklevel=3,
         )

@@ -39,7 +39,7 @@ loggers take 16, the fewest that show a wave's shape."""
 
 MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 _FILE = (
-    "Check whether its file is whole; if it is, state span = [begin, end] in [runs.{run}] to say "
+    "Check whether its file is whole; if it is, state span = [start, end] in [runs.{run}] to say "
     "which part is meant."
 )
 

@@ -321,7 +321,7 @@ def compare_models(
     if not wanted:
         raise RequestError(
             "no run of the campaign tests a model. Name one with --run, or give one "
-            "role = 'test' or a span test = [begin, end]."
+            "role = 'test' or a span test = [start, end]."
         )
     forecast = [model.states for model in models.values()]
     if any(states != forecast[0] for states in forecast):

@@ -27,7 +27,7 @@ CYCLES = 5.0
 """Periods of a test from which on its spectrum tells which waves it holds."""
 NOTHING_TRAINS = (
     "no run of the campaign trains a model. Give one role = 'train', or a span "
-    "train = [begin, end]."
+    "train = [start, end]."
 )
 
 

@@ -126,7 +126,7 @@ def choose_training(
     if missing := [name for name in names if "train_span" not in runs[name].attrs]:
         raise RequestError(
             f"training: the run '{missing[0]}' has no training span in the campaign. Give it "
-            "role = 'train' or a span train = [begin, end], or use scheme = 'leave_out'."
+            "role = 'train' or a span train = [start, end], or use scheme = 'leave_out'."
         )
     spans = {name: _samples(runs[name], runs[name].attrs["train_span"]) for name in names}
     if training.scheme == "pooled":
@@ -460,8 +460,8 @@ def _test_runs(study: Study, name: str) -> list[str]:
     if learnt := [n for n in chosen if n in trains and n not in campaign.test_runs and not folds]:
         raise RequestError(
             f"tests.{name}: the run '{learnt[0]}' trains, and the campaign gives it no test span: "
-            "models would forecast what they learnt from. Give it the spans train = [begin, end] "
-            "and test = [begin, end], or name other runs."
+            "models would forecast what they learnt from. Give it the spans train = [start, end] "
+            "and test = [start, end], or name other runs."
         )
     return chosen
 
