@@ -24,12 +24,12 @@ from seakeep.report.sections.settings import training_overlap, unequal_training
 from seakeep.report.sections.summary import findings, plain_symbol, summary
 from seakeep.report.style import LINES
 from seakeep.report.tables import latex_text, number, probability, small_number
-from seakeep.study import read_result, read_study, run_study
+from seakeep.study import StudyResult, read_result, read_study, run_study
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
 from seakeep.report.figures.boxes import FEWEST, draw_box_violin
-from seakeep.report.figures.common import grid_of_axes
+from seakeep.report.figures.common import grid_of_axes, model_colour
 from seakeep.report.figures.eigenvalues import eigenvalue_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import write_report
@@ -555,3 +555,10 @@ def test_models_stand_beside_the_baselines_and_lost_forecasts_are_named(page):
     assert table.rows == (("a & b < c", "best linear (Bayesian)", "deterministic", "-20", "+10"),)
     (notice,) = (text for text in summary(judged).notices if "diverged and are left out" in text)
     assert "window 1 of 'unseen' (r from 2 s)" in notice
+
+
+def test_each_of_many_models_has_a_colour_of_its_own():
+    names = ["single", "bayesian", "mean", "hold_last", "fir", "arx", "subspace"]
+    told = {name: {"ensemble": name == "bayesian"} for name in names}
+    result = StudyResult(None, {"models": json.dumps(told)}, {})
+    assert len({model_colour(result, name) for name in names}) == len(names)

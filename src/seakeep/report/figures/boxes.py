@@ -192,4 +192,4 @@ def _legend(figure: Figure, result: StudyResult) -> None:
         Patch(color=model_colour(result, model), label=model_words(model), alpha=0.6)
         for model in result.models
     ]
-    figure.legend(handles=handles, loc="outside upper right", ncols=len(handles))
+    figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 5))

@@ -12,19 +12,20 @@ from seakeep.study import StudyResult
 __all__ = ["HEADING", "grid_of_axes", "line_of", "model_colour", "model_words", "short_label"]
 
 
-FURTHER = ("#CC79A7", "#E69F00", "#009E73", "#56B4E9")
+FURTHER = ("#CC79A7", "#E69F00", "#009E73", "#56B4E9", "#8C564B", "#56606B", "#9467BD")
 HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
 """Names of the paper for the averages of the two measures over the channels."""
 
 
 def model_colour(result: StudyResult, model: str) -> str:
     """Colour of a model: that of a forecast, of an ensemble, or one of its own beyond the first."""
-    kind = result.is_ensemble(model)
-    same = [name for name in result.models if result.is_ensemble(name) == kind]
-    place = same.index(model)
-    if place == 0:
-        return COLOURS["ensemble" if kind else "forecast"]
-    return FURTHER[(2 * (place - 1) + int(kind)) % len(FURTHER)]
+    ensemble = result.is_ensemble(model)
+    first = {kind: [m for m in result.models if result.is_ensemble(m) == kind][:1]
+             for kind in (False, True)}  # fmt: skip
+    if [model] == first[ensemble]:
+        return COLOURS["ensemble" if ensemble else "forecast"]
+    others = [name for name in result.models if [name] not in first.values()]
+    return FURTHER[others.index(model) % len(FURTHER)]
 
 
 def line_of(result: StudyResult, model: str) -> dict[str, Any]:

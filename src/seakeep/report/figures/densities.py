@@ -30,7 +30,7 @@ def density_figure(result: StudyResult, model: str) -> Figure:
         for each, name in zip(axes, names, strict=True):
             _draw(each, data.sel(channel=name), name, sides)
         handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper right", ncols=len(handles))
+        figure.legend(handles, labels, loc="outside upper right", ncols=min(len(handles), 5))
         return figure
 
 

@@ -53,7 +53,7 @@ def error_over_time_figure(result: StudyResult) -> Figure:
         handles = [
             Line2D([], [], **line_of(result, m), label=model_words(m)) for m in result.models
         ]
-        figure.legend(handles=handles, loc="outside upper right", ncols=len(handles))
+        figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 5))
         return figure
 
 

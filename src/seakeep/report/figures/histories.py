@@ -51,7 +51,7 @@ def history_figure(result: StudyResult, test: str, training: int, window: int) -
         figure.supylabel("deviation from the training mean, in training SD", fontsize=8)
         axes[-1].set_xlabel(r"time after the last measured state, in encounter periods")
         handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper right", ncols=len(handles))
+        figure.legend(handles, labels, loc="outside upper right", ncols=min(len(handles), 5))
         run, learnt = str(cell["run"].values), str(cell["training"].values)
         axes[0].set_title(
             f"{run}, from {float(cell['start']):.1f} s; trained "
