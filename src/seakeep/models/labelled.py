@@ -236,6 +236,8 @@ def common_labels(runs: Mapping[str, xr.Dataset], names: Sequence[str]) -> tuple
     for name, run in runs.items():
         channel_matrix(run, names, name, slice(0, 0))  # refuses unknown names
     labels = channel_labels(next(iter(runs.values())), names)
+    if len(runs) == 1:
+        return labels
     for number, label in enumerate(labels):
         stated = {
             name: str(units)
