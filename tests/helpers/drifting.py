@@ -40,7 +40,7 @@ def drifting_run(seed=0, samples=1500, moved=0.0, name="run"):
     run = xr.Dataset(
         {key: ("time", values, {"units": "m"}) for key, values in channels.items()},
         coords={"time": ("time", time, {"units": "s"})},
-        attrs={"water_depth": DEPTH, "run": name},
+        attrs={"water_depth": DEPTH, "run": name, "encounter_period": 1.5},
     )
     for key, x in POSITIONS.items():
         run[key].attrs["x_position"] = x

@@ -14,8 +14,8 @@ import seakeep
 from seakeep import BayesianHankelDMDc, DataError, HankelDMDc, RequestError, SeakeepWarning, Uniform
 from seakeep.models import KINDS, HankelDMDcModel, HankelEnsemble, compare_waves, inputs, load_model
 from seakeep.models.engine import group_series, read_groups
-from seakeep.models.interface import Regressors, Span
 from seakeep.models.labelled import ChannelLabel
+from seakeep.models.observables import OBSERVABLES, Bound
 
 DT = 0.1
 PREDICTED = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
@@ -133,55 +133,28 @@ class TestLead:
 
 @dataclass(frozen=True)
 class Half:
-    """A map of somebody else: half of the first input as a regressor without delays."""
+    """An observable of somebody else: half of the first input, two samples before."""
 
     kind: ClassVar[str] = "half"
-    lead_samples: ClassVar[int] = 0
-    extra_history: ClassVar[int] = 2
-    reads_states: ClassVar[str] = "no"
 
-    def fit(self, runs, states, inputs, window):
-        return self
+    def bind(self, inputs, period, dt):
+        def columns(values):
+            out = np.full((len(values), 1), np.nan)
+            out[2:, 0] = 0.5 * values[:-2, 0]
+            return out
 
-    def regressors(self, inputs):
-        return inputs, (ChannelLabel("half", inputs[0].units, "half of the wave, two before"),)
+        label = ChannelLabel("half", inputs[0].units, "half of the wave, two before")
+        return Bound((label,), delayed=False, before=2, ahead=0, columns=columns)
 
-    def reads(self, span):
-        return Span(span.first - 2, span.known, span.stop)
-
-    def wrap(self, drive, run, spans):
-        @dataclass(frozen=True)
-        class Halved:
-            inner: object
-
-            def rows(self, first, stop, known=None):
-                found = self.inner.rows(first - 2, stop, known).delayed
-                return Regressors(found[2:], 0.5 * found[:-2, :1])
-
-        return Halved(drive)
-
-    def look_ahead(self, run, dt):
-        return 0.0
-
-    def notes(self, run):
-        return {}
-
-    def describe(self, dt):
-        return ["  half          of the wave"]
-
-    def to_json(self):
-        return {}
-
-    @classmethod
-    def from_json(cls, content):
-        return cls()
+    def reach(self, dt):
+        return 2, 0
 
 
-class TestMapOfAnother:
-    """One file and one line add an input map."""
+class TestObservableOfAnother:
+    """One file and one line add an observable."""
 
     def test_it_drives_models_ensembles_arrays_and_files(self, monkeypatch, tmp_path):
-        monkeypatch.setitem(inputs.MAPS, "half", Half)
+        monkeypatch.setitem(OBSERVABLES, "half", Half)
         run = sea()
         run["heave"] = ("time", np.r_[np.zeros(3), run.eta.values[:-3]], {"units": "m"})
         # x_{j+1} = u_{j−2}: without input delays only the direct regressor holds it.
@@ -197,7 +170,7 @@ class TestMapOfAnother:
         np.testing.assert_allclose(arrays[:, 0], forecast.heave, atol=1e-12)
         back = load_model(model.save(tmp_path / "m.nc"))
         xr.testing.assert_identical(back.forecast(run, start=20.0, steps=40), forecast)
-        assert "half          of the wave" in back.summary()
+        assert "half" in back.summary()
         many = ensemble(observables=(Half(),), n_members=2).fit(run, ["heave"], ["eta"])
         summary = many.forecast_summary(run, start=20.0, steps=40)
         again = load_model(many.save(tmp_path / "e.nc"))
@@ -205,13 +178,13 @@ class TestMapOfAnother:
         with pytest.raises(RequestError, match=r"delays of their own \(half\)"):
             model.to_state_space()
 
-    def test_a_file_with_a_map_that_is_not_known_is_refused(self, monkeypatch, tmp_path):
+    def test_a_file_with_an_observable_that_is_not_known_is_refused(self, monkeypatch, tmp_path):
         run = sea()
-        monkeypatch.setitem(inputs.MAPS, "half", Half)
+        monkeypatch.setitem(OBSERVABLES, "half", Half)
         model = HankelDMDc(0, 0, 1.0, observables=(Half(),)).fit(run, ["heave"], ["eta"])
         path = model.save(tmp_path / "m.nc")
-        monkeypatch.delitem(inputs.MAPS, "half")
-        with pytest.raises(DataError, match="the input map 'half' is not known here"):
+        monkeypatch.delitem(OBSERVABLES, "half")
+        with pytest.raises(DataError, match=r"observables: kind must be .* received 'half'"):
             load_model(path)
 
 

@@ -130,7 +130,7 @@ def test_the_first_possible_start_is_the_sample_that_fills_the_history(model, te
 
 @pytest.mark.parametrize(("s", "z", "needed"), [(3, 8, 9), (8, 3, 9), (0, 0, 1)])
 def test_history_samples_are_the_longer_delay_and_the_start(s, z, needed):
-    assert HankelDMDc(s, z, 1.0).history_samples == needed
+    assert HankelDMDc(s, z, 1.0).needs(dt=0.1).history + 1 == needed
 
 
 def test_arrays_give_the_same_bits_as_a_run(model, test_run):

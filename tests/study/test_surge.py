@@ -135,13 +135,14 @@ def test_cells_by_predicted_surge_are_what_the_models_say(folder):
         band = models["bayesian"].forecast_summary(scrambled, window.start, window.steps, 0.95)
         for channel in plan.states:
             column = cell.sel(channel=channel)
-            # The same arithmetic, window by window: equal to rounding.
+            # The record is read up to the end of the last window of its run, and continued by
+            # prediction from there: alone, a window ends with less of it.
             np.testing.assert_allclose(
-                column["deterministic_mean"], alone[channel], rtol=0, atol=1e-10
+                column["deterministic_mean"], alone[channel], rtol=0, atol=3e-6
             )
             for key in ("mean", "std", "lower", "upper"):
                 expected = band[channel].sel(statistic=key)
-                np.testing.assert_allclose(column[f"bayesian_{key}"], expected, rtol=0, atol=1e-10)
+                np.testing.assert_allclose(column[f"bayesian_{key}"], expected, rtol=0, atol=3e-6)
 
 
 def test_every_test_set_has_its_statistics_and_its_start_up_is_cut(folder):

@@ -5,6 +5,7 @@ from seakeep.models.executor import processes
 from seakeep.models.inputs import FittedAlignment, ProbeAlignment
 from seakeep.models.interface import InputMap, Model, Needs, Signature, Spec
 from seakeep.models.linear import HankelDMDcModel
+from seakeep.models.observables import OBSERVABLES, Bound, Expression, Powers, SlowSquares
 from seakeep.models.offsets import ProbeOffset, estimate_probe_offset
 from seakeep.models.priors import Fixed, LogUniform, Uniform
 from seakeep.models.registry import KINDS, load_model
@@ -14,8 +15,11 @@ from seakeep.models.validity import Waves, compare_waves
 
 __all__ = [
     "KINDS",
+    "OBSERVABLES",
     "BandForecast",
     "BayesianHankelDMDc",
+    "Bound",
+    "Expression",
     "FittedAlignment",
     "Fixed",
     "HankelDMDc",
@@ -26,9 +30,11 @@ __all__ = [
     "LogUniform",
     "Model",
     "Needs",
+    "Powers",
     "ProbeAlignment",
     "ProbeOffset",
     "Signature",
+    "SlowSquares",
     "Spec",
     "Uniform",
     "Waves",

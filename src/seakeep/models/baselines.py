@@ -22,9 +22,10 @@ from seakeep.models import store
 from seakeep.models.engine import Windows, cut_lost
 from seakeep.models.forecasts import SingleModel, counted
 from seakeep.models.inputs import ProbeAlignment
-from seakeep.models.interface import InputMap, Signature
+from seakeep.models.interface import Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
+from seakeep.models.observables import Observable
 from seakeep.models.settings import (
     DelayRows,
     HankelSettings,
@@ -143,7 +144,7 @@ class Mean(LinearSpec):
     standardize: bool = field(default=True, init=False, repr=False)
     alignment: ProbeAlignment | None = field(default=None, init=False, repr=False)
     lead: int = field(default=0, init=False, repr=False)
-    observables: tuple[InputMap, ...] = field(default=(), init=False, repr=False)
+    observables: tuple[Observable, ...] = field(default=(), init=False, repr=False)
 
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str] = (), stop: Stop = None

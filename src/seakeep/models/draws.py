@@ -70,9 +70,12 @@ class Draw:
     last: int | None
     redrawn: int
 
-    def needed(self, inside: bool, extra: int = 0, lead: int = 0) -> int:
-        """Samples of a run that the window, its history and its look-ahead take."""
-        reach = max(self.state_delays, self.input_delays + extra)
+    def needed(self, inside: bool, history: int = 0, lead: int = 0) -> int:
+        """Samples of a run that the window, its history and its look-ahead take.
+
+        `history` is what the input map reads before an instant, and `lead` what it reads after.
+        """
+        reach = max(self.state_delays, self.input_delays, history)
         least = reach + 2 + max(lead - 1, 0)
         if self.window is None:
             return least
@@ -174,7 +177,7 @@ def _draw_member(
         draw = _rounded(spec, dt, drawn, redrawn)
         if refused := _out_of_range(draw, inside):
             continue
-        needed = draw.needed(inside, input_map.extra_history, input_map.lead_samples)
+        needed = draw.needed(inside, input_map.history(draw.input_delays), input_map.lead_samples)
         run = None if spec.train_on == "all" else int(generator.integers(len(samples)))
         if (min(samples) if run is None else samples[run]) < needed:
             refused = (

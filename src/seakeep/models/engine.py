@@ -13,14 +13,14 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, IntArray, whole_number
+from seakeep.arrays import FloatArray, whole_number
 from seakeep.core.rollout import rollout
 from seakeep.errors import RequestError
 from seakeep.models import labelled
@@ -53,8 +53,6 @@ and resonances that training did not show: a tenfold answer is no forecast of a 
 members that go on from there would make up the mean of an ensemble."""
 PIECE = 2**18
 """Numbers that are looked at together, so that a long run takes little beside its result."""
-SIDE_BY_SIDE = 25
-"""Members that run side by side where they drive their own input; the same for any executor."""
 HELD = 32 * 2**20
 """Bytes of member series that are held in memory; more is put into a temporary file."""
 
@@ -74,8 +72,7 @@ class Windows:
     histories : ndarray, shape (window, s + 1, N)
         Measured states up to each start, physical units.
     delayed : ndarray, shape (window, z + steps, n)
-        Delayed regressors that drive these steps; (window, z + 1, n), up to the start alone, where
-        states that are predicted drive them.
+        Delayed regressors that drive these steps; with predicted states, those of the first pass.
     direct : ndarray, shape (window, steps, m)
         Direct regressors from the start on; likewise.
     look_ahead : tuple of float
@@ -84,8 +81,10 @@ class Windows:
         What a forecast's attributes report of the input map, for the first run.
     drives : tuple of Drive
         One per window where predicted states drive the input, else none; runs share theirs.
-    samples : ndarray of int, shape (window,)
-        Sample of each start in its run.
+    spans : tuple of Span
+        Samples of the regressors of each window in its run.
+    passes : int
+        How often a forecast runs.
     """
 
     places: tuple[tuple[str, float], ...]
@@ -97,7 +96,8 @@ class Windows:
     look_ahead: tuple[float, ...] = ()
     notes: Mapping[str, str | float] = field(default_factory=dict)
     drives: tuple[Drive, ...] = ()
-    samples: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    spans: tuple[Span, ...] = ()
+    passes: int = 1
 
     def __len__(self) -> int:
         return len(self.histories)
@@ -198,12 +198,12 @@ def _windows(
 ) -> Windows:
     """Windows of one length from their runs."""
     input_map = signature.input_map
-    is_closed = input_map.reads_states == "predicted"
+    follows = input_map.reads_states == "predicted"
     rows = [
         drive.rows(
             span.first,
-            span.known + 1 if is_closed or not signature.inputs else span.stop,
-            span.known if is_closed else None,
+            span.stop if signature.inputs else span.known + 1,
+            span.known if follows else None,
         )
         for (_, drive), span in zip(sources, spans, strict=True)
     ]
@@ -221,8 +221,9 @@ def _windows(
         direct=np.stack([each.direct[signature.input_delays :] for each in rows]),
         look_ahead=tuple(input_map.look_ahead(run.run, signature.dt) for run in runs),
         notes=input_map.notes(runs[0].run),
-        drives=tuple(drive for _, drive in sources) if is_closed else (),
-        samples=np.array([span.known for span in spans], dtype=np.intp),
+        drives=tuple(drive for _, drive in sources) if follows else (),
+        spans=tuple(spans),
+        passes=input_map.passes,
     )
 
 
@@ -344,14 +345,25 @@ def array_windows(
 
 def linear_runs(members: Sequence[Dynamics], groups: Sequence[Windows]) -> list[FloatArray]:
     """Free runs of linear members, each of shape (member, window, steps, N), physical units."""
-    out = []
-    for windows in groups:
-        if windows.drives:
-            out.append(_closed_runs(members, windows))
-            continue
-        found = [_open_runs(member, windows) for member in members]
-        out.append(found[0][None] if len(found) == 1 else np.stack(found))
-    return out
+    return [np.stack([_runs(member, windows) for member in members]) for windows in groups]
+
+
+def _runs(member: Dynamics, windows: Windows) -> FloatArray:
+    """Free runs in passes: each one is driven by what the states of the one before make of it."""
+    values = _open_runs(member, windows)
+    delays = windows.delayed.shape[1] - windows.steps
+    for _ in range(windows.passes - 1):
+        rows = [
+            drive.rows(span.first, span.stop, span.known, states)
+            for drive, span, states in zip(windows.drives, windows.spans, values, strict=True)
+        ]
+        followed = replace(
+            windows,
+            delayed=np.stack([each.delayed for each in rows]),
+            direct=np.stack([each.direct[delays:] for each in rows]),
+        )
+        values = _open_runs(member, followed)
+    return values
 
 
 def _open_runs(member: Dynamics, windows: Windows) -> FloatArray:
@@ -375,58 +387,6 @@ def _open_runs(member: Dynamics, windows: Windows) -> FloatArray:
     with np.errstate(over="ignore"):  # a run that is lost is cut just below
         values = member.state_scale.physical(deviations, out=deviations)
     return cut_lost(values, member, windows)
-
-
-def _closed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
-    """Free runs that drive their own input: all members and windows side by side, step by step."""
-    count, steps, N = len(windows), windows.steps, windows.histories.shape[2]
-    out = np.empty((len(members), count, steps, N))
-    x, u = [], []
-    for member in members:
-        history = member.state_scale.deviations(windows.histories[:, -1 - member.state_delays :])
-        x.append(history[:, ::-1].reshape(count, -1))
-        inputs = member.input_scale.deviations(windows.delayed[:, -1 - member.input_delays :])
-        u.append(inputs[:, ::-1].reshape(count, -1))
-    direct = np.repeat(windows.direct[:, None, 0], len(members), axis=1)
-    excess = np.stack(
-        [
-            _excess(each.input_scale, windows.delayed[:, -1 - each.input_delays :])
-            for each in members
-        ]
-    )
-    groups: dict[int, tuple[Drive, list[int]]] = {}
-    for row, drive in enumerate(windows.drives):
-        groups.setdefault(id(drive), (drive, []))[1].append(row)
-    width = windows.delayed.shape[2]
-    for step in range(steps):
-        for number, member in enumerate(members):
-            x[number] = _stepped(member, x[number], u[number], direct[:, number])
-            out[number, :, step] = member.state_scale.physical(x[number][:, :N])
-        if step == steps - 1:
-            break
-        for drive, rows in groups.values():
-            states = np.nan_to_num(out[:, rows, step].swapaxes(0, 1))
-            found = drive.at(windows.samples[rows] + step + 1, states)
-            direct[rows] = found.direct
-            for number, member in enumerate(members):
-                newest = member.input_scale.deviations(found.delayed[:, number])
-                u[number][rows] = np.hstack([newest, u[number][rows][:, :-width]])
-                beyond = _excess(member.input_scale, found.delayed[:, number, None])
-                excess[number, rows] = np.maximum(excess[number, rows], beyond)
-    for number, member in enumerate(members):
-        _cut_lost(out[number], member.state_scale, windows.histories, excess[number])
-    return out
-
-
-def _stepped(member: Dynamics, x: FloatArray, u: FloatArray, direct: FloatArray) -> FloatArray:
-    """Extended states (window, N(s+1)) one step later."""
-    a, b = member.matrices
-    if direct.shape[1]:
-        u = np.hstack([u, member.direct_scale.deviations(direct)])
-    with np.errstate(over="ignore", invalid="ignore"):  # a lost run is cut by the caller
-        reached: FloatArray = x @ a.T + u @ b.T
-    is_exact = len(a) < a.shape[1]
-    return np.hstack([reached, x[:, : -len(a)]]) if is_exact else reached
 
 
 def _excess(scale: Scale, values: FloatArray) -> FloatArray:
@@ -477,21 +437,12 @@ def run_members(
     progress: Progress | None = None,
 ) -> Iterator[list[FloatArray]]:
     """Free runs member by member: of each group an array of shape (window, steps, N)."""
-    size = SIDE_BY_SIDE if any(windows.drives for windows in groups) else 1
-    members = list(range(model.n_members))
-    blocks = [members[first : first + size] for first in range(0, len(members), size)]
-    done = 0
-    for found in in_order(_run_block, (model, groups), blocks, executor):
-        for number in range(len(found[0])):
-            done += 1
-            if progress is not None:
-                progress(done, len(members), f"member {done}")
-            yield [each[number] for each in found]
+    return in_order(_run_member, (model, groups), range(model.n_members), executor, progress)
 
 
-def _run_block(data: tuple[Runs, Sequence[Windows]], members: Sequence[int]) -> list[FloatArray]:
+def _run_member(data: tuple[Runs, Sequence[Windows]], member: int) -> list[FloatArray]:
     model, groups = data
-    return model.free_runs(groups, members)
+    return [each[0] for each in model.free_runs(groups, [member])]
 
 
 Series = tuple[FloatArray, npt.NDArray[np.int64]]

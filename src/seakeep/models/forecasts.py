@@ -333,7 +333,7 @@ def check_arrays(
         raise RequestError(f"ahead must be 'refuse'; received {ahead!r}.")
     states, inputs, count = signature.states, signature.inputs, int(steps)
     s = signature.state_delays
-    z = signature.input_delays + signature.input_map.extra_history
+    z = signature.input_map.history(signature.input_delays)
     x = _finite("x_history", _rows("x_history", x_history, s + 1, states, "s + 1")[-s - 1 :])
     if not inputs:
         return engine.array_windows(signature, x[None], np.zeros((1, z + count, 0)), count)

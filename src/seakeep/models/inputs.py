@@ -21,13 +21,15 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 import xarray as xr
+from scipy import signal
 
-from seakeep.arrays import FloatArray, IntArray
+from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice
+from seakeep.models.checks import check_choice, check_integer
 from seakeep.models.interface import Drive, InputMap, Json, Regressors, Span, plain
 from seakeep.models.labelled import ChannelLabel
+from seakeep.models.observables import Observed
 from seakeep.signals.propagation import (
     CarriedElevation,
     band_limit,
@@ -42,6 +44,13 @@ __all__ = ["MAPS", "Chain", "FittedAlignment", "Lead", "Measured", "ProbeAlignme
 Mode = Literal["effective", "dispersion"]
 Surge = Literal["measured", "predicted", "none"]
 
+SURGE_CUTOFF = 0.2
+"""A model that predicts its surge follows it below this frequency, per encounter period.
+
+Surge at wave frequency is part of the response that the model learns from the wave; following its
+prediction too feeds its error back. Between 0.1 and 0.33 the skill on the virtual tank is flat."""
+SETTLED = 15.0
+"""Encounter periods after which the low-pass filter of the surge has settled: three of its own."""
 BEYOND = 0.5
 """A predicted surge is followed this part of the trained range beyond either end of it."""
 
@@ -53,23 +62,17 @@ class Measured:
     values: FloatArray
     first: int = 0
 
-    def rows(self, first: int, stop: int, known: int | None = None) -> Regressors:
+    def rows(
+        self, first: int, stop: int, known: int | None = None, states: FloatArray | None = None
+    ) -> Regressors:
         """Inputs of a stretch."""
         values = self.values[first - self.first : stop - self.first]
         return Regressors(values, np.empty((stop - first, 0)))
-
-    def at(self, samples: IntArray, states: FloatArray) -> Regressors:
-        """Inputs of one sample of each window, the same for all members."""
-        shape = (*states.shape[:2], self.values.shape[1])
-        delayed = np.broadcast_to(self.values[samples - self.first][:, None], shape)
-        return Regressors(delayed, np.empty((*shape[:2], 0)))
 
 
 @dataclass(frozen=True)
 class Lead:
     """Look-ahead: the input up to `samples` after an instant drives the step from it.
-
-    It moves the regressors that take the model's delays; direct ones bring a lead of their own.
 
     Parameters
     ----------
@@ -86,9 +89,13 @@ class Lead:
         return self.samples
 
     @property
-    def extra_history(self) -> int:
-        """None."""
-        return 0
+    def passes(self) -> int:
+        """One: no predicted state is read."""
+        return 1
+
+    def history(self, input_delays: int) -> int:
+        """The delays themselves."""
+        return input_delays
 
     @property
     def reads_states(self) -> str:
@@ -112,8 +119,8 @@ class Lead:
         return inputs, ()
 
     def reads(self, span: Span) -> Span:
-        """Samples of input, up to the look-ahead later."""
-        return Span(span.first, span.known, span.stop + self.samples)
+        """Samples of input, later by the look-ahead."""
+        return Span(span.first + self.samples, span.known, span.stop + self.samples)
 
     def wrap(self, drive: Drive, run: xr.Dataset | None, spans: Sequence[Span]) -> Drive:
         """Drive that reads ahead."""
@@ -149,17 +156,10 @@ class _Ahead:
     inner: Drive
     samples: int
 
-    def rows(self, first: int, stop: int, known: int | None = None) -> Regressors:
-        found = self.inner.rows(first + self.samples, stop + self.samples, known)
-        if not found.direct.shape[1]:
-            return found
-        return Regressors(found.delayed, self.inner.rows(first, stop, known).direct)
-
-    def at(self, samples: IntArray, states: FloatArray) -> Regressors:
-        found = self.inner.at(samples + self.samples, states)
-        if not found.direct.shape[2]:
-            return found
-        return Regressors(found.delayed, self.inner.at(samples, states).direct)
+    def rows(
+        self, first: int, stop: int, known: int | None = None, states: FloatArray | None = None
+    ) -> Regressors:
+        return self.inner.rows(first + self.samples, stop + self.samples, known, states)
 
 
 @dataclass(frozen=True)
@@ -189,6 +189,10 @@ class ProbeAlignment:
     highest_frequency : float, optional
         Highest frequency of the waves in mode "dispersion", Hz; by default the one below which
         99.9 % of the variance of the training input lies.
+    passes : int, optional
+        With a predicted surge, how often a forecast runs: the first pass holds the surge at its
+        mean over the last encounter period before the start, each further one follows the slow
+        part of the surge that the pass before predicted. A third changes nothing on the tank.
 
     Raises
     ------
@@ -203,8 +207,10 @@ class ProbeAlignment:
     surge_channel: str = "surge"
     channels: tuple[str, ...] | None = None
     highest_frequency: float | None = None
+    passes: int = 2
 
     def __post_init__(self) -> None:
+        check_integer("alignment: passes", self.passes, 1)
         check_choice("alignment: mode", self.mode, ("effective", "dispersion"))
         check_choice("alignment: surge", self.surge, ("measured", "predicted", "none"))
         _check_number("celerity", self.celerity, "m/s", "a positive number or None")
@@ -329,6 +335,7 @@ class ProbeAlignment:
             surge_range=(0.0, 0.0)
             if self.surge == "none"
             else _surge_range(windows, self.surge_channel),
+            period=labelled.mean_period(windows, elevations) if self.surge == "predicted" else None,
         )
 
     def to_json(self) -> Json:
@@ -361,11 +368,12 @@ class FittedAlignment:
         Hz (mode "dispersion").
     surge_range : (float, float)
         Range within which a predicted surge is followed, m.
+    period : float or None
+        Encounter period, samples (surge "predicted").
     """
 
     kind: ClassVar[str] = "probe_alignment"
     lead_samples: ClassVar[int] = 0
-    extra_history: ClassVar[int] = 0
     settings: ProbeAlignment
     inputs: tuple[str, ...]
     states: tuple[str, ...]
@@ -376,6 +384,16 @@ class FittedAlignment:
     water_depth: float | None = None
     highest_frequency: float | None = None
     surge_range: tuple[float, float] = (0.0, 0.0)
+    period: float | None = None
+
+    @property
+    def passes(self) -> int:
+        """Passes of a predicted surge, else one."""
+        return self.settings.passes if self.settings.surge == "predicted" else 1
+
+    def history(self, input_delays: int) -> int:
+        """The delays themselves."""
+        return input_delays
 
     @property
     def reads_states(self) -> str:
@@ -409,16 +427,15 @@ class FittedAlignment:
         return _Carried.of(self, run, spans)
 
     def look_ahead(self, run: xr.Dataset | None, dt: float) -> float:
-        """Time that the slowest waves take over the distance by which they are carried upstream."""
+        """Time that the slowest waves take over the constant distance they are carried upstream.
+
+        A surge upstream reads nothing more: the record is continued by linear prediction there.
+        """
         if run is None:
             return 0.0
-        low, high = self.surge_range
-        if self.settings.surge == "measured":  # the trained range is half of the one followed
-            low += 0.25 * (high - low)
-        farthest = min(
-            (d for d, yes in zip(self.offsets(run), self.carried, strict=True) if yes), default=0.0
-        )
-        return max(0.0, -(farthest + low)) / self._speed(run)
+        places = zip(self.offsets(run), self.carried, strict=True)
+        farthest = min((float(distance) for distance, yes in places if yes), default=0.0)
+        return max(0.0, -farthest) / self._speed(run)
 
     def _speed(self, run: xr.Dataset) -> float:
         if self.celerity is not None:
@@ -520,12 +537,16 @@ class _Carried:
     stretches: tuple[_Stretch, ...]
     column: int
     followed: tuple[float, float]
+    period: float | None
 
     @classmethod
     def of(cls, map_: FittedAlignment, run: xr.Dataset, spans: Sequence[Span]) -> Self:
         name = labelled.run_name(run, "the run")
         settings = map_.settings
-        values = labelled.channel_matrix(run, map_.inputs, name)
+        # No wave is read beyond the look-ahead of the last instant that is asked for.
+        dt = labelled.run_step(run, name)
+        last = max(span.stop for span in spans) + math.ceil(map_.look_ahead(run, dt) / dt)
+        values = labelled.channel_matrix(run, map_.inputs, name)[:last]
         size, is_predicted = len(values), settings.surge == "predicted"
         surge = np.zeros(size)
         reach = map_.surge_range if is_predicted else (np.inf, -np.inf)
@@ -556,11 +577,21 @@ class _Carried:
             carriers = map_.carry(run, name, slice(first, stop), reach)
             found.append(_Stretch(first, stop, carriers))
         column = map_.states.index(settings.surge_channel) if is_predicted else 0
-        return cls(values, surge, map_.offsets(run), tuple(found), column, map_.surge_range)
+        offsets, period = map_.offsets(run), map_.period
+        return cls(values, surge, offsets, tuple(found), column, map_.surge_range, period)
 
-    def rows(self, first: int, stop: int, known: int | None = None) -> Regressors:
-        last = stop - 1 if known is None else known
-        surge = self.surge[np.minimum(np.arange(first, stop), last)]
+    def rows(
+        self, first: int, stop: int, known: int | None = None, states: FloatArray | None = None
+    ) -> Regressors:
+        surge = self.surge[first : stop if self.period is None or known is None else known + 1]
+        if self.period is not None:
+            # The low-pass filter settles on what was measured before.
+            before = self.surge[max(first - round(SETTLED * self.period), 0) : first]
+            gaps = np.flatnonzero(~np.isfinite(before))
+            before = before[gaps[-1] + 1 :] if gaps.size else before
+            later = None if states is None else states[:, self.column]
+            after = self._after(surge, stop, known, later)
+            surge = _slow(np.concatenate([before, surge, after]), self.period)[len(before) :]
         stretch = self._stretch(first)
         out = self.values[first:stop].copy()
         inside = slice(first - stretch.first, stop - stretch.first)
@@ -569,33 +600,31 @@ class _Carried:
                 out[:, column] = carrier.at(surge + self.offsets[column], inside)[:, 0]
         return Regressors(out, np.empty((stop - first, 0)))
 
-    def at(self, samples: IntArray, states: FloatArray) -> Regressors:
-        surge = np.clip(states[..., self.column], *self.followed)
-        out = np.repeat(self.values[samples][:, None], states.shape[1], axis=1)
-        for stretch in {id(each): each for each in map(self._stretch, samples)}.values():
-            mine = (stretch.first <= samples) & (samples < stretch.stop)
-            for column, carrier in enumerate(stretch.carriers):
-                if carrier is not None:
-                    places = surge[mine] + self.offsets[column]
-                    out[mine, :, column] = _carried_to(
-                        carrier, samples[mine] - stretch.first, places
-                    )
-        return Regressors(out, np.empty((*states.shape[:2], 0)))
+    def _after(
+        self, surge: FloatArray, stop: int, known: int | None, predicted: FloatArray | None
+    ) -> FloatArray:
+        """Surge that is followed after sample `known`: held, or as it was predicted."""
+        assert self.period is not None
+        count = 0 if known is None else max(stop - known - 1, 0)
+        held = np.full(count, surge[-max(round(self.period), 1) :].mean())
+        if predicted is not None:
+            number = min(count, len(predicted))
+            held[:number] = np.nan_to_num(predicted[:number], nan=held[0] if count else 0.0)
+            held[number:] = held[number - 1] if number else 0.0
+        result: FloatArray = np.clip(held, *self.followed)
+        return result
 
     def _stretch(self, sample: int) -> _Stretch:
         return next(each for each in self.stretches if each.first <= sample < each.stop)
 
 
-def _carried_to(carrier: CarriedElevation, samples: IntArray, places: FloatArray) -> FloatArray:
-    """Elevation of one sample of each window at places (window, member), shape of `places`."""
-    half = 0.5 * (carrier.highest - carrier.lowest)
-    terms = carrier.terms[:, samples, 0][:, :, None]
-    if half == 0:
-        return np.broadcast_to(terms[0], places.shape)
-    scaled = np.clip((places - 0.5 * (carrier.highest + carrier.lowest)) / half, -1.0, 1.0)
-    orders = np.arange(len(terms))[:, None, None]
-    total: FloatArray = (terms * np.cos(orders * np.arccos(scaled))).sum(axis=0)
-    return total
+def _slow(surge: FloatArray, period: float) -> FloatArray:
+    """Surge below ``SURGE_CUTOFF``, without delay; `period` in samples."""
+    sections = signal.butter(4, 2 * SURGE_CUTOFF / period, output="sos")
+    result: FloatArray = signal.sosfiltfilt(
+        sections, surge, padlen=min(len(surge) - 1, round(5 * period))
+    )
+    return result
 
 
 @dataclass(frozen=True)
@@ -613,13 +642,17 @@ class Chain:
 
     @property
     def lead_samples(self) -> int:
-        """Sum of those of the maps."""
-        return sum(each.lead_samples for each in self.maps)
+        """Samples of input after instant j that row j reads."""
+        return self.reads(Span(0, 0, 1)).stop - 1
+
+    def history(self, input_delays: int) -> int:
+        """Samples of input before the start that a forecast with these delays reads."""
+        return max(input_delays, -self.reads(Span(-input_delays, 0, 1)).first)
 
     @property
-    def extra_history(self) -> int:
-        """Sum of those of the maps."""
-        return sum(each.extra_history for each in self.maps)
+    def passes(self) -> int:
+        """Those of the map that has most."""
+        return max((each.passes for each in self.maps), default=1)
 
     @property
     def reads_states(self) -> str:
@@ -696,7 +729,7 @@ class Chain:
         return cls(tuple(maps))
 
 
-MAPS: dict[str, type[InputMap]] = {Lead.kind: Lead, FittedAlignment.kind: FittedAlignment}
+MAPS: dict[str, type[InputMap]] = {each.kind: each for each in (Lead, FittedAlignment, Observed)}
 """Input maps by their kind, as files name them."""
 
 

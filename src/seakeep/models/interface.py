@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray, IntArray
+from seakeep.arrays import FloatArray
 from seakeep.models.labelled import ChannelLabel, Runs, Stop
 
 __all__ = [
@@ -105,29 +105,16 @@ class Regressors(NamedTuple):
 
 
 class Drive(Protocol):
-    """Regressors of one run, made once and shared by members, windows and steps."""
+    """Regressors of one run, made once and shared by members, windows and passes."""
 
-    def rows(self, first: int, stop: int, known: int | None = None) -> Regressors:
+    def rows(
+        self, first: int, stop: int, known: int | None = None, states: FloatArray | None = None
+    ) -> Regressors:
         """Regressors of the samples from `first` to before `stop`, shape (sample, channel).
 
-        States are taken as they were at sample `known` where they lie after it.
-        """
-        ...
-
-    def at(self, samples: IntArray, states: FloatArray) -> Regressors:
-        """Regressors of one sample of each window, where members have reached these states.
-
-        Parameters
-        ----------
-        samples : ndarray of int, shape (window,)
-            Samples of the run.
-        states : ndarray, shape (window, member, N)
-            Predicted states, physical units.
-
-        Returns
-        -------
-        Regressors
-            Of shape (window, member, channel).
+        Measured states are read up to sample `known` and not after, by default all of them.
+        `states`, shape (steps, N), are predicted ones of the samples after `known`; without them
+        the last known ones are held. Rows are NaN where they need inputs that are not there.
         """
         ...
 
@@ -141,8 +128,8 @@ class InputMap(Protocol):
         Its word in :data:`seakeep.models.inputs.MAPS`.
     lead_samples : int
         Samples of input after the one a step starts from that drive the step.
-    extra_history : int
-        Samples of input before the model's own input delays that it needs.
+    passes : int
+        How often a forecast runs: more than once where predicted states drive it.
     reads_states : {"no", "measured", "predicted"}
         Whether regressors depend on states, and on which after the start.
     """
@@ -155,8 +142,8 @@ class InputMap(Protocol):
         ...
 
     @property
-    def extra_history(self) -> int:
-        """Samples of input before the model's input delays that it needs."""
+    def passes(self) -> int:
+        """How often a forecast runs."""
         ...
 
     @property
@@ -182,6 +169,10 @@ class InputMap(Protocol):
 
     def reads(self, span: Span) -> Span:
         """Samples of its input that the map reads for samples of its output."""
+        ...
+
+    def history(self, input_delays: int) -> int:
+        """Samples of input before the start that a forecast with these delays reads."""
         ...
 
     def wrap(self, drive: Drive, run: xr.Dataset | None, spans: Sequence[Span]) -> Drive:
@@ -273,7 +264,7 @@ class Signature:
     @property
     def history_samples(self) -> int:
         """Samples a forecast needs up to its start, that one included."""
-        return max(self.state_delays, self.input_delays + self.input_map.extra_history) + 1
+        return max(self.state_delays, self.input_map.history(self.input_delays)) + 1
 
     @property
     def lead_samples(self) -> int:

@@ -15,6 +15,7 @@ from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 from seakeep.signals import uniform_step
 from seakeep.signals.time_axis import instant_text, span_text
+from seakeep.signals.waves import encounter_period
 
 __all__ = ["ChannelLabel", "as_runs", "channel_labels", "channel_matrix", "nearest_sample"]
 
@@ -332,3 +333,28 @@ def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "sta
             f"{span_text(time[0], time[-1], step)}. Choose an instant inside it."
         )
     return min(max(round((instant - float(time[0])) / step), 0), time.size - 1)
+
+
+def mean_period(runs: Mapping[str, xr.Dataset], elevations: Sequence[str]) -> float:
+    """Mean encounter period of some runs, samples: as they state it, or counted in a probe.
+
+    Raises
+    ------
+    DataError
+        If a run states none and none can be counted.
+    """
+    found = []
+    for name, run in runs.items():
+        dt = run_step(run, name)
+        if (stated := run.attrs.get("encounter_period")) is not None:
+            found.append(float(stated) / dt)
+            continue
+        wave = channel_matrix(run, elevations[:1], name)[:, 0] if elevations else np.empty(0)
+        try:
+            found.append(encounter_period(wave[np.isfinite(wave)], dt) / dt)
+        except (DataError, RequestError) as error:
+            raise DataError(
+                f"{name}: observables and a predicted surge count in encounter periods, and there "
+                f"is none to be counted: {error} Set run.attrs['encounter_period'] (s)."
+            ) from None
+    return float(np.mean(found))

@@ -14,7 +14,7 @@ from seakeep.models.draws import Draw
 from seakeep.models.engine import Dynamics
 from seakeep.models.interface import InputMap
 from seakeep.models.settings import HankelSettings
-from seakeep.models.training import lengthened, moments
+from seakeep.models.training import lengthened, scales_of
 
 __all__ = ["Member", "TrainingArrays", "identify_member", "reach", "window_ends"]
 
@@ -78,7 +78,7 @@ def identify_member(
     identification setup: the z-score is taken on the training signal).
     """
     chosen = range(len(arrays.states)) if draw.run is None else (draw.run,)
-    back = max(draw.state_delays, draw.input_delays + input_map.extra_history)
+    back = max(draw.state_delays, input_map.history(draw.input_delays))
     windows, parts = [], []
     for run in chosen:
         end = len(arrays.states[run]) - 1 if draw.last is None else draw.last - arrays.offsets[run]
@@ -95,10 +95,7 @@ def identify_member(
             ]
         )
     groups = list(zip(*parts, strict=True))
-    scales = [
-        moments(series, windows, names, settings.standardize)
-        for series, names in zip(groups, arrays.channels, strict=True)
-    ]
+    scales = scales_of(groups, windows, arrays.channels, settings.standardize)
     states, delayed, direct = (
         [scale.deviations(values) for values in series]
         for scale, series in zip(scales, groups, strict=True)
@@ -140,10 +137,14 @@ def reach(
 ) -> list[int]:
     """Earliest sample of each run that a member reads; the run's end where none reads it."""
     earliest = list(samples)
-    extra, lead = input_map.extra_history, input_map.lead_samples
+    lead = input_map.lead_samples
     for draw in draws:
         for run in range(len(samples)) if draw.run is None else (draw.run,):
             last = samples[run] - 1 if draw.last is None else draw.last
-            first = 0 if draw.window is None else last + 1 - draw.needed(inside, extra, lead)
+            first = (
+                0
+                if draw.window is None
+                else last + 1 - draw.needed(inside, input_map.history(draw.input_delays), lead)
+            )
             earliest[run] = min(earliest[run], first)
     return earliest

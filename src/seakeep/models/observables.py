@@ -9,19 +9,32 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from itertools import combinations
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
+import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.errors import RequestError, did_you_mean
+from seakeep.models import labelled
 from seakeep.models.checks import check_choice
+from seakeep.models.interface import Drive, Regressors, Span
 from seakeep.models.labelled import ChannelLabel
 from seakeep.signals import expressions
 
-__all__ = ["OBSERVABLES", "Bound", "Expression", "Observable", "Powers", "SlowSquares"]
+__all__ = [
+    "OBSERVABLES",
+    "Bound",
+    "Expression",
+    "Observable",
+    "Observed",
+    "Observing",
+    "Powers",
+    "SlowSquares",
+]
 
 HALF_WIDTH = 0.5
 """Half of the length of the low-pass filter of :class:`SlowSquares`, in periods of its cutoff.
@@ -59,11 +72,17 @@ class Observable(Protocol):
 
     kind: ClassVar[str]
 
-    def bind(self, inputs: Sequence[ChannelLabel], period: float, dt: float) -> Bound:
+    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
         """Make it ready for these inputs.
 
-        `period` is the encounter period in samples, `dt` the time step in s.
+        `period` is the encounter period in samples, None where no observable of the model has a
+        ``period`` to fill in; `dt` is the time step in s.
         """
+        ...
+
+    def reach(self, dt: float) -> tuple[int, int]:
+        """Samples before and after an instant that its row reads, delays of the model apart."""
+        ...
 
 
 def _column(inputs: Sequence[ChannelLabel], name: str, what: str) -> int:
@@ -124,6 +143,8 @@ class SlowSquares:
         How far ahead of an instant its row reads the elevation, encounter periods.
     lags : sequence of float, optional
         Lags of the columns, encounter periods.
+    period : float, optional
+        Encounter period, s; by default that of the training runs.
 
     Raises
     ------
@@ -136,6 +157,7 @@ class SlowSquares:
     cutoff: float = 1 / 3
     lead: float = 2.0
     lags: tuple[float, ...] = (0, 1, 2, 3, 4, 5)
+    period: float | None = None
     kind: ClassVar[str] = "slow_squares"
 
     def __post_init__(self) -> None:
@@ -148,14 +170,15 @@ class SlowSquares:
         meant = "per encounter period, above 0 and at most 1"
         _numbers(self.cutoff, f"{what}: cutoff", meant, lambda n: 0 < n <= 1)
         _numbers(self.lead, f"{what}: lead", "encounter periods from 0", lambda n: n >= 0)
+        if self.period is not None:
+            _numbers(self.period, f"{what}: period", "seconds above 0", lambda n: n > 0)
 
-    def bind(self, inputs: Sequence[ChannelLabel], period: float, dt: float) -> Bound:
+    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
         """Make it ready; see :class:`Observable`."""
         places = [_column(inputs, name, self.kind) for name in self.of]
-        kernel = slow_kernel(self.cutoff / period, round(HALF_WIDTH / self.cutoff * period))
-        half, lags = len(kernel) // 2, [round(lag * period) for lag in self.lags]
-        reach = half + (max(self.orders) > 0)
-        ahead = round(self.lead * period)
+        period = period if self.period is None else self.period / dt
+        assert period is not None
+        kernel, reach, ahead, lags = self._places(period)
         middle = ahead - reach
         labels = []
         for place in places:
@@ -182,6 +205,22 @@ class SlowSquares:
             return np.concatenate(parts, axis=1)
 
         return Bound(tuple(labels), False, max(0, reach + max(lags) - middle), ahead, columns)
+
+    def reach(self, dt: float) -> tuple[int, int]:
+        """Samples around an instant; see :class:`Observable`."""
+        if self.period is None:
+            raise RequestError(
+                "slow_squares counts in encounter periods, and how far it reads is asked before "
+                "there are runs to count them in. State its period (s)."
+            )
+        _, reach, ahead, lags = self._places(self.period / dt)
+        return max(0, 2 * reach + max(lags) - ahead), ahead
+
+    def _places(self, period: float) -> tuple[FloatArray, int, int, list[int]]:
+        """Filter, its reach either side with the differences, look-ahead, and lags, in samples."""
+        kernel = slow_kernel(self.cutoff / period, round(HALF_WIDTH / self.cutoff * period))
+        reach = len(kernel) // 2 + (max(self.orders) > 0)
+        return kernel, reach, round(self.lead * period), [round(lag * period) for lag in self.lags]
 
 
 @dataclass(frozen=True)
@@ -221,7 +260,7 @@ class Powers:
                 f"powers: products must be true or false; received {self.products!r}."
             )
 
-    def bind(self, inputs: Sequence[ChannelLabel], period: float, dt: float) -> Bound:
+    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
         """Make it ready; see :class:`Observable`."""
         places = [_column(inputs, name, self.kind) for name in self.of]
         pairs = list(combinations(places, 2)) if self.products else []
@@ -251,6 +290,10 @@ class Powers:
 
         return Bound(tuple(labels), True, 0, 0, columns)
 
+    def reach(self, dt: float) -> tuple[int, int]:
+        """None."""
+        return 0, 0
+
 
 @dataclass(frozen=True)
 class Expression:
@@ -278,9 +321,14 @@ class Expression:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise RequestError(f"expression: name must be a word; received {self.name!r}.")
+        if "mean(" in self.expression.replace(" ", ""):
+            raise RequestError(
+                f"expression {self.expression!r}: mean is over all of a record, which a row must "
+                "not depend on. Write the number, or average(a, b)."
+            )
         expressions.parse(self.expression)
 
-    def bind(self, inputs: Sequence[ChannelLabel], period: float, dt: float) -> Bound:
+    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
         """Make it ready; see :class:`Observable`."""
         parsed = expressions.parse(self.expression)
         places = {name: _column(inputs, name, self.kind) for name in parsed.channels}
@@ -294,6 +342,10 @@ class Expression:
 
         label = ChannelLabel(self.name, self.units, self.expression)
         return Bound((label,), True, 0, 0, columns)
+
+    def reach(self, dt: float) -> tuple[int, int]:
+        """None."""
+        return 0, 0
 
 
 OBSERVABLES: dict[str, type[Observable]] = {
@@ -329,3 +381,196 @@ def from_json(table: Mapping[str, Any]) -> Observable:
         return made(**settings)
     except TypeError as error:
         raise RequestError(f"observables: {kind}: {error}. Keys: {', '.join(known)}.") from None
+
+
+def observables_of(value: object) -> tuple[Observable, ...]:
+    """Observables as they are, or made of tables of their keys."""
+    if isinstance(value, str | Mapping) or not isinstance(value, Iterable):
+        raise RequestError(
+            f"observables must be a list; received {value!r}. Write "
+            "observables=[seakeep.SlowSquares('eta_cog')]."
+        )
+    return tuple(from_json(each) if isinstance(each, Mapping) else each for each in value)
+
+
+@dataclass(frozen=True)
+class Observing:
+    """Observables that are not fitted yet; `lead` is that of the inputs they are made of."""
+
+    observables: tuple[Observable, ...]
+    lead: int = 0
+
+    def fit(
+        self,
+        runs: Mapping[str, xr.Dataset],
+        states: Sequence[str],
+        inputs: Sequence[str],
+        window: int | None,
+    ) -> Observed:
+        """Bind the observables to the inputs, and to the encounter period of the runs."""
+        name, first = next(iter(runs.items()))
+        labels = labelled.channel_labels(first, inputs)
+        counts = any(getattr(each, "period", 0.0) is None for each in self.observables)
+        period = labelled.mean_period(runs, list(inputs)) if counts else None
+        made = Observed(self.observables, self.lead, labels, labelled.run_step(first, name), period)
+        names = [label.name for group in made.regressors(labels) for label in group]
+        for each in names:
+            if names.count(each) > 1:
+                raise RequestError(
+                    f"two inputs or observables make a column '{each}'. Give an expression "
+                    "another name, or leave one of the observables out."
+                )
+        return made
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Observables beside the inputs that they are made of: an input map.
+
+    Parameters
+    ----------
+    observables : tuple of Observable
+        Functions of the inputs.
+    lead : int
+        Samples by which the inputs that arrive here look ahead already.
+    inputs : tuple of ChannelLabel
+        Those inputs.
+    dt : float
+        Time step, s.
+    period : float or None
+        Encounter period, samples, where an observable counts in it.
+    """
+
+    kind: ClassVar[str] = "observables"
+    passes: ClassVar[int] = 1
+    reads_states: ClassVar[str] = "no"
+    observables: tuple[Observable, ...]
+    lead: int
+    inputs: tuple[ChannelLabel, ...]
+    dt: float
+    period: float | None
+
+    @cached_property
+    def bound(self) -> tuple[Bound, ...]:
+        """The observables, ready for these inputs."""
+        return tuple(each.bind(self.inputs, self.period, self.dt) for each in self.observables)
+
+    @cached_property
+    def _around(self) -> tuple[int, int, int]:
+        """Samples before and after a row that are read, and those before of delayed columns."""
+        shift = [0 if b.delayed else self.lead for b in self.bound]
+        before = max([0, *(b.before + s for b, s in zip(self.bound, shift, strict=True))])
+        after = max([0, *(b.ahead - s for b, s in zip(self.bound, shift, strict=True))])
+        return before, after, max([0, *(b.before for b in self.bound if b.delayed)])
+
+    @property
+    def lead_samples(self) -> int:
+        """Samples beyond those that the inputs read already."""
+        return self._around[1]
+
+    def history(self, input_delays: int) -> int:
+        """Samples of input before the start that a forecast with these delays reads."""
+        return -self.reads(Span(-input_delays, 0, 1)).first
+
+    def fit(
+        self,
+        runs: Mapping[str, xr.Dataset],
+        states: Sequence[str],
+        inputs: Sequence[str],
+        window: int | None,
+    ) -> Observed:
+        """Fit the observables anew."""
+        return Observing(self.observables, self.lead).fit(runs, states, inputs, window)
+
+    def regressors(
+        self, inputs: tuple[ChannelLabel, ...]
+    ) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
+        """Return the inputs and the observables with delays, and those without."""
+        more = tuple(label for b in self.bound if b.delayed for label in b.labels)
+        return inputs + more, tuple(
+            label for b in self.bound if not b.delayed for label in b.labels
+        )
+
+    def reads(self, span: Span) -> Span:
+        """Samples of input around those of the rows; direct ones count from the start on."""
+        before, after, delayed = self._around
+        first = min(span.first - delayed - self.lead, span.known - before)
+        return Span(first, span.known, span.stop + after)
+
+    def wrap(self, drive: Drive, run: xr.Dataset | None, spans: Sequence[Span]) -> Drive:
+        """Put the observables beside the inputs of a run."""
+        read = [self.reads(span) for span in spans]
+        return _Seen(drive, self, min(r.first for r in read), max(r.stop for r in read))
+
+    def look_ahead(self, run: xr.Dataset | None, dt: float) -> float:
+        """Seconds beyond those that the inputs read already."""
+        return self.lead_samples * dt
+
+    def notes(self, run: xr.Dataset) -> dict[str, str | float]:
+        """Nothing beside the look-ahead, which every forecast reports."""
+        return {}
+
+    def describe(self, dt: float) -> list[str]:
+        """One line per observable."""
+        lines = []
+        for each, bound in zip(self.observables, self.bound, strict=True):
+            ahead = bound.ahead + (self.lead if bound.delayed else 0)
+            columns = f"{len(bound.labels)} column{'' if len(bound.labels) == 1 else 's'}"
+            delays = "with the input delays" if bound.delayed else "at lags of their own"
+            what = ", ".join(getattr(each, "of", ())) or getattr(each, "expression", "")
+            lines.append(
+                f"  observable    {each.kind} of {what}: {columns} {delays}, reads "
+                f"{ahead * dt:.3g} s ahead"
+            )
+        return lines
+
+    def to_json(self) -> dict[str, Any]:
+        """Observables, inputs, time step and period."""
+        return {
+            "observables": [to_json(each) for each in self.observables],
+            "lead": self.lead,
+            "inputs": [asdict(label) for label in self.inputs],
+            "dt": self.dt,
+            "period": self.period,
+        }
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> Self:
+        """Rebuild from :meth:`to_json`."""
+        return cls(
+            tuple(from_json(each) for each in content["observables"]),
+            int(content["lead"]),
+            tuple(ChannelLabel(**each) for each in content["inputs"]),
+            float(content["dt"]),
+            content["period"],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """Inputs and observables of a run, from the sample `low` to before `high` of the inputs."""
+
+    inner: Drive
+    made: Observed
+    low: int
+    high: int
+
+    def rows(
+        self, first: int, stop: int, known: int | None = None, states: FloatArray | None = None
+    ) -> Regressors:
+        before, after, _ = self.made._around
+        start, end = max(first - before, self.low), min(stop + after, self.high)
+        inner = self.inner.rows(start, end, known, states)
+        delayed, direct = [inner.delayed], [inner.direct]
+        for bound in self.made.bound:
+            columns = bound.columns(inner.delayed)
+            if bound.delayed:
+                delayed.append(columns)
+            else:  # these inputs look ahead already, by the lead
+                shifted = np.full_like(columns, np.nan)
+                shifted[self.made.lead :] = columns[: len(columns) - self.made.lead]
+                direct.append(shifted)
+        inside = slice(first - start, stop - start)
+        return Regressors(
+            np.concatenate(delayed, axis=1)[inside], np.concatenate(direct, axis=1)[inside]
+        )

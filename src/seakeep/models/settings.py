@@ -12,9 +12,11 @@ import numpy as np
 
 from seakeep.core.embedding import History
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
-from seakeep.models.checks import check_choice
-from seakeep.models.inputs import Chain, Lead, ProbeAlignment
-from seakeep.models.interface import Fittable, InputMap, Json, Needs, plain
+from seakeep.models.checks import check_choice, check_integer
+from seakeep.models.inputs import Lead, ProbeAlignment
+from seakeep.models.interface import Fittable, Json, Needs, plain
+from seakeep.models.observables import Observable, Observing, observables_of
+from seakeep.models.observables import to_json as observable_json
 
 __all__ = [
     "DelayRows",
@@ -63,18 +65,6 @@ def periods_to_samples(periods: float, encounter_period: float, dt: float) -> in
     return math.floor(periods * encounter_period / dt + 0.5)
 
 
-def check_integer(name: str, value: object, least: int, optional: bool = False) -> None:
-    """Refuse a setting that is not an integer of at least `least` (or None, if `optional`)."""
-    if optional and value is None:
-        return
-    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < least:
-        hint = " Round it to an integer." if isinstance(value, float) else ""
-        raise RequestError(
-            f"{name} must be an integer of at least {least}{' or None' if optional else ''}; "
-            f"received {value!r}.{hint}"
-        )
-
-
 def check_ridge(value: object) -> None:
     """Refuse a λ that is not a number, zero or positive."""
     real = isinstance(value, numbers.Real) and not isinstance(value, bool)
@@ -106,7 +96,7 @@ class HankelSettings:
     standardize: bool = True
     alignment: ProbeAlignment | None = None
     lead: int = 0
-    observables: tuple[InputMap, ...] = ()
+    observables: tuple[Observable, ...] = ()
 
     def __post_init__(self) -> None:
         check_integer("state_delays", self.state_delays, 0)
@@ -121,7 +111,7 @@ class HankelSettings:
             raise RequestError(f"standardize must be True or False; received {self.standardize!r}.")
         check_integer("lead", self.lead, 0)
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
-        object.__setattr__(self, "observables", tuple(self.observables))
+        object.__setattr__(self, "observables", observables_of(self.observables))
         if self.rank is not None and self.ridge > 0:
             warnings.warn(
                 f"rank = {self.rank} truncates singular values instead of regularising, so "
@@ -132,28 +122,33 @@ class HankelSettings:
 
     @property
     def maps(self) -> tuple[Fittable, ...]:
-        """Input maps, not fitted yet: the alignment, the observables of it, and the lead."""
+        """Input maps, not fitted yet: the alignment, the lead, and the observables on both."""
         alignment = () if self.alignment is None else (self.alignment,)
         lead = (Lead(int(self.lead)),) if self.lead else ()
-        return (*alignment, *self.observables, *lead)
+        observed = (Observing(self.observables, int(self.lead)),) if self.observables else ()
+        return (*alignment, *lead, *observed)
 
-    @property
-    def extra_history(self) -> int:
-        """Samples of input before the input delays that the observables need."""
-        return sum(each.extra_history for each in self.observables)
+    def around(self, dt: float, input_delays: int | None = None) -> tuple[int, int]:
+        """Samples of input before and after the start that the rows of a forecast read.
 
-    @property
-    def history_samples(self) -> int:
-        """Samples up to and including the start that a forecast needs: max(s, z) + 1."""
-        return max(self.state_delays, self.input_delays + self.extra_history) + 1
+        Raises
+        ------
+        RequestError
+            If an observable counts in encounter periods and does not state its own.
+        """
+        delays = self.input_delays if input_delays is None else input_delays
+        reach = [each.reach(dt) for each in self.observables]
+        before = max([delays, *(before for before, _ in reach)])
+        return before, max([int(self.lead), *(ahead for _, ahead in reach)])
 
     def needs(self, dt: float) -> Needs:
         """Samples that it asks of its runs."""
+        before, after = self.around(dt)
         return Needs(
             self.window or 1,
-            self.history_samples - 1,
+            max(self.state_delays, before),
             self.history == "inside",
-            self.lead + sum(each.lead_samples for each in self.observables),
+            after,
         )
 
     def to_json(self) -> Json:
@@ -161,7 +156,7 @@ class HankelSettings:
         content = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
         maps = {
             "alignment": None if self.alignment is None else self.alignment.to_json(),
-            "observables": Chain(self.observables).to_json()["maps"],
+            "observables": [observable_json(each) for each in self.observables],
         }
         made: Json = plain({key: maps.get(key, value) for key, value in content.items()})
         return made
@@ -174,8 +169,6 @@ class HankelSettings:
             if key not in known:
                 raise RequestError(f"unknown key '{key}'.{did_you_mean(key, known)}")
         stated = dict(content)
-        if "observables" in stated:
-            stated["observables"] = Chain.from_json({"maps": stated["observables"]}).maps
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeakeepWarning)  # given when the settings were made
             return cls(**stated)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -17,10 +17,12 @@ from seakeep.models.checks import check_choice
 from seakeep.models.draws import Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.inputs import Chain, ProbeAlignment
-from seakeep.models.interface import InputMap, Json, Needs, Signature, Span, plain
+from seakeep.models.interface import Json, Needs, Signature, Span, plain
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.members import TrainingArrays, reach
+from seakeep.models.observables import Observable, observables_of
+from seakeep.models.observables import to_json as observable_json
 from seakeep.models.priors import (
     LogUniform,
     Prior,
@@ -90,7 +92,7 @@ class HankelDMDc(HankelSettings):
         of its keys is taken too.
     lead : int, optional
         Look-ahead in samples: the input up to j + lead drives the step from j to j + 1.
-    observables : sequence of InputMap, optional
+    observables : sequence of SlowSquares, Powers, Expression or tables, optional
         Further regressors, made of the aligned inputs.
 
     Raises
@@ -304,7 +306,7 @@ class BayesianHankelDMDc:
     standardize: bool = True
     alignment: ProbeAlignment | None = None
     lead: int | float = 0
-    observables: tuple[InputMap, ...] = ()
+    observables: tuple[Observable, ...] = ()
     seed_sequence: np.random.SeedSequence = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -318,7 +320,7 @@ class BayesianHankelDMDc:
         _check_lead(self.lead)
         check_choice("sampling", self.sampling, ("monte_carlo", "sobol"))
         check_choice("train_on", self.train_on, ("all", "runs", "windows"))
-        object.__setattr__(self, "observables", tuple(self.observables))
+        object.__setattr__(self, "observables", observables_of(self.observables))
         object.__setattr__(self, "alignment", self.shared(0.5 * period).alignment)
         object.__setattr__(self, "seed_sequence", _seed_sequence(self.seed))
 
@@ -352,11 +354,12 @@ class BayesianHankelDMDc:
                 top = float(prior.ppf(1.0 - 1e-6))
             return periods_to_samples(top, self.encounter_period, dt)
 
+        before, after = shared.around(dt, samples(self.input_delay))
         return Needs(
             1 if self.train_length is None else samples(self.train_length),
-            max(samples(self.state_delay), samples(self.input_delay) + shared.extra_history),
+            max(samples(self.state_delay), before),
             self.history == "inside",
-            shared.lead + sum(each.lead_samples for each in self.observables),
+            after,
         )
 
     def to_json(self) -> Json:
@@ -372,7 +375,7 @@ class BayesianHankelDMDc:
                 "seed": str(seed.entropy),
                 "spawn_key": [int(key) for key in seed.spawn_key],
                 "alignment": None if self.alignment is None else self.alignment.to_json(),
-                "observables": Chain(self.observables).to_json()["maps"],
+                "observables": [observable_json(each) for each in self.observables],
             }
         )
         return made
@@ -389,7 +392,7 @@ class BayesianHankelDMDc:
             int(stated.pop("seed")), spawn_key=[int(key) for key in stated.pop("spawn_key")]
         )
         stated |= {name: from_description(stated[name]) for name in PRIORS}
-        stated["observables"] = Chain.from_json({"maps": stated.get("observables", [])}).maps
+        stated["observables"] = observables_of(stated.get("observables", []))
         return cls(**stated, seed=seed)
 
     @classmethod
@@ -515,7 +518,11 @@ class BayesianHankelDMDc:
         members = draw_members(self, dt, samples, input_map)
         earliest = reach(members, samples, self.history == "inside", input_map)
         arrays, trained = _training_arrays(named, states, inputs, samples, earliest, input_map)
-        series = (arrays.states, arrays.delayed, arrays.direct)
+        # Direct regressors have no value where they need inputs from before the record; no member
+        # reads them there.
+        direct = tuple(values[np.isfinite(values).all(axis=1)] for values in arrays.direct)
+        series = (arrays.states, arrays.delayed, direct)
+        arrays = replace(arrays, direct=tuple(np.nan_to_num(values) for values in arrays.direct))
         scales = [
             moments(each, None, channels, standardize=False)
             for each, channels in zip(series, arrays.channels, strict=True)

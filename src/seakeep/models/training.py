@@ -5,7 +5,7 @@ from __future__ import annotations
 import reprlib
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Self, cast, get_args
 
 import numpy as np
@@ -31,6 +31,7 @@ __all__ = [
     "lengthened",
     "moments",
     "run_regressors",
+    "scales_of",
     "stop_instants",
     "until",
 ]
@@ -197,7 +198,7 @@ def gather(
     if maps:
         runs = until(runs, stops)
     input_map = Chain(tuple(each.fit(dict(runs), states, inputs, window) for each in maps))
-    lead, reach = input_map.lead_samples, max(state_delays, input_delays + input_map.extra_history)
+    lead, reach = input_map.lead_samples, max(state_delays, input_map.history(input_delays))
     pieces = []
     for name, run in runs.items():
         time = np.asarray(run.variables["time"].values, dtype=float)
@@ -225,10 +226,7 @@ def gather(
     channels = [
         [label.name for label in group] for group in (labels[0], delayed_labels, direct_labels)
     ]
-    scales = [
-        moments(each, windows, made, settings.standardize)
-        for each, made in zip(series, channels, strict=True)
-    ]
+    scales = scales_of(series, windows, channels, settings.standardize)
     if len(names) > 1:
         _warn_of_dead(names, series[0], windows, scales[0], channels[0])
         _warn_of_dead(names, series[1], windows, scales[1], channels[1])
@@ -428,6 +426,24 @@ def _check_length(
             f"{needed - received} are missing. Reduce the delays, or give a longer "
             f"{'window' if history == 'inside' and window is not None else 'run'}."
         )
+
+
+def scales_of(
+    series: Sequence[Sequence[FloatArray]],
+    windows: Sequence[TrainingWindow],
+    channels: Sequence[Sequence[str]],
+    standardize: bool,
+) -> list[Scale]:
+    """Moments of states, delayed and direct regressors.
+
+    Direct regressors count from the first snapshot pair on: before it they may need inputs that
+    are not there.
+    """
+    later = [replace(each, first=max(each.first, each.first_column)) for each in windows]
+    return [
+        moments(values, spans, names, standardize)
+        for values, spans, names in zip(series, (windows, windows, later), channels, strict=True)
+    ]
 
 
 def moments(

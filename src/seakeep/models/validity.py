@@ -134,8 +134,8 @@ class Coverage:
         """Variables of a file."""
         label = {"long_name": "part of the training energy", "units": "1", "first": self.first}
         return {
-            "wave_shares": (("input", "band"), self.shares, label),
-            "wave_spread": ("input", self.spread),
+            "wave_shares": (("channel", "band"), self.shares, label),
+            "wave_spread": ("channel", self.spread),
         }
 
     @classmethod

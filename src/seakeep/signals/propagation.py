@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 import scipy
-from scipy import fft, special
+from scipy import fft
 
 from seakeep.arrays import ComplexArray, FloatArray, as_real, as_series, number, positive
 from seakeep.errors import DataError, RequestError
@@ -735,9 +735,10 @@ def _carried(
     distances: tuple[float, float],
     numbers: Callable[[FloatArray], FloatArray],
 ) -> CarriedElevation:
-    """Expand the waves in the distance (Jacobi and Anger's expansion of a plane wave).
+    """Interpolate the waves in the distance, by Chebyshev polynomials.
 
-    exp(−ik(d₀ + hξ)) = exp(−ikd₀) Σ (2 − δ_p0) (−i)^p J_p(kh) T_p(ξ)
+    A plane wave exp(−ikhξ) is Σ (2 − δ_p0) (−i)^p J_p(kh) T_p(ξ) (Jacobi and Anger), so that its
+    coefficients vanish beyond p = kh faster than any power.
     """
     step = positive(dt, "the time step", "s")
     lowest, highest = (number(value, "a distance") for value in distances)
@@ -767,11 +768,13 @@ def _carried(
             "samples per wave period first."
         )
     turned = spectrum * np.exp(-1j * k * centre)[:, None]
-    terms = np.empty((count, *flat.shape))
-    for order in range(count):
-        factor = (1 if order == 0 else 2) * (-1j) ** order * special.jv(order, k * half)
-        record = fft.irfft(turned * factor[:, None], n=size, axis=0)
-        terms[order] = record[padding : padding + flat.shape[0]]
+    nodes = half * np.cos(np.pi * (np.arange(count) + 0.5) / count)
+    records = np.empty((count, *flat.shape))
+    for record, node in zip(records, nodes, strict=True):
+        carried = fft.irfft(turned * np.exp(-1j * k * node)[:, None], n=size, axis=0)
+        record[:] = carried[padding : padding + flat.shape[0]]
+    terms = fft.dct(records, type=2, axis=0, overwrite_x=True) / count
+    terms[0] *= 0.5
     terms[0] += mean
     return CarriedElevation(lowest, highest, terms)
 

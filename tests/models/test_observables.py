@@ -1,0 +1,228 @@
+"""Observables, lead and passes: from a measured run to the columns that drive a model."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep.core.observables import slow_kernel, slow_squares
+from seakeep.errors import RequestError
+from seakeep.models import HankelDMDc
+from seakeep.models import inputs as inputs_module
+from seakeep.models.inputs import Chain, Measured, ProbeAlignment
+from seakeep.models.interface import Regressors, Span
+from seakeep.models.labelled import channel_labels
+from seakeep.models.observables import OBSERVABLES, Expression, Powers, SlowSquares, from_json
+
+DT, PERIOD = 0.1, 16  # s, samples
+
+
+def irregular(seed: int = 0, samples: int = 900) -> xr.Dataset:
+    """Two probes 2 m apart in deep water, and a surge that wanders."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(samples) * DT
+    omega = 2 * np.pi * rng.uniform(0.45, 0.8, 12)
+    phase = rng.uniform(0, 2 * np.pi, 12)
+    channels = {
+        name: (
+            "time",
+            sum(
+                0.01 * np.cos(w * t - w**2 / 9.81 * x + p)
+                for w, p in zip(omega, phase, strict=True)
+            ),
+            {"units": "m", "x_position": x},
+        )
+        for name, x in (("eta_fwd", 0.0), ("eta_cog", 2.0))
+    }
+    channels["surge"] = ("time", 0.3 + 0.2 * np.sin(2 * np.pi * t / 40), {"units": "m"})
+    attrs = {"water_depth": np.inf, "encounter_period": PERIOD * DT}
+    return xr.Dataset(channels, coords={"time": t}, attrs=attrs)
+
+
+INPUTS = ["eta_fwd", "eta_cog"]
+CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3), products=True))
+
+
+def fitted(run, lead=12, surge="predicted", chosen=CHOSEN, inputs=INPUTS) -> Chain:
+    alignment = None if surge is None else ProbeAlignment(mode="dispersion", surge=surge)
+    spec = HankelDMDc(
+        8, 3 * PERIOD, 1.0, delay_rows="exact", alignment=alignment, lead=lead, observables=chosen
+    )
+    return Chain(tuple(each.fit({"run": run}, ["surge"], inputs, None) for each in spec.maps))
+
+
+def rows(chain, run, first, stop, known=None, states=None, inputs=INPUTS) -> Regressors:
+    span = Span(first, stop - 1 if known is None else known, stop)
+    values = np.stack([run[name].values for name in inputs], axis=-1)
+    read = chain.reads(span)
+    measured = Measured(values[read.first : read.stop], read.first)
+    return chain.wrap(measured, run, [span]).rows(first, stop, known, states)
+
+
+def test_the_low_pass_filter_keeps_a_constant_and_damps_the_waves():
+    kernel = slow_kernel(1 / (3 * PERIOD), 24)
+    lag = np.arange(-24, 25)
+    gains = [float(kernel @ np.cos(2 * np.pi * f * lag)) for f in (0, 1 / PERIOD, 2 / PERIOD)]
+    assert gains[0] == pytest.approx(1, abs=1e-12)  # rounding of a sum of 49 numbers
+    assert abs(gains[1]) < 0.03  # the side lobes of the window
+    assert abs(gains[2]) < 0.01
+
+
+def test_slow_squares_are_the_sums_that_they_stand_for():
+    rng = np.random.default_rng(1)
+    series, kernel = rng.normal(size=80), slow_kernel(0.05, 6)
+    found = slow_squares(series, (0, 1, 2), kernel, 3, (0, 5), DT)
+    derivatives = [
+        lambda j: series[j],
+        lambda j: (series[j + 1] - series[j - 1]) / (2 * DT),
+        lambda j: (series[j + 1] - 2 * series[j] + series[j - 1]) / DT**2,
+    ]
+    for row in (20, 41, 60):
+        for order, derivative in enumerate(derivatives):
+            for place, lag in enumerate((0, 5)):
+                middle = row + 3 - lag
+                expected = sum(w * derivative(middle - 6 + i) ** 2 for i, w in enumerate(kernel))
+                # Rounding of thirteen squares of second differences.
+                assert found[row, 2 * order + place] == pytest.approx(expected, rel=1e-12)
+
+
+def test_slow_squares_of_a_regular_wave_weigh_the_amplitude_by_the_frequency():
+    amplitude, omega = 0.05, 2 * np.pi / (PERIOD * DT)
+    series = amplitude * np.cos(omega * DT * np.arange(400))
+    found = slow_squares(series, (0, 1, 2), slow_kernel(1 / (3 * PERIOD), 24), 0, (0,), DT)[200]
+    x = omega * DT
+    # A central difference multiplies by sin(x)/x, and the second by (sin(x/2)/(x/2))^2.
+    gains = [1.0, np.sin(x) / x, (np.sin(x / 2) / (x / 2)) ** 2]
+    for order, gain in enumerate(gains):
+        expected = 0.5 * (amplitude * omega**order * gain) ** 2
+        # What the filter leaves of the wave at twice the frequency.
+        assert found[order] == pytest.approx(expected, rel=0.01)
+
+
+def test_columns_are_named_with_units_and_stand_in_two_groups():
+    run = irregular()
+    chain = fitted(run)
+    delayed, direct = chain.regressors(channel_labels(run, INPUTS))
+    assert {label.name: label.units for label in delayed} == {
+        "eta_fwd": "m",
+        "eta_cog": "m",
+        "eta_fwd_power_2": "m^2",
+        "eta_cog_power_2": "m^2",
+        "eta_fwd_power_3": "m^3",
+        "eta_cog_power_3": "m^3",
+        "eta_fwd_times_eta_cog": "m m",
+    }
+    assert len(direct) == 18
+    assert direct[6].units == "(m/s)^2"
+    # The squares look two periods ahead, which is more than the lead of the waves.
+    assert chain.lead_samples == 2 * PERIOD
+    # Five periods of lags and twice the filter's half width less the look-ahead.
+    assert chain.history(3 * PERIOD) == 5 * PERIOD + 2 * (24 + 1) - 2 * PERIOD
+
+
+def test_the_lead_shifts_the_inputs_and_not_the_squares():
+    run = irregular()
+    ahead = rows(fitted(run, surge=None), run, 200, 300, 200)
+    plain = rows(fitted(run, surge=None, lead=0), run, 200, 300, 200)
+    np.testing.assert_array_equal(ahead.delayed[:, 0], run["eta_fwd"].values[212:312])
+    # The same sums, started at another sample of the convolution.
+    np.testing.assert_allclose(ahead.direct, plain.direct, rtol=1e-10)
+    assert np.isfinite(ahead.direct).all()
+
+
+@pytest.mark.parametrize("surge", ["predicted", "none"])
+def test_no_surge_after_the_start_and_no_wave_beyond_the_look_ahead_is_read(surge):
+    run = irregular()
+    chain = fitted(run, surge=surge)
+    start, steps = 500, 100
+    poisoned = run.copy(deep=True)
+    poisoned["surge"].values[start + 1 :] = np.nan
+    for name in INPUTS:
+        poisoned[name].values[start + steps + chain.lead_samples :] = 1e9
+    first = start - 3 * PERIOD
+    clean = rows(chain, run, first, start + steps, start)
+    dirty = rows(chain, poisoned, first, start + steps, start)
+    assert np.isfinite(clean.delayed).all()
+    assert np.isfinite(clean.direct[3 * PERIOD :]).all()
+    for one, other in zip(clean, dirty, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_the_second_pass_follows_the_surge_that_the_first_predicted():
+    run = irregular()
+    chain = fitted(run, chosen=())
+    measured = rows(chain, run, 452, 600)  # as in training
+    held = rows(chain, run, 452, 600, 500)
+    known = run["surge"].values[501:600, None]
+    followed = rows(chain, run, 452, 600, 500, known)
+    inside = slice(0, -3 * PERIOD)  # where the low-pass filter has not met the end yet
+    errors = [
+        np.sqrt(np.mean((each.delayed - measured.delayed)[inside] ** 2)) / measured.delayed.std()
+        for each in (held, followed)
+    ]
+    # A surge that was predicted exactly gives the rows of training.
+    assert errors[1] < 0.02
+    assert errors[0] > 5 * errors[1]
+
+
+def test_the_record_is_carried_once_for_all_windows_and_passes(monkeypatch):
+    run = irregular()
+    chain = fitted(run)
+    carried = []
+    carry = inputs_module.carry_by_dispersion
+    monkeypatch.setattr(
+        inputs_module, "carry_by_dispersion", lambda *given: carried.append(1) or carry(*given)
+    )
+    spans = [Span(at - 48, at, at + 100) for at in (200, 300, 400)]
+    values = np.stack([run[name].values for name in INPUTS], axis=-1)
+    drive = chain.wrap(Measured(values), run, spans)
+    for span in spans:
+        drive.rows(*span[:1], span.stop, span.known)
+        drive.rows(span.first, span.stop, span.known, np.full((100, 1), 0.4))
+    assert len(carried) == len(INPUTS)
+
+
+def test_a_map_is_the_same_after_a_round_trip_through_json():
+    run = irregular()
+    chain = fitted(run)
+    again = Chain.from_json(json.loads(json.dumps(chain.to_json())))
+    assert again.to_json() == chain.to_json()
+    for one, other in zip(rows(chain, run, 300, 400), rows(again, run, 300, 400), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"kind": "squares"}, r"observables: kind must be 'slow_squares'.*received 'squares'"),
+        ({"kind": "powers", "of": "eta", "power": 2}, r"powers has no key 'power'.*'powers'"),
+        ({"kind": "powers", "of": ["a"], "powers": [1]}, r"integers from 2 to 5; received 1"),
+        ({"kind": "slow_squares", "of": ["a"], "cutoff": 0}, r"cutoff must be per encounter"),
+        ({"kind": "slow_squares", "of": ["a"], "lags": [0, 0]}, r"each once; received"),
+        ({"kind": "slow_squares", "of": []}, r"of must name one or more inputs; received \[\]"),
+        ({"kind": "slow_squares"}, r"slow_squares: .*missing 1 required.*'of'"),
+    ],
+)
+def test_a_setting_out_of_range_is_refused(settings, message):
+    with pytest.raises(RequestError, match=message):
+        from_json(settings)
+
+
+def test_an_observable_of_an_unknown_input_is_refused():
+    with pytest.raises(RequestError, match=r"powers of 'eta_aft': no such input"):
+        fitted(irregular(), chosen=[Powers("eta_aft")])
+
+
+def test_two_columns_of_one_name_are_refused():
+    chosen = [Expression("eta_fwd", "eta_cog**2")]
+    with pytest.raises(RequestError, match="two inputs or observables make a column 'eta_fwd'"):
+        fitted(irregular(), chosen=chosen)
+
+
+def test_every_kind_of_observable_is_registered_under_its_word():
+    assert {kind: made.kind for kind, made in OBSERVABLES.items()} == {
+        "slow_squares": "slow_squares",
+        "powers": "powers",
+        "expression": "expression",
+    }
