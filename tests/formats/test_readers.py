@@ -2,8 +2,6 @@
 
 import os
 import socket
-import sys
-import types
 
 import numpy as np
 import pandas as pd
@@ -11,46 +9,8 @@ import pytest
 
 from seakeep import files
 from seakeep.campaign import read_campaign, read_table
-from seakeep.errors import DataError, MissingFileError
-from seakeep.formats import READERS, Columns, Reader, read_columns
-
-READER = """
-import numpy as np
-from seakeep.formats import Columns
-
-def read_raw(path, options):
-    time, heave = np.frombuffer(path.read_bytes()[4:]).reshape(-1, 2).T
-    return Columns({"time": time, "heave": heave}, units={"time": "s", "heave": "mm"})
-"""
-
-
-@pytest.fixture
-def raw(monkeypatch):
-    """A reader in a module of its own, and the one line that adds it."""
-    module = types.ModuleType("raw_reader")
-    exec(READER, module.__dict__)
-    monkeypatch.setitem(sys.modules, "raw_reader", module)
-    added = Reader("RAW", module.read_raw, signatures=(b"RAW1",), suffixes=(".raw",))
-    READERS.append(added)
-    yield
-    READERS.remove(added)
-
-
-@pytest.mark.parametrize("name", ["run.raw", "run.dat"])
-def test_a_reader_is_added_without_touching_the_package(tmp_path, raw, name):
-    t = 0.1 * np.arange(50)
-    path = tmp_path / name
-    path.write_bytes(b"RAW1" + np.column_stack([t, np.sin(t)]).tobytes())
-    np.testing.assert_array_equal(read_columns(path).values["heave"], np.sin(t))
-    (tmp_path / "campaign.toml").write_text(f"[channels.heave]\n[runs.a]\nfile = '{name}'\n")
-    run = read_campaign(tmp_path / "campaign.toml").prepare()["a"]
-    np.testing.assert_allclose(run["heave"], 1e-3 * np.sin(t), rtol=1e-15)
-
-
-def test_a_reader_added_refuses_text_under_its_name(tmp_path, raw):
-    (tmp_path / "run.raw").write_text("time,heave\n0,1\n1,2\n")
-    with pytest.raises(DataError, match=r"run\.raw is no RAW file: it holds text and starts with"):
-        read_columns(tmp_path / "run.raw")
+from seakeep.errors import MissingFileError
+from seakeep.formats import Columns, Reader
 
 
 def test_each_file_is_parsed_once_in_a_preparation(tmp_path, monkeypatch):

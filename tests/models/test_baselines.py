@@ -1,7 +1,6 @@
 """Baselines: what they are, against other packages and known systems; files; runs of any kind."""
 
 import dataclasses
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -9,10 +8,8 @@ import xarray as xr
 
 import seakeep
 from seakeep.baselines import ARX, FIR, HoldLast, Mean, Subspace
-from seakeep.core import Solution
 from seakeep.errors import RequestError
 from seakeep.models import KINDS
-from seakeep.models.baselines import LinearModel, LinearSpec
 
 DT = 0.1
 STATES, INPUTS = ["heave", "pitch"], ["eta_fwd", "eta_aft"]
@@ -153,31 +150,6 @@ def test_waves_that_have_not_arrived_drive_where_a_lead_is_set(kind, runs):
     # The last three pairs of each training run have no look-ahead left.
     np.testing.assert_allclose(values(found), values(expected), atol=0.02)
     assert found.attrs["reads_input_until"] == pytest.approx(2 * DT)
-
-
-class FadingModel(LinearModel):
-    kind, title = "fading", "The state at the start, fading to the mean"
-
-
-@dataclasses.dataclass(frozen=True)
-class Fading(LinearSpec):
-    """The state at the start, fading to the mean: the example of CONTRIBUTING.md."""
-
-    kind: ClassVar[str] = "fading"
-    model: ClassVar[type[LinearModel]] = FadingModel
-
-    def solve(self, data):
-        return Solution(0.99 * np.eye(len(data.state_labels)), "svd", 0.0, 0)
-
-
-def test_a_baseline_is_a_class_and_a_line(runs, tmp_path, monkeypatch):
-    monkeypatch.setitem(KINDS, Fading.kind, Fading)
-    model = Fading(0, 0, ridge=0.0).fit(runs, STATES, [])
-    path = model.save(tmp_path / "fading.nc")
-    forecast = seakeep.load_model(path).forecast(linear_run(3), start=20.0, steps=2)
-    start, mean = values(linear_run(3))[200], model.state_mean
-    np.testing.assert_allclose(values(forecast)[1], mean + 0.99**2 * (start - mean), rtol=1e-12)
-    assert model.summary().startswith("The state at the start, fading to the mean, dt 0.1 s")
 
 
 def test_settings_that_a_baseline_does_not_have_are_refused():

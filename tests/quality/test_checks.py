@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import seakeep.quality
 from seakeep.errors import SeakeepWarning
-from seakeep.quality import Finding, Kind, Record, Redundant, as_json, findings_of, warn_of
+from seakeep.quality import Finding, Record, Redundant, as_json, findings_of, warn_of
 from seakeep.quality.samples import SamplesKind
 from seakeep.quality.sensors import redundant
 from seakeep.signals.quality import (
@@ -134,35 +133,6 @@ class TestSamples:
             x[start : start + 12] = x[start]
         assert not find_saturation(x).any()
         assert find_saturation(np.clip(waves(), -4.0, 4.0)).any()
-
-
-class Silence(Kind):
-    """A kind of this test."""
-
-    QUIET = (
-        "has a standard deviation of {value:.2g}, less than {limit:.2g}",
-        "Check the gain of [channels.{channel}].",
-    )
-
-
-def quiet(record):
-    """Channels that hardly move."""
-    for name, channel in record.whole.data_vars.items():
-        if (spread := float(channel.std())) < 1e-3:
-            yield Finding(Silence.QUIET, record.run, str(name), spread, 1e-3, "m")
-
-
-def test_a_check_is_one_function_and_one_line(monkeypatch):
-    """As CONTRIBUTING shows it; the package is not touched."""
-    monkeypatch.setattr(seakeep.quality, "CHECKS", [*seakeep.quality.CHECKS, quiet])
-    channels = {"heave": 1e-4 * waves(), "surge": waves()}
-    run = xr.Dataset({n: ("time", x, {"units": "m"}) for n, x in channels.items()}, {"time": T})
-    (found,) = seakeep.quality.check(Record("first", run))
-    assert found.text == "has a standard deviation of 0.00032 m, less than 0.001 m"
-    run.attrs["quality"] = as_json([found])
-    assert findings_of(run) == [found]
-    with pytest.warns(SeakeepWarning, match=r"^first: heave has .*0\.001 m\. Check the gain of"):
-        warn_of([found], set())
 
 
 class TestFindings:

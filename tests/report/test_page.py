@@ -13,8 +13,6 @@ import xarray as xr
 from tutorial_study import put_tutorial
 
 from seakeep.errors import RequestError
-from seakeep.report.section import Section
-from seakeep.report.sections import SECTIONS
 from seakeep.report.sections.errors import error_table, errors
 from seakeep.report.sections.histories import history_data, pack
 from seakeep.report.sections.judgements import PUBLISHED, age, coverage_table, divergence_table
@@ -274,18 +272,6 @@ def test_the_published_divergences_stand_beside_a_study_that_asks_for_them(page)
     table = divergence_table(asked, "bayesian", "paper")
     assert table.columns[-1] == "paper: EV, another data set"
     assert [row[-1] for row in table.rows if row[0] == "heave"] == [PUBLISHED["heave"]]
-
-
-def test_a_section_is_a_function_and_a_line(page, monkeypatch, tmp_path):
-    def trial(result):
-        return Section("trial", "<Trial>", words=(f"{len(result.channels)} channels & more",))
-
-    monkeypatch.setattr("seakeep.report.page.SECTIONS", [*SECTIONS[:1], trial, lambda _: None])
-    result = replace(read_result(page.parent), folder=tmp_path)
-    text = write_report(result).read_text("utf-8")
-    assert '<section id="trial"><h2>&lt;Trial&gt;</h2>' in text
-    assert "channels &amp; more</p>" in text
-    assert '<li><a href="#trial">' in text
 
 
 def test_words_and_symbols_are_said_once(page):

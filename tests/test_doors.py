@@ -1,0 +1,141 @@
+"""The blocks of CONTRIBUTING.md run as they stand: each adds one thing from outside the package."""
+
+import re
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from tutorial_study import put_tutorial
+
+import seakeep
+from seakeep import formats, quality
+from seakeep.errors import DataError, SeakeepWarning
+from seakeep.quality import Record, findings_of, warn_of
+from seakeep.quality.findings import as_json
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+DOORS = dict(re.findall(r"^### Add (.*)\n(?:(?!#).*\n)*?```python\n((?:.*\n)*?)```$", PAGE, re.M))
+
+STUDY = """
+[study]
+campaign = "campaign.toml"
+preset = "recommended"
+[models.fading]
+kind = "fading"
+[models.pair]
+kind = "bayesian_hankel_dmdc"
+n_members = 2
+[tests.unseen]
+runs = ["unseen"]
+windows = 2
+length = 4
+[statistics]
+n_series = 4
+"""
+
+
+@pytest.fixture
+def add(tmp_path):
+    """Run the block of a door as a module of its own; forget afterwards what it made known."""
+    before = []
+
+    def run(door, registry):
+        before.append((registry, registry.copy()))
+        (tmp_path / "door.py").write_text(DOORS[door], encoding="utf-8")
+        return runpy.run_path(str(tmp_path / "door.py"))
+
+    yield run
+    for registry, known in before:
+        registry.clear()
+        (registry.update if isinstance(known, dict) else registry.extend)(known)
+
+
+def test_each_door_is_tried_here():
+    assert list(DOORS) == [
+        "a reader",
+        "a quality check",
+        "a metric",
+        "a model or a baseline",
+        "a figure",
+        "a section of the report",
+    ]
+
+
+@pytest.mark.parametrize("name", ["run.raw", "run.dat"])
+def test_a_reader(add, tmp_path, name):
+    add("a reader", formats.READERS)
+    t = 0.1 * np.arange(50)
+    path = tmp_path / name
+    path.write_bytes(b"RAW1" + np.column_stack([t, np.sin(t)]).tobytes())
+    np.testing.assert_array_equal(formats.read_columns(path).values["heave"], np.sin(t))
+    (tmp_path / "campaign.toml").write_text(f"[channels.heave]\n[runs.a]\nfile = '{name}'\n")
+    run = seakeep.read_campaign(tmp_path / "campaign.toml").prepare()["a"]
+    np.testing.assert_allclose(run["heave"], 1e-3 * np.sin(t), rtol=1e-15)
+    (tmp_path / "text.raw").write_text("time,heave\n0,1\n1,2\n")
+    with pytest.raises(DataError, match=r"text\.raw is no RAW file: it holds text and starts with"):
+        formats.read_columns(tmp_path / "text.raw")
+
+
+def test_a_quality_check(add):
+    add("a quality check", quality.CHECKS)
+    time = 0.05 * np.arange(2000)
+    channels = {"heave": 1e-4 * np.sin(time), "surge": np.sin(time)}
+    run = xr.Dataset({n: ("time", x, {"units": "m"}) for n, x in channels.items()}, {"time": time})
+    (found,) = quality.check(Record("first", run))
+    assert found.text == "has an SD of 7.1e-05 m, less than 0.001 m"
+    run.attrs["quality"] = as_json([found])
+    assert findings_of(run) == [found]
+    with pytest.warns(SeakeepWarning, match=r"^first: heave has an SD of .*Check the gain of"):
+        warn_of([found], set())
+
+
+def test_a_metric(add, run):
+    mae = add("a metric", {})["mae"]
+    measured = run[["heave", "pitch"]]
+    found = mae(predicted=measured + 0.1, measured=measured)
+    for name in measured:
+        assert float(found[name]) == pytest.approx(0.1 / float(measured[name].std(ddof=1)))
+    arrays = measured.to_dataarray("channel").values.T
+    expected = [float(found[name]) for name in measured]
+    assert mae(predicted=arrays + 0.1, measured=arrays) == pytest.approx(expected)
+
+
+def test_a_model_a_figure_and_a_section_in_the_report_of_a_study(add, run, tmp_path):
+    pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+    from seakeep.models import KINDS
+    from seakeep.report.page import write_report
+    from seakeep.report.sections import SECTIONS
+    from seakeep.study import read_result, read_study, run_study
+
+    fading = add("a model or a baseline", KINDS)["Fading"]
+    model = fading().fit(run, ["heave", "pitch"])
+    again = seakeep.load_model(model.save(tmp_path / "fading.nc"))
+    forecast = again.forecast(run, start=10.0, steps=2)
+    start, mean = run.heave.values[200], float(run.heave.mean())
+    np.testing.assert_allclose(forecast.heave.values[1], mean + 0.99**2 * (start - mean))
+    assert again.summary().startswith("The state at the start, fading to the mean, dt 0.05 s")
+
+    add("a figure", SECTIONS)
+    add("a section of the report", SECTIONS)
+    del SECTIONS[:-2]  # the others take their time
+    put_tutorial(tmp_path, STUDY)
+    run_study(read_study(tmp_path / "study.toml"), tmp_path / "out")
+    text = write_report(read_result(tmp_path / "out")).read_text("utf-8")
+    assert (tmp_path / "out/figures/sizes.svg").exists()
+    assert (tmp_path / "out/tables/members.csv").read_text("utf-8").splitlines()[1:] == ["pair,2"]
+    assert '<li><a href="#sizes">' in text
+    assert '<section id="members"><h2>Sizes of ensembles</h2>' in text
+
+
+def test_the_page_names_the_rooms_of_the_house():
+    table = PAGE[PAGE.index("| room, from the top |") : PAGE.index("Where this differs")]
+    rows = [line.split("|")[1] for line in table.splitlines()[2:] if line.startswith("|")]
+    named = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
+    source = ROOT / "src/seakeep"
+    found = {path.stem for path in source.glob("*.py")} | {
+        path.parent.name for path in source.glob("*/__init__.py")
+    }
+    assert sorted(named) == sorted(found - {"__init__", "__main__"})
