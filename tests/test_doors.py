@@ -10,7 +10,7 @@ import xarray as xr
 from tutorial_study import put_tutorial
 
 import seakeep
-from seakeep import formats, quality
+from seakeep import formats, models, quality
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.quality import Record, findings_of, warn_of
 from seakeep.quality.findings import as_json
@@ -59,6 +59,7 @@ def test_each_door_is_tried_here():
         "a quality check",
         "a metric",
         "a model or a baseline",
+        "an input map",
         "a figure",
         "a section of the report",
     ]
@@ -103,14 +104,28 @@ def test_a_metric(add, run):
     assert mae(predicted=arrays + 0.1, measured=arrays) == pytest.approx(expected)
 
 
+def test_an_input_map(add, tmp_path):
+    slope = add("an input map", models.OBSERVABLES)["Slope"]
+    time, eta = 0.1 * np.arange(600), np.random.default_rng(0).standard_normal(600)
+    heave = np.r_[0.0, 0.0, np.abs(np.diff(eta))[:-1]]  # answers the rectified slope at once
+    variables = {"heave": heave, "eta": eta}
+    run = xr.Dataset({n: ("time", x, {"units": "m"}) for n, x in variables.items()}, {"time": time})
+    spec = seakeep.HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=[slope()])
+    model = spec.fit(run, ["heave"], ["eta"])
+    assert model.regressors == ["eta", "slope"]
+    again = seakeep.load_model(model.save(tmp_path / "slope.nc"))
+    forecast = again.forecast(run, start=10.0, steps=300)
+    # The moments leave out the first samples: 2 of 600.
+    np.testing.assert_allclose(forecast.heave, run.heave.sel(time=forecast.time), atol=5e-3)
+
+
 def test_a_model_a_figure_and_a_section_in_the_report_of_a_study(add, run, tmp_path):
     pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
-    from seakeep.models import KINDS
     from seakeep.report.page import write_report
     from seakeep.report.sections import SECTIONS
     from seakeep.study import read_result, read_study, run_study
 
-    fading = add("a model or a baseline", KINDS)["Fading"]
+    fading = add("a model or a baseline", models.KINDS)["Fading"]
     model = fading().fit(run, ["heave", "pitch"])
     again = seakeep.load_model(model.save(tmp_path / "fading.nc"))
     forecast = again.forecast(run, start=10.0, steps=2)

@@ -4,6 +4,7 @@ from seakeep.models.ensemble import BandForecast, HankelEnsemble, HeldEnsemble
 from seakeep.models.executor import processes
 from seakeep.models.inputs import FittedAlignment, ProbeAlignment
 from seakeep.models.interface import InputMap, Model, Needs, Signature, Spec
+from seakeep.models.labelled import ChannelLabel
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.observables import OBSERVABLES, Bound, Expression, Powers, SlowSquares
 from seakeep.models.offsets import ProbeOffset, estimate_probe_offset
@@ -19,6 +20,7 @@ __all__ = [
     "BandForecast",
     "BayesianHankelDMDc",
     "Bound",
+    "ChannelLabel",
     "Expression",
     "FittedAlignment",
     "Fixed",
