@@ -264,7 +264,7 @@ def write_netcdf(
     Raises
     ------
     OSError
-        If a file cannot be read or written; :func:`replacing` tells it in words.
+        If a file cannot be read or written; :func:`replacing` puts it into words.
     """
     # Here, so that commands that write no such file start without HDF5.
     import h5netcdf

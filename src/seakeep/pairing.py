@@ -28,7 +28,7 @@ class Paired:
     lead : tuple of str
         Dimensions of the first Dataset before ``time``.
     arrays : dict of str to ndarray
-        One a Dataset, at the instants of the first: (…, time, channel) of the first; the others
+        One per Dataset, at the instants of the first: (…, time, channel) of the first; the others
         the same shape, or (time, channel) where they have no further dimension.
     """
 

@@ -309,7 +309,7 @@ def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise RequestError(
             f"{path} is not valid TOML: {error}. Write texts in quotes, lists in [ ], "
-            "one 'key = value' a line, and each table and key once." + _if_no_toml(path, what)
+            "one 'key = value' per line, and each table and key once." + _if_no_toml(path, what)
         ) from None
     except RecursionError:
         raise RequestError(

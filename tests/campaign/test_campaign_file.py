@@ -69,13 +69,13 @@ MISTAKES = [
         'file = "second.csv"\n',
         "",
         "runs.second: a run needs either 'file', relative to the campaign file, or 'files', a "
-        "table of one file an instrument; received a table with role, span.",
+        "table of one file per instrument; received a table with role, span.",
     ),
     (
         "sampling_rate = 10",
         "sampling_rate = -10",
         "preparation.sampling_rate: received -10, which should be greater than 0. "
-        "Give samples a second, Hz.",
+        "Give samples per second, Hz.",
     ),
     (
         "sampling_rate = 10",

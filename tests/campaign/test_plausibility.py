@@ -77,7 +77,7 @@ class TestClocksAndRates:
 
     @pytest.mark.parametrize(
         ("files", "text"),
-        [('time = "Time"\nsampling_rate = 100', "samples at 50 Hz, as its times tell; 100 Hz are"),
+        [('time = "Time"\nsampling_rate = 100', "samples at 50 Hz, by its times; 100 Hz are"),
          ("sampling_rate = 25", "counted at the 25 Hz stated; the file's own times, which are "),
          ('time = "Time"\nsampling_rate = 50', None), ("sampling_rate = 50", None)],
     )  # fmt: skip
@@ -145,7 +145,7 @@ class TestRecords:
         assert run.attrs["test_span"] == pytest.approx((10.0, 15.0))
 
     def test_one_that_begins_late_too(self, loggers):
-        with pytest.warns(SeakeepWarning, match=r"mru begins at 3 s, the other loggers at 0 s"):
+        with pytest.warns(SeakeepWarning, match=r"mru starts at 3 s, the other loggers at 0 s"):
             run = loggers(begin=3.0).prepare()["first"]
         assert len(records(run)) == 1
 

@@ -222,7 +222,7 @@ def amplitudes(run):
 
 
 def test_the_paper_preset_of_the_preparation(tmp_path):
-    """Pass 10 Hz, stop 10.75 Hz, then 32 samples a period, and no other filter."""
+    """Pass 10 Hz, stop 10.75 Hz, then 32 samples per period, and no other filter."""
     run = tone_campaign(tmp_path, TONES, "paper")
     assert run.attrs["preparation_preset"] == "paper"
     assert run.attrs["dt"] == PERIOD / 32

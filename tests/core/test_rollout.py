@@ -135,7 +135,7 @@ def test_a_window_that_was_given_up_does_not_come_back():
     [
         ({"inputs": np.zeros((3, 12))}, r"rollout needs A .* received .*\(3, 12\)"),
         ({"histories": np.zeros((3, 7))}, r"histories \(3, 7\) .* a history has 8 values"),
-        ({"histories": np.zeros((2, 4, 2))}, r"both have one row a window"),
+        ({"histories": np.zeros((2, 4, 2))}, r"both have one row per window"),
         ({"inputs": np.zeros((3, 16, 3))}, r"inputs with 3 channels do not fit B of shape"),
         ({"inputs": np.zeros((3, 4, 2))}, r"inputs of 4 samples do not reach one step: 4 delays"),
         ({"B": np.zeros((2, 0))}, r"inputs with 2 channels .* shape \(window, steps, 0\)"),

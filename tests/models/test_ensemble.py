@@ -21,7 +21,7 @@ from seakeep import (
 from seakeep.models import engine, summaries
 from seakeep.models.draws import child
 
-PERIOD, DT = 1.6, 0.1  # 16 samples a period
+PERIOD, DT = 1.6, 0.1  # 16 samples per period
 STATES, INPUTS = ["heave", "pitch"], ["eta"]
 
 

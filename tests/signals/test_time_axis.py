@@ -115,7 +115,7 @@ RATE, PERIOD = 500.0, 1.64  # of the paper
 
 @pytest.mark.parametrize("part", [0.05, 0.4, 0.79, 0.8])
 def test_gain_below_four_fifths_of_the_new_nyquist_frequency(part):
-    """The recommended chain, 500 Hz to 32 samples a period of 1.64 s, tone by tone."""
+    """The recommended chain, 500 Hz to 32 samples per period of 1.64 s, tone by tone."""
     gain, _ = gains(part * 0.5 * 32 / PERIOD)
     assert gain == pytest.approx(1.0, abs=1.2e-3)  # 60 dB, Kaiser's formula met within 1 dB
 

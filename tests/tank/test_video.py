@@ -77,7 +77,7 @@ def test_lamp_shows_the_trigger(video, played):
 
 
 # The camera starts late by more than a twentieth of this short run, which is told.
-@pytest.mark.filterwarnings("ignore:one. video begins at:seakeep.SeakeepWarning")
+@pytest.mark.filterwarnings("ignore:one. video starts at:seakeep.SeakeepWarning")
 def test_a_filmed_campaign_is_prepared(filmed, tmp_path):
     files = play(filmed, tmp_path, videos=["one"])["one"]
     assert files["side_view"].suffix == ".mp4"

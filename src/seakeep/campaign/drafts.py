@@ -119,7 +119,7 @@ def _key(name: str) -> str:
 
 
 def _times(tables: Sequence[Columns]) -> list[str | None]:
-    """Time column of each file, by its name; else by its values, where no file tells its rate."""
+    """Time column of each file, by its name; else by its values, where no file states its rate."""
     named = [time_column(table) for table in tables]
     return [
         rising_column(table) if time is None and table.sampling_rate is None else time

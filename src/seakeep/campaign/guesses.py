@@ -87,7 +87,7 @@ class File:
 
     @property
     def rate(self) -> float | None:
-        """Samples per second, where the file tells."""
+        """Samples per second, where the file states them."""
         step = None if self.time is None else time_step_of(self.table, self.time)
         return self.table.sampling_rate if step is None else 1.0 / step
 

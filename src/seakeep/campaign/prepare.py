@@ -1,4 +1,4 @@
-"""The campaign: runs as they were measured, and as a model wants them."""
+"""The campaign: runs as measured, and as models take them."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ KEPT = 2**30
 model tests fit; what is beyond is read again."""
 
 FORMAT = 7
-"""Goes into the digest: raise it when the same settings begin to give other arrays or findings."""
+"""Goes into the digest: raise it when the same settings give other arrays or findings."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Campaign:
         return list(self.settings.models)
 
     def model(self, name: str | None = None) -> ModelSettings:
-        """Look the settings of a model up.
+        """Return the settings of a model.
 
         Parameters
         ----------
@@ -546,8 +546,8 @@ def read_campaign(path: Path | str) -> Campaign:
     Raises
     ------
     RequestError
-        If the file is missing or no TOML, or says what a campaign cannot say: one message names
-        every key at fault, the value received, and the mend.
+        If the file is missing, is no TOML, or does not describe a campaign: one message names
+        every key at fault, the value received, and the remedy.
     """
     path = Path(path).expanduser()
     return Campaign(path, read_settings(path))

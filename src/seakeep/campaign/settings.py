@@ -1,7 +1,7 @@
 """What a campaign file may say: one frozen table a section, validated by pydantic.
 
 Nothing is read from disk here; :mod:`seakeep.campaign.validation` fills these tables from TOML and
-turns what does not fit into messages. A field's description is the mend that a message proposes.
+turns what does not fit into messages. A field's description is the remedy that a message proposes.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class FileSettings(Table):
     time: str | None = Field(default=None, description="the name of the time column")
     time_unit: str | None = Field(default=None, description="unit of the time column, such as 'ms'")
     sampling_rate: Positive | None = Field(
-        default=None, description="samples a second, for files that have no time column"
+        default=None, description="samples per second, for files that have no time column"
     )
     sampling_rate_assumed: bool = Field(
         default=False,
@@ -111,7 +111,7 @@ class FileSettings(Table):
     )
     decimal: Literal[".", ","] | None = Field(default=None, description="'.' or ','")
     comment: Annotated[str, Field(min_length=1)] | None = Field(
-        default=None, description="the mark that begins a comment line; '#' and '%' are known"
+        default=None, description="the mark that starts a comment line; '#' and '%' are known"
     )
     skip_rows: Annotated[int, Field(ge=0)] = Field(
         default=0, description="lines to leave out at the head of the file"
@@ -128,7 +128,7 @@ class FileSettings(Table):
     )
 
     def known(self) -> Options:
-        """What a reader is told of these."""
+        """What a reader needs to know of these."""
         return Options(**{each.name: getattr(self, each.name) for each in fields(Options)})
 
 
@@ -183,7 +183,7 @@ def _run_name(name: str) -> str:
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.+-]{,99}", name):
         raise ValueError(
             "the name of a run is made of at most 100 letters, digits and '_', '-', '.', '+', and "
-            "begins with a letter or digit, because files are named after it; rename it"
+            "starts with a letter or digit, because files are named after it; rename it"
         )
     return name
 
@@ -207,7 +207,7 @@ class InstrumentSettings(Table):
     """
 
     sampling_rate: Positive | None = Field(
-        default=None, description="samples a second; times are counted where the file has none"
+        default=None, description="samples per second; times are counted where the file has none"
     )
     sampling_rate_assumed: bool = Field(
         default=False,
@@ -394,7 +394,7 @@ class PreparationSettings(Table):
     """``[preparation]``: the common time step and how it is reached.
 
     The preset ``paper`` filters every channel that was sampled fast enough as the paper does
-    (pass 10 Hz, stop 10.75 Hz, 60 dB) and then takes 32 samples a period without another filter;
+    (pass 10 Hz, stop 10.75 Hz, 60 dB) and then takes 32 samples per period without another filter;
     ``recommended`` filters below 0.8 of the new Nyquist frequency. Keys that are stated replace
     those of the preset.
     """
@@ -402,10 +402,10 @@ class PreparationSettings(Table):
     preset: Literal["paper", "recommended"] | None = Field(
         default=None, description="'paper' or 'recommended'"
     )
-    sampling_rate: Positive | None = Field(default=None, description="samples a second, Hz")
+    sampling_rate: Positive | None = Field(default=None, description="samples per second, Hz")
     dt: Positive | None = Field(default=None, description="time step in seconds")
     steps_per_period: Annotated[int, Field(ge=4)] | None = Field(
-        default=None, description="samples a mean encounter period; 32 is the paper's"
+        default=None, description="samples per mean encounter period; 32 is the paper's"
     )
     attenuation: Annotated[float, Field(ge=50, le=200)] = Field(
         default=60.0, description="attenuation above the new Nyquist frequency, dB, at least 50"
@@ -484,7 +484,7 @@ class AlignmentSettings(Table):
 class RunSettings(Table):
     """``[runs.NAME]``: one run, its file or files, and what it serves for.
 
-    `file` where one file holds all channels, else `files`, one an instrument. Either `role` (with
+    `file` where one file holds all channels, else `files`, one per instrument. Either `role` (with
     an optional `span`, the part that is used), or `train` and `test`, spans of one run that is
     used for both. `record` cuts the files before anything else is done with them.
     """
@@ -538,7 +538,7 @@ class RunSettings(Table):
         if (self.file is None) == (not self.files):
             raise ValueError(
                 "a run needs either 'file', relative to the campaign file, or 'files', a table of "
-                "one file an instrument"
+                "one file per instrument"
             )
         if self.role is not None and (self.train or self.test):
             raise ValueError(
@@ -677,7 +677,7 @@ class ModelSettings(Table):
         default=None, description="a number, 0 or more; a prior for an ensemble"
     )
     window: Window | None = Field(
-        default=None, description="training snapshots a run, or periods such as '20 T'"
+        default=None, description="training snapshots per run, or periods such as '20 T'"
     )
     history: Literal["before", "inside"] | None = Field(default=None, description="")
     delay_rows: Literal["ridge", "exact"] | None = Field(default=None, description="")

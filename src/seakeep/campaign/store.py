@@ -1,4 +1,4 @@
-"""Prepared runs on disk: one NetCDF file a run, used again while it is fresh and unaltered."""
+"""Prepared runs on disk: one NetCDF file per run, used again while it is fresh and unaltered."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from seakeep.files import (
 __all__ = ["load_prepared", "prepared_folder", "write_prepared"]
 
 PREPARED = "prepared run"
-"""Kind of these files, by which they are told from measurements."""
+"""Kind of these files, which sets them apart from measurements."""
 
 
 def write_prepared(

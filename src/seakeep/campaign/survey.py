@@ -1,4 +1,4 @@
-"""What only all runs together tell: the clocks of the loggers and the encounter period."""
+"""Computed from all runs together: the clocks of the loggers and the encounter period."""
 
 from __future__ import annotations
 

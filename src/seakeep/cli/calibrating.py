@@ -56,7 +56,7 @@ def calibrate(
         typer.Option(
             "--start",
             help="First instant used of each run, s or encounter periods such as '20 T'; by "
-            "default the begin of its training span, or of the run.",
+            "default the start of its training span, or of the run.",
         ),
     ] = None,
     stop: Annotated[
@@ -73,10 +73,10 @@ def calibrate(
 ) -> None:
     """Calibrate the band of an ensemble on measured windows.
 
-    The band is widened so that it holds what it says in the sea it was calibrated in.
-    The ensemble forecasts windows end to end, none of which a member has read, and the bounds are
-    moved outwards by a quantile of how far measurements lie outside (split-conformal). Leave out
-    what the ensemble is to be judged on.
+    Widens the band until it holds the part of the measurement that it claims, in the sea of these
+    runs. The ensemble forecasts windows, end to end, that no member has read; the bounds then move
+    outwards by a quantile of the distances by which measurements lie outside (split-conformal
+    prediction). Leave out what the ensemble is to be judged on.
 
     Example: seakeep calibrate ensemble.nc docs/tutorial/campaign.toml --run unseen --stop 60
     --steps 200 -o calibrated.nc

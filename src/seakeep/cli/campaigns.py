@@ -91,7 +91,7 @@ def prepare(
         ),
     ] = None,
     anew: Annotated[
-        bool, typer.Option("--anew", help="Prepare again what is fresh already.")
+        bool, typer.Option("--anew", help="Prepare all runs again, fresh ones too.")
     ] = False,
     sheet: Annotated[
         bool, typer.Option("--sheet/--no-sheet", help="Write the data-quality sheet.")
@@ -101,8 +101,8 @@ def prepare(
 
     Raw files become analysis-ready runs, one NetCDF file each.
 
-    Each run is written as soon as it is done: interrupted, a second call continues. A run that
-    cannot be read does not keep the others from being prepared; at the end it is an error.
+    Each run is written as soon as it is done: after an interruption, the same command continues.
+    A run that cannot be read is reported at the end, with exit status 1, after all others.
 
     fit, forecast and compare use these files while they are fresh (same settings, same raw
     files), and prepare in memory what is missing.

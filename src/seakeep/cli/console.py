@@ -1,4 +1,4 @@
-"""What all commands share: streams, progress, and how mistakes are told."""
+"""What all commands share: streams, progress, and how mistakes are reported."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def messages() -> Console:
 
 
 def worker_count(workers: int | None) -> int:
-    """Number of workers that was asked for; by default one a core that may be used."""
+    """Number of workers that was asked for; by default one per core that may be used."""
     if workers is not None:
         return workers
     if hasattr(os, "sched_getaffinity"):

@@ -51,8 +51,8 @@ def fit(
 ) -> None:
     """Identify a model, or an ensemble, from a campaign.
 
-    The training runs are used. The table [model] decides which: kind =
-    'bayesian_hankel_dmdc' is an ensemble.
+    Reads the runs that train. The table [model] sets the kind of model and its settings:
+    kind = 'bayesian_hankel_dmdc' is an ensemble.
 
     Example: seakeep fit docs/tutorial/campaign.toml -o model.nc
 

@@ -61,7 +61,7 @@ Workers = Annotated[
     int | None,
     typer.Option(
         "--workers",
-        help="Processes for the members of a large ensemble; by default none but this one.",
+        help="Processes for the members of a large ensemble; by default this process alone.",
         min=1,
     ),
 ]

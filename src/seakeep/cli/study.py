@@ -24,7 +24,7 @@ Workers = Annotated[
     int | None,
     typer.Option(
         "--workers",
-        help="Processes on this machine, each on one core; by default one a core.",
+        help="Processes on this machine, each on one core; by default one per core.",
         min=1,
         metavar="N",
     ),
@@ -71,7 +71,8 @@ def reproduce(
         str, typer.Option("--preset", help="paper, or recommended (our choices).")
     ] = "paper",
     seed: Annotated[
-        int, typer.Option("--seed", help="Of waves, noise, windows, draws.", min=0, max=2**64 - 1)
+        int,
+        typer.Option("--seed", help="Seed of waves, noise, windows, draws.", min=0, max=2**64 - 1),
     ] = 0,
     workers: Workers = None,
     scheduler: Scheduler = None,

@@ -38,7 +38,7 @@ def tank(
     ] = "csv",
     one_logger: Annotated[
         bool,
-        typer.Option("--one-logger", help="One file and one clock a run, for all instruments."),
+        typer.Option("--one-logger", help="One file and one clock per run, for all instruments."),
     ] = False,
     spacing: Annotated[
         Literal["equal", "jittered"] | None,
@@ -57,8 +57,8 @@ def tank(
 ) -> None:
     """Play a virtual campaign: raw files and campaign.toml.
 
-    The raw files are such as a towing tank delivers.
-    The truth lies in the folder truth, which no identification command reads.
+    Raw files look like those of a towing tank. The folder truth holds the true motions; no command
+    that identifies models reads it.
 
     Example: seakeep tank --out virtual --seed 0
     """

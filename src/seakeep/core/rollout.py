@@ -128,7 +128,7 @@ def rollout(
     if start.shape[1] != a.shape[1] or start.shape[0] != driving.shape[0]:
         raise RequestError(
             f"histories {np.shape(histories)} and inputs {driving.shape} do not fit A {a.shape}: "
-            f"a history has {a.shape[1]} values, and both have one row a window."
+            f"a history has {a.shape[1]} values, and both have one row per window."
         )
     groups, further = [(b, driving)], () if direct is None else np.shape(direct)
     if direct is not None:
@@ -418,7 +418,7 @@ def _forced(rows: Arrays, matrices: Arrays) -> FloatArray:
 def _run_shifting(
     propagator: _Propagator, start: FloatArray, rows: Arrays
 ) -> tuple[FloatArray, FloatArray]:
-    # Samples lie newest first in one long row a window, so the extended state of every block is a
+    # Samples lie newest first in one long row per window, so the extended state of every block is a
     # contiguous piece of it and nothing is ever moved. Rows come with the last block first too.
     windows = len(start)
     width, size = propagator.output_state.shape

@@ -107,7 +107,7 @@ def identify_subspace(
     future : int
         f, instants of the future.
     ridge : float
-        λ of the first regression per column, for inputs that nearly tell their own future.
+        λ of the first regression per column, for inputs that nearly predict their own future.
     direct : sequence of ndarray, each (time, d), optional
         Further inputs of the runs, which the filter of the past does not read.
 

@@ -236,7 +236,7 @@ class FIR(LinearSpec):
     input_delays : int
         z. A forecast needs z + 1 samples of history.
     ridge : float, optional
-        λ, for inputs of a narrow band, whose past and present tell nearly the same.
+        λ, for inputs of a narrow band, whose past and present are nearly the same.
     ridge_scale : {"absolute", "per_snapshot"}, optional
         Whether λ is multiplied by the number of columns.
     window, history, standardize, alignment, lead, observables
@@ -290,9 +290,9 @@ class Subspace(HankelSettings):
     order : int
         Number of latent states.
     future : int, optional
-        Instants of the future that the state has to tell; by default s + 1.
+        Instants of the future that the state must predict; by default s + 1.
     ridge : float, optional
-        λ per snapshot of the first regression, for inputs that tell their own future.
+        λ per snapshot of the first regression, for inputs that predict their own future.
     window, history, standardize, alignment, lead, observables
         As in :class:`seakeep.HankelDMDc`; an alignment to the predicted surge is refused.
     """

@@ -139,7 +139,7 @@ def draw_members(spec: Drawn, dt: float, samples: Sequence[int], input_map: Inpu
     Returns
     -------
     list of Draw
-        One a member.
+        One per member.
 
     Raises
     ------

@@ -630,7 +630,7 @@ class HankelEnsemble(_Forecasts):
         -------
         HeldEnsemble
             Its ``forecast_arrays`` gives mean and band from plain arrays. It takes N(N(s+1) +
-            Q(z+1)) numbers a member with exact delay rows, and s + 1 times as many with
+            Q(z+1)) numbers per member with exact delay rows, and s + 1 times as many with
             regressed ones.
         """
         found = in_order(_identify, self, range(self.n_members), executor, progress)
@@ -820,17 +820,17 @@ class HeldEnsemble(_Forecasts):
 
     @property
     def signature(self) -> Signature:  # type: ignore[override]
-        """That of the ensemble."""
+        """Signature of the ensemble."""
         return self.ensemble.signature
 
     @property
     def origin(self) -> Json:  # type: ignore[override]
-        """That of the ensemble."""
+        """Priors, seed and rules of the ensemble."""
         return self.ensemble.origin
 
     @property
     def calibration(self) -> Calibration | None:  # type: ignore[override]
-        """That of the ensemble."""
+        """Calibration of the ensemble."""
         return self.ensemble.calibration
 
     @property

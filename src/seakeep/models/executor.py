@@ -289,7 +289,7 @@ def _submitting(
             ) from None
         if type(error).__name__ == "KilledWorker":  # of Dask, which may not be installed
             raise WorkerLostError(
-                "a piece of work took several workers of the cluster with it (is their memory "
+                "several workers of the cluster were lost over one piece of work (is their memory "
                 f"large enough?): {error}"
             ) from None
         raise

@@ -1,8 +1,8 @@
 """The contracts of this room: what is fitted, what forecasts, and what drives a forecast.
 
-Helpers take a :class:`Signature`, never a whole model. Whoever adds a model writes a ``Spec`` and a
-``Model`` and adds one line to :data:`seakeep.models.registry.KINDS`; whoever adds an input map
-writes an ``InputMap`` and adds one line to :data:`seakeep.models.inputs.MAPS`.
+Helpers take a :class:`Signature`, never a whole model. A new model is a ``Spec``, a
+``Model`` and one line in :data:`seakeep.models.registry.KINDS`; a new input map is an ``InputMap``
+and one line in :data:`seakeep.models.inputs.MAPS`.
 """
 
 from __future__ import annotations
@@ -217,7 +217,7 @@ class Fittable(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Signature:
-    """What a forecast must know of a model, or of an ensemble.
+    """What a forecast needs to know about a model or an ensemble.
 
     Parameters
     ----------
@@ -295,18 +295,18 @@ class Needs:
 
 
 class Model(Protocol):
-    """What compare, study, report and check know of a fitted model; arrays are ``engine``'s."""
+    """What compare, study and report know about a fitted model."""
 
     kind: ClassVar[str]
 
     @property
     def signature(self) -> Signature:
-        """What helpers take."""
+        """Time step, labels, delays, scales and input map."""
         ...
 
     @property
     def n_members(self) -> int:
-        """1 of a single model."""
+        """Number of members; 1 for a single model."""
         ...
 
     @property

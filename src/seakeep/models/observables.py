@@ -73,7 +73,7 @@ class Observable(Protocol):
     kind: ClassVar[str]
 
     def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
-        """Make it ready for these inputs.
+        """Columns for these inputs.
 
         `period` is the encounter period in samples, None where no observable of the model has a
         ``period`` to fill in; `dt` is the time step in s.
@@ -174,7 +174,7 @@ class SlowSquares:
             _numbers(self.period, f"{what}: period", "seconds above 0", lambda n: n > 0)
 
     def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
-        """Make it ready; see :class:`Observable`."""
+        """Columns for these inputs; see :class:`Observable`."""
         places = [_column(inputs, name, self.kind) for name in self.of]
         period = period if self.period is None else self.period / dt
         assert period is not None
@@ -261,7 +261,7 @@ class Powers:
             )
 
     def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
-        """Make it ready; see :class:`Observable`."""
+        """Columns for these inputs; see :class:`Observable`."""
         places = [_column(inputs, name, self.kind) for name in self.of]
         pairs = list(combinations(places, 2)) if self.products else []
         labels = [
@@ -291,7 +291,7 @@ class Powers:
         return Bound(tuple(labels), True, 0, 0, columns)
 
     def reach(self, dt: float) -> tuple[int, int]:
-        """None."""
+        """0, 0: the instant itself."""
         return 0, 0
 
 
@@ -329,7 +329,7 @@ class Expression:
         expressions.parse(self.expression)
 
     def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
-        """Make it ready; see :class:`Observable`."""
+        """Columns for these inputs; see :class:`Observable`."""
         parsed = expressions.parse(self.expression)
         places = {name: _column(inputs, name, self.kind) for name in parsed.channels}
 
@@ -344,7 +344,7 @@ class Expression:
         return Bound((label,), True, 0, 0, columns)
 
     def reach(self, dt: float) -> tuple[int, int]:
-        """None."""
+        """0, 0: the instant itself."""
         return 0, 0
 
 

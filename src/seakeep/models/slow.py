@@ -1,4 +1,4 @@
-"""Slow motions of which a training window holds too few cycles to tell mean and spread."""
+"""Slow motions of which a training window holds too few cycles to estimate mean and spread."""
 
 from __future__ import annotations
 

@@ -359,7 +359,7 @@ def stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
         if len(values) != len(names):
             raise RequestError(
                 f"stop has {len(values)} instants for {len(names)} runs; give one for all, or "
-                "one a run."
+                "one per run."
             )
         return dict(zip(names, values, strict=True))
     return dict.fromkeys(names, labelled.as_instant(stop, "stop"))

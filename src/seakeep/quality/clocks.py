@@ -50,10 +50,10 @@ class ClocksKind(Kind):
     TIME_GAPS = "time has {gaps} gap(s): {missing} samples are missing"
     JITTER = "time has a jitter of {jitter:.3g} ms RMS; interpolated onto a uniform step"
     TIMES_ASIDE = (
-        "counted at the {limit:g} stated; the file's own times, which are left aside, tell "
+        "counted at the {limit:g} stated; the file's own times, which are left aside, give "
         "{value:.5g}. Leave sampling_rate out, or correct it"
     )
-    OTHER_RATE = "samples at {value:.5g}, as its times tell; {limit:g} are stated"
+    OTHER_RATE = "samples at {value:.5g}, by its times; {limit:g} are stated"
     ASSUMED_CLOCK = (
         "clock assumed the same as the reference's: state trigger, shared, correlated or offset (0 "
         "where the two run on one clock) in [instruments.{channel}]"
@@ -61,7 +61,7 @@ class ClocksKind(Kind):
     UNCERTAIN_CLOCK = "clock poorly known: {described}"
     CLOCK_DRIFT = "clock drifts by {value:+.0f} ppm"
     STARTS_LATE = (
-        "begins at {value:.4g}, the other loggers at {limit:.4g}: the run is cut to what all "
+        "starts at {value:.4g}, the other loggers at {limit:.4g}: the run is cut to what all "
         "recorded",
         _FILE,
     )
@@ -71,7 +71,7 @@ class ClocksKind(Kind):
         _FILE,
     )
     RATE = (
-        "is sampled at {value:g}, which is assumed: no file tells its rate",
+        "is sampled at {value:g}, which is assumed: no file states its rate",
         "All periods and rates follow from it. Correct sampling_rate in [{table}], and remove "
         "sampling_rate_assumed there.",
     )

@@ -27,7 +27,7 @@ __all__ = ["SensorsKind", "compared", "held", "positions", "redundant"]
 
 
 class SensorsKind(Kind):
-    """What two sensors tell of each other."""
+    """What two sensors say about each other."""
 
     STILL = "against {other}: constant while the other sensor moves"
     UNSEEN = "against {other}: no motion seen"
@@ -101,7 +101,7 @@ def redundant(record: Record) -> Iterator[Finding]:
 
 
 def _faults(found: Agreement, unit: str) -> Iterator[tuple[SensorsKind, float, float, str]]:
-    """What speaks against a sensor: kind, value, limit, unit."""
+    """Evidence against a sensor: kind, value, limit, unit."""
     if not np.isfinite(found.correlation):
         kind = SensorsKind.STILL if found.gain == 0 else SensorsKind.UNSEEN
         yield kind, found.gain, np.nan, "1"

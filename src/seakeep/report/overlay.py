@@ -34,7 +34,7 @@ LONG = 60
 """A record of more periods than this is drawn as an envelope, with a part of it enlarged."""
 ENLARGED = 20
 MOST_STEPS = 150
-"""Steps of an envelope that a panel can show; longer records take several periods a step."""
+"""Steps of an envelope that a panel can show; longer records take several periods per step."""
 
 LABEL = 8
 """Points of a label: the longest line of one fits beside its panel."""
@@ -131,7 +131,7 @@ def _of_one_unit(inputs: xr.Dataset) -> list[list[str]]:
 
 
 def _with_prefixes(comparison: Comparison) -> Comparison:
-    """Loads in kN or MN where they are large: one factor a state, and one for alike inputs."""
+    """Loads in kN or MN where they are large: one factor per state, and one for alike inputs."""
     forecast, measured, inputs = (
         each.copy() for each in (comparison.forecast, comparison.measured, comparison.inputs)
     )

@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 SHEET = "data-quality sheet"
-"""Kind of the files of a sheet, by which they are told from the user's."""
+"""Kind of the files of a sheet, which sets them apart from the user's."""
 
 _MARKS = {
     "missing": ("#D55E00", "x"),

@@ -352,7 +352,7 @@ def complementary_filter(
     """
     if times not in (1, 2):
         raise RequestError(
-            f"blend gives a rate or a position: times is 1 or 2; received {times!r}."
+            f"complementary_filter gives a rate or a position: times is 1 or 2; received {times!r}."
         )
     x, a = as_series(position, minimum=8), as_series(acceleration, minimum=8)
     if x.shape != a.shape or x.ndim != 1:

@@ -267,7 +267,7 @@ def _sinc_sums(
 ) -> FloatArray:
     """Low-passed values of a series between its samples.
 
-    `position` counts in old samples; `edges`, of the pass and stop bands, are cycles a sample.
+    `position` counts in old samples; `edges`, of the pass and stop bands, are cycles per sample.
     """
     attenuation = max(positive(attenuation, "the attenuation", "dB"), 50.0)
     width = edges[1] - edges[0]

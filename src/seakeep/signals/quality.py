@@ -36,7 +36,7 @@ __all__ = [
 MISSING, BRIDGED, OUTLIER, SATURATED, STUCK, REPLACED = 1, 2, 4, 8, 16, 32
 
 LEAST_CORRELATION = 0.8
-"""At a lower correlation no lag and no scale is told: 36 % of the variance would be the sensor's
+"""At a lower correlation no lag and no scale is given: 36 % of the variance would be the sensor's
 own."""
 
 LARGEST_NRMSE = 0.2

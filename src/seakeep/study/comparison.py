@@ -244,7 +244,7 @@ def compare(
     Returns
     -------
     list of Comparison
-        One a run.
+        One per run.
 
     Raises
     ------

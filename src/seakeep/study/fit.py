@@ -24,7 +24,7 @@ __all__ = ["fit_baselines", "fit_campaign", "training_runs", "warn_of_repeats", 
 
 BASELINES = ("hold_last", "mean", "fir", "arx", "subspace")
 CYCLES = 5.0
-"""Periods of a test from which on its spectrum tells which waves it holds."""
+"""Periods of a test from which on its spectrum shows which waves it holds."""
 NOTHING_TRAINS = (
     "no run of the campaign trains a model. Give one role = 'train', or a span "
     "train = [start, end]."

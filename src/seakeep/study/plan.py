@@ -281,7 +281,7 @@ def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
     Parameters
     ----------
     spans : sequence of (str, float, float)
-        Run, begin and end of each window.
+        Run, start and end of each window.
 
     Returns
     -------

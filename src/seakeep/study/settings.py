@@ -293,8 +293,8 @@ def read_study(path: Path | str) -> Study:
     Raises
     ------
     RequestError
-        If a file is missing or no TOML, or says what a study cannot say: one message names every
-        key at fault, the value received, and the mend.
+        If a file is missing, is no TOML, or does not describe a study: one message names every key
+        at fault, the value received, and the remedy.
     """
     path = Path(path).expanduser()
     settings = validated(StudySettings, read_toml(path, "study"), path, "study")

@@ -61,7 +61,7 @@ def versions() -> dict[str, str]:
 
 @contextmanager
 def storing(folder: Path) -> Iterator[None]:
-    """Say why results could not be written, and what mends it."""
+    """Say why results could not be written, and the remedy."""
     try:
         yield
     except (RequestError, OSError) as error:

@@ -268,8 +268,8 @@ def play(
     kind : {"csv", "nc"}, optional
         Format of the raw files.
     one_logger : bool, optional
-        Record all instruments on one logger (one file a run, no clock errors) instead of one
-        file an instrument.
+        Record all instruments on one logger (one file per run, no clock errors) instead of one
+        file per instrument.
     names : iterable of str, optional
         Runs; the default is all.
     videos : iterable of str, optional

@@ -90,7 +90,7 @@ def _cells(result: StudyResult, test: str, model: str, measure: str) -> FloatArr
 
 
 def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
-    """ANRMSE and NAMMAE of all cells of some test sets, a box-violin a model."""
+    """ANRMSE and NAMMAE of all cells of some test sets, a box-violin per model."""
     with figure_style():
         figure = new_figure(max(8.5, 2.0 + 1.7 * len(tests)), 3.6)
         for axes, (measure, heading) in zip(figure.subplots(1, 2), HEADING.items(), strict=True):

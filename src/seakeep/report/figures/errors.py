@@ -85,7 +85,7 @@ def member_errors(result: StudyResult, test: str, model: str) -> FloatArray:
 
 
 def hyperparameter_figure(result: StudyResult, model: str) -> Figure:
-    """Error of each member against what was drawn for it, a row a test set."""
+    """Error of each member against what was drawn for it, a row per test set."""
     with figure_style():
         draws = result.groups[f"draws/{model}"]
         drawn = [name for name in HYPERPARAMETERS if np.ptp(draws[name].values) > 0]
