@@ -354,7 +354,8 @@ def mean_period(runs: Mapping[str, xr.Dataset], elevations: Sequence[str]) -> fl
             found.append(encounter_period(wave[np.isfinite(wave)], dt) / dt)
         except (DataError, RequestError) as error:
             raise DataError(
-                f"{name}: observables and a predicted surge count in encounter periods, and there "
-                f"is none to be counted: {error} Set run.attrs['encounter_period'] (s)."
+                f"{name}: observables, a predicted surge and ridge = 'rollout' count in encounter "
+                f"periods, and there is none to be counted: {error} Set "
+                "run.attrs['encounter_period'] (s)."
             ) from None
     return float(np.mean(found))

@@ -47,6 +47,8 @@ class HankelDMDcModel(SingleModel):
         Runs, windows and form of the regression.
     coverage : Coverage
         Waves that it was trained in.
+    selection : str
+        How λ was chosen; empty where it was stated.
     """
 
     kind: ClassVar[str] = "hankel_dmdc"
@@ -55,6 +57,7 @@ class HankelDMDcModel(SingleModel):
     signature: Signature = field(repr=False)
     training: Training
     coverage: Coverage = field(repr=False)
+    selection: str = ""
 
     def __post_init__(self) -> None:
         self.coefficients.flags.writeable = False
@@ -383,6 +386,8 @@ class HankelDMDcModel(SingleModel):
             f"{counted(len(self.inputs), 'input')}, dt {self.dt:g} s",
             *self.lines(f"{_regression(self.settings, self.training)}; delay rows {rows}"),
         ]
+        if self.selection:
+            lines.append(f"  chosen        {self.selection}")
         radius = self.spectral_radius
         verdict = "stable" if radius < 1 else "UNSTABLE: long forecasts diverge"
         lines.append(f"  stability     spectral radius {radius:.6f} ({verdict})")
@@ -423,6 +428,7 @@ class HankelDMDcModel(SingleModel):
                 "settings": store.as_json(self.settings.to_json()),
                 "training": store.as_json(self.training.to_json()),
                 "signature": store.as_json(store.signature_json(self.signature)),
+                "selection": self.selection,
             },
         )
 
@@ -440,6 +446,7 @@ class HankelDMDcModel(SingleModel):
             signature=signature,
             training=Training.from_json(store.content(dataset, "training")),
             coverage=Coverage.from_dataset(dataset),
+            selection=str(dataset.attrs["selection"]),
         )
 
 

@@ -6,7 +6,7 @@ import math
 import numbers
 import warnings
 from dataclasses import dataclass, fields
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
@@ -65,13 +65,15 @@ def periods_to_samples(periods: float, encounter_period: float, dt: float) -> in
     return math.floor(periods * encounter_period / dt + 0.5)
 
 
-def check_ridge(value: object) -> None:
-    """Refuse a λ that is not a number, zero or positive."""
+def check_ridge(value: object, may_choose: bool = False) -> None:
+    """Refuse a λ that is not a number, zero or positive, nor "rollout" where λ can be chosen."""
+    if may_choose and isinstance(value, str) and value == "rollout":
+        return
     real = isinstance(value, numbers.Real) and not isinstance(value, bool)
     if not real or not math.isfinite(value) or value < 0:  # type: ignore[arg-type,operator]
         raise RequestError(
-            f"ridge must be a number, zero or positive; received {value!r}. "
-            "The paper uses 100; 0 asks for the solution of least norm."
+            f"ridge must be a number, zero or positive{', or the word rollout' * may_choose}; "
+            f"received {value!r}. The paper uses 100; 0 asks for the solution of least norm."
         )
 
 
@@ -85,9 +87,10 @@ class HankelSettings:
         If a setting is out of range.
     """
 
+    may_choose: ClassVar[bool] = False
     state_delays: int
     input_delays: int
-    ridge: float
+    ridge: float | Literal["rollout"]
     window: int | None = None
     history: History = "before"
     delay_rows: DelayRows = "ridge"
@@ -103,7 +106,7 @@ class HankelSettings:
         check_integer("input_delays", self.input_delays, 0)
         check_integer("window", self.window, 2, optional=True)
         check_integer("rank", self.rank, 1, optional=True)
-        check_ridge(self.ridge)
+        check_ridge(self.ridge, self.may_choose)
         check_choice("history", self.history, ("before", "inside"))
         check_choice("delay_rows", self.delay_rows, ("ridge", "exact"))
         check_choice("ridge_scale", self.ridge_scale, ("absolute", "per_snapshot"))
@@ -112,10 +115,10 @@ class HankelSettings:
         check_integer("lead", self.lead, 0)
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
         object.__setattr__(self, "observables", observables_of(self.observables))
-        if self.rank is not None and self.ridge > 0:
+        if self.rank is not None and self.ridge != 0:
             warnings.warn(
                 f"rank = {self.rank} truncates singular values instead of regularising, so "
-                f"ridge = {self.ridge:g} is not used. Set ridge=0 to say so.",
+                f"ridge = {self.ridge} is not used. Set ridge=0 to say so.",
                 SeakeepWarning,
                 stacklevel=4,
             )

@@ -31,6 +31,7 @@ from seakeep.models.priors import (
     describe,
     from_description,
 )
+from seakeep.models.selection import select
 from seakeep.models.settings import (
     DelayRows,
     HankelSettings,
@@ -71,8 +72,9 @@ class HankelDMDc(HankelSettings):
         s, number of delayed copies of the states.
     input_delays : int
         z, number of delayed copies of the inputs.
-    ridge : float
-        λ ≥ 0; zero takes the solution of least norm.
+    ridge : float or "rollout"
+        λ ≥ 0; zero takes the solution of least norm. "rollout" chooses λ per snapshot pair by the
+        error of free runs on training runs that are held out in turn; it takes exact delay rows.
     window : int, optional
         m, snapshots a run; None takes all up to ``stop``.
     history : {"before", "inside"}, optional
@@ -121,6 +123,7 @@ class HankelDMDc(HankelSettings):
     kind: ClassVar[str] = "hankel_dmdc"
     is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
+    may_choose: ClassVar[bool] = True
 
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
@@ -210,7 +213,14 @@ class HankelDMDc(HankelSettings):
             If a run is too short, has gaps or times that are not uniform, another step than the
             first, or a constant channel while ``standardize`` is set.
         """
-        data = gather(as_runs(runs), states, inputs, stop, self)
+        named = as_runs(runs)
+        if isinstance(self.ridge, str):
+            check_names(states, inputs)
+            found = select(self, until(named, stop), list(states), list(inputs))
+            ridge = found.settings.ridge
+            chosen = replace(self, ridge=ridge, ridge_scale="per_snapshot")
+            return replace(chosen.fit(named, states, inputs, stop), selection=found.note)
+        data = gather(named, states, inputs, stop, self)
         solution = identify(
             data.states,
             data.delayed,

@@ -1,0 +1,694 @@
+r"""Settings chosen by free runs on training runs that are held out.
+
+Each candidate is fitted to all training runs but one and judged by its free runs on that one, in
+windows of one or two lengths; the mean over folds, windows and channels of the NRMSE decides. The
+columns of all candidates are built once: a fold, a choice of delays and of observables is a part of
+one Gram matrix, and one eigendecomposition gives every λ (:mod:`seakeep.core.path`).
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import astuple, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from seakeep.arrays import BoolArray, FloatArray, IntArray
+from seakeep.core import metrics
+from seakeep.core.path import Moments, free_runs, lagged, ridge_path
+from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.models import labelled
+from seakeep.models.executor import Progress, in_order
+from seakeep.models.inputs import Measured
+from seakeep.models.interface import Drive, Span
+from seakeep.models.labelled import mean_period
+from seakeep.models.observables import Observable, Observed, Powers, SlowSquares
+from seakeep.models.settings import HankelSettings
+from seakeep.models.training import TrainingData, gather
+
+__all__ = [
+    "RIDGES",
+    "VARIED",
+    "Candidate",
+    "Choice",
+    "Problem",
+    "Selected",
+    "Trial",
+    "default_observables",
+    "search",
+    "select",
+    "split",
+]
+
+RIDGES = tuple(float(f"{10 ** (exponent / 2):.3g}") for exponent in range(-10, -1))
+"""λ per snapshot pair that are tried, half a decade apart.
+
+On the virtual tank and on both measured sets the best lies between 3e-4 and 3e-2; the error is flat
+within half a decade of it."""
+Scales = tuple[
+    tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]
+]
+"""Mean and standard deviation of the states, of the delayed and of the direct regressors."""
+FALLBACK = 1e-3
+"""λ per snapshot pair where nothing can be held out."""
+VARIED = ("ridge", "observables", "lead", "input_delays", "state_delays")
+"""Settings that can be chosen."""
+WORST = 10.0
+"""NRMSE at which a channel counts no worse: a run that is lost must not decide alone."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A choice of columns.
+
+    Parameters
+    ----------
+    state_delays, input_delays : int
+        s and z.
+    lead : int
+        Look-ahead of the delayed regressors, samples.
+    observables : tuple of int
+        Those that are taken, by their place among all.
+    """
+
+    state_delays: int
+    input_delays: int
+    lead: int
+    observables: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What a candidate scored.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (λ, window)
+        NRMSE averaged over the channels, by window of all folds and horizons.
+    weights : ndarray, shape (window,)
+        They sum to one; folds and horizons count alike.
+    """
+
+    scores: FloatArray
+    weights: FloatArray
+
+    @property
+    def means(self) -> FloatArray:
+        """Score at each λ."""
+        result: FloatArray = self.scores @ self.weights
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Training runs with the columns of all candidates.
+
+    Parameters
+    ----------
+    data : TrainingData
+        Gathered with the longest delays, the longest lead and all observables.
+    drives : tuple of Drive
+        One per run.
+    offsets : tuple of int
+        Sample of each run at which its arrays in `data` start.
+    widest : Candidate
+        What `data` was gathered with.
+    owners : tuple of int
+        For each delayed column the observable that made it, −1 for an input itself.
+    direct_owners : tuple of int
+        For each direct column the observable that made it.
+    horizons : tuple of int
+        Lengths of the windows, samples.
+    passes : int
+        Passes of a predicted surge; 0 where no predicted state drives the input.
+    is_per_snapshot : bool
+        Whether λ counts per snapshot pair.
+    """
+
+    data: TrainingData
+    drives: tuple[Drive, ...]
+    offsets: tuple[int, ...]
+    widest: Candidate
+    owners: tuple[int, ...]
+    direct_owners: tuple[int, ...]
+    horizons: tuple[int, ...]
+    passes: int
+    is_per_snapshot: bool = True
+    moments: tuple[Moments, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        made = tuple(self._moments(run) for run in range(len(self.data.names)))
+        object.__setattr__(self, "moments", made)
+
+    def _moments(self, run: int) -> Moments:
+        data, window, widest = self.data, self.data.windows[run], self.widest
+        first, count = window.first_column, window.columns
+        parts = [
+            lagged(data.states[run], first, count, widest.state_delays),
+            lagged(data.delayed[run], first, count, widest.input_delays),
+            data.direct[run][first : first + count],
+        ]
+        targets = data.states[run][first + 1 : first + 1 + count]
+        return Moments.of(np.concatenate(parts, axis=1), targets)
+
+    def columns(self, candidate: Candidate) -> IntArray:
+        """Columns of a candidate among those of the widest."""
+        N, Q = self.data.states[0].shape[1], self.data.delayed[0].shape[1]
+        states = np.arange(N * (candidate.state_delays + 1))
+        kept = np.flatnonzero(self._delayed(candidate))
+        ahead = self.widest.lead - candidate.lead
+        lags = np.arange(ahead, ahead + candidate.input_delays + 1)
+        first = N * (self.widest.state_delays + 1)
+        delayed = (first + Q * lags[:, None] + kept).ravel()
+        first += Q * (self.widest.input_delays + 1)
+        direct = first + np.flatnonzero(self._direct(candidate))
+        return np.concatenate([states, delayed, direct])
+
+    def _delayed(self, candidate: Candidate) -> BoolArray:
+        return np.isin(self.owners, (-1, *candidate.observables))
+
+    def _direct(self, candidate: Candidate) -> BoolArray:
+        return np.isin(self.direct_owners, candidate.observables)
+
+    def radius(self, candidate: Candidate, ridge: float) -> float:
+        """Spectral radius of the model that a candidate gives of all runs."""
+        scales, gram, right, count = self._system(candidate, range(len(self.data.names)))
+        ridge *= count if self.is_per_snapshot else 1
+        size = len(scales[0][0]) * (candidate.state_delays + 1)
+        top = ridge_path(gram, right, [ridge])[0, :, :size]
+        square = np.concatenate([top, np.eye(size - len(top), size)])
+        return float(np.abs(np.linalg.eigvals(square)).max())
+
+    def folds(self) -> list[int]:
+        """Runs in which a window of some horizon fits: each is held out once."""
+        return [
+            run
+            for run in range(len(self.data.names))
+            if any(self._starts(run, steps).size for steps in self.horizons)
+        ]
+
+    def _starts(self, run: int, steps: int) -> IntArray:
+        """Samples from which windows end to end are forecast in a run that is held out."""
+        window = self.data.windows[run]
+        return np.arange(window.first_column, window.last - steps + 1, steps)
+
+    def judge(
+        self, candidate: Candidate, ridges: Sequence[float], fold: int
+    ) -> Iterator[FloatArray]:
+        """Scores, shape (λ, window), for each horizon that fits into the run that is held out."""
+        for steps in self.horizons:
+            starts = self._starts(fold, steps)
+            if starts.size:
+                predicted, scale = self.forecast(candidate, ridges, fold, steps)
+                measured = self._measured(fold, starts, steps)
+                with np.errstate(over="ignore", invalid="ignore"):
+                    errors = metrics.nrmse(
+                        predicted=predicted, measured=measured, training_std=scale[1]
+                    )
+                judged = ~metrics.is_slack(
+                    predicted=measured, measured=measured, training_std=scale[1]
+                )
+                errors = np.where(np.isfinite(errors), np.minimum(errors, WORST), WORST)
+                yield np.nanmean(np.where(judged, errors, np.nan), axis=-1)
+
+    def _measured(self, run: int, starts: IntArray, steps: int) -> FloatArray:
+        states = self.data.states[run]
+        return np.stack([states[at + 1 : at + 1 + steps] for at in starts])
+
+    def forecast(
+        self, candidate: Candidate, ridges: Sequence[float], fold: int, steps: int
+    ) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
+        """Free runs of a candidate on a run that is held out.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            Columns.
+        ridges : sequence of float
+            λ.
+        fold : int
+            The run that is held out.
+        steps : int
+            Length of the windows.
+
+        Returns
+        -------
+        predicted : ndarray, shape (λ, window, steps, N)
+            In the standardised deviations of `data`.
+        scale : (ndarray, ndarray), each of shape (N,)
+            Mean and standard deviation of the states that trained, likewise.
+        """
+        data, s, z = self.data, candidate.state_delays, candidate.input_delays
+        others = [run for run in range(len(data.names)) if run != fold]
+        (x, u, w), gram, right, count = self._system(candidate, others)
+        kept, direct = self._delayed(candidate), self._direct(candidate)
+        factor = count if self.is_per_snapshot else 1
+        weights = ridge_path(gram, right, [factor * ridge for ridge in ridges])
+        size = len(x[0]) * (s + 1)
+        top, rest = weights[..., :size], weights[..., size:]
+        starts = self._starts(fold, steps)
+        histories = np.concatenate(
+            [lagged((data.states[fold] - x[0]) / x[1], at, 1, s) for at in starts]
+        )
+        predicted = np.empty(0)
+        for number in range(max(self.passes, 1)):
+            # The first pass is the same for every λ: the surge is held.
+            models = 1 if number == 0 else len(weights)
+            rows = [
+                [
+                    self._rows(fold, int(at), steps, predicted[model, place] if number else None)
+                    for place, at in enumerate(starts)
+                ]
+                for model in range(models)
+            ]
+            forcing = np.empty((len(weights), len(starts), steps, len(x[0])))
+            ahead = self.widest.lead - candidate.lead
+            for model, each in enumerate(rows):
+                driving = np.stack(
+                    [
+                        np.concatenate(
+                            [
+                                lagged(
+                                    ((delayed - u[0]) / u[1])[:, kept],
+                                    self.widest.input_delays - ahead,
+                                    steps,
+                                    z,
+                                ),
+                                ((straight - w[0]) / w[1])[:, direct],
+                            ],
+                            axis=1,
+                        )
+                        for delayed, straight in each
+                    ]
+                )
+                chosen = slice(None) if models == 1 else slice(model, model + 1)
+                forcing[chosen] = np.einsum("wtp,lnp->lwtn", driving, rest[chosen], optimize=True)
+            predicted = free_runs(top, histories, forcing) * x[1] + x[0]
+        return predicted, x
+
+    def _system(
+        self, candidate: Candidate, runs: Sequence[int]
+    ) -> tuple[Scales, FloatArray, FloatArray, int]:
+        """Moments of states and both kinds of regressors, Gram matrix, right-hand side, pairs."""
+        data, s, z = self.data, candidate.state_delays, candidate.input_delays
+        x, u = (_pooled(series, data, runs, False) for series in (data.states, data.delayed))
+        w = _pooled(data.direct, data, runs, True)
+        kept, direct = self._delayed(candidate), self._direct(candidate)
+        mean, scale = (
+            np.concatenate(
+                [np.tile(x[part], s + 1), np.tile(u[part][kept], z + 1), w[part][direct]]
+            )
+            for part in (0, 1)
+        )
+        total = sum((self.moments[run] for run in runs[1:]), self.moments[runs[0]])
+        system = total.chosen(self.columns(candidate)).standardised(mean, scale, *x)
+        return (x, u, w), *system, total.count
+
+    def _rows(
+        self, run: int, at: int, steps: int, predicted: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Standardised delayed (z + steps rows) and direct regressors (steps rows) of a window."""
+        data, z = self.data, self.widest.input_delays
+        if not self.passes:
+            return data.delayed[run][at - z : at + steps], data.direct[run][at : at + steps]
+        known = at + self.offsets[run]
+        states = None if predicted is None else data.state_scale.physical(predicted)
+        found = self.drives[run].rows(known - z, known + steps, known, states)
+        return (
+            data.input_scale.deviations(found.delayed),
+            data.direct_scale.deviations(found.direct[z:]),
+        )
+
+
+def _pooled(
+    series: Sequence[FloatArray], data: TrainingData, runs: Sequence[int], is_direct: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Mean and standard deviation (ddof = 1) over the windows of some runs, as a fit takes them."""
+    parts = []
+    for run in runs:
+        window = data.windows[run]
+        first = max(window.first, window.first_column) if is_direct else window.first
+        parts.append(series[run][first : window.last + 1])
+    values = np.concatenate(parts)
+    return values.mean(axis=0), values.std(axis=0, ddof=1)
+
+
+def split(runs: dict[str, xr.Dataset], parts: int) -> dict[str, xr.Dataset]:
+    """Parts of runs, end to end: what is held out in turn where there is one run alone."""
+    out = {}
+    for name, run in runs.items():
+        edges = np.linspace(0, run.sizes["time"], parts + 1).astype(int)
+        for number, (first, stop) in enumerate(itertools.pairwise(edges), start=1):
+            out[f"{name}, part {number}"] = run.isel(time=slice(first, stop))
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """What a search found.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Columns.
+    ridge : float
+        λ.
+    trials : tuple of (Candidate, Trial)
+        All that was tried, in order.
+    """
+
+    candidate: Candidate
+    ridge: float
+    trials: tuple[tuple[Candidate, Trial], ...]
+
+
+def search(
+    problem: Problem,
+    base: Candidate,
+    options: Mapping[str, Sequence[Any]],
+    ridges: Sequence[float],
+    *,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    known: MutableMapping[str, list[list[list[float]]]] | None = None,
+) -> Choice:
+    """Choose columns and λ: one setting after the other, each with the whole path of λ.
+
+    Parameters
+    ----------
+    problem : Problem
+        Training runs.
+    base : Candidate
+        Where the search starts.
+    options : mapping of str to sequence
+        Values to try of fields of :class:`Candidate`.
+    ridges : sequence of float
+        λ to try.
+    executor : Executor, optional
+        Judges candidates and folds side by side; the result is the same.
+    progress : callable, optional
+        Called with what is done.
+    known : mapping, optional
+        Scores by candidate and fold that need not be found again; new ones are added.
+
+    Returns
+    -------
+    Choice
+        Never a model that grows: λ is raised until the spectral radius is below one.
+    """
+    known = {} if known is None else known
+    trials: dict[Candidate, Trial] = {}
+    best = base
+    for key, values in (("", [None]), *options.items()):
+        tried = [replace(best, **{key: value}) if key else best for value in values]
+        for candidate, trial in _judged(problem, tried, ridges, executor, progress, known):
+            trials.setdefault(candidate, trial)
+        best = min(trials, key=lambda each: float(trials[each].means.min()))
+    order = np.argsort(trials[best].means, kind="stable")
+    chosen = int(order[0])
+    while problem.radius(best, ridges[chosen]) >= 1.0 and chosen + 1 < len(ridges):
+        chosen += 1
+    return Choice(best, ridges[chosen], tuple(trials.items()))
+
+
+def _judged(
+    problem: Problem,
+    candidates: Sequence[Candidate],
+    ridges: Sequence[float],
+    executor: Executor | None,
+    progress: Progress | None,
+    known: MutableMapping[str, list[list[list[float]]]],
+) -> Iterator[tuple[Candidate, Trial]]:
+    folds = problem.folds()
+    todo = [
+        (candidate, tuple(ridges), fold)
+        for candidate in dict.fromkeys(candidates)
+        for fold in folds
+        if _key(candidate, fold) not in known
+    ]
+    found = in_order(_unit, problem, todo, executor, progress, "candidate and fold")
+    for (candidate, _, fold), scores in zip(todo, found, strict=True):
+        known[_key(candidate, fold)] = [each.tolist() for each in scores]
+    for candidate in dict.fromkeys(candidates):
+        scores, weights = [], []
+        for fold in folds:
+            horizons = [np.array(each) for each in known[_key(candidate, fold)]]
+            scores += horizons
+            weights += [
+                np.full(each.shape[1], 1.0 / (len(folds) * len(horizons) * each.shape[1]))
+                for each in horizons
+            ]
+        yield candidate, Trial(np.concatenate(scores, axis=1), np.concatenate(weights))
+
+
+def _key(candidate: Candidate, fold: int) -> str:
+    return json.dumps([*astuple(candidate), fold])
+
+
+def _unit(problem: Problem, item: tuple[Candidate, Sequence[float], int]) -> list[FloatArray]:
+    return list(problem.judge(*item))
+
+
+@dataclass(frozen=True, eq=False)
+class Selected:
+    """What free runs chose, and on what evidence.
+
+    Parameters
+    ----------
+    settings : HankelSettings
+        Complete: nothing is left to be chosen.
+    rows : tuple of dict
+        One per candidate and λ: settings, mean score, bounds of its 95 % interval, and whether it
+        was chosen.
+    note : str
+        How it was chosen, in words.
+    """
+
+    settings: HankelSettings
+    rows: tuple[dict[str, Any], ...]
+    note: str
+
+
+def select(
+    settings: HankelSettings,
+    runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+    *,
+    vary: Sequence[str] = ("ridge",),
+    horizon: Sequence[float] = (15.0, 45.0),
+    parts: int | None = None,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    known: MutableMapping[str, Any] | None = None,
+    seed: int = 0,
+) -> Selected:
+    """Choose settings by free runs on training runs that are held out in turn.
+
+    Parameters
+    ----------
+    settings : HankelSettings
+        Where the search starts; what `vary` does not name stays.
+    runs : mapping of str to Dataset
+        Training runs, cut at the end of their training windows.
+    states, inputs : sequence of str
+        Channels.
+    vary : sequence of str
+        Names out of ``VARIED``; λ is always chosen.
+    horizon : sequence of float
+        Lengths of the windows that are judged, encounter periods.
+    parts : int, optional
+        Number of parts into which each run is cut, to hold out one part in turn; by default runs
+        are held out whole, and a single run in three parts.
+    executor, progress, known
+        As in :func:`search`.
+    seed : int
+        Of the bootstrap of the intervals.
+
+    Returns
+    -------
+    Selected
+        Where no window fits into what could be held out, λ is ``FALLBACK`` per snapshot pair.
+
+    Raises
+    ------
+    RequestError
+        If `vary` names something else, or the delay rows are not exact.
+    """
+    for name in vary:
+        if name not in VARIED:
+            raise RequestError(
+                f"vary names '{name}'.{did_you_mean(name, VARIED)} Choose among "
+                f"{', '.join(VARIED)}."
+            )
+    if settings.delay_rows != "exact" or settings.rank is not None:
+        raise RequestError(
+            "choosing by free runs takes delay_rows = 'exact' and no rank; received delay_rows = "
+            f"'{settings.delay_rows}', rank = {settings.rank}. Change them, or state ridge."
+        )
+    pieces = dict(runs)
+    if parts is not None or len(pieces) == 1:
+        pieces = split(pieces, 3 if parts is None else parts)
+    period = mean_period(runs, list(inputs))
+    chosen = settings.observables
+    if "observables" in vary and not chosen:
+        chosen = default_observables(inputs)
+    options = _options(settings, vary, period, len(chosen))
+    base = Candidate(
+        settings.state_delays,
+        settings.input_delays,
+        int(settings.lead),
+        tuple(range(len(settings.observables))),
+    )
+    problem = _problem(
+        replace(settings, observables=chosen),
+        pieces,
+        states,
+        inputs,
+        base,
+        options,
+        tuple(round(each * period) for each in horizon),
+    )
+    if problem is None or not problem.folds():
+        longest = max(run.sizes["time"] for run in pieces.values())
+        return Selected(
+            replace(settings, ridge=FALLBACK, ridge_scale="per_snapshot"),
+            (),
+            f"ridge {FALLBACK:g} per snapshot pair: no window of {round(min(horizon) * period)} "
+            f"samples can be held out of parts of at most {longest}",
+        )
+    found = search(
+        problem, base, options, RIDGES, executor=executor, progress=progress, known=known
+    )
+    best = dict(found.trials)[found.candidate]
+    score = float(best.means[RIDGES.index(found.ridge)])
+    made = replace(
+        settings,
+        state_delays=found.candidate.state_delays,
+        input_delays=found.candidate.input_delays,
+        lead=found.candidate.lead,
+        observables=tuple(chosen[number] for number in found.candidate.observables),
+        ridge=found.ridge,
+        ridge_scale="per_snapshot",
+    )
+    count = sum(len(trial.means) for _, trial in found.trials)
+    note = (
+        f"ridge {found.ridge:g} per snapshot pair: the best of {count} settings in free runs on "
+        f"{len(problem.folds())} parts held out in turn, mean NRMSE {score:.3f}"
+    )
+    return Selected(made, tuple(_rows_of(found, chosen, seed)), note)
+
+
+def default_observables(inputs: Sequence[str]) -> tuple[Observable, ...]:
+    """Slow squares of the elevation at the vessel, or of all, and powers of all elevations."""
+    elevations = tuple(name for name in inputs if name.startswith("eta"))
+    if not elevations:
+        return ()
+    at_vessel = tuple(name for name in elevations if name == "eta_cog") or elevations
+    return SlowSquares(at_vessel), Powers(elevations)
+
+
+def _options(
+    settings: HankelSettings, vary: Sequence[str], period: float, observables: int
+) -> dict[str, list[Any]]:
+    """Values to try of the fields of a candidate."""
+    found: dict[str, list[Any]] = {}
+    if "observables" in vary:
+        every = tuple(range(observables))
+        found["observables"] = list(dict.fromkeys([(), *((number,) for number in every), every]))
+    for name, periods in (
+        ("lead", (0.0, 0.5, 0.75, 1.0)),
+        ("input_delays", (2.0, 3.0, 5.0)),
+        ("state_delays", (0.5, 1.0, 1.5)),
+    ):
+        if name in vary:
+            found[name] = [round(each * period) for each in periods]
+    return found
+
+
+def _problem(
+    settings: HankelSettings,
+    runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+    base: Candidate,
+    options: Mapping[str, Sequence[Any]],
+    horizons: tuple[int, ...],
+) -> Problem | None:
+    """The columns of all candidates; None where the runs are too short for them."""
+    leads = [base.lead, *options.get("lead", ())]
+    lead = max(leads)
+    delays = max([base.input_delays, *options.get("input_delays", ())]) + lead - min(leads)
+    widest = Candidate(
+        max([base.state_delays, *options.get("state_delays", ())]),
+        delays,
+        lead,
+        tuple(range(len(settings.observables))),
+    )
+    wide = replace(
+        settings,
+        state_delays=widest.state_delays,
+        input_delays=widest.input_delays,
+        lead=lead,
+        ridge=1.0,
+        standardize=True,
+    )
+    try:
+        data = gather(runs, states, inputs, None, wide)
+    except DataError:
+        if any(run.sizes["time"] > max(delays, widest.state_delays) + 2 for run in runs.values()):
+            raise
+        return None
+    chain, drives, offsets = data.input_map, [], []
+    for (name, run), x in zip(runs.items(), data.states, strict=True):
+        size = run.sizes["time"]
+        span = Span(0, size - 1, size - chain.lead_samples)
+        values = labelled.channel_matrix(run, list(inputs), name)
+        drives.append(chain.wrap(Measured(values), run, [span]))
+        offsets.append(size - max(chain.lead_samples - 1, 0) - len(x))
+    owners: list[int] = [-1] * len(inputs)
+    direct: list[int] = []
+    observed = [each for each in chain.maps if isinstance(each, Observed)]
+    for number, bound in enumerate(observed[0].bound if observed else ()):
+        (owners if bound.delayed else direct).extend([number] * len(bound.labels))
+    return Problem(
+        data=data,
+        drives=tuple(drives),
+        offsets=tuple(offsets),
+        widest=widest,
+        owners=tuple(owners),
+        direct_owners=tuple(direct),
+        horizons=horizons,
+        passes=chain.passes if chain.reads_states == "predicted" else 0,
+    )
+
+
+def _rows_of(
+    found: Choice, observables: Sequence[Observable], seed: int
+) -> Iterator[dict[str, Any]]:
+    """Rows of the table: windows are drawn again 400 times for the interval of each score."""
+    rng = np.random.default_rng(seed)
+    for candidate, trial in found.trials:
+        count = len(trial.weights)
+        drawn = rng.integers(count, size=(400, count))
+        weights = trial.weights[drawn]
+        totals = (trial.scores[:, drawn] * weights).sum(axis=2) / weights.sum(axis=1)
+        lower, upper = np.quantile(totals, [0.025, 0.975], axis=1)
+        for number, score in enumerate(trial.means):
+            yield {
+                "state_delays": candidate.state_delays,
+                "input_delays": candidate.input_delays,
+                "lead": candidate.lead,
+                "observables": ", ".join(observables[k].kind for k in candidate.observables)
+                or "none",
+                "ridge": RIDGES[number],
+                "score": float(score),
+                "lower": float(lower[number]),
+                "upper": float(upper[number]),
+                "chosen": candidate == found.candidate and RIDGES[number] == found.ridge,
+            }
