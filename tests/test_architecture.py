@@ -31,6 +31,7 @@ FLOORS = (
     ("check",),
     ("study",),
     ("report", "plot"),
+    ("tuning",),
     ("cli",),
     ("__main__", "__init__"),
 )

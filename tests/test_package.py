@@ -19,8 +19,8 @@ REQUESTS = (
     ["info"],
 )
 VERBS = (
-    *("tank", "init", "prepare", "fit", "calibrate", "forecast", "compare", "study", "report"),
-    *("reproduce", "datasets", "track", "info"),
+    *("tank", "init", "prepare", "tune", "fit", "calibrate", "forecast", "compare", "study"),
+    *("report", "reproduce", "datasets", "track", "info"),
 )
 
 

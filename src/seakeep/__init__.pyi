@@ -29,6 +29,7 @@ from .models import (
     load_model,
     summarize,
 )
+from .tuning import TuneResult, tune
 
 __version__: str
 
@@ -48,6 +49,7 @@ __all__ = [
     "SeakeepError",
     "SeakeepWarning",
     "SlowSquares",
+    "TuneResult",
     "Uniform",
     "baselines",
     "campaign",
@@ -64,4 +66,5 @@ __all__ = [
     "study",
     "summarize",
     "tank",
+    "tune",
 ]

@@ -624,6 +624,18 @@ NumberOrPrior = Annotated[
     Annotated[NotNegative, Tag("<number>")] | Annotated[PriorSettings, Tag("<prior>")],
     Discriminator(_branch),
 ]
+
+
+def _ridge_branch(value: object) -> str:
+    return "<word>" if isinstance(value, str) else _branch(value)
+
+
+Ridge = Annotated[
+    Annotated[NotNegative, Tag("<number>")]
+    | Annotated[PriorSettings, Tag("<prior>")]
+    | Annotated[Literal["rollout"], Tag("<word>")],
+    Discriminator(_ridge_branch),
+]
 _ONE_MODEL = ("state_delays", "input_delays", "window")
 _ENSEMBLE = (
     *("train_length", "state_delay", "input_delay"),
@@ -673,8 +685,15 @@ class ModelSettings(Table):
     lead: Delay | None = Field(
         default=None, description="samples by which inputs are read ahead, or periods: '0.75 T'"
     )
-    ridge: NumberOrPrior | None = Field(
-        default=None, description="a number, 0 or more; a prior for an ensemble"
+    ridge: Ridge | None = Field(
+        default=None,
+        description="a number, 0 or more; 'rollout' chooses it by free runs on training runs that "
+        "are held out; a prior for an ensemble",
+    )
+    observables: Annotated[tuple[dict[str, Any], ...], Field(strict=False)] | None = Field(
+        default=None,
+        description="list of tables, such as { kind = 'slow_squares', of = 'eta_cog' }: further "
+        "inputs made of the measured ones; kinds 'slow_squares', 'powers' and 'expression'",
     )
     window: Window | None = Field(
         default=None, description="training snapshots per run, or periods such as '20 T'"

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from seakeep.cli import calibrating, campaigns, information, modelling, tank, tracking
+from seakeep.cli import calibrating, campaigns, information, modelling, tank, tracking, tuning
 from seakeep.cli import study as studying
 from seakeep.cli.console import messages, tell_warnings
 from seakeep.errors import SeakeepError
@@ -53,6 +53,7 @@ def _options(
 app.command("tank")(tank.tank)
 app.command("init")(campaigns.init)
 app.command("prepare")(campaigns.prepare)
+app.command("tune")(tuning.tune)
 app.command("fit")(modelling.fit)
 app.command("calibrate")(calibrating.calibrate)
 app.command("forecast")(modelling.forecast)

@@ -103,17 +103,8 @@ def fit_campaign(
         trained; and where the model reads waves after the instant that it forecasts.
     """
     settings = campaign.model(model)
-    prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
-    if not prepared:
-        raise RequestError(NOTHING_TRAINS)
-    warn_of_runs(prepared.values(), [*settings.states, *settings.inputs])
+    spec, prepared, runs, stop = read_training(campaign, model, progress)
     dt = float(next(iter(prepared.values())).attrs["dt"])
-    period = campaign.encounter_period() if counts_in_periods(settings) else None
-    spec = build_spec(settings, period, dt)
-    runs = training_runs(prepared, _longest_window(spec, dt))
-    stop = settings.stop
-    if isinstance(stop, Length):
-        stop = None if period is None else stop.at(period)
     identified = spec.fit(runs, list(settings.states), list(settings.inputs), stop=stop)
     both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
     warn_of_repeats(identified, campaign, both)
@@ -131,6 +122,36 @@ def fit_campaign(
     if getattr(spec, "standardize", False):
         _warn_of_slow_model(identified, runs)
     return identified
+
+
+def read_training(
+    campaign: Campaign, model: str | None = None, progress: Progress | None = None
+) -> tuple[Spec, dict[str, xr.Dataset], dict[str, xr.Dataset], float | None]:
+    """Read what a model of a campaign trains on; arguments and errors as :func:`fit_campaign`.
+
+    Returns
+    -------
+    spec : Spec
+        Settings of the model.
+    prepared : dict of str to Dataset
+        Runs that train, whole.
+    runs : dict of str to Dataset
+        Their training parts.
+    stop : float or None
+        Last instant of the training windows, s.
+    """
+    settings = campaign.model(model)
+    prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
+    if not prepared:
+        raise RequestError(NOTHING_TRAINS)
+    warn_of_runs(prepared.values(), [*settings.states, *settings.inputs])
+    dt = float(next(iter(prepared.values())).attrs["dt"])
+    period = campaign.encounter_period() if counts_in_periods(settings) else None
+    spec = build_spec(settings, period, dt)
+    stop = settings.stop
+    if isinstance(stop, Length):
+        stop = None if period is None else stop.at(period)
+    return spec, prepared, training_runs(prepared, _longest_window(spec, dt)), stop
 
 
 def fit_baselines(

@@ -13,9 +13,10 @@ from typing import Any, Literal, cast
 from seakeep.campaign import ModelSettings, PriorSettings
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.models import KINDS, ProbeAlignment, Spec
+from seakeep.models.observables import Observable, SlowSquares, observables_of
 from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform
 from seakeep.models.settings import periods_to_samples
-from seakeep.toml import Length, lengths
+from seakeep.toml import Length, lengths, parse_length
 
 __all__ = ["ResolvedModel", "Spec", "build_spec", "counts_in_periods", "resolve_model"]
 
@@ -93,7 +94,8 @@ def _values(spec: Spec) -> dict[str, Any]:
 def counts_in_periods(settings: ModelSettings) -> bool:
     """Whether a model is stated in encounter periods: by a preset, a key, or as an ensemble."""
     by_kind = _kind_of(settings).is_ensemble
-    return settings.preset is not None or by_kind or any(lengths(settings))
+    squares = any(each.get("kind") == SlowSquares.kind for each in settings.observables or ())
+    return settings.preset is not None or by_kind or squares or any(lengths(settings))
 
 
 def build_spec(settings: ModelSettings, encounter_period: float | None, dt: float) -> Spec:
@@ -156,6 +158,9 @@ def resolve_model(
             f"{what} counts in encounter periods, and the campaign has none. State "
             "encounter_period (s) in [campaign]."
         )
+    if "observables" in stated:
+        tables = stated["observables"]
+        stated["observables"] = tuple(_observable(each, encounter_period) for each in tables)
     for key, value in stated.items():
         if isinstance(value, Length) and encounter_period is not None:
             stated[key] = periods_to_samples(value.value, encounter_period, dt)
@@ -220,6 +225,21 @@ def _sources(
         return "preset" if key in by_preset and by_preset[key] != default else "default"
 
     return {key: source(key) for key in _values(spec)}
+
+
+def _observable(table: Mapping[str, Any], encounter_period: float | None) -> Observable:
+    """An observable of its table, which counts in encounter periods: 2 or '2 T', '0.33 /T'."""
+
+    def counted(value: Any) -> Any:
+        if isinstance(value, list | tuple):
+            return [counted(each) for each in value]
+        return parse_length(value).value if isinstance(value, str) else value
+
+    in_periods = {key: counted(table[key]) for key in ("cutoff", "lead", "lags") if key in table}
+    (made,) = observables_of([{**table, **in_periods}])
+    if isinstance(made, SlowSquares) and made.period is None:
+        return replace(made, period=encounter_period)
+    return made
 
 
 def _prior(stated: PriorSettings | float) -> Prior:

@@ -1,0 +1,130 @@
+"""``seakeep tune``."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from seakeep.cli.console import messages, progress_bar
+from seakeep.cli.options import CampaignFile, Scheduler, Workers, member_executor, read_files
+from seakeep.errors import RequestError
+from seakeep.files import check_output, replacing
+
+if TYPE_CHECKING:
+    from seakeep.tuning import TuneResult
+
+__all__ = ["tune"]
+
+
+def tune(
+    campaign: CampaignFile,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary",
+            help="What to choose beside the ridge: observables, lead, input_delays, state_delays. "
+            "Repeat it for several. Default: observables.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--out", help="Tuned campaign file, beside CAMPAIGN. Default: NAME_tuned.toml."
+        ),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option("--model", help="Key in [models.NAME]; by default the table [model]."),
+    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """Choose settings by free runs on held-out training runs.
+
+    Each candidate is fitted to all training runs but one and judged by free runs on that one.
+    The choice is written into a copy of the campaign file; a search that was interrupted goes on
+    where it stopped.
+
+    Example: seakeep tune docs/tutorial/campaign.toml --vary input_delays
+    """
+    from seakeep.campaign import read_campaign
+    from seakeep.models import HankelDMDc
+    from seakeep.study.fit import read_training
+    from seakeep.tuning import tune as search
+
+    read = read_campaign(campaign)
+    target = out or campaign.with_name(f"{campaign.stem}_tuned.toml")
+    if target.resolve().parent != campaign.resolve().parent:
+        raise RequestError(
+            f"{target} lies in another folder than {campaign}, and paths in the file count from "
+            "its folder. Write it beside the campaign file."
+        )
+    check_output(target, "tuned campaign", read_files(read))
+    settings = read.model(model)
+    with progress_bar("Preparing") as progress:
+        spec, _, runs, stop = read_training(read, model, progress)
+    if not isinstance(spec, HankelDMDc):
+        raise RequestError(
+            f"kind = '{settings.kind}' cannot be tuned: a Hankel model is. Name another model with "
+            "--model, or set kind = 'hankel_dmdc'."
+        )
+    kept = target.with_suffix(".scores.json")
+    with member_executor(workers, scheduler) as executor, progress_bar("Tuning") as progress:
+        found = search(
+            spec,
+            runs,
+            list(settings.states),
+            list(settings.inputs),
+            vary=vary or ["observables"],
+            stop=stop,
+            executor=executor,
+            progress=progress,
+            resume=kept,
+        )
+    typer.echo(found.describe())
+    text = _tuned(campaign.read_text(encoding="utf-8"), model, found)
+    with replacing(target) as place:
+        place.write_text(text, encoding="utf-8")
+    kept.unlink(missing_ok=True)
+    messages().print(f"Wrote {target}. Fit it with: seakeep fit {target} -o model.nc")
+    if find_spec("matplotlib") and found.table.sizes["trial"]:
+        picture = target.with_suffix(".png")
+        figure = found.figure()
+        with replacing(picture) as place:
+            figure.savefig(place, format="png", dpi=150)
+        messages().print(f"Wrote {picture}.")
+
+
+def _tuned(text: str, model: str | None, found: TuneResult) -> str:
+    """The campaign file with the choice in the table of the model, and nothing else changed."""
+    import tomlkit
+
+    from seakeep.models.observables import to_json
+
+    document = tomlkit.parse(text)
+    table: Any = document["model"] if model is None else document["models"][model]
+    spec = found.spec
+    values: dict[str, Any] = {
+        "state_delays": spec.state_delays,
+        "input_delays": spec.input_delays,
+        "lead": spec.lead,
+        "delay_rows": spec.delay_rows,
+        "ridge": spec.ridge,
+        "ridge_scale": spec.ridge_scale,
+    }
+    if spec.observables:
+        tables = tomlkit.array()
+        for each in spec.observables:
+            row = tomlkit.inline_table()
+            row.update({k: v for k, v in to_json(each).items() if v not in (None, "")})
+            tables.append(row)
+        values["observables"] = tables.multiline(True)
+    for key, value in values.items():
+        table[key] = value
+    table["ridge"].comment("chosen by seakeep tune, by free runs on held-out training runs")
+    first = "# seakeep_file: tuned campaign\n"
+    body = tomlkit.dumps(document)
+    return body if body.startswith(first) else first + body

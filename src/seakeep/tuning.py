@@ -1,0 +1,240 @@
+"""``seakeep.tune``: settings chosen by free runs on training runs that are held out."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, MutableMapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from seakeep.errors import RequestError
+from seakeep.files import read_bytes, replacing
+from seakeep.models import HankelDMDc
+from seakeep.models.labelled import Runs, Stop, as_runs, channel_matrix
+from seakeep.models.selection import select
+from seakeep.models.training import check_names, until
+
+if TYPE_CHECKING:
+    from seakeep.report.figures.tuning import Figure
+
+__all__ = ["TuneResult", "tune"]
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class TuneResult:
+    """What :func:`tune` found.
+
+    Parameters
+    ----------
+    spec : HankelDMDc
+        The settings that were chosen; ``spec.fit(runs, states, inputs)`` fits the model.
+    table : Dataset
+        Over ``trial``: ``state_delays``, ``input_delays``, ``lead`` (samples), ``observables``
+        (their kinds), ``ridge`` (per snapshot pair), ``score`` (mean NRMSE of free runs), the
+        bounds ``lower`` and ``upper`` of its 95 % interval, and ``chosen``.
+    note : str
+        How the choice was made.
+    """
+
+    spec: HankelDMDc
+    table: xr.Dataset
+    note: str
+
+    def describe(self) -> str:
+        """Text: how the choice was made, and the best λ of each candidate.
+
+        Returns
+        -------
+        str
+        """
+        lines = [self.note]
+        keys = ("observables", "lead", "state_delays", "input_delays")
+        rows = self.table.to_dataframe()
+        for values, part in rows.groupby(list(keys), sort=False):
+            best = part.iloc[int(part["score"].to_numpy().argmin())]
+            what = ", ".join(f"{key} {value}" for key, value in zip(keys, values, strict=True))
+            lines.append(
+                f"  {best['score']:.3f} [{best['lower']:.3f}, {best['upper']:.3f}]  ridge "
+                f"{best['ridge']:g}, {what}{'  (chosen)' if part['chosen'].any() else ''}"
+            )
+        return "\n".join(lines)
+
+    def figure(self) -> Figure:
+        """Draw the error against λ, a line per candidate; needs the extra ``figures``.
+
+        Returns
+        -------
+        Figure
+        """
+        from seakeep.report.figures.tuning import tuning_figure
+
+        return tuning_figure(self.table)
+
+
+def tune(
+    spec: HankelDMDc,
+    runs: Runs,
+    states: Sequence[str],
+    inputs: Sequence[str],
+    vary: Sequence[str] = ("ridge", "observables"),
+    horizon: Sequence[float] = (15.0, 45.0),
+    folds: str | int = "run",
+    *,
+    stop: Stop = None,
+    executor: Executor | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+    resume: str | Path | None = None,
+) -> TuneResult:
+    """Choose settings by the error of free runs on training runs that are held out in turn.
+
+    Parameters
+    ----------
+    spec : HankelDMDc
+        Where the search starts, with exact delay rows; what `vary` does not name stays.
+    runs : Dataset, sequence of Dataset, or mapping of names to Datasets
+        Training runs.
+    states, inputs : sequence of str
+        Channels of the model.
+    vary : sequence of str, optional
+        Out of "ridge" (always chosen), "observables" (none, slow squares, powers, both; or those of
+        the spec), "lead", "input_delays" and "state_delays".
+    horizon : sequence of float, optional
+        Lengths of the free runs, encounter periods.
+    folds : "run" or int, optional
+        Whether whole runs are held out, or parts of each run: their number. A single run is held
+        out in three parts.
+    stop : float, sequence or mapping of float, optional
+        Last instant of the training window of the runs, s.
+    executor : concurrent.futures.Executor, optional
+        Works on several candidates side by side; the result is the same.
+    seed : int, optional
+        Of the bootstrap of the intervals.
+    progress : callable, optional
+        Called as ``progress(done, total, what)``.
+    resume : str or Path, optional
+        File that keeps what was found, so that a search that was interrupted goes on.
+
+    Returns
+    -------
+    TuneResult
+        Settings, table, figure.
+
+    Raises
+    ------
+    RequestError
+        If `vary` names something else, the delay rows are not exact, or a file to resume is of
+        other runs or settings.
+    DataError
+        As :meth:`HankelDMDc.fit`.
+    """
+    if folds != "run" and (isinstance(folds, bool) or not isinstance(folds, int) or folds < 2):
+        raise RequestError(f"folds must be 'run' or an integer of at least 2; received {folds!r}.")
+    check_names(states, inputs)
+    named = until(as_runs(runs), stop)
+    known: MutableMapping[str, Any] = {}
+    if resume is not None:
+        asked = {"spec": spec.to_json(), "horizon": list(horizon), "folds": folds}
+        known = _Kept(Path(resume), _digest(asked, named, [*states, *inputs]))
+    found = select(
+        spec,
+        named,
+        list(states),
+        list(inputs),
+        vary=vary,
+        horizon=horizon,
+        parts=None if folds == "run" else int(folds),
+        executor=executor,
+        progress=progress,
+        known=known,
+        seed=seed,
+    )
+    settings = found.settings
+    chosen = replace(
+        spec,
+        state_delays=settings.state_delays,
+        input_delays=settings.input_delays,
+        lead=settings.lead,
+        observables=settings.observables,
+        ridge=settings.ridge,
+        ridge_scale="per_snapshot",
+    )
+    return TuneResult(chosen, _table(found.rows), found.note)
+
+
+def _table(rows: Sequence[dict[str, Any]]) -> xr.Dataset:
+    """Rows as a Dataset over ``trial``."""
+    words = {
+        "ridge": "λ per snapshot pair",
+        "score": "mean NRMSE of free runs",
+        "lower": "lower bound of the 95 % interval of the score",
+        "upper": "upper bound of the 95 % interval of the score",
+    }
+    keys = ("state_delays", "input_delays", "lead", "observables", "ridge", "score")
+    return xr.Dataset(
+        {
+            key: (
+                "trial",
+                np.array([row[key] for row in rows]),
+                {"long_name": words.get(key, key.replace("_", " "))},
+            )
+            for key in (*keys, "lower", "upper", "chosen")
+        }
+    )
+
+
+def _digest(asked: object, runs: dict[str, xr.Dataset], channels: Sequence[str]) -> str:
+    """Checksum of what a search depends on."""
+    found = hashlib.sha256(json.dumps(asked, sort_keys=True).encode())
+    for name, run in runs.items():
+        found.update(name.encode())
+        found.update(np.ascontiguousarray(channel_matrix(run, channels, name)).tobytes())
+    return found.hexdigest()
+
+
+class _Kept(MutableMapping[str, Any]):
+    """Scores in a file: each one that is added is written."""
+
+    def __init__(self, path: Path, digest: str) -> None:
+        self.path = path
+        self.content: dict[str, Any] = {"digest": digest, "scores": {}}
+        if path.exists():
+            try:
+                content = json.loads(read_bytes(path))
+                kept, scores = content["digest"], dict(content["scores"])
+            except (ValueError, LookupError, TypeError) as error:
+                raise RequestError(
+                    f"{path} keeps no scores of a search ({error}). Name another file, or remove "
+                    "it."
+                ) from None
+            if kept != digest:
+                raise RequestError(
+                    f"{path} keeps scores of other runs or settings. Name another file, or remove "
+                    "it to start anew."
+                )
+            self.content["scores"] = scores
+
+    def __getitem__(self, key: str) -> Any:
+        return self.content["scores"][key]
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        self.content["scores"][key] = value
+        with replacing(self.path) as place:
+            place.write_text(json.dumps(self.content), encoding="utf-8")
+
+    def __delitem__(self, key: str) -> None:
+        del self.content["scores"][key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.content["scores"])
+
+    def __len__(self) -> int:
+        return len(self.content["scores"])

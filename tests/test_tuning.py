@@ -1,0 +1,146 @@
+"""``seakeep.tune`` and ``seakeep tune``: the table, the figure, the file, and going on."""
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import seakeep
+from seakeep import HankelDMDc, RequestError
+from seakeep.models import processes
+
+sys.path.insert(0, str(Path(__file__).parent / "models"))
+
+from test_selection import INPUTS, SPEC, STATES, runs
+
+TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorial"
+
+
+def test_the_choice_is_in_the_spec_the_table_and_the_text():
+    result = seakeep.tune(SPEC, runs(), STATES, INPUTS, horizon=(15,))
+    chosen = result.table.isel(trial=np.flatnonzero(result.table["chosen"].values))
+    assert chosen.sizes["trial"] == 1
+    assert result.spec.ridge == float(chosen["ridge"][0])
+    assert {each.kind for each in result.spec.observables} <= {"slow_squares", "powers"}
+    assert "(chosen)" in result.describe()
+    model = result.spec.fit(runs(), STATES, INPUTS)
+    assert model.settings.ridge == result.spec.ridge
+
+
+def test_the_result_is_the_same_for_any_number_of_workers():
+    alone = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["ridge"], horizon=(15,))
+    with processes(2) as executor:
+        other = seakeep.tune(
+            SPEC, runs(), STATES, INPUTS, vary=["ridge"], horizon=(15,), executor=executor
+        )
+    assert alone.table.identical(other.table)
+
+
+def test_a_search_that_was_interrupted_goes_on(tmp_path):
+    kept = tmp_path / "kept.json"
+    done = []
+
+    def stop(number, total, what):
+        done.append(number)
+        if number == 2:
+            raise KeyboardInterrupt
+
+    more = {"vary": ["ridge"], "horizon": (15,), "resume": kept}
+    with pytest.raises(KeyboardInterrupt):
+        seakeep.tune(SPEC, runs(), STATES, INPUTS, progress=stop, **more)
+    assert len(json.loads(kept.read_text())["scores"]) == 1  # the second was not handed on
+    counted = []
+    again = seakeep.tune(
+        SPEC, runs(), STATES, INPUTS, progress=lambda *each: counted.append(each), **more
+    )
+    assert len(counted) == 2  # of three folds
+    whole = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["ridge"], horizon=(15,))
+    assert again.table.identical(whole.table)
+    with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
+        seakeep.tune(SPEC, runs(2), STATES, INPUTS, **more)
+    kept.write_text("[]")
+    with pytest.raises(RequestError, match="keeps no scores of a search"):
+        seakeep.tune(SPEC, runs(), STATES, INPUTS, **more)
+
+
+def test_folds_that_are_no_number_of_parts_are_refused():
+    with pytest.raises(RequestError, match=r"folds must be 'run' or an integer of at least 2"):
+        seakeep.tune(SPEC, runs(), STATES, INPUTS, folds=1)
+
+
+def test_the_figure_has_a_line_per_candidate_and_units():
+    pytest.importorskip("matplotlib")
+    result = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["lead"], horizon=(15,))
+    figure = result.figure()
+    (axes,) = figure.axes
+    words = [text.get_text() for text in axes.get_legend().get_texts()]
+    leads = np.unique(result.table["lead"].values)
+    assert words == [*(f"lead {lead}" for lead in leads), "chosen"]
+    assert axes.get_xlabel().endswith("(1)")
+
+
+def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tmp_path, monkeypatch, capsys):
+    for path in TUTORIAL.iterdir():
+        if path.suffix in (".csv", ".toml"):
+            shutil.copy(path, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    from seakeep.cli import main
+
+    before = (tmp_path / "campaign.toml").read_text()
+    assert main(["tune", "campaign.toml", "--vary", "lead"]) == 0, capsys.readouterr().err
+    assert "held out in turn" in capsys.readouterr().out
+    assert (tmp_path / "campaign.toml").read_text() == before
+    tuned = seakeep.read_campaign(tmp_path / "campaign_tuned.toml").model()
+    assert isinstance(tuned.ridge, float)
+    assert tuned.ridge_scale == "per_snapshot"
+    assert not (tmp_path / "campaign_tuned.scores.json").exists()
+    text = (tmp_path / "campaign_tuned.toml").read_text()
+    kept = [line for line in before.splitlines() if line.strip()]
+    assert all(line in text for line in kept)
+    assert main(["tune", "campaign.toml", "-o", "../x.toml"]) == 2
+    assert "lies in another folder" in capsys.readouterr().err
+
+
+def test_a_campaign_file_states_observables_and_a_ridge_by_roll_out(tmp_path):
+    from seakeep.study.resolve import build_spec
+
+    for path in TUTORIAL.iterdir():
+        if path.suffix == ".csv":
+            shutil.copy(path, tmp_path)
+    text = (TUTORIAL / "campaign.toml").read_text().split("[model]")[0]
+    (tmp_path / "campaign.toml").write_text(
+        text
+        + """
+[model]
+states = ["heave", "mooring_bow"]
+inputs = ["eta_fwd", "eta_mid"]
+state_delays = "1 T"
+input_delays = "3 T"
+lead = "0.75 T"
+ridge = "rollout"
+delay_rows = "exact"
+
+[[model.observables]]
+kind = "slow_squares"
+of = "eta_mid"
+cutoff = "0.33 /T"
+lead = "2 T"
+lags = ["0 T", "1 T"]
+
+[[model.observables]]
+kind = "powers"
+of = ["eta_fwd"]
+powers = [2]
+"""
+    )
+    settings = seakeep.read_campaign(tmp_path / "campaign.toml").model()
+    spec = build_spec(settings, 1.5, 0.08)
+    assert spec.ridge == "rollout"
+    assert spec.lead == 14
+    squares, powers = spec.observables
+    assert squares == seakeep.SlowSquares("eta_mid", (0, 1, 2), 0.33, 2.0, (0.0, 1.0), 1.5)
+    assert powers == seakeep.Powers("eta_fwd", (2,))
+    assert isinstance(spec, HankelDMDc)
