@@ -391,18 +391,11 @@ def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halve
             "model.alignment: 'celerity' goes with mode = 'effective' alone; remove it",
         ),
         ("alignment = { sruge = 'none' }", "model.alignment.sruge: unknown key.*mean 'surge'"),
-        (
-            "[runs.all]\nprobe_offset = 1.0\nprobe_offset_span = [0, 9]",
-            "runs.all: state 'probe_offset' or 'probe_offset_span', not both",
-        ),
     ],
 )
 def test_wrong_alignments_in_the_file_are_named(halves, text, message):
-    runs = None
-    if text.startswith("[runs"):
-        text, runs = "", text + '\nfile = "run.csv"\n'
     with pytest.raises(RequestError, match=message):
-        campaign(halves, EXACT + "\n" + text, runs)
+        campaign(halves, EXACT + "\n" + text)
 
 
 def test_a_preset_fills_in_what_is_not_stated_key_by_key_and_says_so():

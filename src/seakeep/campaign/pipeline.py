@@ -790,7 +790,6 @@ def attributes_of(
         "frame": rig.frame,
         "encounter_period": general.encounter_period,
         "probe_offset": settings.probe_offset,
-        "probe_offset_span": settings.probe_offset_span,
     }
     whole = (float(time[0]), float(time[-1]))
     for use in ("train", "test"):

@@ -519,10 +519,6 @@ class RunSettings(Table):
         default=None,
         description="metres by which this run's elevations are carried, positive downstream",
     )
-    probe_offset_span: Span | None = Field(
-        default=None,
-        description="[start, end] in s or periods, from which a model estimates the offset",
-    )
 
     @property
     def serves(self) -> str:
@@ -545,8 +541,6 @@ class RunSettings(Table):
                 "'role' does not go with 'train' and 'test'; state the role and 'span', or the "
                 "two spans"
             )
-        if self.probe_offset is not None and self.probe_offset_span is not None:
-            raise ValueError("state 'probe_offset' or 'probe_offset_span', not both")
         return self
 
 

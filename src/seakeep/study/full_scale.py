@@ -10,7 +10,7 @@ from seakeep.signals.froude import froude_factor
 __all__ = ["to_full_scale"]
 
 ATTRIBUTES = {"dt": "s", "start": "s", "encounter_period": "s", "train_span": "s",
-               "test_span": "s", "probe_offset_span": "s", "water_depth": "m",
+               "test_span": "s", "water_depth": "m",
                "probe_offset": "m", "probe_offset_spread": "m"}  # fmt: skip
 """Times and lengths among the attributes of a run, with their units."""
 
