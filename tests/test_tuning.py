@@ -102,6 +102,8 @@ def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tmp_path, mon
     assert all(line in text for line in kept)
     assert main(["tune", "campaign.toml", "-o", "../x.toml"]) == 2
     assert "lies in another folder" in capsys.readouterr().err
+    assert main(["tune", "campaign.toml", "-o", "tuned"]) == 2
+    assert "Name it tuned.toml" in capsys.readouterr().err
 
 
 def test_a_campaign_file_states_observables_and_a_ridge_by_roll_out(tmp_path):

@@ -11,7 +11,7 @@ import typer
 from seakeep.cli.console import messages, progress_bar
 from seakeep.cli.options import CampaignFile, Scheduler, Workers, member_executor, read_files
 from seakeep.errors import RequestError
-from seakeep.files import check_output, replacing
+from seakeep.files import check_output, check_place, replacing
 
 if TYPE_CHECKING:
     from seakeep.tuning import TuneResult
@@ -62,6 +62,7 @@ def tune(
             f"{target} lies in another folder than {campaign}, and paths in the file count from "
             "its folder. Write it beside the campaign file."
         )
+    check_place(target, ".toml")
     check_output(target, "tuned campaign", read_files(read))
     settings = read.model(model)
     with progress_bar("Preparing") as progress:
