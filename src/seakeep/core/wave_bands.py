@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy import fft
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = ["band_edges", "band_energy"]
 
@@ -21,15 +23,23 @@ def band_energy(series: FloatArray, dt: float, first: int, count: int) -> FloatA
     ndarray, shape (channel, band)
         Sums of a Hann-tapered periodogram; they add up to about the variance times the length.
     """
-    taper = np.hanning(len(series) + 2)[1:-1, None]
+    taper, bands, inside = _taper_and_bands(len(series), dt, first, count)
     power = np.abs(fft.rfft(taper * (series - series.mean(axis=0)), axis=0)) ** 2
-    frequency = fft.rfftfreq(len(series), dt)[1:]
-    bands = np.floor(PER_OCTAVE * np.log2(frequency)).astype(int) - first
-    inside = (bands >= 0) & (bands < count)
     out = np.zeros((series.shape[1], count))
     for channel, column in enumerate(power[1:].T):
-        out[channel] = np.bincount(bands[inside], column[inside], count) / len(series)
+        out[channel] = np.bincount(bands, column[inside], count) / len(series)
     return out
+
+
+@lru_cache(maxsize=8)
+def _taper_and_bands(
+    length: int, dt: float, first: int, count: int
+) -> tuple[FloatArray, IntArray, BoolArray]:
+    """Hann taper, band of each frequency that lies in one, and which do."""
+    frequency = fft.rfftfreq(length, dt)[1:]
+    bands = np.floor(PER_OCTAVE * np.log2(frequency)).astype(np.intp) - first
+    inside = (bands >= 0) & (bands < count)
+    return np.hanning(length + 2)[1:-1, None], bands[inside], inside
 
 
 def band_edges(first: int, count: int) -> FloatArray:

@@ -254,16 +254,17 @@ def forecast_notes(signature: Signature, windows: Windows) -> dict[str, Any]:
 
 def label_channels(
     signature: Signature, values: FloatArray, dims: tuple[str, ...]
-) -> dict[str, xr.Variable]:
+) -> dict[str, Any]:
     """Variables of values of shape (…, N), with units and spread in training."""
+    spread = signature.state_scale.spread.tolist()
     return {
-        label.name: xr.Variable(
+        label.name: (
             dims,
             values[..., column],
             {
                 "units": label.units,
                 "long_name": label.long_name,
-                "training_std": float(signature.state_scale.spread[column]),
+                "training_std": spread[column],
             },
         )
         for column, label in enumerate(signature.state_labels)
@@ -349,7 +350,7 @@ def check_arrays(
 def _rows(
     name: str, value: npt.ArrayLike, least: int, names: Sequence[str], meaning: str
 ) -> FloatArray:
-    array = as_real(_by_name(name, value, names), name)
+    array = as_real(_by_name(name, value, names), name, greatest=np.inf)
     channels = len(names)
     if array.ndim != 2 or array.shape[1] != channels or array.shape[0] < least:
         turned = array.ndim == 2 and array.shape[0] == channels and array.shape[1] >= least
@@ -384,4 +385,4 @@ def _finite(name: str, needed: FloatArray) -> FloatArray:
             f"{name} holds {int(np.sum(~np.isfinite(needed)))} values that are not finite in the "
             f"{len(needed)} rows needed. Fill the gap first."
         )
-    return needed
+    return as_real(needed, name)

@@ -302,7 +302,7 @@ class ProbeAlignment:
             correlate.
         """
         first_name, first = next(iter(runs.items()))
-        labelled.channel_matrix(first, inputs, first_name, slice(0, 0))  # refuses unknown names
+        labelled.check_channels(first, inputs, first_name)
         carried = _elevations(self, first, inputs)
         if self.surge == "predicted" and self.surge_channel not in states:
             raise RequestError(

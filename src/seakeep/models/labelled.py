@@ -157,8 +157,16 @@ def channel_matrix(
     """
     size = len(range(*samples.indices(run.sizes["time"])))
     out = np.empty((size, len(names)))
+    for column, variable in enumerate(check_channels(run, names, name)):
+        out[:, column] = variable.values[samples]
+    return out
+
+
+def check_channels(run: xr.Dataset, names: Sequence[str], name: str) -> list[xr.Variable]:
+    """Variables of channels; one that is missing, not numeric or not over time raises an error."""
     variables, channels = run.variables, run.data_vars
-    for column, channel in enumerate(names):
+    out = []
+    for channel in names:
         if channel not in channels:
             known = [str(variable) for variable in channels]
             raise RequestError(
@@ -176,7 +184,7 @@ def channel_matrix(
                 f"channel '{channel}' of {name} is of type {variable.dtype}, not a real number. "
                 "Convert the column, or leave it out of the run."
             )
-        out[:, column] = variable.values[samples]
+        out.append(variable)
     return out
 
 
@@ -205,7 +213,8 @@ def _spacing(time: FloatArray) -> float:
 
 def channel_labels(run: xr.Dataset, names: Sequence[str]) -> tuple[ChannelLabel, ...]:
     """Labels of channels as the run states them."""
-    attributes = [run.variables[channel].attrs for channel in names]
+    variables = run.variables
+    attributes = [variables[channel].attrs for channel in names]
     return tuple(
         ChannelLabel(
             channel,
@@ -235,7 +244,7 @@ def common_labels(runs: Mapping[str, xr.Dataset], names: Sequence[str]) -> tuple
         If some of the runs state the unit of a channel and others do not.
     """
     for name, run in runs.items():
-        channel_matrix(run, names, name, slice(0, 0))  # refuses unknown names
+        check_channels(run, names, name)
     labels = channel_labels(next(iter(runs.values())), names)
     if len(runs) == 1:
         return labels
@@ -272,11 +281,11 @@ def common_labels(runs: Mapping[str, xr.Dataset], names: Sequence[str]) -> tuple
 
 def check_units(run: xr.Dataset, labels: Sequence[ChannelLabel], name: str) -> None:
     """Refuse a run in another unit than the model's, and warn of one that states none."""
-    silent = []
+    silent, variables = [], run.variables
     for label in labels:
-        if label.name not in run.variables or not label.units:
+        if label.name not in variables or not label.units:
             continue
-        units = run.variables[label.name].attrs.get("units")
+        units = variables[label.name].attrs.get("units")
         if not units:
             silent.append(label)
         elif str(units) != label.units:

