@@ -551,8 +551,9 @@ def resampled(run: Run, dt: float) -> Run:
         out = out.assign(_on_axis(group, time, dt, run.settings.preparation, run.name))
         for name in group.coords:
             if str(name).endswith("_flags"):
-                flags = _flags_at(group[name].to_numpy(), group["time"].to_numpy(), time, dt)
-                out.coords[str(name)] = ("time", flags, group[name].attrs)
+                given = group.variables[name]
+                flags = _flags_at(given.to_numpy(), group["time"].to_numpy(), time, dt)
+                out.coords[str(name)] = ("time", flags, given.attrs)
     channels = variables_of(out)
     for name in run.late:
         channels |= derive(channels, name, run.settings, dt, run.name)
@@ -598,8 +599,8 @@ def _on_axis(
 ) -> dict[str, tuple[str, FloatArray, dict[str, object]]]:
     time = group["time"].to_numpy()
     own = uniform_step(time, f"run '{run}'")
-    names = list(group.data_vars)
-    series = np.column_stack([group[name].to_numpy() for name in names])
+    channels = {name: group.variables[name] for name in group.data_vars}
+    series = np.column_stack([channel.to_numpy() for channel in channels.values()])
     filtered = settings.low_pass is not None and settings.low_pass[1] < 0.5 / own
     if filtered and settings.low_pass is not None:
         series = low_pass(series, own, *settings.low_pass)
@@ -611,8 +612,8 @@ def _on_axis(
     else:
         series = series[: wanted.size]
     out = {}
-    for i, name in enumerate(names):
-        attributes = dict(group[name].attrs)
+    for i, (name, channel) in enumerate(channels.items()):
+        attributes = dict(channel.attrs)
         if filtered and settings.low_pass is not None:
             attributes["low_pass"] = tuple(settings.low_pass)
         out[str(name)] = ("time", series[:, i].copy(), attributes)

@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -153,7 +154,7 @@ class Campaign:
         asked = settings.preparation.steps_per_period is not None or self._counts_in_periods
         return asked and settings.campaign.encounter_period is None
 
-    @property
+    @cached_property
     def _counts_in_periods(self) -> bool:
         """Whether something on which prepared runs depend is stated in encounter periods."""
         models = ("model", "models")

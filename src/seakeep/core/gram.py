@@ -31,6 +31,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -97,27 +98,27 @@ class Group:
     lags: int
     head: slice
 
-    @property
+    @cached_property
     def stop(self) -> int:
         """Row after the last."""
         return self.start + self.channels * self.lags
 
-    @property
+    @cached_property
     def rows(self) -> slice:
         """All of its rows."""
         return slice(self.start, self.stop)
 
-    @property
+    @cached_property
     def newest(self) -> slice:
         """Rows of lag zero."""
         return slice(self.start, self.start + self.channels)
 
-    @property
+    @cached_property
     def older(self) -> slice:
         """Rows of the other lags."""
         return slice(self.start + self.channels, self.stop)
 
-    @property
+    @cached_property
     def newer(self) -> slice:
         """Rows of all lags but the last; `older` moved up by one lag."""
         return slice(self.start, self.stop - self.channels)

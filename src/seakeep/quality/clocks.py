@@ -10,7 +10,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.quality.findings import Finding, Kind
-from seakeep.quality.record import Record, step_of
+from seakeep.quality.record import Record, channels_of, step_of
 from seakeep.quality.samples import is_elevation
 from seakeep.signals.filters import PASSBAND
 from seakeep.signals.quality import energy_above, noise_level
@@ -170,11 +170,11 @@ def steps(record: Record) -> Iterator[Finding]:
     edge = (0.5 * (PASSBAND + 1.0) if record.anti_alias else 1.0) * 0.5 / dt
     fate = "is damped or lost" if record.anti_alias else "is folded into slower waves"
     for logger, group in record.groups.items():
-        for name in map(str, group.data_vars):
-            wanted = is_elevation(group[name]) or name in MOTIONS
-            if not wanted or "derived_from" in group[name].attrs or own[logger] >= dt:
+        for name, channel in channels_of(group).items():
+            wanted = is_elevation(name, channel) or name in MOTIONS
+            if not wanted or "derived_from" in channel.attrs or own[logger] >= dt:
                 continue
-            x = group[name].to_numpy()
+            x = channel.to_numpy()
             share, period = energy_above(x, own[logger], edge)
             if share > LOST_ENERGY and not is_noise(x):
                 details = {"share": 100 * share, "period": period, "fate": fate}

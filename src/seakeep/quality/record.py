@@ -92,7 +92,12 @@ def step_of(data: xr.Dataset) -> float:
     return float(data["time"][1] - data["time"][0])
 
 
-def filled(channel: xr.DataArray) -> FloatArray:
+def channels_of(data: xr.Dataset) -> dict[str, xr.Variable]:
+    """Channels by name; ``data[name]`` would look at all others each time, for coordinates."""
+    return {str(name): data.variables[name] for name in data.data_vars}
+
+
+def filled(channel: xr.DataArray | xr.Variable) -> FloatArray:
     """Values of a channel, straight lines across gaps."""
     x = channel.to_numpy()
     there = np.isfinite(x)

@@ -9,7 +9,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.quality.findings import Finding, Kind
-from seakeep.quality.record import Record, filled, step_of
+from seakeep.quality.record import Record, channels_of, filled, step_of
 from seakeep.signals.quality import (
     BRIDGED,
     MISSING,
@@ -66,10 +66,10 @@ def flagged(record: Record) -> Iterator[Finding]:
     """Samples that carry a flag."""
     for group in record.groups.values():
         time, dt = group["time"].to_numpy(), step_of(group)
-        for name in map(str, group.data_vars):
-            if "derived_from" in group[name].attrs or f"{name}_flags" not in group.coords:
+        for name, channel in channels_of(group).items():
+            if "derived_from" in channel.attrs or f"{name}_flags" not in group.coords:
                 continue
-            flags = group[f"{name}_flags"].to_numpy()
+            flags = group.variables[f"{name}_flags"].to_numpy()
             for bit, kind in _FLAGS.items():
                 hit = (flags & bit) > 0
                 if not hit.any():
@@ -102,32 +102,32 @@ def _why_open(parts: Sequence[tuple[int, int]], size: int, dt: float, longest: f
 def constant(record: Record) -> Iterator[Finding]:
     """Channels that never change."""
     for group in record.groups.values():
-        for name, channel in group.data_vars.items():
+        for name, channel in channels_of(group).items():
             if "derived_from" not in channel.attrs and not np.ptp(channel.to_numpy()):
                 value, unit = float(channel[0]), str(channel.attrs["units"])
-                yield Finding(SamplesKind.CONSTANT, record.run, str(name), value, unit=unit)
+                yield Finding(SamplesKind.CONSTANT, record.run, name, value, unit=unit)
 
 
 def levels(record: Record) -> Iterator[Finding]:
     """Levels that drift, of channels that have no slow motion of their own."""
     dt = step_of(record.whole)
-    for name in map(str, record.whole.data_vars):
-        if not (is_elevation(record.whole[name]) or name in NO_SLOW_MOTION):
+    for name, channel in channels_of(record.whole).items():
+        if not (is_elevation(name, channel) or name in NO_SLOW_MOTION):
             continue
-        x = filled(record.whole[name])
+        x = filled(channel)
         if x.size < 16 or not np.ptp(x):
             continue
         change, sure = level_drift(x, dt, dominant_period(x, dt))
         # A level that moves by half the waves' spread shifts means and standardisation visibly.
         limit = 0.5 * float(x.std())
         if abs(change) > limit and sure > 5:
-            unit = str(record.whole[name].attrs["units"])
+            unit = str(channel.attrs["units"])
             yield Finding(SamplesKind.DRIFT, record.run, name, change, limit, unit)
 
 
-def is_elevation(channel: xr.DataArray) -> bool:
+def is_elevation(name: str, channel: xr.Variable) -> bool:
     """Whether a channel is a wave elevation: ``eta_…`` in metres."""
-    return str(channel.name).startswith("eta_") and channel.attrs.get("units") == "m"
+    return name.startswith("eta_") and channel.attrs.get("units") == "m"
 
 
 def impossible(record: Record) -> Iterator[Finding]:
@@ -137,12 +137,12 @@ def impossible(record: Record) -> Iterator[Finding]:
     is deep. One sample in a hundred may, as spikes do.
     """
     depth = record.water_depth
-    for name in map(str, record.whole.data_vars):
-        x = record.whole[name].to_numpy()
+    for name, channel in channels_of(record.whole).items():
+        x = channel.to_numpy()
         x = x[np.isfinite(x)]
         if not x.size:
             continue
-        vertical = depth is not None and (name == "heave" or is_elevation(record.whole[name]))
+        vertical = depth is not None and (name == "heave" or is_elevation(name, channel))
         if name in ("roll", "pitch") and (far := _reached(x)) > np.pi / 2:
             yield Finding(SamplesKind.IMPOSSIBLE, record.run, name, far, np.pi / 2, "rad")
         elif vertical and depth is not None and (far := _reached(x - x.mean())) > depth:

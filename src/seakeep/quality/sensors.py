@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.quality.findings import Finding, Kind
-from seakeep.quality.record import Record, Redundant, filled, step_of
+from seakeep.quality.record import Record, Redundant, channels_of, filled, step_of
 from seakeep.signals import misplaced_probes
 from seakeep.signals.quality import (
     FEWEST_STEPS,
@@ -147,9 +147,9 @@ def positions(record: Record) -> Iterator[Finding]:
     """
     run, depth = record.whole, record.water_depth
     places = {
-        str(name): float(run[name].attrs["x_position"])
-        for name in run.data_vars
-        if "x_position" in run[name].attrs
+        name: float(channel.attrs["x_position"])
+        for name, channel in channels_of(run).items()
+        if "x_position" in channel.attrs
     }
     if depth is None or record.waves == "regular" or len(places) < 2:
         return
