@@ -30,6 +30,7 @@ from seakeep.models.draws import Draw
 from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
 from seakeep.models.executor import Progress, in_order, one_blas_thread
 from seakeep.models.forecasts import (
+    Forecaster,
     check_arrays,
     counted,
     forecast_notes,
@@ -42,7 +43,7 @@ from seakeep.models.forecasts import (
 )
 from seakeep.models.inputs import Chain, FittedAlignment
 from seakeep.models.interface import Json, Signature
-from seakeep.models.labelled import ChannelLabel, Runs
+from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.members import (
     TrainingArrays,
@@ -85,10 +86,9 @@ TRAIN_ON = {
 }
 
 
-class _Forecasts:
+class _Forecasts(Forecaster):
     """Forecasts of several members: what an ensemble and members that are held have in common."""
 
-    signature: Signature
     origin: Json
     calibration: Calibration | None
 
@@ -102,68 +102,9 @@ class _Forecasts:
         raise NotImplementedError
 
     @property
-    def dt(self) -> float:
-        """Time step, s."""
-        return self.signature.dt
-
-    @property
-    def states(self) -> list[str]:
-        """Names of the states, in the order of the members."""
-        return self.signature.states
-
-    @property
-    def inputs(self) -> list[str]:
-        """Names of the measured inputs, in the order of the members."""
-        return self.signature.inputs
-
-    @property
-    def regressors(self) -> list[str]:
-        """Names of what the inputs become: the delayed regressors, then the direct ones."""
-        return self.signature.regressors
-
-    @property
-    def state_labels(self) -> tuple[ChannelLabel, ...]:
-        """Names, units and long names of the states."""
-        return self.signature.state_labels
-
-    @property
-    def input_labels(self) -> tuple[ChannelLabel, ...]:
-        """Names, units and long names of the measured inputs."""
-        return self.signature.input_labels
-
-    @property
-    def state_delays(self) -> int:
-        """Longest s of a member."""
-        return self.signature.state_delays
-
-    @property
-    def input_delays(self) -> int:
-        """Longest z of a member."""
-        return self.signature.input_delays
-
-    @property
-    def history_samples(self) -> int:
-        """Samples a forecast needs up to its start, so that every member has its history."""
-        return self.signature.history_samples
-
-    @property
-    def lead_samples(self) -> int:
-        """Samples of input after the one a step starts from that drive the step."""
-        return self.signature.lead_samples
-
-    @property
     def state_spread(self) -> FloatArray:
         """Standard deviation of the states over all that members learn from, shape (N,)."""
         return self.signature.state_scale.spread
-
-    def read_windows(
-        self,
-        runs: Mapping[str, xr.Dataset],
-        places: Sequence[tuple[str, float]],
-        steps: int | None,
-    ) -> Windows:
-        """What forecasts from several starts, in several runs, read: (run, start in s) each."""
-        return engine.read_windows(self.signature, runs, places, steps)
 
     def forecast(
         self,

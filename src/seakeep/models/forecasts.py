@@ -21,6 +21,7 @@ from seakeep.models.training import Training
 from seakeep.signals.time_axis import fixed, instant_text, span_text
 
 __all__ = [
+    "Forecaster",
     "SingleModel",
     "check_arrays",
     "counted",
@@ -38,19 +39,10 @@ DIVERGED_AT = "diverged at t = "
 """How the status of a free run that was given up starts."""
 
 
-class SingleModel:
-    """What every model of one member offers; it brings a signature and ``free_runs``."""
+class Forecaster:
+    """What models, ensembles and held members say of themselves, from their signature."""
 
-    kind: ClassVar[str]
-    n_members: ClassVar[int] = 1
     signature: Signature
-    training: Training
-
-    def free_runs(
-        self, groups: Sequence[Windows], members: Sequence[int] = (0,)
-    ) -> list[FloatArray]:
-        """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
-        raise NotImplementedError
 
     @property
     def dt(self) -> float:
@@ -84,23 +76,46 @@ class SingleModel:
 
     @property
     def state_delays(self) -> int:
-        """Number of delayed copies of the states, s."""
+        """Number of delayed copies of the states, s; the longest of a member."""
         return self.signature.state_delays
 
     @property
     def input_delays(self) -> int:
-        """Number of delayed copies of the inputs, z."""
+        """Number of delayed copies of the inputs, z; the longest of a member."""
         return self.signature.input_delays
 
     @property
     def history_samples(self) -> int:
-        """Samples a forecast needs up to its start, that one included: max(s, z) + 1."""
+        """Samples a forecast needs up to its start, that one included, for the longest delays."""
         return self.signature.history_samples
 
     @property
     def lead_samples(self) -> int:
         """Samples of input after the one a step starts from that drive the step."""
         return self.signature.lead_samples
+
+    def read_windows(
+        self,
+        runs: Mapping[str, xr.Dataset],
+        places: Sequence[tuple[str, float]],
+        steps: int | None,
+    ) -> Windows:
+        """What forecasts from several starts, in several runs, read: (run, start in s) each."""
+        return engine.read_windows(self.signature, runs, places, steps)
+
+
+class SingleModel(Forecaster):
+    """What every model of one member offers; it brings a signature and ``free_runs``."""
+
+    kind: ClassVar[str]
+    n_members: ClassVar[int] = 1
+    training: Training
+
+    def free_runs(
+        self, groups: Sequence[Windows], members: Sequence[int] = (0,)
+    ) -> list[FloatArray]:
+        """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
+        raise NotImplementedError
 
     @property
     def training_spans(self) -> dict[str, tuple[float, float]]:
@@ -133,15 +148,6 @@ class SingleModel:
                 training.runs, training.columns, training.first, training.stop, strict=True
             )
         ]
-
-    def read_windows(
-        self,
-        runs: Mapping[str, xr.Dataset],
-        places: Sequence[tuple[str, float]],
-        steps: int | None,
-    ) -> Windows:
-        """What forecasts from several starts, in several runs, read: (run, start in s) each."""
-        return engine.read_windows(self.signature, runs, places, steps)
 
     def forecast(self, run: xr.Dataset, start: float, steps: int | None = None) -> xr.Dataset:
         """Free run driven by the measured input of `run`.
