@@ -418,6 +418,7 @@ def test_baselines_stand_beside_a_model_and_their_loss_is_not_its_own(run, place
     assert status == 0, err
     heads = next(line for line in out.splitlines() if "below hold last" in line)
     assert "below mean  below best linear" in heads
+    assert max(len(line.rstrip()) for line in out.splitlines()) <= 80
     with (place / "based/comparison.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     kinds = {"model", "hold_last", "mean", "fir", "arx", "subspace"}

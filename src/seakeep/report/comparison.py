@@ -124,7 +124,7 @@ def model_blocks(
 ) -> Iterator[Table]:
     """Several models beside each other, a table of averages and one of channels per run."""
     first = next(iter(tables.values()))
-    heads = ("model", "ANRMSE", "fit %", "NAMMAE", *(f"below {each}" for each in references))
+    heads = ("model", "ANRMSE", "NAMMAE", *(f"below {each}" for each in references))
     for run in first["run"].values:
         of_run = {name: table.sel(run=run) for name, table in tables.items()}
         errors = {name: float(at["anrmse"]) for name, at in of_run.items()}
@@ -136,7 +136,6 @@ def model_blocks(
             (
                 name,
                 _text(at["anrmse"], "{:.3f}"),
-                _text(at["fit"].mean(), "{:z.1f}"),
                 _text(at["mean_nammae"], "{:.3f}"),
                 *(_text(100 * (1 - errors[name] / each), "{:+z.0f} %") for each in best.values()),
             )
