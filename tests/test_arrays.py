@@ -117,6 +117,11 @@ CALLS = {
     "statistics.choose_block_length": (statistics.choose_block_length, X),
     "statistics.conformal_margin": (statistics.conformal_margin, TABLE[None]),
     "statistics.coverage": (statistics.coverage, TABLE - 1, TABLE + 1, TABLE),
+    "statistics.coverage_table": (
+        statistics.coverage_table, TABLE - 1, TABLE + 1, TABLE,
+    ),
+    "statistics.band_crps": (statistics.band_crps, TABLE - 1, TABLE + 1, TABLE),
+    "statistics.winkler_score": (statistics.winkler_score, TABLE - 1, TABLE + 1, TABLE),
     "statistics.density_grid": (statistics.density_grid, X, Y),
     "statistics.density_interval": (
         lambda x: statistics.density_interval(x, block_length=9, rng=RNG(0), n_series=3), X,

@@ -31,7 +31,14 @@ from seakeep.core.bootstrap import (
     lag_one_correlation,
 )
 from seakeep.core.calibration import ConformalMargin, band_scores, conformal_margin
-from seakeep.core.coverage import BandCoverage, BoxStatistics, box_statistics
+from seakeep.core.coverage import (
+    BandCoverage,
+    BoxStatistics,
+    CoverageTable,
+    band_crps,
+    box_statistics,
+    winkler_score,
+)
 from seakeep.core.density import (
     Bandwidth,
     DensityInterval,
@@ -51,9 +58,11 @@ __all__ = [
     "BlockChoice",
     "BoxStatistics",
     "ConformalMargin",
+    "CoverageTable",
     "DensityInterval",
     "JsdInterval",
     "TrendTest",
+    "band_crps",
     "band_error_over_time",
     "band_scores",
     "block_length",
@@ -61,6 +70,7 @@ __all__ = [
     "choose_block_length",
     "conformal_margin",
     "coverage",
+    "coverage_table",
     "density_grid",
     "density_interval",
     "jensen_shannon",
@@ -71,6 +81,7 @@ __all__ = [
     "moving_block_bootstrap",
     "split_bands",
     "trend_test",
+    "winkler_score",
 ]
 
 
@@ -278,15 +289,64 @@ def coverage(lower: Any, upper: Any, measured: Any) -> Any:
                 "gaps first, or judge a window without them."
             )
     band = _coverage.coverage(**pairs.arrays)
-    units = [str(measured[name].attrs.get("units", "")) for name in names]
     return xr.Dataset(
         {
             field.name: ((*lead, "channel"), getattr(band, field.name))
             for field in fields(_coverage.BandCoverage)
         },
-        coords={
-            "channel": names,
-            "unit": ("channel", units),
-            **{dim: lower[dim] for dim in lead if dim in lower.coords},
-        },
+        coords=_channels(names, measured)
+        | {dim: lower[dim] for dim in lead if dim in lower.coords},
     )
+
+
+def _channels(names: Sequence[str], measured: xr.Dataset) -> dict[str, Any]:
+    """Channels and their units, as coordinates."""
+    units = [str(measured[name].attrs.get("units", "")) for name in names]
+    return {"channel": list(names), "unit": ("channel", units)}
+
+
+@overload
+def coverage_table(
+    lower: xr.Dataset,
+    upper: xr.Dataset,
+    measured: xr.Dataset,
+    level: float = 0.95,
+    waves: xr.DataArray | None = None,
+) -> xr.Dataset: ...
+@overload
+def coverage_table(
+    lower: npt.ArrayLike,
+    upper: npt.ArrayLike,
+    measured: npt.ArrayLike,
+    level: float = 0.95,
+    waves: npt.ArrayLike | None = None,
+) -> CoverageTable: ...
+@functools.wraps(_coverage.coverage_table)
+def coverage_table(
+    lower: Any, upper: Any, measured: Any, level: float = 0.95, waves: Any = None
+) -> Any:
+    """Take Datasets too; the docstring shown is that of the array function."""
+    if not _labelled(lower=lower, upper=upper, measured=measured):
+        return _coverage.coverage_table(lower, upper, measured, level, waves)
+    pairs = pair(lower=lower, upper=upper, measured=measured)
+    heights = None
+    if waves is not None:
+        if not isinstance(waves, xr.DataArray):
+            raise RequestError(
+                f"waves is a {type(waves).__name__}; with Datasets it must be a DataArray with the "
+                "dimension 'time'."
+            )
+        first = pairs.names[0]  # a height beside the bounds of a channel, at their instants
+        alone = xr.Dataset({first: waves.assign_attrs(units="")})
+        heights = pair(lower=lower[[first]], waves=alone).arrays["waves"][..., 0]
+    found = _coverage.coverage_table(**pairs.arrays, level=level, waves=heights)
+    dims = {"parts": ("part",), "instants": ("part",)}
+    table = xr.Dataset(
+        {
+            field.name: (dims.get(field.name, ("part", "channel")), getattr(found, field.name))
+            for field in fields(CoverageTable)
+            if field.name != "parts"
+        },
+        coords={"part": list(found.parts), **_channels(pairs.names, measured)},
+    )
+    return table.assign_attrs(level=level)

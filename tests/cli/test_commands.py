@@ -266,7 +266,7 @@ def test_calibrate_takes_an_unread_part_of_a_run_that_trains(run, place):
 
 def test_calibrate_widens_the_band_that_compare_and_forecast_show(run, place):
     calibrate = f"calibrate ensemble.nc {CAMPAIGN} --run unseen --stop 60 --steps 200 -o wide.nc"
-    status, out, err = run(f"{calibrate} --level 0.9")
+    status, out, err = run(f"{calibrate} --level 0.9 --scale constant")
     assert status == 0, err
     assert "Margin of the 90 % band, from 3 windows of 200 instants (unseen)" in out
     assert "Calibrated on unseen 9.52 to 57.52 s: judge it on other instants." in out
@@ -274,7 +274,7 @@ def test_calibrate_widens_the_band_that_compare_and_forecast_show(run, place):
     ensemble = seakeep.load_model(place / "ensemble.nc")
     unseen = seakeep.read_campaign(place / CAMPAIGN).prepare(names=["unseen"])["unseen"]
     part = unseen.sel(time=slice(None, 60.001))
-    expected = ensemble.calibrate(part, steps=200, level=0.9)
+    expected = ensemble.calibrate(part, steps=200, level=0.9, scale="constant")
     margin = expected.calibration.found.margin
     found = seakeep.load_model(place / "wide.nc").calibration
     np.testing.assert_array_equal(found.found.margin, margin)
@@ -300,6 +300,17 @@ def test_calibrate_widens_the_band_that_compare_and_forecast_show(run, place):
         np.testing.assert_array_equal(
             stored["heave"].sel(statistic="upper"), band.sel(statistic="upper") + margin[0]
         )
+
+
+def test_calibrate_scales_by_the_spread_and_folds_over_the_runs_that_train(run, place):
+    calibrate = f"calibrate ensemble.nc {CAMPAIGN} --steps 200 --folds run -o folds.nc"
+    status, out, err = run(calibrate)
+    assert status == 0, err
+    assert "Factor k and floor f, ±k·√(σ² + f²), of the 95 % band, from" in out
+    found = seakeep.load_model(place / "folds.nc").calibration
+    assert (found.scale, found.folds) == ("spread", "run")
+    k, floor = found.found.margin[0], found.floor[0]
+    assert re.search(rf"heave +m +{k:.2f} +{floor:.4g} ".replace(".", r"\."), out)
 
 
 def test_compare_tells_where_a_forecast_shows_memory_or_a_band_does_not_hold(run):
@@ -538,6 +549,11 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
             f"forecast model.nc {FROM_20} --scheduler tcp://127.0.0.1:9 -o f.nc",
             2,
             r"--scheduler is for ensembles, and",
+        ),
+        (
+            f"calibrate ensemble.nc {CAMPAIGN} --steps 9 --scale learnt -o c.nc",
+            2,
+            r"scale = 'learnt' is not offered.* Take 'spread'",
         ),
         (
             f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unsen -o c.nc",

@@ -1,5 +1,7 @@
 """The calibrated band of an ensemble: on windows that no member read, kept in its file."""
 
+import json
+import re
 import warnings
 
 import numpy as np
@@ -8,7 +10,9 @@ import xarray as xr
 
 import seakeep
 from seakeep.core.calibration import band_scores, conformal_margin
-from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.models import store
+from seakeep.models.calibration import found_margin, held_out
 
 STATES, INPUTS, DT = ["heave", "pitch"], ["eta"], 0.1
 
@@ -53,7 +57,14 @@ def calibrated(ensemble, run):
     return ensemble.calibrate(run.sel(time=slice(None, 110.0)), steps=40)
 
 
-def test_the_calibrated_band_covers_unseen_windows_as_it_says(calibrated, run):
+@pytest.fixture(scope="module")
+def moved(ensemble, run):
+    return ensemble.calibrate(run.sel(time=slice(None, 110.0)), steps=40, scale="constant")
+
+
+@pytest.mark.parametrize("scale", ["spread", "constant"])
+def test_the_calibrated_band_covers_unseen_windows_as_it_says(calibrated, moved, run, scale):
+    calibrated = {"spread": calibrated, "constant": moved}[scale]
     inside = {"members": [], "calibrated": []}
     for start in np.arange(112.0, 155.0, 4.0):
         for band, found in inside.items():
@@ -67,7 +78,21 @@ def test_the_calibrated_band_covers_unseen_windows_as_it_says(calibrated, run):
     assert np.mean(inside["calibrated"]) == pytest.approx(0.95, abs=0.036)
 
 
-def test_bounds_are_moved_by_the_margin_and_nothing_else(calibrated, ensemble, run):
+def test_the_band_is_a_factor_times_the_spread_with_a_floor(calibrated, ensemble, run):
+    plain = ensemble.forecast_summary(run, 120.0, 30)
+    wide = calibrated.forecast_summary(run, 120.0, 30, band="calibrated")
+    found = calibrated.calibration
+    for k, name in enumerate(STATES):
+        mean, std = (plain[name].sel(statistic=key).values for key in ("mean", "std"))
+        assert 4 * found.floor[k] > 1.5  # the noise alone
+        half = found.found.margin[k] * np.sqrt(std**2 + found.floor[k] ** 2)
+        for key, bound in (("mean", mean), ("lower", mean - half), ("upper", mean + half)):
+            np.testing.assert_allclose(wide[name].sel(statistic=key), bound, rtol=0, atol=1e-12)
+    assert "calibrated factor times the root" in wide["statistic"].attrs["comment"]
+
+
+def test_bounds_are_moved_by_a_constant_margin_and_nothing_else(moved, ensemble, run):
+    calibrated = moved
     plain = ensemble.forecast_summary(run, 120.0, 30)
     wide = calibrated.forecast_summary(run, 120.0, 30, band="calibrated")
     margin = calibrated.calibration.found.margin
@@ -89,7 +114,8 @@ def test_bounds_are_moved_by_the_margin_and_nothing_else(calibrated, ensemble, r
         ensemble.summarize_windows(run, [120.0], 30, band="calibrated")
 
 
-def test_no_window_touches_what_a_member_has_read(ensemble, calibrated, run):
+def test_no_window_touches_what_a_member_has_read(ensemble, moved, run):
+    calibrated = moved
     (first, last) = ensemble.read_spans["sea"]
     # The longest draw with its delay history, up to stop.
     needed = max(draw.needed(False) for draw in ensemble.members)
@@ -166,7 +192,9 @@ def test_runs_without_names_are_known_by_their_samples(run):
         named.calibrate(1.001 * sea(0, 500, "a").assign_attrs(run="a"), steps=250)
 
 
-def test_a_file_keeps_the_calibration(calibrated, ensemble, run, tmp_path):
+@pytest.mark.parametrize("scale", ["spread", "constant"])
+def test_a_file_keeps_the_calibration(calibrated, moved, ensemble, run, tmp_path, scale):
+    calibrated = {"spread": calibrated, "constant": moved}[scale]
     calibrated.save(tmp_path / "ensemble.nc")
     kept = seakeep.load_model(tmp_path / "ensemble.nc")
     xr.testing.assert_identical(
@@ -174,12 +202,102 @@ def test_a_file_keeps_the_calibration(calibrated, ensemble, run, tmp_path):
         calibrated.forecast_summary(run, 120.0, 30, band="calibrated"),
     )
     assert kept.calibration.windows == calibrated.calibration.windows
+    assert kept.calibration.scale == scale
     ensemble.save(tmp_path / "plain.nc")
     assert seakeep.load_model(tmp_path / "plain.nc").calibration is None
 
 
-def test_the_summary_says_it(calibrated, ensemble):
-    assert "calibrated for 0.95 on 20 windows of 40 steps" in calibrated.summary()
+def altered(calibrated, path, **values):
+    """A file whose calibration was written otherwise, under a sound checksum."""
+    dataset = calibrated.to_dataset()
+    kept = json.loads(dataset.attrs["calibration"]) | values
+    kept = {key: value for key, value in kept.items() if value != "gone"}
+    store.write(dataset.assign_attrs(calibration=json.dumps(kept)), path, calibrated.kind)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"floor": "gone"}, r"calibrated by an older seakeep.* Calibrate the ensemble again"),
+        ({"floor": [0.1]}, r"floor of the calibration is no list of 2 numbers from zero on"),
+        ({"margin": [0.1, -1.0]}, r"margin of the calibration is no list of 2 numbers"),
+        ({"windows": "gone"}, "a part is missing: 'windows'"),
+        ({"level": 2.0}, "level must lie between 0 and 1"),
+    ],
+)
+def test_a_calibration_that_does_not_fit_is_refused(calibrated, tmp_path, values, message):
+    with pytest.raises((DataError, RequestError), match=message):
+        seakeep.load_model(altered(calibrated, tmp_path / "other.nc", **values))
+
+
+def pooled(train_on, runs):
+    spec = seakeep.BayesianHankelDMDc(
+        encounter_period=1.6,
+        train_length=None,
+        state_delay=seakeep.Uniform(0.2, 0.6),
+        input_delay=seakeep.Uniform(0.5, 1.5),
+        ridge=seakeep.Uniform(200, 400),
+        n_members=6,
+        seed=1,
+        train_on=train_on,
+    )
+    return spec.fit(runs, STATES, INPUTS)
+
+
+def test_folds_are_forecast_by_what_the_other_runs_teach():
+    runs = {name: sea(seed, 500, name) for seed, name in enumerate(("a", "b", "c"))}
+    ensemble = pooled("all", runs)
+    with pytest.raises(RequestError, match=r"or let each run .* \(folds = 'run'\)"):
+        ensemble.calibrate(runs, steps=40)
+    found = ensemble.calibrate(runs, steps=40, folds="run").calibration
+    # By hand: the same settings fitted anew on the other runs, which none of them has read.
+    judged = [
+        held_out(
+            pooled("all", {key: each for key, each in runs.items() if key != name}),
+            {name: run},
+            40,
+            0.95,
+        )[name]
+        for name, run in runs.items()
+    ]
+    expected, floor = found_margin(judged, 0.95, "spread")
+    np.testing.assert_allclose(found.found.margin, expected.margin, rtol=1e-9)
+    np.testing.assert_allclose(found.floor, floor, rtol=1e-9)
+    assert found.folds == "run"
+    assert found.windows == dict.fromkeys(runs, (500 - ensemble.history_samples) // 40)
+    # A run that none has read is forecast by all.
+    other = {"other": sea(3, 500, "other")}
+    one, two = (ensemble.calibrate(other, 40, folds=folds).calibration for folds in ("run", None))
+    np.testing.assert_array_equal(one.found.margin, two.found.margin)
+
+
+def test_members_that_learn_from_the_run_alone_do_not_forecast_it():
+    runs = {name: sea(seed, 500, name) for seed, name in enumerate(("a", "b"))}
+    ensemble = pooled("runs", runs)
+    without = ensemble.without("a")
+    assert without.arrays.names == ("b",)
+    kept = [number for number, draw in enumerate(ensemble.members) if draw.run == 1]
+    assert 0 < without.n_members == len(kept) < 6
+    run = sea(3, 300, "other")
+    np.testing.assert_array_equal(
+        without.forecast(run, 10.0, 40)["heave"],
+        ensemble.forecast(run, 10.0, 40)["heave"].isel(member=kept),
+    )
+    told = []
+    ensemble.calibrate(runs, 40, folds="run", progress=lambda *each: told.append(each))
+    assert [(done, total) for done, total, _ in told] == [(k, 6) for k in range(1, 7)]
+    with pytest.raises(RequestError, match="no member learnt from another run than 'a'"):
+        pooled("all", {"a": runs["a"]}).calibrate(runs["a"], 40, folds="run")
+    with pytest.raises(RequestError, match="no run 'c' trains"):
+        ensemble.without("c")
+
+
+def test_the_summary_says_it(calibrated, moved, ensemble):
+    said = calibrated.summary()
+    assert "calibrated for 0.95 on 20 windows of 40 steps: " in said
+    assert re.search(r"7\.\d to 7\.\d times spread and a floor of .* training SD either way", said)
+    assert re.search(r"20 windows of 40 steps: wider by .* training SD either", moved.summary())
     assert "calibrated" not in ensemble.summary()
 
 
@@ -217,3 +335,9 @@ def test_what_is_refused(ensemble, calibrated, run):
         ensemble.calibrate(run, steps=0)
     with pytest.raises(RequestError, match="level must lie between 0 and 1"):
         ensemble.calibrate(run, steps=40, level=95)
+    with pytest.raises(RequestError, match=r"scale = 'learnt' is not offered.* Take 'spread'"):
+        ensemble.calibrate(run, steps=40, scale="learnt")
+    with pytest.raises(RequestError, match="must be 'spread' or 'constant'; received 'x'"):
+        ensemble.calibrate(run, steps=40, scale="x")
+    with pytest.raises(RequestError, match="folds must be 'run', or None"):
+        ensemble.calibrate(run, steps=40, folds="window")

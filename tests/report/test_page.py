@@ -171,11 +171,13 @@ def test_a_history_shows_the_calibrated_band_around_that_of_the_members(page):
     ((test, training, window), *_) = shown_cells(found)
     figure = history_figure(found, test, training, window)
     cell = found.tests[test].isel(training=training, window=window)
-    margins = found.groups["calibration/bayesian"]["margin"].isel(training=training)
+    kept = found.groups["calibration/bayesian"].isel(training=training)
     for axes, name in zip(figure.axes, found.channels, strict=True):
         one = cell.sel(channel=name)
         (lower,) = (line for line in axes.lines if line.get_label() == "calibrated")
-        wider = one["bayesian_lower"].values - float(margins.sel(channel=name))
+        margin, floor = (float(kept[key].sel(channel=name)) for key in ("margin", "floor"))
+        half = margin * np.hypot(one["bayesian_std"].values, floor)
+        wider = one["bayesian_mean"].values - half
         mean, spread = float(one["training_mean"]), float(one["training_std"])
         np.testing.assert_allclose(lower.get_ydata(), (wider - mean) / spread, rtol=1e-10)
     (legend,) = figure.legends

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from seakeep.core.calibration import calibrated_bounds, spread_floor, spread_scores
 from seakeep.errors import DataError, RequestError
 from seakeep.statistics import band_scores, conformal_margin, coverage
 
@@ -75,6 +76,54 @@ def test_independent_scores_are_worth_nearly_all_of_their_number():
     scores = np.random.default_rng(3).standard_normal((10, 300, 1))
     # The first few correlations are noise of 1/√3000, until one is not positive.
     assert conformal_margin(scores, 0.9).blocks[0] > 3000 / 1.5
+
+
+def test_a_band_that_follows_the_spread_covers_and_is_narrower_than_a_constant_one():
+    rng = np.random.default_rng(4)
+    steps, windows, repeats = 100, 12, 500
+    inside, high, widths = np.empty((3, 2, repeats))
+    for repeat in range(repeats):
+        # The members know how the errors grow with the waves, and a third of how large they are.
+        sigma = np.exp(rng.normal(0.0, 0.7, (2 * windows, steps, 1)))
+        mean = rng.standard_normal(sigma.shape)
+        y, std = mean + sigma * rng.standard_normal(sigma.shape), sigma / 3
+        half = 1.96 * std
+        seen, new = slice(None, windows), slice(windows, None)
+        floor = spread_floor(mean[seen], y[seen])
+        found = conformal_margin(spread_scores(mean[seen], std[seen], y[seen], floor))
+        moved = conformal_margin(
+            band_scores(mean[seen] - half[seen], mean[seen] + half[seen], y[seen])
+        )
+        members = (mean[new], std[new], mean[new] - half[new], mean[new] + half[new])
+        highest = sigma[new] > np.quantile(sigma[new], 2 / 3)
+        bands = (
+            calibrated_bounds(*members, found.margin, floor),
+            calibrated_bounds(*members, moved.margin, None),
+        )
+        for k, (low, up) in enumerate(bands):
+            held = (low <= y[new]) & (y[new] <= up)
+            inside[k, repeat], high[k, repeat] = held.mean(), held[highest].mean()
+            widths[k, repeat] = (up - low).mean()
+    # The spread of single repetitions is about 0.008; their mean is known to 0.0004.
+    np.testing.assert_allclose(inside.mean(axis=1), 0.95, atol=0.01)
+    assert np.mean(np.abs(inside[0] - 0.95) <= 0.03) > 0.97
+    # Where errors are large the floor takes some of what a constant margin takes more of.
+    assert high[0].mean() > high[1].mean() + 0.01
+    assert widths[0].mean() < 0.98 * widths[1].mean()
+
+
+def test_floor_and_scores_by_hand_and_forecasts_that_are_lost():
+    mean = np.array([[[0.0], [2.0]], [[np.nan], [np.nan]]])
+    y = np.array([[[3.0], [-2.0]], [[0.0], [0.0]]])
+    floor = spread_floor(mean, y)
+    assert floor[0] == pytest.approx(np.sqrt((9 + 16) / 2) / 4, rel=1e-15)
+    assert spread_floor(mean[1:], y[1:])[0] == 1.0
+    std = np.array([[[0.0], [1.0]], [[np.nan], [np.nan]]])
+    scores = spread_scores(mean, std, y, floor)
+    np.testing.assert_allclose(scores[0, :, 0], [3 / floor[0], 4 / np.hypot(1, floor[0])])
+    assert np.isinf(scores[1]).all()
+    # Neither error nor scale: a channel that never moves.
+    assert spread_scores(y * 0, y * 0, y * 0, np.zeros(1)).max() == 0.0
 
 
 def test_few_blocks_warrant_less_and_give_the_largest_score():

@@ -118,6 +118,22 @@ def test_coverage_of_each_channel():
     assert found["width"].values == pytest.approx(2.0, rel=1e-12)
 
 
+def test_a_coverage_table_has_parts_channels_and_units():
+    waves = xr.DataArray(np.linspace(1.0, 2.0, TIME.size), dims="time", coords={"time": TIME})
+    band = PREDICTED.isel(time=slice(10, 100))
+    found = statistics.coverage_table(band - 1, band + 1, MEASURED, level=0.9, waves=waves)
+    names, part = ["pitch", "heave"], slice(10, 100)
+    low, y = (np.stack([d[n].values[part] for n in names], 1) for d in (PREDICTED - 1, MEASURED))
+    alone = core_coverage.coverage_table(low, low + 2, y, 0.9, waves.values[part])
+    assert found["part"].values.tolist() == list(alone.parts)
+    for key in ("inside", "width", "relative_width", "winkler", "crps"):
+        np.testing.assert_allclose(found[key], getattr(alone, key), rtol=1e-12)
+    assert found["unit"].values.tolist() == [MEASURED[name].attrs["units"] for name in names]
+    assert found.attrs["level"] == 0.9
+    with pytest.raises(RequestError, match="waves is a ndarray"):
+        statistics.coverage_table(band - 1, band + 1, MEASURED, waves=waves.values)
+
+
 def test_a_window_is_found_in_a_longer_measurement():
     window = PREDICTED.isel(time=slice(50, 150))
     moved = window.assign_coords(time=window.time + 1e-6)

@@ -36,8 +36,10 @@ def test_the_paper_has_no_calibration_unless_asked(study_folder, preset, stated,
     assert study.settings.calibrates is expected
 
 
-def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder):
-    study = edited(study_folder, ("length = 6", "length = 3"))
+@pytest.mark.parametrize("scale", ["spread", "constant"])
+def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder, scale):
+    stated = [("n_series = 8", 'n_series = 8\nscale = "constant"')] if scale == "constant" else []
+    study = edited(study_folder, ("length = 6", "length = 3"), *stated)
     found = run_study(study, study_folder / "out")
     plan, runs = make_plan(study)
     kept = found.groups["calibration/bayesian"]
@@ -48,17 +50,26 @@ def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder
         ensemble = fit_training(plan, runs, "bayesian", training)
         parts = {name: runs[name] for name in ("first", "second")}  # they train as a whole
         steps = plan.tests["unseen"][0].steps
-        alone = ensemble.calibrate(parts, steps).calibration
+        alone = ensemble.calibrate(parts, steps, scale=scale).calibration
         np.testing.assert_allclose(kept["margin"][k], alone.found.margin, rtol=1e-9)
         assert int(kept["windows"][k]) == sum(alone.windows.values()) > 0
         cell = test.isel(training=k)
         lower = cell["bayesian_lower"] - alone.found.margin
         upper = cell["bayesian_upper"] + alone.found.margin
+        if scale == "spread":
+            np.testing.assert_allclose(kept["floor"][k], alone.floor, rtol=1e-9)
+            half = alone.found.margin * np.sqrt(cell["bayesian_std"] ** 2 + alone.floor**2)
+            lower, upper = cell["bayesian_mean"] - half, cell["bayesian_mean"] + half
         inside.append(((lower <= cell["measured"]) & (cell["measured"] <= upper)).values)
     by_channel = np.mean(inside, axis=(0, 1, 2))
     np.testing.assert_allclose(table["calibrated_inside"][1:], by_channel, rtol=1e-9)
     assert (table["calibrated_inside"] >= table["inside"]).all()
     assert (table["calibrated_relative_width"] > table["relative_width"]).all()
+    bands = found.groups["statistics/bands/unseen"].sel(model="bayesian", band="calibrated")
+    np.testing.assert_allclose(bands["inside"].sel(part="all"), by_channel, rtol=1e-9)
+    thirds = bands.sel(part=["lowest waves", "middle waves", "highest waves"])
+    np.testing.assert_allclose(thirds["crps"].mean("part"), bands["crps"].sel(part="all"))
+    assert {"first third", "last third"} < set(bands["part"].values)
 
 
 def test_where_runs_are_left_out_each_is_forecast_by_the_others_and_the_test_run_by_none(

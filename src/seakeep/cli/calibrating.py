@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from seakeep.campaign import Campaign
     from seakeep.models import HankelEnsemble
+    from seakeep.models.calibration import BandScale
     from seakeep.report.tables import Table
 
 __all__ = ["calibrate"]
@@ -68,15 +69,31 @@ def calibrate(
         ),
     ] = None,
     level: Level = None,
+    scale: Annotated[
+        str,
+        typer.Option(
+            "--scale",
+            help="What the half-width follows: 'spread', a factor times that of the members with a "
+            "floor, or 'constant', the members' band moved outwards by as much everywhere.",
+        ),
+    ] = "spread",
+    folds: Annotated[
+        str | None,
+        typer.Option(
+            "--folds",
+            help="'run': each run that trains is forecast by the members as they learn from the "
+            "other runs; by default only windows that no member has read count.",
+        ),
+    ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
 ) -> None:
     """Calibrate the band of an ensemble on measured windows.
 
-    Widens the band until it holds the part of the measurement that it claims, in the sea of these
-    runs. The ensemble forecasts windows, end to end, that no member has read; the bounds then move
-    outwards by a quantile of the distances by which measurements lie outside (split-conformal
-    prediction). Leave out what the ensemble is to be judged on.
+    Makes a band that holds the part of the measurement that it claims, in the sea of these runs.
+    The ensemble forecasts windows, end to end, that no member has read; a quantile of its errors
+    there makes the band (split-conformal prediction). Leave out what the ensemble is to be judged
+    on.
 
     Example: seakeep calibrate ensemble.nc docs/tutorial/campaign.toml --run unseen --stop 60
     --steps 200 -o calibrated.nc
@@ -84,10 +101,12 @@ def calibrate(
     check_place(out, ".nc")
     from seakeep.campaign import load_prepared, read_campaign
     from seakeep.models import HankelEnsemble, load_model
+    from seakeep.models.calibration import check_scale
     from seakeep.models.forecasts import counted
     from seakeep.signals.time_axis import instant_text, span_text
     from seakeep.study.comparison import samples_of
 
+    check_scale(scale)
     fitted = load_model(ensemble)
     if not isinstance(fitted, HankelEnsemble):
         raise RequestError(
@@ -117,6 +136,8 @@ def calibrate(
             parts,
             count,
             DEFAULT_LEVEL if level is None else level,
+            scale=cast("BandScale", scale),
+            folds=cast('Literal["run"] | None', folds),
             executor=executor,
             progress=quietly(progress),
         )
@@ -173,15 +194,18 @@ def _part(run: xr.Dataset, start: float | None, stop: float | None) -> xr.Datase
 
 
 def _table(ensemble: HankelEnsemble) -> Table:
-    """Margins of the channels, and what they were found on."""
+    """Margins of the channels, or factors and floors of their scale, and what they rest on."""
     from seakeep.models.forecasts import counted
     from seakeep.report.tables import Table
 
-    assert ensemble.calibration is not None
-    found, windows = ensemble.calibration.found, ensemble.calibration.windows
+    calibration = ensemble.calibration
+    assert calibration is not None
+    found, windows, floor = calibration.found, calibration.windows, calibration.floor
+    made = "Margin" if floor is None else "Factor k and floor f, ±k·√(σ² + f²),"
+    width = found.margin if floor is None else floor
     title = (
-        f"Margin of the {100 * found.level:g} % band, from "
-        f"{counted(sum(windows.values()), 'window')} of {ensemble.calibration.steps} instants "
+        f"{made} of the {100 * found.level:g} % band, from "
+        f"{counted(sum(windows.values()), 'window')} of {calibration.steps} instants "
         f"({', '.join(windows)})"
     )
     rows = []
@@ -191,11 +215,13 @@ def _table(ensemble: HankelEnsemble) -> Table:
             (
                 label.name,
                 shown,
-                f"{factor * found.margin[k]:.4g}",
-                f"{found.margin[k] / ensemble.state_spread[k]:.3f}",
+                *([] if floor is None else [f"{found.margin[k]:.2f}"]),
+                f"{factor * width[k]:.4g}",
+                f"{width[k] / ensemble.state_spread[k]:.3f}",
                 f"{found.blocks[k]:.0f}",
                 f"{math.floor(1e4 * found.warranted[k] + 1e-6) / 100:g}",
             )
         )
-    columns = ("channel", "unit", "margin", "in SD", "blocks", "warranted %")
-    return Table("margins", title, columns, tuple(rows), numeric=(2, 3, 4, 5))
+    names = ("margin",) if floor is None else ("k", "f")
+    columns = ("channel", "unit", *names, "in SD", "blocks", "warranted %")
+    return Table("margins", title, columns, tuple(rows), numeric=tuple(range(2, len(columns))))

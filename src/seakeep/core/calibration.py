@@ -1,7 +1,8 @@
-"""How far the band of an ensemble must be widened to hold what it is meant to hold.
+"""How wide the band of an ensemble must be to hold what it is meant to hold.
 
-Split-conformal prediction: the band forecasts windows that its members never saw, and is widened by
-a quantile of what they lie outside of it.
+Split-conformal prediction: the ensemble forecasts windows that its members never saw, and a
+quantile of its errors there makes the band. Either the band of the members is moved outwards by a
+constant margin, or the half-width is a factor times a scale that follows the members' spread.
 """
 
 from __future__ import annotations
@@ -14,17 +15,28 @@ import numpy.typing as npt
 from seakeep.arrays import FloatArray, as_real, fraction
 from seakeep.errors import DataError, RequestError
 
-__all__ = ["ConformalMargin", "band_scores", "conformal_margin"]
+__all__ = [
+    "ConformalMargin",
+    "band_scores",
+    "calibrated_bounds",
+    "conformal_margin",
+    "spread_floor",
+    "spread_scores",
+]
+
+FLOOR = 0.25
+"""Part of the root mean square error below which the scale of a band never falls."""
 
 
 @dataclass(frozen=True)
 class ConformalMargin:
-    """By how much bounds are moved outwards, channel by channel.
+    """Quantile of the scores that makes the band, channel by channel.
 
     Attributes
     ----------
     margin : ndarray, shape (channel,)
-        In the unit of the channel; infinite where a band was lost too often.
+        In the unit of the scores: that of the channel from :func:`band_scores`, a factor from
+        scores that were divided by a scale. Infinite where a band was lost too often.
     block_length : ndarray, shape (channel,)
         Samples over which exceedances depend on each other.
     blocks : ndarray, shape (channel,)
@@ -77,6 +89,51 @@ def band_scores(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayL
         )
     found: FloatArray = np.maximum(low - y, y - high)
     return np.where(np.isnan(found), np.inf, found)
+
+
+def spread_floor(mean: FloatArray, measured: FloatArray) -> FloatArray:
+    """A quarter of the root mean square error of each channel, shape (channel,).
+
+    Windows (window, time, channel) that were lost (NaN) are left out; 1 where all are, since no
+    factor of any floor holds the measurement there.
+    """
+    lost = np.isnan(mean).any(axis=1, keepdims=True)
+    squares = np.where(lost, 0.0, mean - measured) ** 2
+    count = mean.shape[1] * np.count_nonzero(~lost, axis=(0, 1))
+    rms = np.sqrt(squares.sum(axis=(0, 1)) / np.maximum(count, 1))
+    return np.where(count > 0, FLOOR * rms, 1.0)
+
+
+def spread_scores(
+    mean: FloatArray, std: FloatArray, measured: FloatArray, floor: FloatArray
+) -> FloatArray:
+    r"""Errors over :math:`\sqrt{\sigma^2 + f^2}`, σ the members' spread and f the `floor`.
+
+    Arrays (…, time, channel); infinite where the forecast is lost (NaN), zero where error and scale
+    both are.
+    """
+    error, scale = np.abs(measured - mean), np.hypot(std, floor)
+    found = np.divide(error, scale, out=np.zeros_like(error), where=scale != 0)
+    return np.where(np.isnan(found), np.inf, found)
+
+
+def calibrated_bounds(
+    mean: FloatArray,
+    std: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    margin: FloatArray,
+    floor: FloatArray | None,
+) -> tuple[FloatArray, FloatArray]:
+    """Bounds of a calibrated band: those of the members moved, or a factor times their spread.
+
+    Without a floor the margin is added outside of `lower` and `upper`; with one it is the factor
+    of the scale of :func:`spread_scores` around `mean`.
+    """
+    if floor is None:
+        return lower - margin, upper + margin
+    half = margin * np.hypot(std, floor)
+    return mean - half, mean + half
 
 
 def conformal_margin(

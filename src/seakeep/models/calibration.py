@@ -4,36 +4,49 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol, get_args
+from dataclasses import dataclass
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray, fraction, whole_number
-from seakeep.core.calibration import ConformalMargin, band_scores, conformal_margin
-from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.core.calibration import (
+    ConformalMargin,
+    band_scores,
+    calibrated_bounds,
+    conformal_margin,
+    spread_floor,
+    spread_scores,
+)
+from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice
 from seakeep.models.engine import Runs as FreeRuns
 from seakeep.models.engine import member_series, read_windows
 from seakeep.models.executor import Progress
+from seakeep.models.interface import Json
 from seakeep.models.members import TrainingArrays
-from seakeep.models.summaries import STATISTICS, reduce_members
+from seakeep.models.summaries import reduce_members
 
 __all__ = [
     "Band",
+    "BandScale",
     "Calibration",
     "calibrate",
     "check_band",
-    "held_out_scores",
+    "found_margin",
+    "held_out",
     "warn_of_horizon",
     "widened",
 ]
 
 Band = Literal["members", "calibrated"]
+BandScale = Literal["spread", "constant"]
+Judged = tuple[FloatArray, FloatArray]
+"""Statistics of windows, (window, 4, steps, N), and the measurement, (window, steps, N)."""
 NUMBERS = ("margin", "block_length", "blocks", "warranted")
 
 
@@ -44,47 +57,90 @@ class Ensemble(FreeRuns, Protocol):
     def arrays(self) -> TrainingArrays: ...
     @property
     def read_spans(self) -> dict[str, tuple[float, float]]: ...
+    def without(self, run: str) -> Ensemble:
+        """Members as they learn from the other runs."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What a band was widened by, and on what that was found.
+    """What makes the calibrated band, and on what that was found.
 
     Parameters
     ----------
     found : ConformalMargin
-        Margins of the states.
+        Margins of the states, or factors of their scale.
+    floor : ndarray of shape (N,), or None
+        Least scale of each state, a quarter of its root mean square error, where the band follows
+        the members' spread; None where the margin is constant.
     windows : dict of str to int
         Number of windows in each run.
     steps : int
         Instants of a window.
     spans : dict of str to (float, float)
-        First start and last instant of the windows in each run, s; empty where a file does not
-        say.
+        First start and last instant of the windows in each run, s.
+    folds : {"run"} or None
+        Whether members forecast the runs that trained them as they learn from the others.
     """
 
     found: ConformalMargin
+    floor: FloatArray | None
     windows: dict[str, int]
     steps: int
-    spans: dict[str, tuple[float, float]] = field(default_factory=dict)
+    spans: dict[str, tuple[float, float]]
+    folds: str | None = None
+
+    @property
+    def scale(self) -> BandScale:
+        """What the half-width follows."""
+        return "constant" if self.floor is None else "spread"
+
+    @property
+    def bounds(self) -> str:
+        """What the bounds of the band are, in words."""
+        level = self.found.level
+        if self.floor is not None:
+            return (
+                "the mean minus and plus a calibrated factor times the root of the members' "
+                "variance and a squared floor"
+            )
+        quantiles = f"the quantiles {0.5 - level / 2:g} and {0.5 + level / 2:g} of the members"
+        return f"{quantiles}, moved outwards by the margin of a calibration"
 
     def to_json(self) -> str:
         """As text; a margin that is infinite is kept as such."""
-        arrays = {key: getattr(self.found, key).tolist() for key in NUMBERS}
+        arrays: Json = {key: getattr(self.found, key).tolist() for key in NUMBERS}
+        floor = None if self.floor is None else self.floor.tolist()
         words = {"level": self.found.level, "windows": self.windows, "steps": self.steps}
-        words["spans"] = self.spans
-        return json.dumps(arrays | words)
+        return json.dumps(
+            arrays | words | {"spans": self.spans, "floor": floor, "folds": self.folds}
+        )
 
     @classmethod
-    def from_json(cls, text: str) -> Calibration | None:
-        """Rebuild from :meth:`to_json`; None of ``null``."""
-        kept: dict[str, Any] | None = json.loads(text)
+    def from_json(cls, text: str, channels: int) -> Calibration | None:
+        """Rebuild from :meth:`to_json`, for so many states; None of ``null``."""
+        kept: Json | None = json.loads(text)
         if kept is None:
             return None
-        arrays = {key: np.array(kept[key]) for key in NUMBERS}
-        found = ConformalMargin(**arrays, level=float(kept["level"]))
-        spans = {name: (float(a), float(b)) for name, (a, b) in kept.get("spans", {}).items()}
-        return cls(found, dict(kept["windows"]), int(kept["steps"]), spans)
+        if "floor" not in kept:
+            raise DataError(
+                "the ensemble's band was calibrated by an older seakeep, in a form that is no "
+                "longer read. Calibrate the ensemble again, from its file without a calibration."
+            )
+        arrays = {key: _positive(kept, key, channels) for key in NUMBERS}
+        floor = None if kept["floor"] is None else _positive(kept, "floor", channels)
+        found = ConformalMargin(**arrays, level=fraction(kept["level"], "level"))
+        spans = {name: (float(a), float(b)) for name, (a, b) in kept["spans"].items()}
+        windows = {name: int(count) for name, count in kept["windows"].items()}
+        return cls(found, floor, windows, int(kept["steps"]), spans, kept["folds"])
+
+
+def _positive(kept: Json, key: str, channels: int) -> FloatArray:
+    """Numbers of a calibration, one per state, none negative."""
+    values = np.array(kept[key], dtype=float)
+    if values.shape != (channels,) or not np.all(values >= 0):
+        raise ValueError(f"{key} of the calibration is no list of {channels} numbers from zero on")
+    return values
 
 
 def calibrate(
@@ -92,16 +148,24 @@ def calibrate(
     runs: labelled.Runs,
     steps: int,
     level: float,
+    scale: BandScale,
+    folds: Literal["run"] | None,
     executor: Executor | None,
     progress: Progress | None = None,
 ) -> Calibration:
-    """Find the margins of an ensemble; see :meth:`HankelEnsemble.calibrate`."""
+    """Find the band of an ensemble; see :meth:`HankelEnsemble.calibrate`."""
     named = labelled.as_runs(runs)
     level = fraction(level, "level")
-    free = _free_starts(ensemble, named, steps)
-    scores = _scores(ensemble, named, free, steps, level, executor, progress)
+    check_scale(scale)
+    if folds not in (None, "run"):
+        raise RequestError(f"folds must be 'run', or None for unread windows; received {folds!r}.")
+    sources = dict.fromkeys(named, ensemble)
+    if folds:
+        sources = {name: _unread_by(ensemble, name, run) for name, run in named.items()}
+    free = _free_starts(sources, named, steps)
+    judged = _judged(sources, named, free, steps, level, executor, progress)
     history = ensemble.signature.history_samples
-    if not scores:
+    if not judged:
         longest = (
             max(run.sizes["time"] for run in named.values()) - ensemble.signature.history_samples
         )
@@ -111,24 +175,48 @@ def calibrate(
         raise RequestError(
             f"no window of {steps} steps with {history} samples of history is "
             f"free in {', '.join(named)}, as given here: {reason}. Give fewer steps, longer parts, "
-            "or runs that do not train."
+            "or runs that do not train; or let each run that trains be forecast by what the "
+            "others teach (folds = 'run')."
         )
-    margin = conformal_margin(np.concatenate(list(scores.values())), level)
-    windows = {name: len(each) for name, each in scores.items()}
+    found, floor = found_margin(judged.values(), level, scale)
+    windows = {name: len(measured) for name, (_, measured) in judged.items()}
     spans = {
         n: (starts[0], starts[-1] + steps * ensemble.signature.dt) for n, starts in free.items()
     }
-    return Calibration(margin, windows, steps, spans)
+    return Calibration(found, floor, windows, steps, spans, folds)
 
 
-def held_out_scores(
+def found_margin(
+    judged: Iterable[Judged], level: float, scale: BandScale
+) -> tuple[ConformalMargin, FloatArray | None]:
+    """Margins of bands in windows that no member has read, and the floor of their scale."""
+    values, measured = (np.concatenate(each) for each in zip(*judged, strict=True))
+    mean, std, lower, upper = np.moveaxis(values, 1, 0)
+    if scale == "constant":
+        return conformal_margin(band_scores(lower, upper, measured), level), None
+    floor = spread_floor(mean, measured)
+    return conformal_margin(spread_scores(mean, std, measured, floor), level), floor
+
+
+def check_scale(scale: str) -> None:
+    """Refuse a scale of the band that there is not."""
+    if scale == "learnt":
+        raise RequestError(
+            "scale = 'learnt' is not offered: a regression of the errors on wave envelope, horizon "
+            "and spread made bands as wide as scale = 'spread', which holds more in other waves. "
+            "Take 'spread'."
+        )
+    check_choice("scale", scale, get_args(BandScale))
+
+
+def held_out(
     ensemble: Ensemble,
     runs: Mapping[str, xr.Dataset],
     steps: int,
     level: float,
     executor: Executor | None = None,
-) -> dict[str, FloatArray]:
-    """Scores of the band in windows end to end, none of which a member has read.
+) -> dict[str, Judged]:
+    """Forecasts of windows end to end, none of which a member has read, and the measurement.
 
     Parameters
     ----------
@@ -145,52 +233,58 @@ def held_out_scores(
 
     Returns
     -------
-    dict of str to ndarray, each of shape (window, steps, N)
+    dict of str to (ndarray of shape (window, 4, steps, N), ndarray of shape (window, steps, N))
         Runs in which there is such a window.
     """
     level = fraction(level, "level")
-    return _scores(ensemble, runs, _free_starts(ensemble, runs, steps), steps, level, executor)
+    sources = dict.fromkeys(runs, ensemble)
+    return _judged(sources, runs, _free_starts(sources, runs, steps), steps, level, executor)
+
+
+def _unread_by(ensemble: Ensemble, name: str, run: xr.Dataset) -> Ensemble:
+    """The ensemble, without what it learnt from a run."""
+    known = _read_run(ensemble, name, run)
+    return ensemble if known is None else ensemble.without(known)
 
 
 def _free_starts(
-    ensemble: Ensemble, runs: Mapping[str, xr.Dataset], steps: int
+    sources: Mapping[str, Ensemble], runs: Mapping[str, xr.Dataset], steps: int
 ) -> dict[str, list[float]]:
     """Starts of the windows of each run in which there are any."""
-    free = {name: _unread_starts(ensemble, name, run, steps) for name, run in runs.items()}
+    free = {name: _unread_starts(sources[name], name, run, steps) for name, run in runs.items()}
     return {name: starts for name, starts in free.items() if starts}
 
 
-def _scores(
-    ensemble: Ensemble,
+def _judged(
+    sources: Mapping[str, Ensemble],
     runs: Mapping[str, xr.Dataset],
     free: Mapping[str, list[float]],
     steps: int,
     level: float,
     executor: Executor | None,
     progress: Progress | None = None,
-) -> dict[str, FloatArray]:
-    """Scores in windows from these starts; a step of progress is a member in one of the runs."""
-    found: dict[str, FloatArray] = {}
-    for number, (name, starts) in enumerate(free.items()):
-        run = runs[name]
-        tell = None if progress is None else _counted(progress, number, len(free), name)
+) -> dict[str, Judged]:
+    """Forecasts from these starts; a step of progress is a member in one of the runs."""
+    found: dict[str, Judged] = {}
+    done, total = 0, sum(sources[name].n_members for name in free)
+    for name, starts in free.items():
+        ensemble, run = sources[name], runs[name]
+        tell = None if progress is None else _counted(progress, done, total, name)
+        done += ensemble.n_members
         places = [(name, start) for start in starts]
         windows = read_windows(ensemble.signature, {name: run}, places, steps)
         with member_series(ensemble, windows, executor, tell) as (series, lost):
             values = reduce_members(series, lost, level)
-        lower, upper = (values[:, STATISTICS.index(key)] for key in ("lower", "upper"))
         measured = np.stack(
             [_measured(ensemble, run, name, start, steps) for _, start in windows.places]
         )
-        found[name] = band_scores(lower, upper, measured)
+        found[name] = values, measured
     return found
 
 
-def _counted(progress: Progress, before: int, runs: int, name: str) -> Progress:
+def _counted(progress: Progress, before: int, total: int, name: str) -> Progress:
     """Progress over the members of one run, as part of several."""
-    return lambda done, total, what: progress(
-        before * total + done, runs * total, f"{name}, {what}"
-    )
+    return lambda done, _, what: progress(before + done, total, f"{name}, {what}")
 
 
 def _unread_starts(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) -> list[float]:
@@ -198,7 +292,8 @@ def _unread_starts(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) -
     whole_number(steps, "steps")
     time = np.asarray(run["time"].values, dtype=float)
     slack = 1e-6 * ensemble.signature.dt
-    read = _read_span(ensemble, name, run)
+    known = _read_run(ensemble, name, run)
+    read = None if known is None else ensemble.read_spans[known]
     starts, at = [], ensemble.signature.history_samples - 1
     while at + steps < time.size:
         # The instants at + 1 … at + steps are forecast.
@@ -211,16 +306,16 @@ def _unread_starts(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) -
     return starts
 
 
-def _read_span(ensemble: Ensemble, name: str, run: xr.Dataset) -> tuple[float, float] | None:
-    """What members have read of a run: of the one that holds their samples, else of its name.
+def _read_run(ensemble: Ensemble, name: str, run: xr.Dataset) -> str | None:
+    """Which run of the training this is: the one that holds its samples, else that of its name.
 
     A name that was made up for a run without one says nothing.
     """
     arrays, spans = ensemble.arrays, ensemble.read_spans
     for key, begin, states in zip(arrays.names, arrays.begins, arrays.states, strict=True):
         if key in spans and _holds(run, ensemble, name, begin, states):
-            return spans[key]
-    return None if labelled.is_made_up(name, run) else spans.get(name)
+            return key
+    return name if name in spans and not labelled.is_made_up(name, run) else None
 
 
 def _holds(
@@ -305,7 +400,7 @@ def widened(calibration: Calibration | None, values: FloatArray, band: Band) -> 
     """Statistics of shape (…, 4, steps, N) with the bounds of a band that was checked."""
     if band == "members" or calibration is None:
         return values
-    out, margin = values.copy(), calibration.found.margin
-    out[..., STATISTICS.index("lower"), :, :] -= margin
-    out[..., STATISTICS.index("upper"), :, :] += margin
-    return out
+    mean, std, lower, upper = np.moveaxis(values, -3, 0)
+    margin, floor = calibration.found.margin, calibration.floor
+    bounds = calibrated_bounds(mean, std, lower, upper, margin, floor)
+    return np.stack([mean, std, *bounds], axis=-3)

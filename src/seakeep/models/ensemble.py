@@ -9,7 +9,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,7 @@ from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import engine, store
 from seakeep.models.calibration import (
     Band,
+    BandScale,
     Calibration,
     calibrate,
     check_band,
@@ -168,7 +169,7 @@ class _Forecasts(Forecaster):
         level : float, optional
             Probability between ``lower`` and ``upper``.
         band : {"members", "calibrated"}, optional
-            Quantiles of the members, or these moved outwards as :meth:`calibrate` found.
+            Quantiles of the members, or the bounds that :meth:`calibrate` found.
 
         Returns
         -------
@@ -189,7 +190,7 @@ class _Forecasts(Forecaster):
         return xr.Dataset(
             variables,
             coords={
-                "statistic": statistic_coordinate(level, band == "calibrated"),
+                "statistic": statistic_coordinate(level, self._bounds(band)),
                 "member": np.arange(self.n_members),
                 "time": windows.time[0],
             },
@@ -273,7 +274,7 @@ class _Forecasts(Forecaster):
         variables = label_channels(self.signature, values, ("window", "statistic", "lead"))
         variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
         coords = window_coords(windows, self.dt)
-        coords["statistic"] = statistic_coordinate(level, band == "calibrated")
+        coords["statistic"] = statistic_coordinate(level, self._bounds(band))
         return xr.Dataset(
             variables, coords=coords, attrs=self._notes(windows) | self._counts(level, band)
         )
@@ -300,6 +301,10 @@ class _Forecasts(Forecaster):
 
     def _status(self, lost: npt.NDArray[np.int64], windows: Windows) -> xr.Variable:
         return xr.Variable(("member",), statuses(lost, windows.time[0].values, self.dt))
+
+    def _bounds(self, band: Band) -> str:
+        """What the bounds of a calibrated band are."""
+        return self.calibration.bounds if self.calibration and band == "calibrated" else ""
 
     def _counts(self, level: float, band: Band) -> dict[str, Any]:
         kind = {"band": band} if band == "calibrated" else {}
@@ -332,7 +337,7 @@ class HankelEnsemble(_Forecasts):
     coverage : Coverage
         Waves that they were trained in.
     calibration : Calibration, optional
-        By how much the calibrated band is wider than that of the members; see :meth:`calibrate`.
+        What makes the calibrated band; see :meth:`calibrate`.
     """
 
     kind: ClassVar[str] = "bayesian_hankel_dmdc"
@@ -535,12 +540,18 @@ class HankelEnsemble(_Forecasts):
         ]
         if (calibration := self.calibration) is not None:
             found, count_of = calibration.found, sum(calibration.windows.values())
-            relative = found.margin / self.state_spread
-            lines.append(
+            line = (
                 f"  band          calibrated for {found.level:g} on "
-                f"{counted(count_of, 'window')} of {calibration.steps} steps: wider by "
-                f"{_range(relative, '.2g')} training SD either way"
+                f"{counted(count_of, 'window')} of {calibration.steps} steps: "
             )
+            if calibration.floor is None:
+                line += f"wider by {_range(found.margin / self.state_spread, '.2g')} "
+            else:
+                line += (
+                    f"{_range(found.margin, '.2g')} times spread and a floor of "
+                    f"{_range(calibration.floor / self.state_spread, '.2g')} "
+                )
+            lines.append(line + "training SD either way")
         radii = self.spectral_radii()
         unstable = int(np.count_nonzero(radii >= 1.0))
         verdict = (
@@ -583,13 +594,15 @@ class HankelEnsemble(_Forecasts):
         steps: int,
         level: float = 0.95,
         *,
+        scale: BandScale = "spread",
+        folds: Literal["run"] | None = None,
         executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> Self:
-        """Widen the band so that it holds unseen measurements as often as it says.
+        r"""Make a band that holds unseen measurements as often as it says.
 
-        The band forecasts windows end to end in `runs` that no member has read, and is moved
-        outwards, channel by channel, by a quantile of how far measurements lie outside of it
+        The ensemble forecasts windows end to end in `runs` that no member has read, and a quantile
+        of its errors there makes the band, channel by channel
         (:func:`seakeep.statistics.conformal_margin`, which says what that warrants and what not).
 
         Parameters
@@ -601,6 +614,16 @@ class HankelEnsemble(_Forecasts):
             Instants of a window: as many as will be forecast.
         level : float, optional
             Probability that the band is to have.
+        scale : {"spread", "constant"}, optional
+            ``"spread"``: the band is :math:`\mu \pm k \sqrt{\sigma^2 + (e/4)^2}`, with mean and
+            standard deviation of the members at each instant, e the root mean square error of the
+            mean in these windows, and k the quantile. ``"constant"``: the members' own band, moved
+            outwards by as much at every instant.
+        folds : {"run"}, optional
+            For runs that train, read to their ends: each is forecast by the same members as they
+            learn from the other runs, and the margin goes to the members as they are. What the
+            input map learnt, it learnt from all of them. Members that learn from the run alone
+            are left out there.
         executor, progress
             As in :meth:`forecast`; a step is a member in one of the runs.
 
@@ -616,7 +639,42 @@ class HankelEnsemble(_Forecasts):
         DataError
             If a run cannot be used.
         """
-        return replace(self, calibration=calibrate(self, runs, steps, level, executor, progress))
+        found = calibrate(self, runs, steps, level, scale, folds, executor, progress)
+        return replace(self, calibration=found)
+
+    def without(self, run: str) -> HankelEnsemble:
+        """The same draws as they learn from the other runs, to forecast a run that trained.
+
+        Parameters
+        ----------
+        run : str
+            Name of a run that trains.
+
+        Returns
+        -------
+        HankelEnsemble
+            Without the members that learn from that run alone; the input map is kept.
+
+        Raises
+        ------
+        RequestError
+            If no member is left, or no run of that name trains.
+        """
+        names = self.arrays.names
+        if run not in names:
+            raise RequestError(f"no run '{run}' trains. Those that do: {', '.join(names)}.")
+        kept = [number for number, name in enumerate(names) if name != run]
+        members = tuple(
+            draw if draw.run is None else replace(draw, run=kept.index(draw.run))
+            for draw in self.members
+            if kept and (draw.run is None or draw.run in kept)
+        )
+        if not members:
+            raise RequestError(
+                f"no member learnt from another run than '{run}', and none is left to forecast "
+                "it. Train on several runs, or calibrate on a run that does not train."
+            )
+        return replace(self, members=members, arrays=self.arrays.only(kept), calibration=None)
 
     def save(self, path: str | Path) -> Path:
         """Write draws and training arrays as NetCDF, to a temporary name first.
@@ -698,7 +756,9 @@ class HankelEnsemble(_Forecasts):
             arrays=arrays,
             signature=signature,
             coverage=Coverage.from_dataset(dataset),
-            calibration=Calibration.from_json(dataset.attrs["calibration"]),
+            calibration=Calibration.from_json(
+                dataset.attrs["calibration"], len(signature.state_labels)
+            ),
         )
 
 

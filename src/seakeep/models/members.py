@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,6 +45,13 @@ class TrainingArrays:
     offsets: tuple[int, ...]
     begins: tuple[float, ...]
     channels: tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
+
+    def only(self, runs: Sequence[int]) -> TrainingArrays:
+        """Those of some of the runs."""
+        parts = ("names", "states", "delayed", "direct", "offsets", "begins")
+        return replace(
+            self, **{part: tuple(getattr(self, part)[run] for run in runs) for part in parts}
+        )
 
 
 @dataclass(frozen=True, eq=False)

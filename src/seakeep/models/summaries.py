@@ -66,10 +66,10 @@ def _quantiles(values: FloatArray, probabilities: tuple[float, float]) -> FloatA
     return out
 
 
-def statistic_coordinate(level: float, calibrated: bool = False) -> xr.Variable:
+def statistic_coordinate(level: float, bounds: str = "") -> xr.Variable:
     """Coordinate of the statistics, which says what the bounds of the band are."""
-    bounds = f"the quantiles {0.5 - level / 2:g} and {0.5 + level / 2:g} of the members"
-    bounds += ", moved outwards by the margin of a calibration" if calibrated else ""
+    quantiles = f"the quantiles {0.5 - level / 2:g} and {0.5 + level / 2:g} of the members"
+    bounds = bounds or quantiles
     attrs = {
         "long_name": "statistic over the members",
         "comment": f"lower and upper are {bounds}; members that diverged are left out of all four",

@@ -18,7 +18,10 @@ import xarray as xr
 
 from seakeep import statistics
 from seakeep.arrays import FloatArray
+from seakeep.core.calibration import calibrated_bounds
+from seakeep.core.coverage import CoverageTable
 from seakeep.errors import DataError, SeakeepWarning
+from seakeep.models.summaries import STATISTICS
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
 from seakeep.waves import phase_speed
@@ -27,6 +30,8 @@ __all__ = [
     "BAND_ERRORS",
     "VARIANTS",
     "average_of",
+    "band_of",
+    "band_parts",
     "box_table",
     "coverage_table",
     "is_regular",
@@ -68,12 +73,13 @@ def judge(
         if (skill := skill_table(boxes, kinds)) is not None:
             out[f"statistics/skill/{name}"] = skill
         if ensembles := [model for model in models if f"{model}_lower" in test]:
-            margins = {
-                m: groups[f"calibration/{m}"]["margin"].values
-                for m in ensembles
-                if f"calibration/{m}" in groups
+            calibrations = {
+                m: groups[f"calibration/{m}"] for m in ensembles if f"calibration/{m}" in groups
             }
-            out[f"statistics/coverage/{name}"] = coverage_table(test, ensembles, margins)
+            out[f"statistics/coverage/{name}"] = coverage_table(test, ensembles, calibrations)
+            level = settings.statistics.level
+            if (parts := band_parts(test, ensembles, calibrations, level)) is not None:
+                out[f"statistics/bands/{name}"] = parts
         rng = random_stream(settings.study.seed, f"trend.{name}")
         out[f"statistics/trend/{name}"] = trend_table(test, models, rng)
         if is_regular(groups, name):
@@ -197,25 +203,23 @@ def average_of(cells: FloatArray) -> FloatArray:
 
 
 def coverage_table(
-    test: xr.Dataset, ensembles: Sequence[str], margins: Mapping[str, FloatArray] | None = None
+    test: xr.Dataset, ensembles: Sequence[str], calibrations: Mapping[str, xr.Dataset] | None = None
 ) -> xr.Dataset:
     """Part of the instants at which the band holds the measurement, and the truth where known.
 
-    Over (model, against, channel), averages over all cells. With margins, of shape (training,
-    channel), the same of the calibrated band: ``calibrated_inside`` and so on.
+    Over (model, against, channel), averages over all cells. With calibrations of a study, the same
+    of the calibrated band: ``calibrated_inside`` and so on.
     """
     sides = ["measured", *(["truth"] if "truth" in test else [])]
     numbers = ("inside", "below", "above", "relative_width")
     names = ["average", *map(str, test["channel"].values)]
     judged = test["judged"].values
     variables: dict[str, Any] = {}
-    for prefix in ("", "calibrated_") if margins else ("",):
+    for prefix in ("", "calibrated_") if calibrations else ("",):
         values = np.full((len(numbers), len(ensembles), len(sides), len(names)), np.nan)
         for m, model in enumerate(ensembles):
-            lower, upper = (test[f"{model}_{bound}"].values[judged] for bound in ("lower", "upper"))
-            if margins and prefix:
-                margin = margins[model][np.nonzero(judged)[0], None, :]
-                lower, upper = lower - margin, upper + margin
+            found = calibrations[model] if calibrations and prefix else None
+            lower, upper = (bound[judged] for bound in band_of(test, model, found))
             for s, side in enumerate(sides):
                 values[:, m, s] = _coverage_row(test, side, lower, upper, numbers)
         variables |= {
@@ -224,6 +228,60 @@ def coverage_table(
     return xr.Dataset(
         variables, coords={"model": list(ensembles), "against": sides, "channel": names}
     )
+
+
+def band_parts(
+    test: xr.Dataset, ensembles: Sequence[str], calibrations: Mapping[str, xr.Dataset], level: float
+) -> xr.Dataset | None:
+    """Coverage, width, Winkler score and CRPS of bands over (model, band, part, channel).
+
+    Parts are all instants, thirds by wave height, and thirds of the horizon; None where no band
+    can be judged.
+    """
+    judged = test["judged"].values
+    shape = (*judged.shape, *test["measured"].shape[1:])
+    measured = np.broadcast_to(test["measured"].values, shape)[judged]
+    waves = None
+    if "wave_height" in test and np.isfinite(test["wave_height"]).all():
+        waves = np.broadcast_to(test["wave_height"].values, shape[:-1])[judged]
+    numbers = ("inside", "width", "relative_width", "winkler", "crps")
+    bands = ("members", "calibrated") if calibrations else ("members",)
+    tables: dict[tuple[int, int], CoverageTable] = {}
+    for m, model in enumerate(ensembles):
+        for b, found in enumerate((None, calibrations.get(model))[: len(bands)]):
+            lower, upper = (bound[judged] for bound in band_of(test, model, found))
+            if np.isnan(lower).any(axis=(1, 2)).all():
+                continue  # lost everywhere, or nothing to calibrate on
+            tables[m, b] = statistics.coverage_table(lower, upper, measured, level, waves)
+    if not tables:
+        return None
+    parts = next(iter(tables.values())).parts
+    names = list(test["channel"].values)
+    values = np.full((len(numbers), len(ensembles), len(bands), len(parts), len(names)), np.nan)
+    for (m, b), table in tables.items():
+        values[:, m, b] = [getattr(table, number) for number in numbers]
+    dims = ("model", "band", "part", "channel")
+    return xr.Dataset(
+        {number: (dims, values[i]) for i, number in enumerate(numbers)},
+        coords={
+            "model": list(ensembles),
+            "band": list(bands),
+            "part": list(parts),
+            "channel": names,
+        },
+    )
+
+
+def band_of(
+    test: xr.Dataset, model: str, calibration: xr.Dataset | None
+) -> tuple[FloatArray, FloatArray]:
+    """Bounds of a band in a test set, (training, window, time, channel): calibrated, or not."""
+    if calibration is None:
+        return test[f"{model}_lower"].values, test[f"{model}_upper"].values
+    mean, std, lower, upper = (test[f"{model}_{key}"].values for key in STATISTICS)
+    margin = calibration["margin"].values[:, None, None, :]
+    floor = calibration["floor"].values[:, None, None, :] if "floor" in calibration else None
+    return calibrated_bounds(mean, std, lower, upper, margin, floor)
 
 
 def _coverage_row(

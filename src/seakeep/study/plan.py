@@ -17,6 +17,7 @@ from seakeep.campaign import load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Needs
+from seakeep.models.calibration import BandScale
 from seakeep.models.settings import periods_to_samples
 from seakeep.models.slow import warn_of_slow_motions
 from seakeep.study.resolve import ResolvedModel, Spec, resolve_model
@@ -347,6 +348,8 @@ class Plan:
         Samples of the largest draw of all models.
     calibrated_on : tuple of str
         Runs that train, if bands are to be calibrated on them.
+    scale : {"spread", "constant"}
+        What the half-width of calibrated bands follows.
     eigenvalues : bool
         Whether those of every model are kept.
     """
@@ -363,6 +366,7 @@ class Plan:
     shown: int
     needs: Needs
     calibrated_on: tuple[str, ...] = ()
+    scale: BandScale = "spread"
     eigenvalues: bool = True
 
     @property
@@ -432,6 +436,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
         shown=settings.output.shown_windows,
         needs=needs,
         calibrated_on=tuple(training_names) if settings.calibrates else (),
+        scale=settings.statistics.scale,
         eigenvalues=settings.output.eigenvalues,
     )
     _check_pairs(plan)

@@ -145,6 +145,11 @@ class StatisticsSettings(Table):
         description="whether the bands of ensembles are calibrated too, on training data that "
         "members have not read; left out, with preset = 'recommended' alone",
     )
+    scale: Literal["spread", "constant"] = Field(
+        default="spread",
+        description="what the half-width of a calibrated band follows: 'spread', that of the "
+        "members with a floor, or 'constant', the members' band moved by as much everywhere",
+    )
     densities_of: str | None = Field(
         default=None, description="the test set whose densities are compared; left out, the first"
     )

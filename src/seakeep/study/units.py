@@ -17,11 +17,11 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.core import metrics
 from seakeep.core.bands import band_error_over_time
-from seakeep.core.calibration import conformal_margin
 from seakeep.errors import DataError, SeakeepError
-from seakeep.models.calibration import held_out_scores
+from seakeep.models.calibration import Judged, found_margin, held_out
 from seakeep.models.engine import group_series, read_groups
 from seakeep.models.summaries import STATISTICS, reduce_members
+from seakeep.signals import envelope_squared
 from seakeep.study.judge import BAND_ERRORS
 from seakeep.study.plan import Plan, TestWindow, TrainingSet, between
 from seakeep.study.settings import Study
@@ -195,7 +195,7 @@ def _eigenvalues(fitted: Any) -> npt.NDArray[np.complex128]:
 
 
 def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> dict[str, Any]:
-    """Find the margins of an ensemble on windows as long as those of the first test set.
+    """Find the band of an ensemble on windows as long as those of the first test set.
 
     The windows lie in the training spans, clear of what the members have read. Where these read
     all of it (runs left out, or pooled), each run is forecast by an ensemble that learnt from the
@@ -204,37 +204,35 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> dict[str, A
     training = plan.training[unit.training]
     steps = next(iter(plan.tests.values()))[0].steps
     if training.left_out or len(training.runs) > 1:
-        scores = _scores_of_others(plan, runs, unit, steps)
+        judged = _judged_by_others(plan, runs, unit, steps)
     else:
         names = plan.calibrated_on
         parts = {name: between(runs[name], runs[name].attrs["train_span"]) for name in names}
-        scores = list(held_out_scores(fitted, parts, steps, plan.level).values())
-    if not scores:
-        nothing = np.full(len(plan.states), np.nan)
-        return {"margin": nothing, "blocks": nothing, "warranted": nothing, "windows": 0}
-    every = np.concatenate(scores)
-    found = conformal_margin(every, plan.level)
-    return {
-        "margin": found.margin,
-        "blocks": found.blocks,
-        "warranted": found.warranted,
-        "windows": len(every),
-    }
+        judged = list(held_out(fitted, parts, steps, plan.level).values())
+    keys = ("margin", "blocks", "warranted")
+    if judged:
+        found, floor = found_margin(judged, plan.level, plan.scale)
+        out = {key: getattr(found, key) for key in keys}
+    else:
+        floor = np.full(len(plan.states), np.nan)
+        out = dict.fromkeys(keys, floor)
+    out["windows"] = sum(len(measured) for _, measured in judged)
+    return out if floor is None or plan.scale == "constant" else out | {"floor": floor}
 
 
-def _scores_of_others(plan: Plan, runs: Runs, unit: Unit, steps: int) -> list[FloatArray]:
-    """Scores in the runs of a training set, each by what the other ones teach."""
+def _judged_by_others(plan: Plan, runs: Runs, unit: Unit, steps: int) -> list[Judged]:
+    """Forecasts of the runs of a training set, each by what the other ones teach."""
     training = plan.training[unit.training]
     groups = [each.left_out for each in plan.training if each is not training and each.left_out]
-    scores: list[FloatArray] = []
+    judged: list[Judged] = []
     for group in groups or [(run,) for run in training.runs]:
         rest = tuple(span for span in training.spans if span[0] not in group)
         held = {n: between(runs[n], (b, e)) for n, b, e in training.spans if n in group}
         if rest and held:
             others = TrainingSet(f"{training.name}, calibration", rest)
             ensemble = fit_training(plan, runs, unit.model, others)
-            scores += held_out_scores(ensemble, held, steps, plan.level).values()
-    return scores
+            judged += held_out(ensemble, held, steps, plan.level).values()
+    return judged
 
 
 def collect(study: Study, plan: Plan, runs: Runs, read: Read) -> dict[str, xr.Dataset]:
@@ -282,6 +280,8 @@ def _collect_test(
         "training_mean": (("training", "channel"), moments[:, 0]),
         "training_std": (("training", "channel"), moments[:, 1]),
     }
+    if (heights := wave_heights(plan, runs, windows)) is not None:
+        variables["wave_height"] = (("window", "time"), heights)
     truth = true_channels(study, plan, runs, test)
     if truth is not None:
         variables["truth"] = (dims, truth)
@@ -301,6 +301,24 @@ def _collect_test(
     for model in plan.specs:
         _add_errors(out, model, plan.dt, frequency)
     return out
+
+
+def wave_heights(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray | None:
+    """Twice the envelope of the first wave elevation in windows, (window, time); None of none."""
+    name = next((name for name in plan.inputs if name.startswith("eta_")), None)
+    if name is None:
+        return None
+    out = []
+    for window in windows:
+        run = runs[window.run]
+        at = int(np.argmin(np.abs(run["time"].values - window.start)))
+        elevation = run[name].values.astype(float)
+        known = np.flatnonzero(np.isfinite(elevation))  # gaps at the ends of a record
+        heights = np.full(elevation.size, np.nan)
+        part = slice(known[0], known[-1] + 1)
+        heights[part] = 2.0 * np.sqrt(envelope_squared(elevation[part], plan.dt))
+        out.append(heights[at + 1 : at + 1 + window.steps])
+    return np.stack(out)
 
 
 def _collect_model(

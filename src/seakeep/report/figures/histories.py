@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from seakeep.report.figures.common import line_of, model_words, short_label
 from seakeep.report.style import LINES, THIN, figure_style, new_figure
 from seakeep.study import StudyResult
+from seakeep.study.judge import band_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,14 +42,15 @@ def history_figure(result: StudyResult, test: str, training: int, window: int) -
         names = result.channels
         figure = new_figure(7.5, 0.9 + 0.95 * len(names))
         axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
-        margins = {
-            model: result.groups[f"calibration/{model}"]["margin"].isel(training=training)
+        alone = result.tests[test].isel(training=[training], window=[window])
+        bands = {
+            model: band_of(alone, model, found.isel(training=[training]))
             for model in result.models
-            if f"calibration/{model}" in result.groups
+            if (found := result.groups.get(f"calibration/{model}")) is not None
         }
-        for each, name in zip(axes, names, strict=True):
-            wider = {model: float(margin.sel(channel=name)) for model, margin in margins.items()}
-            _draw_channel(each, result, cell.sel(channel=name), name, wider)
+        for k, (each, name) in enumerate(zip(axes, names, strict=True)):
+            edges = {model: [edge[0, 0, :, k] for edge in band] for model, band in bands.items()}
+            _draw_channel(each, result, cell.sel(channel=name), name, edges)
         figure.supylabel("deviation from the training mean, in training SD", fontsize=8)
         axes[-1].set_xlabel(r"time after the last measured state, in encounter periods")
         handles, labels = axes[0].get_legend_handles_labels()
@@ -63,7 +66,7 @@ def history_figure(result: StudyResult, test: str, training: int, window: int) -
 
 
 def _draw_channel(
-    axes: Any, result: StudyResult, cell: Any, name: str, margins: dict[str, float]
+    axes: Any, result: StudyResult, cell: Any, name: str, edges: Mapping[str, Sequence[Any]]
 ) -> None:
     mean, spread = float(cell["training_mean"]), float(cell["training_std"])
 
@@ -87,11 +90,10 @@ def _draw_channel(
                 linewidth=0,
                 label=f"{level:g} % band",
             )
-            if np.isfinite(margin := margins.get(model, np.nan) / spread):
-                bounds = (standard(f"{model}_lower") - margin, standard(f"{model}_upper") + margin)
-                for number, bound in enumerate(bounds):
+            if np.isfinite(edges.get(model, np.nan)).all():
+                for number, bound in enumerate(edges[model]):
                     label = "calibrated" if number == 0 else None
-                    axes.plot(time, bound, label=label, **{**style, **EDGE})
+                    axes.plot(time, (bound - mean) / spread, label=label, **{**style, **EDGE})
         words = f"{model_words(model)} mean" if result.is_ensemble(model) else model_words(model)
         axes.plot(time, standard(f"{model}_mean"), label=words, **style)
     axes.set_ylabel(short_label(name), rotation=0, ha="right", va="center")

@@ -134,11 +134,18 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
         "members), and its mean width in measured SD; means over all cells."
     )
     if calibrated:
+        found = result.groups[f"calibration/{model}"]
+        made = (
+            "the mean, and a factor times the members' spread (with a floor of a quarter of the "
+            "root mean square error) to either side, found"
+            if "floor" in found
+            else "these quantiles, moved outwards by a margin found"
+        )
         note += (
-            " Calibrated: these quantiles, moved outwards by a margin found on training data that "
+            f" Calibrated: {made} on training data that "
             "the members had not read, in windows as long as the first test set's. "
             + _other_lengths(result)
-            + _calibrated_on(result.groups[f"calibration/{model}"], level)
+            + _calibrated_on(found, level)
             + "The margin warrants nothing in a sea of another kind."
         )
     if true:
