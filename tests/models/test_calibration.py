@@ -161,6 +161,28 @@ def test_another_run_is_used_whole(ensemble):
     assert found.windows == {"other": (500 - ensemble.history_samples) // 40}
 
 
+def test_windows_leave_room_for_the_look_ahead():
+    spec = seakeep.BayesianHankelDMDc(
+        encounter_period=1.6,
+        train_length=seakeep.Fixed(15),
+        state_delay=seakeep.Fixed(0.4),
+        input_delay=seakeep.Fixed(1.0),
+        ridge=seakeep.Uniform(200, 400),
+        n_members=3,
+        lead=10,
+    )
+    ensemble = spec.fit(sea(0), STATES, INPUTS, stop=60.0)
+    history, other = ensemble.history_samples, sea(3, 400, "other")
+    # The last of 40 steps starts from instant 39 and is driven by the input at 39 + 10.
+    for samples, windows in ((history + 40 + 9, 1), (history + 40 + 8, 0)):
+        part = other.isel(time=slice(None, samples))
+        if windows:
+            assert ensemble.calibrate(part, 40).calibration.windows == {"other": 1}
+        else:
+            with pytest.raises(RequestError, match="no window of 40 steps"):
+                ensemble.calibrate(part, 40)
+
+
 def unnamed(run):
     plain = run.copy()
     del plain.attrs["run"]

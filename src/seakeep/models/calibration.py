@@ -166,9 +166,8 @@ def calibrate(
     judged = _judged(sources, named, free, steps, level, executor, progress)
     history = ensemble.signature.history_samples
     if not judged:
-        longest = (
-            max(run.sizes["time"] for run in named.values()) - ensemble.signature.history_samples
-        )
+        ahead = max(ensemble.signature.lead_samples - 1, 0)
+        longest = max(run.sizes["time"] for run in named.values()) - history - ahead
         reason = "members have read what is left of them"
         if longest < steps:
             reason = f"at most {max(longest, 0)} steps fit into the longest of them"
@@ -295,7 +294,9 @@ def _unread_starts(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) -
     known = _read_run(ensemble, name, run)
     read = None if known is None else ensemble.read_spans[known]
     starts, at = [], ensemble.signature.history_samples - 1
-    while at + steps < time.size:
+    # The last step reads the input beyond its own end where the model looks further ahead.
+    reach = steps + max(ensemble.signature.lead_samples - 1, 0)
+    while at + reach < time.size:
         # The instants at + 1 … at + steps are forecast.
         if read and time[at + 1] <= read[1] + slack and time[at + steps] >= read[0] - slack:
             at = max(at, int(np.searchsorted(time, read[1] - slack)))
