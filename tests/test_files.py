@@ -67,6 +67,28 @@ def test_permissions_follow_the_umask(tmp_path):
     assert Path(tmp_path / "a.txt").stat().st_mode & 0o777 == 0o640
 
 
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path):
+    """Written anew, a private file (0600) could be read by the group."""
+    place = tmp_path / "a.txt"
+    for mode in (0o600, 0o444, 0o664):
+        place.touch()
+        place.chmod(mode)
+        with replacing(place) as temporary:
+            temporary.write_text("x")
+        assert place.stat().st_mode & 0o777 == mode
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links of POSIX")
+def test_a_link_stays_one(tmp_path):
+    (tmp_path / "a.txt").write_text("old")
+    (tmp_path / "link.txt").symlink_to("a.txt")
+    with replacing(tmp_path / "link.txt") as temporary:
+        temporary.write_text("new")
+    assert (tmp_path / "link.txt").is_symlink()
+    assert (tmp_path / "a.txt").read_text() == "new"
+
+
 def test_a_folder_in_the_place_of_the_file_is_named(tmp_path):
     with (
         pytest.raises(RequestError, match=r"it is a folder\. Name a file in it"),

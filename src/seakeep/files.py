@@ -207,7 +207,8 @@ def replacing(path: Path) -> Iterator[Path]:
     Yields
     ------
     Path
-        An empty file in the same folder, to be overwritten.
+        An empty file in the same folder, to be overwritten. It has the permissions of the file that
+        it replaces, or those that the umask gives to a new one.
 
     Raises
     ------
@@ -217,13 +218,18 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     check_place(path)
     try:
+        target = path.resolve()  # a link stays one
         # Opened and not made by tempfile, so that the file gets the permissions the user's umask
         # gives to any other.
-        temporary = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
+        temporary = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
         temporary.open("xb").close()
         try:
+            if target.exists():
+                temporary.chmod(stat.S_IMODE(target.stat().st_mode) | stat.S_IWUSR)
             yield temporary
-            temporary.replace(path)
+            if target.exists():
+                temporary.chmod(stat.S_IMODE(target.stat().st_mode))
+            temporary.replace(target)
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:
@@ -373,7 +379,9 @@ def check_output(
             f"{path} is read by this command and would be overwritten by the {kind}. "
             "Choose another name."
         )
-    if path.suffix == ".nc":
+    with path.open("rb") as file:
+        binary = path.suffix == ".nc" or file.read(len(HDF5)) == HDF5
+    if binary:
         ours = _mark_of_netcdf(path) == kind
     else:
         with path.open("rb") as file:
@@ -393,6 +401,9 @@ def check_output(
 
 HEAD = 8192
 """Bytes of a file in which its mark is looked for."""
+
+HDF5 = b"\x89HDF\r\n\x1a\n"
+"""First bytes of a NetCDF file, whatever its name ends on."""
 
 
 def _mark_of_netcdf(path: Path) -> str | None:

@@ -302,3 +302,14 @@ def test_export_of_a_model_without_input_is_refused(run, tmp_path):
     with pytest.raises(RequestError, match="the model has no input"):
         model.to_mat(tmp_path / "rom.mat")
     assert not (tmp_path / "rom.mat").exists()
+
+
+def test_a_measurement_is_never_overwritten(tmp_path, run, channels):
+    model = HankelDMDc(4, 2, 1.0).fit(run, **channels)
+    for name in ("raw.nc", "raw.csv", "raw.mat"):
+        (tmp_path / name).write_text("time,heave")
+        with pytest.raises(RequestError, match=rf"{name} exists and is no model that seakeep"):
+            model.save(tmp_path / name)
+        assert (tmp_path / name).read_text() == "time,heave"
+    model.save(tmp_path / "model.bin")
+    model.save(tmp_path / "model.bin")  # one of ours is replaced, whatever its name

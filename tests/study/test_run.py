@@ -374,3 +374,13 @@ def test_joined_series_are_the_windows_end_to_end(finished):
     assert predicted.shape == (2, 3 * test.sizes["time"], test.sizes["channel"])
     np.testing.assert_array_equal(measured[: test.sizes["time"]], test["measured"][0])
     np.testing.assert_array_equal(predicted[1, -1], test["bayesian_mean"][1, -1, -1])
+
+
+@pytest.mark.parametrize("name", ["report.html", "figures/photo.png", "tables/lines.csv"])
+def test_a_report_is_never_written_among_files_of_others(name, study_folder):
+    mine = study_folder / "out" / name
+    mine.parent.mkdir(parents=True)
+    mine.write_text("mine")
+    with pytest.raises(RequestError, match=r"no report (that|of) seakeep"):
+        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
+    assert mine.read_text() == "mine"

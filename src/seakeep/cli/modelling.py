@@ -343,12 +343,6 @@ def _draw(
     ]
 
 
-def _check_outputs(out: Path, runs: list[str], suffix: str, used: list[Path]) -> None:
-    check_output(out / TABLE, "table", used, "run,channel,channel_units,.*")
-    for name in runs:
-        check_output(out / f"{name}.{suffix}", "figure", used)
-
-
 def _scale(campaign: Campaign) -> float:
     general = campaign.settings.campaign
     if "scale_factor" not in general.model_fields_set:

@@ -15,7 +15,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError
-from seakeep.files import MARK, replacing, write_netcdf
+from seakeep.files import MARK, check_output, replacing, write_netcdf
 from seakeep.models.inputs import Chain
 from seakeep.models.interface import Json, Scale, Signature
 from seakeep.models.labelled import ChannelLabel
@@ -157,7 +157,7 @@ def write(dataset: xr.Dataset, path: str | Path, kind: str) -> Path:
     dataset : Dataset
         What a model's ``to_dataset`` gives.
     path : str or Path
-        File, overwritten if it exists.
+        File; an earlier model there is replaced.
     kind : str
         Kind of model.
 
@@ -169,9 +169,10 @@ def write(dataset: xr.Dataset, path: str | Path, kind: str) -> Path:
     Raises
     ------
     RequestError
-        If the file cannot be written.
+        If the file cannot be written, or another one than a model is there.
     """
     target = Path(path)
+    check_output(target, "model")
     labelled = dataset.assign_attrs(
         **{MARK: "model"},
         seakeep_kind=kind,

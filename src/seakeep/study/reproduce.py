@@ -13,7 +13,7 @@ import xarray as xr
 
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
-from seakeep.files import replacing
+from seakeep.files import MARK, check_output, replacing
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
 from seakeep.study.store import StudyResult, storing, versions
@@ -30,6 +30,8 @@ WAVES = {
     "paper": "√(2E Δf); 100 components at equal spacing, as printed",
     "recommended": "√(2E Δf); 100 components at jittered frequencies, which do not repeat",
 }
+
+STUDY_FILE = "reproduction's study file"
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,7 @@ def reproduce(
     out, counts = Path(out), size or Size()
     with storing(out):
         out.mkdir(parents=True, exist_ok=True)
+    check_output(out / "study.toml", STUDY_FILE)
     nominal = _play(out / "campaign", preset, seed, progress)
     with storing(out), replacing(out / "study.toml") as temporary:
         temporary.write_text(study_text(preset, counts, seed), encoding="utf-8")
@@ -169,6 +172,7 @@ def study_text(preset: Preset, size: Size, seed: int) -> str:
     alignment = ['alignment = { mode = "effective", surge = "measured" }'] if paper else []
     lines = [
         "# The paper's study on the virtual tank; written by `seakeep reproduce`.",
+        f"# {MARK}: {STUDY_FILE}",
         "[study]",
         'name = "Virtual CK-14e"',
         'description = "HDMDc and BHDMDc of a moored vessel with a moon pool in head seas; data '

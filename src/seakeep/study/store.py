@@ -21,7 +21,7 @@ import xarray as xr
 from filelock import FileLock, Timeout
 
 from seakeep.errors import DataError, RequestError, SeakeepError
-from seakeep.files import check_seal, replacing, write_netcdf
+from seakeep.files import check_output, check_seal, replacing, write_netcdf
 
 __all__ = [
     "RESULT",
@@ -39,6 +39,7 @@ FORMAT = 4
 """Goes into digest and result: raise it when the same settings give other arrays than before."""
 
 RESULT = "study.nc"
+PAGE = "report.html"
 HEADER = "study.json"
 LOCK = "study.lock"
 UNITS = "units"
@@ -119,6 +120,20 @@ class UnitFolder:
         header = self.folder / HEADER
         if header.exists() and self._holds_results():
             _check_header(self.folder, _read_header(header), self._header())
+        else:
+            self._check_files_of_others()
+
+    def _check_files_of_others(self) -> None:
+        """Refuse a folder in which the report would replace what none has written."""
+        check_output(self.folder / PAGE, "report")
+        if (self.folder / RESULT).exists() or (self.folder / PAGE).exists():
+            return
+        for name in ("figures", "tables"):
+            if any(self.folder.glob(f"{name}/*")):
+                raise RequestError(
+                    f"{self.folder / name} holds files that no report of seakeep wrote; those of "
+                    "the report would stand among them. Choose another folder (-o)."
+                )
 
     def open(self, name: str) -> None:
         """Make the folder this study's, or find that it belongs to it; errors as :meth:`check`."""
