@@ -361,18 +361,18 @@ def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halve
     surge = 0.3 * np.sin(table[:, 0] / 5)
     header = "t [s],eta [m],z [m],x [m]"
     np.savetxt(path, np.column_stack([table, surge]), delimiter=",", header=header, comments="")
-    aligned = EXACT + '\nalignment = { mode = "dispersion", surge = "measured" }'
+    # A probe downstream: its waves are carried upstream, to where they were before.
+    aligned = EXACT + '\nalignment = { mode = "dispersion", surge = "measured", offset = -0.3 }'
     text = campaign(halves, aligned).path.read_text()
     (halves / "campaign.toml").write_text(
         '[rig]\nwater_depth = 3.6\npositions = { eta_fwd = 1.0 }\n[channels.surge]\ncolumn = "x"\n'
         + text.replace("test = [100.0, 200.0]", "test = [100.0, 200.0]\nprobe_offset = 0.1")
     )
     whole = seakeep.read_campaign(halves / "campaign.toml")
-    with pytest.warns(
-        SeakeepWarning, match=r"up to 1\.14 s after the instant"
-    ):  # a probe downstream
+    with pytest.warns(SeakeepWarning, match=r"up to 1\.14 s after the instant"):
         model = fit_campaign(whole)
-    assert model.alignment.settings == seakeep.ProbeAlignment(mode="dispersion", surge="measured")
+    expected = seakeep.ProbeAlignment(mode="dispersion", surge="measured", offset=-0.3)
+    assert model.alignment.settings == expected
     with pytest.warns(SeakeepWarning, match="needs these waves ahead of time"):
         found = comparison_table(compare(model, whole)).isel(run=0)
     assert str(found["conditional_on"].values) == "surge"
