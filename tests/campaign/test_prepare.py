@@ -296,7 +296,7 @@ class TestBadRuns:
             match=r"run 'second' .*: channel 'heave' has 4 missing values of 1001 in 2 gap\(s\), "
             r"the first at t = 2 s \(3 samples, 0\.06 s\), the longest at t = 2 s \(3 samples, "
             r"0\.06 s\) \(also in pitch\)\. Repair the file, leave the channel out, or cut the gap "
-            r"off with record = \[begin, end\] in \[runs\.second\]",
+            r"off with record = \[start, end\] in \[runs\.second\]",
         ):
             rewrite(tank, change).prepare()
 
