@@ -115,14 +115,17 @@ def as_finished(
         pending = {submit([item]): number for number, item in islice(waiting, AHEAD)}
         while pending:
             finished = _wait_for_any(pending, executor)
-            failed = [future for future in finished if future.exception() is not None]
-            for future in finished - set(failed):  # what is done is handed on before an error is
-                number = pending.pop(future)
-                for following, item in islice(waiting, 1):
-                    pending[submit([item])] = following
-                yield number, future.result()[0]
-            for future in failed:
-                future.result()
+            errors = [error for each in finished if (error := each.exception()) is not None]
+            sound = [each for each in finished if each.exception() is None]
+            results = [(pending.pop(each), each.result()[0]) for each in sound]
+            # A result that is still referred to would be computed again if its worker were lost.
+            finished.clear()
+            sound.clear()
+            for number, item in islice(waiting, len(results)):
+                pending[submit([item])] = number
+            yield from results  # what is done is handed on before an error is
+            if errors:
+                raise errors[0]
 
 
 def one_blas_thread() -> AbstractContextManager[object]:
@@ -265,11 +268,13 @@ def _submitting(
 ) -> Iterator[Callable[[Sequence[Item]], Future[list[Result]]]]:
     """Hand out items; what is not done is cancelled when the block is left."""
     payload, token = pickle.dumps((data, versions()), protocol=5), uuid.uuid4().hex
-    futures: list[Future[list[Result]]] = []
+    under_way: set[Future[list[Result]]] = set()  # not the finished: they hold their results
 
     def submit(items: Sequence[Item]) -> Future[list[Result]]:
-        futures.append(executor.submit(_work, token, payload, function, items))
-        return futures[-1]
+        future = executor.submit(_work, token, payload, function, items)
+        under_way.add(future)
+        future.add_done_callback(under_way.discard)
+        return future
 
     _check_alive(executor)
     try:
@@ -281,7 +286,7 @@ def _submitting(
             "line: if __name__ == '__main__':"
         ) from None
     except BaseException as error:
-        for future in futures:
+        for future in tuple(under_way):
             future.cancel()
         if isinstance(error, CancelledError):
             raise WorkerLostError(
