@@ -36,7 +36,7 @@ def section_runs(section):
 def _prepared_once(section, section_runs):
     """Let the commands find the runs prepared instead of preparing them in each test."""
     patch = pytest.MonkeyPatch()
-    for module in ("workflow", "comparison"):
+    for module in ("fit", "comparison"):
         target = f"seakeep.study.{module}.load_prepared"
 
         def taken(campaign, names, progress=None):

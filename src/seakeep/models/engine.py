@@ -345,7 +345,11 @@ def array_windows(
 
 def linear_runs(members: Sequence[Dynamics], groups: Sequence[Windows]) -> list[FloatArray]:
     """Free runs of linear members, each of shape (member, window, steps, N), physical units."""
-    return [np.stack([_runs(member, windows) for member in members]) for windows in groups]
+    found = []
+    for windows in groups:
+        each = [_runs(member, windows) for member in members]
+        found.append(each[0][None] if len(each) == 1 else np.stack(each))  # one needs no copy
+    return found
 
 
 def _runs(member: Dynamics, windows: Windows) -> FloatArray:

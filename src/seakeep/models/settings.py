@@ -116,9 +116,10 @@ class HankelSettings:
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
         object.__setattr__(self, "observables", observables_of(self.observables))
         if self.rank is not None and self.ridge != 0:
+            ridge = self.ridge if isinstance(self.ridge, str) else f"{self.ridge:g}"
             warnings.warn(
                 f"rank = {self.rank} truncates singular values instead of regularising, so "
-                f"ridge = {self.ridge} is not used. Set ridge=0 to say so.",
+                f"ridge = {ridge} is not used. Set ridge=0 to say so.",
                 SeakeepWarning,
                 stacklevel=4,
             )
