@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,8 +51,7 @@ def window_errors(runs, period, preset, alignment, forecast_runs=None):
     dt = next(iter(runs.values())).attrs["dt"]
     make = getattr(seakeep.HankelDMDc, preset)
     base = make(encounter_period=period, dt=dt)
-    fields = {name: getattr(base, name) for name in base.__dataclass_fields__}
-    spec = seakeep.HankelDMDc(**{**fields, "alignment": alignment})
+    spec = replace(base, alignment=alignment)
     steps = periods_to_samples(PERIODS, period, dt)
     rows = []
     for name in runs if forecast_runs is None else forecast_runs:

@@ -50,7 +50,7 @@ def probe_offset(campaign, model):
     peak = seakeep.signals.peak_period(run.eta_wp.values, model.dt)
     celerity = float(phase_speed(2 * np.pi / peak))
     lagging = replace(
-        fit_settings(model),
+        model.settings,
         alignment=seakeep.ProbeAlignment(mode="effective", surge="none", celerity=celerity),
     )
     train = between(campaign.prepare(["Data01"])["Data01"])
@@ -64,14 +64,6 @@ def probe_offset(campaign, model):
             f"{factor * found.offset:.3g} ± {factor * found.spread:.2g} {unit} (95 %: {low:.3g} to "
             f"{high:.3g}), NRMSE {corrected:.3f}, {corrected / uncorrected:.2f} of the uncorrected"
         )
-
-
-def fit_settings(model):
-    """Settings that fit a model like this one."""
-    settings = model.settings
-    return seakeep.HankelDMDc(
-        **{name: getattr(settings, name) for name in settings.__dataclass_fields__}
-    )
 
 
 def between(run):

@@ -1,6 +1,7 @@
 """The examples on measured data hold what their pages say (needs SEAKEEP_DATA_DIR)."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -151,13 +152,11 @@ def test_a_constant_time_lag_stands_beside_the_offset(semisubmersible):
     run = campaign.prepare(["Data02"])["Data02"]
     train = campaign.prepare(["Data01"])["Data01"]
     train = train.sel(time=slice(*train.attrs["train_span"]))
-    fields = {name: getattr(model.settings, name) for name in model.settings.__dataclass_fields__}
     # One celerity makes of a distance one lag for all frequencies; which one does not matter.
     celerity = 25.0
     one = seakeep.ProbeAlignment(mode="effective", surge="none", celerity=celerity)
-    lagging = seakeep.HankelDMDc(**{**fields, "alignment": one}).fit(
-        train, model.states, model.inputs
-    )
+    spec = replace(model.settings, alignment=one)
+    lagging = spec.fit(train, model.states, model.inputs)
     found = seakeep.estimate_probe_offset(lagging, run, SPAN)
     assert found.offset / celerity == pytest.approx(1.57, abs=0.12)  # s; twice its spread of 0.06
     assert 0.02 < found.spread / celerity < 0.12

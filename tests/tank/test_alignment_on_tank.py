@@ -1,5 +1,7 @@
 """The alignment on the virtual tank's raw files: what it brings, and what it reads."""
 
+from dataclasses import replace
+
 import chain_on_tank
 import numpy as np
 import pytest
@@ -51,9 +53,8 @@ def test_predicted_surge_runs_closed_loop(runs, period):
     train = [run for name, run in runs.items() if name != "irregular_3"]
     run = runs["irregular_3"]
     paper = seakeep.HankelDMDc.paper(encounter_period=period, dt=run.attrs["dt"])
-    fields = {name: getattr(paper, name) for name in paper.__dataclass_fields__}
-    alignment = ALIGNMENTS["predicted, effective"]
-    model = seakeep.HankelDMDc(**{**fields, "alignment": alignment}).fit(train, STATES, INPUTS)
+    spec = replace(paper, alignment=ALIGNMENTS["predicted, effective"])
+    model = spec.fit(train, STATES, INPUTS)
     start = float(run["time"][model.history_samples - 1])
     expected = model.forecast(run, start=start, steps=96)
     scrambled = run.copy(deep=True)
@@ -64,7 +65,7 @@ def test_predicted_surge_runs_closed_loop(runs, period):
     xr.testing.assert_equal(model.forecast(scrambled, start=start, steps=96), expected)
     # The scramble bites where measured surge is read.
     measured = ALIGNMENTS["measured, effective"]
-    model = seakeep.HankelDMDc(**{**fields, "alignment": measured}).fit(train, STATES, INPUTS)
+    model = replace(paper, alignment=measured).fit(train, STATES, INPUTS)
     forecasts = [model.forecast(each, start=start, steps=96) for each in (run, scrambled)]
     assert not np.allclose(forecasts[0]["heave"], forecasts[1]["heave"], atol=1e-3)
 
