@@ -643,6 +643,8 @@ def test_debug_shows_the_traceback(run):
     ],
 )
 def test_no_output_replaces_an_input_or_a_file_of_others(command, kept, run, place, monkeypatch):
+    if "drawn" in command:
+        pytest.importorskip("matplotlib")
     for name, text in {
         "docs/tutorial/raw.nc": "CDF\x01",
         "other.csv": "time [s],heave [m],WP_01 [m]\n",
