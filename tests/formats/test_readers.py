@@ -52,7 +52,7 @@ class TestPaths:
         self.refused(tmp_path / "a", r"a cannot be read: Too many levels of symbolic links\. Corre")
 
     def test_a_nul_in_a_name(self):
-        self.refused("run\0.csv", r"run\\0\.csv cannot be read: embedded null byte\. Correct")
+        self.refused("run\0.csv", r"run\\0\.csv cannot be read: .*embedded null (byte|char)")
 
     def test_a_home_that_is_unknown(self):
         self.refused("~nobody-of-this-name/run.csv", "cannot be read: Could not determine home")

@@ -57,7 +57,7 @@ class Finding:
     unit : str, optional
         Unit of both.
     place : float, optional
-        Instant at which it starts, s; NaN where it concerns the whole record.
+        Instant at which it starts, s; None where it concerns the whole record.
     details : mapping, optional
         What else the sentence says: numbers and words.
     """
@@ -65,10 +65,10 @@ class Finding:
     kind: Kind
     run: str
     channel: str
-    value: float = math.nan
-    limit: float = math.nan
+    value: float | None = None
+    limit: float | None = None
     unit: str = ""
-    place: float = math.nan
+    place: float | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -92,9 +92,10 @@ class Finding:
 class _Quantity:
     """A number that is formatted with its unit, angles in degrees."""
 
-    def __init__(self, value: float, unit: str) -> None:
+    def __init__(self, value: float | None, unit: str) -> None:
         factor, shown = displayed(unit)
-        self.value, self.unit = factor * value, "" if shown in ("1", "-") else shown
+        self.value = math.nan if value is None else factor * value
+        self.unit = "" if shown in ("1", "-") else shown
 
     def __format__(self, form: str) -> str:
         return f"{self.value:{form}} {self.unit}".rstrip()
@@ -121,8 +122,8 @@ def as_json(findings: Iterable[Finding]) -> str:
     )
 
 
-def _or_none(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _or_none(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None
 
 
 def findings_of(run: xr.Dataset) -> list[Finding]:
@@ -131,12 +132,11 @@ def findings_of(run: xr.Dataset) -> list[Finding]:
     out = []
     for each in json.loads(str(run.attrs.get("quality", "[]"))):
         text = each.pop("text")
-        numbers = {k: math.nan if each[k] is None else each[k] for k in ("value", "limit", "place")}
         if (name := each["kind"]) not in known:  # of a check that is not loaded
             each |= {"kind": _Foreign.OTHER, "details": {"words": text}}
         else:
             each["kind"] = known[name]
-        out.append(Finding(**{**each, **numbers}))
+        out.append(Finding(**each))
     return out
 
 
