@@ -408,6 +408,19 @@ def test_the_interactive_lines_have_the_dashes_of_the_figures(page):
     assert ensemble["dash"] == list(LINES["ensemble"]["linestyle"][1])
 
 
+@pytest.mark.parametrize("values", [np.zeros(12), -np.arange(12.0), np.arange(12.0)])
+def test_a_logarithmic_axis_shows_what_is_positive_and_warns_of_nothing(values):
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    axes = figure.subplots()
+    axes.set_yscale("log")
+    draw_box_violin(axes, values, 0.0, 1.0, "black")
+    figure.draw_without_rendering()
+    points = [each.get_offsets()[:, 1] for each in axes.collections if len(each.get_offsets()) > 1]
+    np.testing.assert_array_equal(np.concatenate([[], *points]), values[values > 0])
+
+
 def test_boxes_and_whiskers_are_matplotlibs():
     from matplotlib.cbook import boxplot_stats
     from matplotlib.figure import Figure

@@ -44,12 +44,12 @@ DECADE = 10.0
 def draw_box_violin(
     axes: Any, values: npt.ArrayLike, place: float, width: float, colour: str
 ) -> None:
-    """Draw one box-violin."""
+    """Draw one box-violin; a logarithmic axis has no place for values that are not positive."""
+    logarithmic = axes.get_yscale() == "log"
     x = np.asarray(values, dtype=float).ravel()
-    x = x[np.isfinite(x)]
+    x = x[np.isfinite(x) & (not logarithmic or x > 0)]
     if x.size == 0:
         return
-    logarithmic = axes.get_yscale() == "log"
     if x.size >= FEWEST and np.ptp(x) > 0:
         spread = np.log10(x) if logarithmic else x
         violin = axes.violinplot([spread], [place], widths=width, showextrema=False, points=120)
