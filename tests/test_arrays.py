@@ -80,6 +80,7 @@ CALLS = {
         X, Y,
     ),
     "signals.onto_uniform": (signals.onto_uniform, T, X),
+    "signals.predict_waves": (lambda x: signals.predict_waves(x, 20), X),
     "signals.peak_period": (lambda x: signals.peak_period(x, 0.05), X),
     "signals.phase_celerity": (lambda x, y: signals.phase_celerity(x, y, 0.05, 1.2, 3.6), X, Y),
     "signals.probe_separation": (

@@ -173,6 +173,17 @@ def test_fit_says_what_an_ensemble_is_made_of(run, place):
 FROM_20 = f"{CAMPAIGN} --run unseen --start 20 --steps 50"
 
 
+def test_forecast_goes_beyond_the_waves_when_it_may_predict_them(run):
+    command = f"forecast model.nc {CAMPAIGN} --run unseen --start 110 --steps 200 -o beyond.nc"
+    status, _, err = run(command)
+    assert (status, "ahead = 'predict' continues the input" in err) == (2, True)
+    status, _, err = run(f"{command} --ahead predict")
+    assert status == 0
+    assert re.search(
+        r"200 instants after t = [\d.]+ s, status ok, input predicted from t = \d", err
+    )
+
+
 def test_forecast_writes_the_band_of_an_ensemble_as_netcdf_and_csv(run, place):
     for name in ("band.nc", "band.csv"):
         status, _, err = run(f"forecast ensemble.nc {FROM_20} --level 0.9 -o {name}")

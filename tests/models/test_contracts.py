@@ -105,8 +105,6 @@ class TestLead:
         np.testing.assert_allclose(found[:, 0], expected.heave, rtol=0, atol=1e-13)
         with pytest.raises(RequestError, match=r"at least 54 rows \(steps − 1 \+ lead_samples\)"):
             model.forecast_arrays(x[:201], u[:201], u[201:254], steps=50)
-        with pytest.raises(RequestError, match="ahead must be 'refuse'"):
-            model.forecast_arrays(x[:201], u[:201], u[201:], steps=50, ahead="guess")
 
     def test_the_end_of_a_run_leaves_room_for_the_lead(self):
         run = sea(ahead=4)

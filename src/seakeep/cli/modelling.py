@@ -103,6 +103,14 @@ def forecast(
     degrees: Annotated[
         bool, typer.Option("--degrees", help="Write angles in degrees instead of radians.")
     ] = False,
+    ahead: Annotated[
+        str,
+        typer.Option(
+            "--ahead",
+            help="Where the waves end before the model's look-ahead does: 'refuse', or 'predict' "
+            "them from their record.",
+        ),
+    ] = "refuse",
 ) -> None:
     """Forecast a run from START, driven by measured waves.
 
@@ -149,7 +157,11 @@ def forecast(
             member_executor(workers, scheduler) as executor,
             progress_bar("Forecasting") as progress,
         ):
-            how: dict[str, Any] = {"executor": executor, "progress": quietly(progress)}
+            how: dict[str, Any] = {
+                "ahead": ahead,
+                "executor": executor,
+                "progress": quietly(progress),
+            }
             if members:
                 result = identified.forecast(prepared, first, count, **how)
             else:
@@ -157,7 +169,7 @@ def forecast(
                     prepared, first, count, **_band({str(model): identified}, level, band), **how
                 )
     else:
-        result = identified.forecast(prepared, start=first, steps=count)
+        result = identified.forecast(prepared, start=first, steps=count, ahead=ahead)
     scaled = ""
     if full_scale:
         scale = _scale(read)
@@ -402,6 +414,8 @@ def _band(
 
 def _usable(result: xr.Dataset) -> bool:
     """Whether there is a forecast at all instants, of one member at least."""
+    from seakeep.models.forecasts import is_usable
+
     if "member" in result.dims:
         return int(result.attrs["diverged"]) < result.sizes["member"]
-    return str(result.attrs["status"]) == "ok"
+    return is_usable(str(result.attrs["status"]))

@@ -24,9 +24,11 @@ from seakeep.arrays import FloatArray, whole_number
 from seakeep.core.rollout import rollout
 from seakeep.errors import RequestError
 from seakeep.models import labelled
+from seakeep.models.checks import check_choice
 from seakeep.models.executor import Progress, in_order
 from seakeep.models.inputs import Measured
 from seakeep.models.interface import Drive, Scale, Signature, Span
+from seakeep.signals.propagation import predict_waves
 from seakeep.signals.time_axis import instant_text
 
 __all__ = [
@@ -85,6 +87,8 @@ class Windows:
         Samples of the regressors of each window in its run.
     passes : int
         How often a forecast runs.
+    predicted : tuple of int
+        First step of each window that reads predicted input, or −1.
     """
 
     places: tuple[tuple[str, float], ...]
@@ -98,6 +102,7 @@ class Windows:
     drives: tuple[Drive, ...] = ()
     spans: tuple[Span, ...] = ()
     passes: int = 1
+    predicted: tuple[int, ...] = ()
 
     def __len__(self) -> int:
         return len(self.histories)
@@ -155,17 +160,21 @@ def read_windows(
     runs: Mapping[str, xr.Dataset],
     places: Sequence[Place],
     steps: int | None,
+    ahead: str = "refuse",
 ) -> Windows:
     """Read what forecasts from several starts need; arguments and errors as ``forecast``."""
-    return read_groups(signature, runs, [(places, steps)])[0]
+    return read_groups(signature, runs, [(places, steps)], ahead)[0]
 
 
 def read_groups(
     signature: Signature,
     runs: Mapping[str, xr.Dataset],
     groups: Sequence[tuple[Sequence[Place], int | None]],
+    ahead: str = "refuse",
 ) -> list[Windows]:
     """Windows of several lengths; each probe is carried once per run for all of them."""
+    check_choice("ahead", ahead, ("refuse", "predict"))
+    predicts = ahead == "predict" and bool(signature.inputs)
     opened: dict[str, _Opened] = {}
     spans: list[list[Span]] = []
     for places, steps in groups:
@@ -180,12 +189,14 @@ def read_groups(
         for name, start in places:
             if name not in opened:
                 opened[name] = _Opened.of(signature, runs[name], name)
-            mine.append(opened[name].span(signature, start, steps))
+            mine.append(opened[name].span(signature, start, steps, predicts))
         spans.append(mine)
     wanted: dict[str, list[Span]] = {name: [] for name in opened}
     for (places, _), each in zip(groups, spans, strict=True):
         for (name, _), span in zip(places, each, strict=True):
             wanted[name].append(span)
+    if predicts:
+        opened = {name: each.continued(signature, wanted[name]) for name, each in opened.items()}
     drives = {name: each.drive(signature, wanted[name]) for name, each in opened.items()}
     return [
         _windows(signature, [(opened[name], drives[name]) for name, _ in places], each)
@@ -224,16 +235,20 @@ def _windows(
         drives=tuple(drive for _, drive in sources) if follows else (),
         spans=tuple(spans),
         passes=input_map.passes,
+        predicted=tuple(
+            run.first_predicted(signature, span) for run, span in zip(runs, spans, strict=True)
+        ),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Opened:
-    """A run that was checked."""
+    """A run that was checked; its inputs may be predicted after the sample `known`."""
 
     run: xr.Dataset
     name: str
     time: FloatArray
+    known: int | None = None
 
     @classmethod
     def of(cls, signature: Signature, run: xr.Dataset, key: str) -> _Opened:
@@ -243,11 +258,13 @@ class _Opened:
         labelled.check_units(run, signature.state_labels + signature.input_labels, name)
         return cls(run, name, np.asarray(run.variables["time"].values, dtype=float))
 
-    def span(self, signature: Signature, start: float, steps: int | None) -> Span:
+    def span(
+        self, signature: Signature, start: float, steps: int | None, predicts: bool = False
+    ) -> Span:
         """Samples of input that a forecast reads, before the map."""
         time, dt, name = self.time, signature.dt, self.name
         at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
-        needed, lead = signature.history_samples, signature.lead_samples
+        needed, lead = signature.history_samples, 0 if predicts else signature.lead_samples
 
         def told(instant: float) -> str:
             return instant_text(instant, dt)
@@ -262,7 +279,7 @@ class _Opened:
             )
         available = time.size - 1 - at
         # The last input needed is the one an instant before the last state, and the lead after it.
-        most = available + 1 - lead if signature.inputs else None
+        most = available + 1 - lead if signature.inputs and not predicts else None
         count = whole_number(
             available - max(lead - 1, 0) if steps is None else steps,
             "steps (to the end of the run)" if steps is None else "steps",
@@ -273,9 +290,46 @@ class _Opened:
                 f"{count} steps from {told(time[at])} s need the input up to "
                 f"{told(time[at] + (count - 1 + lead) * dt)} s and {name} ends at "
                 f"{told(time[-1])} s{ahead}. At most {max(most, 0)} steps can be forecast from "
-                "there."
+                "there; ahead = 'predict' continues the input by linear prediction."
             )
         return Span(at - signature.input_delays, at, at + count)
+
+    def continued(self, signature: Signature, spans: Sequence[Span]) -> _Opened:
+        """The run up to the last sample that is wanted, with inputs predicted that are missing."""
+        stop = max(signature.input_map.reads(span).stop for span in spans)
+        start = max(span.known for span in spans)
+        names = signature.inputs
+        values = labelled.channel_matrix(self.run, names, self.name, slice(0, stop))
+        ends = [min(_end(column), stop) for column in values.T]
+        # What is missing before a start is no future, and is refused as ever.
+        missing = [end if start < end < stop else None for end in ends]
+        if all(end is None for end in missing):
+            return self
+        if signature.input_map.reads_states == "measured":
+            raise RequestError(
+                f"ahead = 'predict' continues inputs, and those of {self.name} are carried to the "
+                "measured surge, which nothing continues. Forecast fewer steps, or fit a model "
+                "with surge = 'predicted' or 'none'."
+            )
+        read = {name: self.run[name] for name in {*names, *signature.states} if name in self.run}
+        run = xr.Dataset(read, attrs=self.run.attrs).isel(time=slice(0, stop))
+        more = stop - run.sizes["time"]
+        beyond = self.time[-1] + signature.dt * np.arange(1, more + 1)
+        run = run.pad(time=(0, more), keep_attrs=True)
+        run = run.assign_coords(time=np.concatenate([self.time[:stop], beyond]))
+        for name, column, end in zip(names, values.T, missing, strict=True):
+            if end is not None:
+                whole = [column[:end], predict_waves(_sound_tail(column[:end]), stop - end)]
+                run[name] = ("time", np.concatenate(whole), run[name].attrs)
+        return replace(self, run=run, known=min(end for end in missing if end is not None) - 1)
+
+    def first_predicted(self, signature: Signature, span: Span) -> int:
+        """First step that reads predicted input, or −1."""
+        if self.known is None:
+            return -1
+        ahead = signature.input_map.look_ahead(self.run, signature.dt) / signature.dt
+        first = max(self.known - math.ceil(ahead - 1e-6) - span.known + 1, 0)
+        return first if first < span.stop - span.known else -1
 
     def drive(self, signature: Signature, spans: Sequence[Span]) -> Drive:
         """Regressors of the run, made once for all windows."""
@@ -303,6 +357,18 @@ class _Opened:
         beyond = self.time[-1] + dt * np.arange(1, span.stop - span.known - inside.size + 1)
         attrs = dict(self.run.variables["time"].attrs) or {"units": "s", "long_name": "time"}
         return xr.Variable(("time",), np.concatenate([inside, beyond]), attrs)
+
+
+def _end(values: FloatArray) -> int:
+    """Number of samples up to the last finite one."""
+    sound = np.flatnonzero(np.isfinite(values))
+    return int(sound[-1]) + 1 if sound.size else 0
+
+
+def _sound_tail(values: FloatArray) -> FloatArray:
+    """Samples after the last gap."""
+    gaps = np.flatnonzero(~np.isfinite(values))
+    return values[int(gaps[-1]) + 1 :] if gaps.size else values
 
 
 def array_windows(

@@ -113,6 +113,7 @@ class _Forecasts(Forecaster):
         start: float,
         steps: int | None = None,
         *,
+        ahead: str = "refuse",
         executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> xr.Dataset:
@@ -120,7 +121,7 @@ class _Forecasts(Forecaster):
 
         Parameters
         ----------
-        run, start, steps
+        run, start, steps, ahead
             As in :meth:`HankelDMDcModel.forecast`.
         executor : concurrent.futures.Executor, optional
             Who identifies and runs the members: :func:`seakeep.models.processes`, or Dask's
@@ -139,14 +140,16 @@ class _Forecasts(Forecaster):
         RequestError, DataError
             As :meth:`HankelDMDcModel.forecast`.
         """
-        windows = self.read_windows(*one_run(run, [start]), steps)
+        windows = self.read_windows(*one_run(run, [start]), steps, ahead)
         with member_series(self, windows, executor, progress) as (series, lost):
             variables = label_channels(self.signature, np.array(series[:, 0]), ("member", "time"))
         variables["status"] = self._status(lost[:, 0], windows)
         return xr.Dataset(
             variables,
             coords={"member": np.arange(self.n_members), "time": windows.time[0]},
-            attrs=self._notes(windows) | verdict(lost) | {"start": windows.places[0][1]},
+            attrs=self._notes(windows)
+            | verdict(lost, windows, self.dt)
+            | {"start": windows.places[0][1]},
         )
 
     def forecast_summary(
@@ -157,6 +160,7 @@ class _Forecasts(Forecaster):
         level: float = 0.95,
         *,
         band: Band = "members",
+        ahead: str = "refuse",
         executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> xr.Dataset:
@@ -164,7 +168,7 @@ class _Forecasts(Forecaster):
 
         Parameters
         ----------
-        run, start, steps, executor, progress
+        run, start, steps, ahead, executor, progress
             As in :meth:`forecast`.
         level : float, optional
             Probability between ``lower`` and ``upper``.
@@ -183,10 +187,13 @@ class _Forecasts(Forecaster):
         RequestError, DataError
             As :meth:`forecast`.
         """
-        windows, values, lost = self._reduced(run, [start], steps, level, band, executor, progress)
+        windows, values, lost = self._reduced(
+            run, [start], steps, level, band, ahead, executor, progress
+        )
         variables = label_channels(self.signature, values[0], ("statistic", "time"))
         variables["status"] = self._status(lost[:, 0], windows)
-        counts = {"start": windows.places[0][1]} | self._counts(level, band) | verdict(lost)
+        counts = {"start": windows.places[0][1]} | self._counts(level, band)
+        counts |= verdict(lost, windows, self.dt)
         return xr.Dataset(
             variables,
             coords={
@@ -203,6 +210,7 @@ class _Forecasts(Forecaster):
         starts: Sequence[float],
         steps: int,
         *,
+        ahead: str = "refuse",
         executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> xr.Dataset:
@@ -210,7 +218,7 @@ class _Forecasts(Forecaster):
 
         Parameters
         ----------
-        run, steps, executor, progress
+        run, steps, ahead, executor, progress
             As in :meth:`forecast`; `steps` holds for all.
         starts : sequence of float
             Instants of the last measured state, s.
@@ -219,21 +227,19 @@ class _Forecasts(Forecaster):
         -------
         Dataset
             States with dimensions (window, member, lead), ``lead`` in s after each ``start``
-            (over ``window``), and ``status`` over (window, member).
+            (over ``window``), and ``status`` over (window, member); with predicted input also
+            ``input_predicted_from`` over ``window``.
 
         Raises
         ------
         RequestError, DataError
             As :meth:`forecast`.
         """
-        windows = self.read_windows(*one_run(run, starts), steps)
+        windows = self.read_windows(*one_run(run, starts), steps, ahead)
         with member_series(self, windows, executor, progress) as (series, lost):
             values = np.array(series).swapaxes(0, 1)
         variables = label_channels(self.signature, values, ("window", "member", "lead"))
-        status = [
-            statuses(row, time.values, self.dt)
-            for row, time in zip(lost.T, windows.time, strict=True)
-        ]
+        status = [statuses(row, windows, window, self.dt) for window, row in enumerate(lost.T)]
         variables["status"] = xr.Variable(("window", "member"), np.stack(status))
         coords = window_coords(windows, self.dt) | {"member": np.arange(self.n_members)}
         return xr.Dataset(variables, coords=coords, attrs=self._notes(windows))
@@ -246,6 +252,7 @@ class _Forecasts(Forecaster):
         level: float = 0.95,
         *,
         band: Band = "members",
+        ahead: str = "refuse",
         executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> xr.Dataset:
@@ -253,7 +260,7 @@ class _Forecasts(Forecaster):
 
         Parameters
         ----------
-        run, starts, steps, executor, progress
+        run, starts, steps, ahead, executor, progress
             As in :meth:`forecast_windows`.
         level : float, optional
             Probability between ``lower`` and ``upper``.
@@ -270,7 +277,9 @@ class _Forecasts(Forecaster):
         RequestError, DataError
             As :meth:`forecast`.
         """
-        windows, values, lost = self._reduced(run, starts, steps, level, band, executor, progress)
+        windows, values, lost = self._reduced(
+            run, starts, steps, level, band, ahead, executor, progress
+        )
         variables = label_channels(self.signature, values, ("window", "statistic", "lead"))
         variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
         coords = window_coords(windows, self.dt)
@@ -286,13 +295,14 @@ class _Forecasts(Forecaster):
         steps: int | None,
         level: float,
         band: Band,
+        ahead: str,
         executor: Executor | None,
         progress: Progress | None,
     ) -> tuple[Windows, FloatArray, npt.NDArray[np.int64]]:
         """Windows, statistics (window, 4, steps, N), and where members were lost."""
         level = fraction(level, "level")
         check_band(self.calibration, level, band)
-        windows = self.read_windows(*one_run(run, starts), steps)
+        windows = self.read_windows(*one_run(run, starts), steps, ahead)
         if band == "calibrated":
             warn_of_horizon(self.calibration, windows.places[0][0], windows.steps)
         with member_series(self, windows, executor, progress) as (series, lost):
@@ -300,7 +310,7 @@ class _Forecasts(Forecaster):
         return windows, widened(self.calibration, values, band), lost
 
     def _status(self, lost: npt.NDArray[np.int64], windows: Windows) -> xr.Variable:
-        return xr.Variable(("member",), statuses(lost, windows.time[0].values, self.dt))
+        return xr.Variable(("member",), statuses(lost, windows, 0, self.dt))
 
     def _bounds(self, band: Band) -> str:
         """What the bounds of a calibrated band are."""

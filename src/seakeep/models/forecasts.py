@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from typing import Any, ClassVar
@@ -13,11 +14,13 @@ import xarray as xr
 from seakeep.arrays import FloatArray, as_real, whole_number
 from seakeep.errors import RequestError
 from seakeep.models import engine
+from seakeep.models.checks import check_choice
 from seakeep.models.engine import Windows, first_lost
 from seakeep.models.executor import Progress
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import ChannelLabel, run_name
 from seakeep.models.training import Training
+from seakeep.signals.propagation import predict_waves
 from seakeep.signals.time_axis import fixed, instant_text, span_text
 
 __all__ = [
@@ -25,18 +28,15 @@ __all__ = [
     "SingleModel",
     "check_arrays",
     "counted",
+    "is_usable",
     "label_channels",
     "one_run",
     "status_at_clock",
-    "status_text",
     "statuses",
     "verdict",
     "window_coords",
     "with_units",
 ]
-
-DIVERGED_AT = "diverged at t = "
-"""How the status of a free run that was given up starts."""
 
 
 class Forecaster:
@@ -99,9 +99,10 @@ class Forecaster:
         runs: Mapping[str, xr.Dataset],
         places: Sequence[tuple[str, float]],
         steps: int | None,
+        ahead: str = "refuse",
     ) -> Windows:
         """What forecasts from several starts, in several runs, read: (run, start in s) each."""
-        return engine.read_windows(self.signature, runs, places, steps)
+        return engine.read_windows(self.signature, runs, places, steps, ahead)
 
 
 class SingleModel(Forecaster):
@@ -149,7 +150,9 @@ class SingleModel(Forecaster):
             )
         ]
 
-    def forecast(self, run: xr.Dataset, start: float, steps: int | None = None) -> xr.Dataset:
+    def forecast(
+        self, run: xr.Dataset, start: float, steps: int | None = None, *, ahead: str = "refuse"
+    ) -> xr.Dataset:
         """Free run driven by the measured input of `run`.
 
         States are read up to `start` and not after; inputs up to the instant before the last, and
@@ -166,6 +169,11 @@ class SingleModel(Forecaster):
             ``history_samples`` samples up to it are needed.
         steps : int, optional
             Number of instants forecast; by default to the end of the run.
+        ahead : {"refuse", "predict"}, optional
+            What to do where the input ends before the look-ahead does: refuse, or continue each
+            input from its own record by linear prediction
+            (:func:`seakeep.signals.predict_waves`). Samples that are missing up to the end count
+            as not there.
 
         Returns
         -------
@@ -173,7 +181,9 @@ class SingleModel(Forecaster):
             States at the `steps` instants after `start`, with units; ``attrs["start"]`` is the
             instant taken, ``attrs["status"]`` "ok" or from when on the forecast diverged (NaN
             from there), ``attrs["reads_input_until"]`` how long after the last instant the last
-            input that was read lies, s: negative where it lies before.
+            input that was read lies, s: negative where it lies before. Where input was predicted,
+            the status ends in ", input predicted from t = … s", the first instant that depends on
+            it, which ``attrs["input_predicted_from"]`` holds too.
 
         Raises
         ------
@@ -182,12 +192,12 @@ class SingleModel(Forecaster):
         DataError
             If the step or the units are not the model's, or needed samples are missing.
         """
-        windows = self.read_windows(*one_run(run, [start]), steps)
+        windows = self.read_windows(*one_run(run, [start]), steps, ahead)
         values = self.free_runs([windows])[0][0]
         signature = self.signature
         variables = label_channels(signature, values[0], ("time",))
         lost = first_lost(values)
-        status = status_text(int(lost[0]), windows.time[0].values, signature.dt)
+        status = window_status(int(lost[0]), windows, 0, signature.dt)
         attrs = {**forecast_notes(signature, windows), "start": windows.places[0][1]}
         # The instants stand among the variables: given as coords, xarray would merge twice.
         return xr.Dataset({"time": windows.time[0], **variables}, attrs=attrs | {"status": status})
@@ -198,6 +208,7 @@ class SingleModel(Forecaster):
         starts: Sequence[float],
         steps: int,
         *,
+        ahead: str = "refuse",
         executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> xr.Dataset:
@@ -205,7 +216,7 @@ class SingleModel(Forecaster):
 
         Parameters
         ----------
-        run, steps
+        run, steps, ahead
             As in :meth:`forecast`; `steps` holds for all.
         starts : sequence of float
             Instants of the last measured state, s.
@@ -216,20 +227,21 @@ class SingleModel(Forecaster):
         -------
         Dataset
             States with dimensions (window, lead), ``lead`` in s after each ``start`` (over
-            ``window``), and ``status`` over ``window``.
+            ``window``), and ``status`` over ``window``; with predicted input also
+            ``input_predicted_from`` over ``window``, NaN where it is all measured.
 
         Raises
         ------
         RequestError, DataError
             As :meth:`forecast`, or if there is no start.
         """
-        windows = self.read_windows(*one_run(run, starts), steps)
+        windows = self.read_windows(*one_run(run, starts), steps, ahead)
         ((values,),) = engine.run_members(self, [windows], executor, progress)
         signature = self.signature
         variables = label_channels(signature, values, ("window", "lead"))
         status = [
-            status_text(int(at), time.values, signature.dt)
-            for at, time in zip(first_lost(values), windows.time, strict=True)
+            window_status(int(at), windows, window, signature.dt)
+            for window, at in enumerate(first_lost(values))
         ]
         variables["status"] = xr.Variable(("window",), status)
         return xr.Dataset(
@@ -253,9 +265,18 @@ def one_run(
 
 def forecast_notes(signature: Signature, windows: Windows) -> dict[str, Any]:
     """Attributes of a forecast: its run, what its input map reads, and how far ahead."""
-    ahead = max(windows.look_ahead) - signature.dt
-    notes = {"reads_input_until": ahead} if signature.inputs else {}
+    notes: dict[str, Any] = {}
+    if signature.inputs:
+        notes["reads_input_until"] = max(windows.look_ahead) - signature.dt
+    if len(windows) == 1 and (from_instant := predicted_from(windows, 0)) is not None:
+        notes["input_predicted_from"] = from_instant
     return {"run": windows.places[0][0], **windows.notes, **notes}
+
+
+def predicted_from(windows: Windows, window: int) -> float | None:
+    """First instant of a window that depends on predicted input, s."""
+    at = windows.predicted[window]
+    return None if at < 0 else float(windows.time[window].values[at])
 
 
 def label_channels(
@@ -281,35 +302,64 @@ def window_coords(windows: Windows, dt: float) -> dict[str, xr.Variable]:
     """Start of each of several windows, and the time after it."""
     lead = dt * np.arange(1, windows.steps + 1)
     starts = np.array([start for _, start in windows.places])
-    return {
+    coords = {
         "start": xr.Variable(("window",), starts, {"units": "s", "long_name": "start"}),
         "lead": xr.Variable(("lead",), lead, {"units": "s", "long_name": "time after start"}),
     }
+    if any(at >= 0 for at in windows.predicted):
+        found = [predicted_from(windows, window) for window in range(len(windows))]
+        words = {"units": "s", "long_name": "first instant that depends on predicted input"}
+        values = np.array(found, dtype=float)  # None becomes NaN
+        coords["input_predicted_from"] = xr.Variable(("window",), values, words)
+    return coords
 
 
-def status_text(lost: int, time: FloatArray, dt: float) -> str:
-    """What ``status`` says of a free run whose first lost instant is `lost`, or −1 for none."""
-    return "ok" if lost < 0 else f"{DIVERGED_AT}{instant_text(time[lost], dt)} s"
+def status_text(lost: int, time: FloatArray, dt: float, predicted: int = -1) -> str:
+    """What ``status`` says of a free run.
+
+    `lost` is its first lost instant and `predicted` the first that depends on predicted input, −1
+    for none.
+    """
+    said = "ok" if lost < 0 else f"diverged at t = {instant_text(time[lost], dt)} s"
+    if predicted < 0:
+        return said
+    return f"{said}, input predicted from t = {instant_text(time[predicted], dt)} s"
 
 
 def status_at_clock(status: str, clock: float) -> str:
     """The same status where time runs by a factor `clock`, as at full scale."""
-    if not status.startswith(DIVERGED_AT):
-        return status
-    instant = status.removeprefix(DIVERGED_AT).removesuffix(" s")
-    decimals = max(3, len(instant.partition(".")[2]))
-    return f"{DIVERGED_AT}{fixed(clock * float(instant), decimals)} s"
+
+    def scaled(found: re.Match[str]) -> str:
+        decimals = max(3, len(found[1].partition(".")[2]))
+        return f"t = {fixed(clock * float(found[1]), decimals)} s"
+
+    return re.sub(r"t = (\S+) s", scaled, status)
 
 
-def statuses(lost: npt.NDArray[np.int64], time: FloatArray, dt: float) -> npt.NDArray[np.str_]:
-    """Status of each member from its first lost instant, or −1."""
-    return np.array([status_text(int(at), time, dt) for at in lost], dtype=str)
+def is_usable(status: str) -> bool:
+    """Whether a status tells of a forecast at all instants."""
+    return status.startswith("ok")
 
 
-def verdict(lost: npt.NDArray[np.int64]) -> dict[str, Any]:
-    """Attributes that count the members that were lost."""
+def window_status(lost: int, windows: Windows, window: int, dt: float) -> str:
+    """Status of one of several windows."""
+    time = windows.time[window].values
+    return status_text(lost, time, dt, windows.predicted[window])
+
+
+def statuses(
+    lost: npt.NDArray[np.int64], windows: Windows, window: int, dt: float
+) -> npt.NDArray[np.str_]:
+    """Status of each member in a window from its first lost instant, or −1."""
+    return np.array([window_status(int(at), windows, window, dt) for at in lost], dtype=str)
+
+
+def verdict(lost: npt.NDArray[np.int64], windows: Windows, dt: float) -> dict[str, Any]:
+    """Attributes that count the members that were lost, of a single window."""
     diverged = int(np.count_nonzero(lost >= 0))
-    status = f"{diverged} of {len(lost)} members diverged" if diverged else "ok"
+    status = window_status(-1, windows, 0, dt)
+    if diverged:
+        status = status.replace("ok", f"{diverged} of {len(lost)} members diverged", 1)
     return {"status": status, "diverged": diverged}
 
 
@@ -336,20 +386,24 @@ def check_arrays(
     Columns that have names (a pandas DataFrame, a DataArray) are taken by name.
     """
     whole_number(steps, "steps")
-    if ahead != "refuse":
-        raise RequestError(f"ahead must be 'refuse'; received {ahead!r}.")
+    check_choice("ahead", ahead, ("refuse", "predict"))
     states, inputs, count = signature.states, signature.inputs, int(steps)
     s = signature.state_delays
     z = signature.input_map.history(signature.input_delays)
     x = _finite("x_history", _rows("x_history", x_history, s + 1, states, "s + 1")[-s - 1 :])
     if not inputs:
         return engine.array_windows(signature, x[None], np.zeros((1, z + count, 0)), count)
-    u = _finite("u_history", _rows("u_history", u_history, z + 1, inputs, "z + 1")[-z - 1 :])
+    past = _rows("u_history", u_history, z + 1, inputs, "z + 1")
+    u = _finite("u_history", past[-z - 1 :])
     future = np.zeros((0, len(inputs))) if np.size(u_future) == 0 else u_future
     needed = count - 1 + signature.lead_samples
     meaning = "steps − 1 + lead_samples" if signature.lead_samples else "steps − 1"
-    after = _rows("u_future", future, needed, inputs, meaning)
-    driving = np.concatenate([u, _finite("u_future", after[:needed])])
+    least = needed if ahead == "refuse" else 0
+    after = _finite("u_future", _rows("u_future", future, least, inputs, meaning)[:needed])
+    driving = np.concatenate([u, after])
+    if missing := needed - len(after):
+        known = np.concatenate([_finite("u_history", past), after])
+        driving = np.concatenate([driving, predict_waves(known, missing)])
     return engine.array_windows(signature, x[None], driving[None], count)
 
 

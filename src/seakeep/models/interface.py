@@ -334,7 +334,9 @@ class Model(Protocol):
         """First and last instant of the training windows of each run, s."""
         ...
 
-    def forecast(self, run: xr.Dataset, start: float, steps: int | None = None) -> xr.Dataset:
+    def forecast(
+        self, run: xr.Dataset, start: float, steps: int | None = None, *, ahead: str = "refuse"
+    ) -> xr.Dataset:
         """Free run from an instant on."""
         ...
 
@@ -344,6 +346,7 @@ class Model(Protocol):
         starts: Sequence[float],
         steps: int,
         *,
+        ahead: str = "refuse",
         executor: Executor | None = None,
     ) -> xr.Dataset:
         """Free runs from several instants, side by side."""

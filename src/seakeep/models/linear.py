@@ -248,8 +248,10 @@ class HankelDMDcModel(SingleModel):
             Inputs at k + 1, k + 2, …; shape (0, 0) for a model without input.
         steps : int
             Number of instants.
-        ahead : {"refuse"}, optional
-            What to do where `u_future` ends before the look-ahead does.
+        ahead : {"refuse", "predict"}, optional
+            What to do where `u_future` ends before the look-ahead does: refuse, or continue it by
+            linear prediction (:func:`seakeep.signals.predict_waves`) from all rows of `u_history`
+            and `u_future`; tens of wave periods of history are best.
 
         Returns
         -------

@@ -27,6 +27,7 @@ from seakeep.signals.propagation import (
     effective_celerity,
     misplaced_probes,
     phase_celerity,
+    predict_waves,
     probe_separation,
 )
 from seakeep.signals.rigid_body import (
@@ -89,6 +90,7 @@ __all__ = [
     "peak_period",
     "phase_celerity",
     "pool_drift",
+    "predict_waves",
     "probe_separation",
     "remove_gravity",
     "resample",

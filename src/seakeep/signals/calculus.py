@@ -72,21 +72,26 @@ def predicted_extension(
     long response is not fed a jump. The continuation fades out as a half cosine.
     """
     flat = array.reshape(array.shape[0], -1)
-    fitted = min(fitted, flat.shape[0])
-    order = max(1, min(order, fitted // 3))
     window = 0.5 * (1 + np.cos(np.pi * np.arange(1, count + 1) / (count + 1))) if fade else 1.0
     out = np.empty((flat.shape[0] + 2 * count, flat.shape[1]))
     for column, values in enumerate(np.ascontiguousarray(flat.T)):
-        ends = []
-        for inward in (values[::-1], values):
-            past = inward[-fitted:]
-            denominator = np.concatenate([[1.0], -linear_prediction(past, order)])
-            state = scipy.signal.lfiltic([1.0], denominator, past[: -order - 1 : -1])
-            ends.append(
-                scipy.signal.lfilter([1.0], denominator, np.zeros(count), zi=state)[0] * window
-            )
-        out[:, column] = np.concatenate([ends[0][::-1], values, ends[1]])
+        before, after = (
+            predicted(inward[-fitted:], count, order) * window for inward in (values[::-1], values)
+        )
+        out[:, column] = np.concatenate([before[::-1], values, after])
     return out.reshape((-1, *array.shape[1:]))
+
+
+def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
+    """The `count` values after a series of zero mean, by linear prediction (Burg).
+
+    The order is at most a third of the number of samples.
+    """
+    order = max(1, min(order, past.size // 3))
+    denominator = np.concatenate([[1.0], -linear_prediction(past, order)])
+    state = scipy.signal.lfiltic([1.0], denominator, past[: -order - 1 : -1])
+    out: FloatArray = scipy.signal.lfilter([1.0], denominator, np.zeros(count), zi=state)[0]
+    return out
 
 
 def _checked_band(band: tuple[float, float], dt: float, samples: int) -> tuple[float, float]:

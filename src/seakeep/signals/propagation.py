@@ -18,9 +18,17 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import ComplexArray, FloatArray, as_real, as_series, number, positive
+from seakeep.arrays import (
+    ComplexArray,
+    FloatArray,
+    as_real,
+    as_series,
+    number,
+    positive,
+    whole_number,
+)
 from seakeep.errors import DataError, RequestError
-from seakeep.signals.calculus import predicted_extension
+from seakeep.signals.calculus import predicted, predicted_extension
 from seakeep.signals.lags import as_pair, correlation_peak, parabola_peak
 from seakeep.signals.leakage import is_regular
 from seakeep.signals.waves import encounter_period, welch_segments
@@ -40,6 +48,7 @@ __all__ = [
     "effective_celerity",
     "misplaced_probes",
     "phase_celerity",
+    "predict_waves",
     "probe_separation",
 ]
 
@@ -712,6 +721,63 @@ def delay_by_celerity(
     places = _distances(distance, array.shape[0])
     span = (float(places.min()), float(places.max()))
     return carry_by_celerity(array, dt, span, celerity).at(places).reshape(array.shape)
+
+
+MEMORY = 4.0
+"""Wave periods that a linear prediction looks back. On the virtual tank the error over 0.75
+encounter periods is 0.53 SD with one half of a period, 0.43 with one, 0.38 with two, 0.32 with
+four."""
+
+
+def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
+    """Continue elevations by linear prediction, each from its own record.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,) or (time, channel)
+        Elevations, uniformly sampled, without gaps; tens of wave periods are best.
+    count : int
+        Number of samples to predict.
+
+    Returns
+    -------
+    ndarray, shape (count,) or (count, channel)
+        The samples after the record: what an autoregressive model of its last four periods
+        expects. They tend to the mean, as waves cannot be foreseen for long.
+
+    Raises
+    ------
+    RequestError
+        If `count` is no positive integer.
+    DataError
+        If a record has gaps.
+
+    Notes
+    -----
+    The coefficients are found by Burg's method (Maximum entropy spectral analysis, 1975), which
+    makes a stable model of any record.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(0, 60, 0.05)
+    >>> tone = np.cos(2 * np.pi * t / 1.6)
+    >>> bool(np.max(np.abs(predict_waves(tone[:1000], 32) - tone[1000:1032])) < 0.02)
+    True
+    """
+    array = as_series(series, minimum=4, channels=True)
+    number_of = whole_number(count, "count")
+    flat = array.reshape(array.shape[0], -1)
+    out = np.empty((number_of, flat.shape[1]))
+    for column, values in enumerate(flat.T):
+        mean = values.mean()
+        deviations = values - mean
+        order = 1
+        if np.ptp(deviations) > 0:
+            slowest = 1.0 / array.shape[0]
+            order = round(MEMORY / max(band_limit(deviations, 1.0, 0.5), slowest))
+        out[:, column] = mean + predicted(deviations, number_of, order)
+    return out.reshape((-1, *array.shape[1:]))
 
 
 def _distances(distance: npt.ArrayLike, samples: int) -> FloatArray:

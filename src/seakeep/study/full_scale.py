@@ -11,6 +11,7 @@ __all__ = ["to_full_scale"]
 
 ATTRIBUTES = {"dt": "s", "start": "s", "encounter_period": "s", "train_span": "s",
                "test_span": "s", "water_depth": "m",
+               "reads_input_until": "s", "input_predicted_from": "s",
                "probe_offset": "m", "probe_offset_spread": "m"}  # fmt: skip
 """Times and lengths among the attributes of a run, with their units."""
 

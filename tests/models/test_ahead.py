@@ -1,0 +1,176 @@
+"""Forecasts beyond the waves that were measured: ``ahead="predict"``."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from drifting import INPUTS, STATES, drifting_run
+
+import seakeep
+from seakeep import DataError, HankelDMDc, RequestError
+from seakeep.models.forecasts import status_at_clock
+from seakeep.signals import predict_waves
+
+PREDICTED = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
+SQUARES = seakeep.SlowSquares("eta_fwd", orders=(0,), lags=(0, 1))
+START, STEPS, LEAD = 20.0, 40, 6
+
+
+def model_of(runs, **settings):
+    spec = HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD, **settings)
+    return spec.fit(runs, STATES, INPUTS)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return [drifting_run(seed) for seed in (1, 2)]
+
+
+@pytest.fixture(scope="module")
+def test_run():
+    return drifting_run(7)
+
+
+@pytest.fixture(scope="module", params=["plain", "aligned", "observed"])
+def model(request, runs):
+    settings = {
+        "plain": {},
+        "aligned": {"alignment": PREDICTED},
+        "observed": {"alignment": PREDICTED, "observables": (SQUARES,)},
+    }
+    return model_of(runs, **settings[request.param])
+
+
+def reads_until(model, run):
+    """Sample of the last wave that a forecast reads."""
+    start = round((START - float(run.time[0])) / model.dt)
+    return start + STEPS - 1 + model.lead_samples
+
+
+def test_waves_that_are_there_are_not_predicted_and_none_beyond_is_read(model, test_run):
+    expected = model.forecast(test_run, START, STEPS)
+    poisoned = test_run.copy(deep=True)
+    for name in INPUTS:
+        poisoned[name].values[reads_until(model, test_run) + 1 :] = 1e9
+    for state in STATES:
+        poisoned[state].values[poisoned.time.values > START + 1e-9] = np.nan
+    found = model.forecast(poisoned, START, STEPS, ahead="predict")
+    xr.testing.assert_identical(found, expected)
+    assert found.attrs["status"] == "ok"
+
+
+def test_missing_waves_are_those_of_a_record_that_was_continued(model, test_run):
+    last = reads_until(model, test_run) - 10
+    short = test_run.isel(time=slice(0, last + 1))
+    with pytest.raises(RequestError, match="ahead = 'predict' continues the input"):
+        model.forecast(short, START, STEPS)
+    found = model.forecast(short, START, STEPS, ahead="predict")
+    assert found.sizes["time"] == STEPS
+    # By hand: the probes continued, everything after the start but waves thrown away.
+    long = test_run.isel(time=slice(0, last + 11)).copy(deep=True)
+    for name in INPUTS:
+        values = short[name].values
+        long[name].values[last + 1 :] = predict_waves(values, 10)
+    expected = model.forecast(long, START, STEPS)
+    for state in STATES:
+        np.testing.assert_array_equal(found[state].values, expected[state].values)
+    # What is missing counts as not there, and what lies beyond it is not read.
+    gone = test_run.copy(deep=True)
+    for name in INPUTS:
+        gone[name].values[last + 1 : reads_until(model, test_run) + 1] = np.nan
+        gone[name].values[reads_until(model, test_run) + 1 :] = 1e9
+    again = model.forecast(gone, START, STEPS, ahead="predict")
+    for state in STATES:
+        np.testing.assert_array_equal(again[state].values, found[state].values)
+    assert again.attrs["status"] == found.attrs["status"]
+
+
+def test_the_status_says_from_when_and_before_that_nothing_changes(runs, test_run):
+    model = model_of(runs)
+    last = reads_until(model, test_run) - 10
+    short = test_run.isel(time=slice(0, last + 1))
+    found = model.forecast(short, START, STEPS, ahead="predict")
+    whole = model.forecast(test_run, START, STEPS)
+    since = found.attrs["input_predicted_from"]
+    assert since == pytest.approx(float(whole.time[STEPS - 10]))
+    assert found.attrs["status"] == f"ok, input predicted from t = {since:g} s"
+    full = status_at_clock(found.attrs["status"], 2.0)
+    assert float(full.removeprefix("ok, input predicted from t = ")[:-2]) == 2 * since
+    same = found.time.values < since - 1e-9
+    for state in STATES:
+        one, other = found[state].values, whole[state].values
+        np.testing.assert_array_equal(one[same], other[same])
+        assert not np.any(one[~same] == other[~same])
+
+
+def test_predicted_waves_are_better_than_none(runs, test_run):
+    model = model_of(runs)
+    at = round((START - float(test_run.time[0])) / model.dt)
+    found = model.forecast(test_run.isel(time=slice(0, at + 1)), START, STEPS, ahead="predict")
+    assert found.attrs["input_predicted_from"] == float(found.time[0])
+    calm = test_run.copy(deep=True)
+    for name in INPUTS:
+        calm[name].values[at + 1 :] = calm[name].values[: at + 1].mean()
+    true = test_run.sel(time=found.time, method="nearest")
+    errors = [
+        float(np.sqrt(np.mean((forecast.heave.values - true.heave.values)[:8] ** 2)))
+        for forecast in (found, model.forecast(calm, START, STEPS))
+    ]
+    assert errors[0] < 0.5 * errors[1]
+
+
+def test_ensembles_windows_and_arrays_predict_alike(runs, test_run):
+    spec = seakeep.BayesianHankelDMDc(
+        encounter_period=1.6,
+        train_length=None,
+        state_delay=seakeep.Uniform(0.2, 0.4),
+        input_delay=seakeep.Uniform(0.6, 1.0),
+        ridge=seakeep.Uniform(1, 2),
+        n_members=3,
+        delay_rows="exact",
+        lead=LEAD,
+    )
+    ensemble = spec.fit(runs, STATES, INPUTS)
+    last = reads_until(ensemble, test_run) - 4
+    short = test_run.isel(time=slice(0, last + 1))
+    members = ensemble.forecast(short, START, STEPS, ahead="predict")
+    words = members.attrs["status"]
+    assert words == f"ok, input predicted from t = {members.attrs['input_predicted_from']:g} s"
+    assert list(members["status"].values) == [words] * 3
+    summary = ensemble.forecast_summary(short, START, STEPS, ahead="predict")
+    assert summary.attrs["status"] == words
+    np.testing.assert_allclose(
+        summary["heave"].sel(statistic="mean"), members["heave"].mean("member"), rtol=1e-12
+    )
+    for made in (ensemble, ensemble.member(0)):
+        windows = made.forecast_windows(short, [10.0, START], STEPS, ahead="predict")
+        assert np.isnan(windows["input_predicted_from"][0])
+        assert float(windows["input_predicted_from"][1]) == members.attrs["input_predicted_from"]
+        assert set(windows["status"].values[0].ravel()) == {"ok"}
+        assert set(windows["status"].values[1].ravel()) == {words}
+    reduced = ensemble.summarize_windows(short, [10.0, START], STEPS, ahead="predict")
+    np.testing.assert_array_equal(reduced["input_predicted_from"], windows["input_predicted_from"])
+    at = round((START - float(test_run.time[0])) / ensemble.dt)
+    x, u = (np.stack([short[n].values for n in names], axis=1) for names in (STATES, INPUTS))
+    given = (x[: at + 1], u[: at + 1], u[at + 1 :], STEPS)
+    band = ensemble.hold().forecast_arrays(*given, ahead="predict")
+    np.testing.assert_allclose(band.mean[:, 0], summary[STATES[0]].sel(statistic="mean"), rtol=1e-9)
+    one = ensemble.member(1).forecast_arrays(*given, ahead="predict")
+    np.testing.assert_allclose(one[:, 0], members[STATES[0]].sel(member=1), rtol=1e-9)
+
+
+def test_what_cannot_be_predicted_is_refused(runs, test_run):
+    model = model_of(runs)
+    with pytest.raises(RequestError, match="ahead must be 'refuse' or 'predict'; received 'guess'"):
+        model.forecast(test_run, START, STEPS, ahead="guess")
+    x, u = (np.stack([test_run[n].values for n in names], axis=1) for names in (STATES, INPUTS))
+    with pytest.raises(RequestError, match="ahead must be 'refuse' or 'predict'; received 'guess'"):
+        model.forecast_arrays(x, u, u, STEPS, ahead="guess")
+    # A probe that is dead before the start is a gap in the history, and no future.
+    dead = test_run.copy(deep=True)
+    dead[INPUTS[0]].values[round(START / model.dt) - 5 :] = np.nan
+    with pytest.raises(DataError, match=f"channel '{INPUTS[0]}' of .* missing"):
+        model.forecast(dead, START, STEPS, ahead="predict")
+    measured = model_of(runs, alignment=seakeep.ProbeAlignment(mode="dispersion"))
+    short = test_run.isel(time=slice(0, reads_until(measured, test_run)))
+    with pytest.raises(RequestError, match="measured surge, which nothing continues"):
+        measured.forecast(short, START, STEPS, ahead="predict")
