@@ -203,12 +203,16 @@ def test_table_holds_what_can_be_computed_by_hand():
     assert float(table["measured_max"].sel(channel="heave")) == deviation.max()
     fit = 100 * (1 - expected * np.sqrt(samples / (samples - 1)))
     assert float(table["fit"].sel(channel="heave")) == pytest.approx(fit, rel=1e-12)
+    known = float(comparison().forecast["heave"].attrs["training_std"])
+    in_training = expected * deviation.std(ddof=1) / known
+    assert float(table["training_nrmse"].sel(channel="heave")) == pytest.approx(in_training, 1e-12)
 
 
 def test_degrees_change_extremes_and_no_error_measure():
     radians, degrees = comparison(), in_degrees(comparison())
     before, after = comparison_table([radians]), comparison_table([degrees])
-    np.testing.assert_allclose(before["nrmse"], after["nrmse"], rtol=1e-12)
+    for measure in ("nrmse", "training_nrmse"):
+        np.testing.assert_allclose(before[measure], after[measure], rtol=1e-12)
     pitch = after.isel(run=0).sel(channel="pitch")
     assert str(pitch["channel_units"].values) == "deg"
     assert float(pitch["measured_max"]) == pytest.approx(np.degrees(0.1 * np.cos(TIME).max()))
@@ -222,7 +226,10 @@ def test_a_slack_line_is_left_out_and_shown_as_such():
     assert int(table["slack_channels"]) == 1
     shown = block_of(comparison_table([comparison(slack=True)]))
     assert shown.note == "1 still channel left out of the average"
-    assert shown.rows[2][2] == "–"
+    assert shown.rows[2][1] == "–"
+    # Its error in training SD says something all the same, and counts.
+    every = float(table["training_nrmse"].mean(skipna=False))
+    assert float(table["training_anrmse"]) == pytest.approx(every, rel=1e-12)
 
 
 def test_csv_has_a_row_a_channel_and_all_digits(tmp_path):
@@ -246,7 +253,7 @@ def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path)
     }
     references = {"hold last": ["hold_last"], "best linear": ["arx", "fir"]}
     averages, channels = model_blocks(tables, references)
-    heads = ("model", "ANRMSE", "NAMMAE", "below hold last", "below best linear")
+    heads = ("model", "ANRMSE", "in training SD", "NAMMAE", "below hold last", "below best linear")
     assert averages.columns == heads
     ours = averages.rows[0]
     assert ours[:2] == ("ours", "0.100")

@@ -128,6 +128,7 @@ def cells(inside=0.5):
             "m_upper": (("training", "window", "time", "channel"), upper),
             "m_nrmse": (("training", "window", "channel"), errors),
             "m_nammae": (("training", "window", "channel"), 2 * errors),
+            "m_training_nrmse": (("training", "window", "channel"), 3 * errors),
         },
         coords={"channel": ["heave", "pitch"]},
     )

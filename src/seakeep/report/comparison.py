@@ -27,6 +27,7 @@ __all__ = [
 
 _SHOWN = {
     "nrmse": ("NRMSE", "{:.3f}", "anrmse"),
+    "training_nrmse": ("in training SD", "{:.3f}", "training_anrmse"),
     "fit": ("fit %", "{:.1f}", ""),
     "nammae": ("NAMMAE", "{:.3f}", "mean_nammae"),
     "sd_ratio": ("SD ratio", "{:.3f}", ""),
@@ -43,11 +44,14 @@ _IN_UNITS = {
 }
 """Columns of a second table, in the unit of the channel."""
 _STORED = (
-    *("nrmse", "fit", "nammae", "sd_ratio", "measured_min", "predicted_min", "measured_max"),
-    *("predicted_max", "coverage", "band_width", "relative_band_width"),
+    *("nrmse", "training_nrmse", "fit", "nammae", "sd_ratio", "measured_min", "predicted_min"),
+    *("measured_max", "predicted_max", "coverage", "band_width", "relative_band_width"),
 )
 """Columns of a CSV file."""
-_OF_RUNS = ("start", "status", "anrmse", "conditional_on", "probe_offset", "probe_offset_spread")
+_OF_RUNS = (
+    *("start", "status", "anrmse", "training_anrmse", "conditional_on", "probe_offset"),
+    "probe_offset_spread",
+)
 _OF_BANDS = ("band", "level", "members", "diverged")
 _OF_SCALE = ("scale", "scale_factor")
 
@@ -55,20 +59,19 @@ _OF_SCALE = ("scale", "scale_factor")
 def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
     """Comparison of forecasts with measurements, two tables per run that fit a terminal."""
     shown = {name: each for name, each in _SHOWN.items() if name in table}
-    columns = ("channel", "unit", *(heading for heading, _, _ in shown.values()))
+    columns = ("channel", *(heading for heading, _, _ in shown.values()))
     for run in table["run"].values:
         at = table.sel(run=run)
         rows = [
             (
                 str(name),
-                str(at["channel_units"].sel(channel=name).values),
                 *(_text(at[key].sel(channel=name), form) for key, (_, form, _) in shown.items()),
             )
             for name in table["channel"].values
         ]
         means = [_text(at[mean], form) if mean else "" for _, form, mean in shown.values()]
-        rows.append(("average", "", *means))
-        numeric = tuple(range(2, len(columns)))
+        rows.append(("average", *means))
+        numeric = tuple(range(1, len(columns)))
         name, title = f"comparison_{run}", f"{run}: {_title(at)}"
         last = (len(rows) - 1,)
         yield Table(name, title, columns, tuple(rows), _note(at), numeric, averages=last)
@@ -124,7 +127,13 @@ def model_blocks(
 ) -> Iterator[Table]:
     """Several models beside each other, a table of averages and one of channels per run."""
     first = next(iter(tables.values()))
-    heads = ("model", "ANRMSE", "NAMMAE", *(f"below {each}" for each in references))
+    heads = (
+        "model",
+        "ANRMSE",
+        "in training SD",
+        "NAMMAE",
+        *(f"below {each}" for each in references),
+    )
     for run in first["run"].values:
         of_run = {name: table.sel(run=run) for name, table in tables.items()}
         errors = {name: float(at["anrmse"]) for name, at in of_run.items()}
@@ -136,6 +145,7 @@ def model_blocks(
             (
                 name,
                 _text(at["anrmse"], "{:.3f}"),
+                _text(at["training_anrmse"], "{:.3f}"),
                 _text(at["mean_nammae"], "{:.3f}"),
                 *(_text(100 * (1 - errors[name] / each), "{:+z.0f} %") for each in best.values()),
             )

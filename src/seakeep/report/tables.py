@@ -149,6 +149,10 @@ def rich_table(table: Table) -> RichTable:
             longest = max((len(row[k]) for row in table.rows), default=0)
             width = max(longest, *map(len, heading.split() or [""]))
             out.add_column(heading, justify="right", min_width=width, overflow="fold")
+        elif k == 0:  # names of channels stay in one piece
+            words = [word for row in (table.columns, *table.rows) for word in row[k].split()]
+            longest = max(map(len, words), default=0)
+            out.add_column(heading, min_width=min(longest, NAME), overflow="fold")
         else:
             out.add_column(heading, overflow="fold")
     for k, row in enumerate(table.rows):
@@ -165,6 +169,8 @@ _LATEX = {
     "·": r"$\cdot$", "³": r"$^3$", "φ": r"$\varphi$", "θ": r"$\theta$", "ω": r"$\omega$",
     "<": r"$<$", ">": r"$>$", "T̂": r"$\hat T$", "τ̂": r"$\hat\tau$",
 }  # fmt: skip
+NAME = 20
+"""Characters of a word, such as the name of a channel, that a terminal does not break."""
 WIDE = 24
 """Characters of a cell from which on its column may break lines in LaTeX."""
 LINE = 90

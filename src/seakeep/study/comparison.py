@@ -464,14 +464,15 @@ def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
     Returns
     -------
     Dataset
-        Over ``run`` and ``channel``: ``nrmse``, ``fit`` (%), ``nammae``, ``sd_ratio`` (predicted
+        Over ``run`` and ``channel``: ``nrmse``, ``training_nrmse`` (the same error in standard
+        deviations of the training), ``fit`` (%), ``nammae``, ``sd_ratio`` (predicted
         over measured), ``measured_min``, ``measured_max``, ``predicted_min``, ``predicted_max``
-        (in ``channel_units``); over ``run``: ``anrmse`` and ``mean_nammae`` over
-        the channels that can be judged, ``slack_channels`` (how many cannot), ``status``,
-        ``start``, and ``conditional_on``: the measured output that the forecast read after its
-        start, or an empty text; ``probe_offset`` and ``probe_offset_spread`` (m), NaN where the
-        run has none. Of an ensemble also ``coverage``, the part of the measured instants that lie
-        in the band (%), ``band_width``, its mean width (in ``channel_units``), and
+        (in ``channel_units``); over ``run``: ``anrmse`` and ``mean_nammae`` over the channels that
+        can be judged, ``training_anrmse`` over all, ``slack_channels`` (how many cannot),
+        ``status``, ``start``, and ``conditional_on``: the measured output that the forecast read
+        after its start, or an empty text; ``probe_offset`` and ``probe_offset_spread`` (m), NaN
+        where the run has none. Of an ensemble also ``coverage``, the part of the measured instants
+        that lie in the band (%), ``band_width``, its mean width (in ``channel_units``), and
         ``relative_band_width`` (in measured standard deviations); over ``run``:
         ``mean_coverage`` over the channels that can be judged, ``members``, ``diverged``,
         ``level`` and ``band`` ("members" or "calibrated"). At full scale ``scale`` ("full") and
@@ -488,6 +489,7 @@ def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
 
 _COLUMNS = {
     "nrmse": ("1", "RMS error in measured standard deviations"),
+    "training_nrmse": ("1", "RMS error in standard deviations of the training"),
     "fit": ("%", "fit as MATLAB's compare states it"),
     "nammae": ("1", "error of minimum and maximum in measured standard deviations"),
     "sd_ratio": ("1", "standard deviation, predicted over measured"),
@@ -510,6 +512,7 @@ def _row(comparison: Comparison) -> xr.Dataset:
         sd_ratio = p.std("time", ddof=1, skipna=False) / spread.where(~slack)
     each = {
         "nrmse": metrics.nrmse(predicted=p, measured=m),
+        "training_nrmse": _in_training_sd(p, m),
         "fit": metrics.fit_percent(predicted=p, measured=m),
         "nammae": metrics.normalised_extremes_error(predicted=p, measured=m),
         "sd_ratio": sd_ratio,
@@ -527,6 +530,7 @@ def _row(comparison: Comparison) -> xr.Dataset:
         | _scale_entries(comparison)
         | {
             "anrmse": comparison.anrmse,
+            "training_anrmse": float(each["training_nrmse"].to_array().mean(skipna=False)),
             "mean_nammae": float(metrics.nammae(predicted=p, measured=m)),
             "slack_channels": int(slack.to_array().sum()),
             "status": comparison.status,
@@ -540,6 +544,17 @@ def _row(comparison: Comparison) -> xr.Dataset:
             "channel": names,
             "channel_units": ("channel", [str(p[name].attrs.get("units", "")) for name in names]),
         },
+    )
+
+
+def _in_training_sd(p: xr.Dataset, m: xr.Dataset) -> xr.Dataset:
+    """RMS error of each channel over its standard deviation in training."""
+    return xr.Dataset(
+        {
+            name: np.sqrt(((each - m[name]) ** 2).mean(skipna=False))
+            / float(each.attrs.get("training_std", np.nan))
+            for name, each in p.data_vars.items()
+        }
     )
 
 

@@ -28,6 +28,7 @@ from seakeep.waves import phase_speed
 
 __all__ = [
     "BAND_ERRORS",
+    "MEASURES",
     "VARIANTS",
     "average_of",
     "band_of",
@@ -44,6 +45,8 @@ __all__ = [
 
 BAND_ERRORS = {"all": "error_over_time", "low": "error_low", "wave": "error_wave"}
 """Names of ε(t), as a whole and in its two bands."""
+MEASURES = ("nrmse", "nammae", "training_nrmse")
+"""Errors of a cell: both of the paper, in SD of the window, and the first in SD of the training."""
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "paper": {"block_length": "carlstein", "bandwidth": "paper", "joins": True},
@@ -161,9 +164,9 @@ def box_table(test: xr.Dataset, models: Sequence[str]) -> xr.Dataset:
     """Quartiles of the errors over all cells of a test set, over (model, measure, channel).
 
     The channel ``average`` is the paper's ANRMSE and NAMMAE: the average of each cell over the
-    channels that can be judged.
+    channels that can be judged. ``training_nrmse`` counts the error in SD of the training, also
+    that of a channel that barely moves.
     """
-    measures = ("nrmse", "nammae")
     numbers = (
         "median",
         "lower_quartile",
@@ -175,10 +178,10 @@ def box_table(test: xr.Dataset, models: Sequence[str]) -> xr.Dataset:
         "left_out",
     )
     names = ["average", *map(str, test["channel"].values)]
-    values = np.full((len(numbers), len(models), len(measures), len(names)), np.nan)
+    values = np.full((len(numbers), len(models), len(MEASURES), len(names)), np.nan)
     judged = test["judged"].values
     for m, model in enumerate(models):
-        for k, measure in enumerate(measures):
+        for k, measure in enumerate(MEASURES):
             cells = test[f"{model}_{measure}"].values[judged]
             columns = [average_of(cells), *cells.T]
             for c, column in enumerate(columns):
@@ -190,7 +193,7 @@ def box_table(test: xr.Dataset, models: Sequence[str]) -> xr.Dataset:
                 values[:, m, k, c] = [getattr(box, number) for number in numbers]
     return xr.Dataset(
         {n: (("model", "measure", "channel"), values[i]) for i, n in enumerate(numbers)},
-        coords={"model": list(models), "measure": list(measures), "channel": names},
+        coords={"model": list(models), "measure": list(MEASURES), "channel": names},
     )
 
 

@@ -35,7 +35,7 @@ __all__ = [
     "write_result",
 ]
 
-FORMAT = 4
+FORMAT = 5
 """Goes into digest and result: raise it when the same settings give other arrays than before."""
 
 RESULT = "study.nc"

@@ -22,7 +22,7 @@ from seakeep.models.calibration import Judged, found_margin, held_out
 from seakeep.models.engine import group_series, read_groups
 from seakeep.models.summaries import STATISTICS, reduce_members
 from seakeep.signals import envelope_squared
-from seakeep.study.judge import BAND_ERRORS
+from seakeep.study.judge import BAND_ERRORS, MEASURES
 from seakeep.study.plan import Plan, TestWindow, TrainingSet, between
 from seakeep.study.settings import Study
 
@@ -362,6 +362,7 @@ def _add_errors(out: xr.Dataset, model: str, dt: float, frequency: float) -> Non
     results = {
         "nrmse": np.full((*shape[:2], shape[3]), np.nan),
         "nammae": np.full((*shape[:2], shape[3]), np.nan),
+        "training_nrmse": np.full((*shape[:2], shape[3]), np.nan),
         **{BAND_ERRORS[band]: np.full(shape[:3], np.nan) for band in BAND_ERRORS},
     }
     for training in range(shape[0]):
@@ -372,12 +373,14 @@ def _add_errors(out: xr.Dataset, model: str, dt: float, frequency: float) -> Non
         }
         results["nrmse"][training] = metrics.nrmse(**pair)
         results["nammae"][training] = metrics.normalised_extremes_error(**pair)
+        error = metrics.root_mean_square(predicted[training] - measured[training])
+        results["training_nrmse"][training] = error / pair["training_std"]
         results["error_over_time"][training] = metrics.error_over_time(**pair)
         bands = band_error_over_time(**pair, dt=dt, frequency=frequency)
         results["error_low"][training], results["error_wave"][training] = bands
     dims = ("training", "window")
-    out[f"{model}_nrmse"] = ((*dims, "channel"), results["nrmse"])
-    out[f"{model}_nammae"] = ((*dims, "channel"), results["nammae"])
+    for key in MEASURES:
+        out[f"{model}_{key}"] = ((*dims, "channel"), results[key])
     for key in BAND_ERRORS.values():
         out[f"{model}_{key}"] = ((*dims, "time"), results[key])
 

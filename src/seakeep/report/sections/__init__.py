@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from seakeep.report.section import Section
-from seakeep.report.sections import data, errors, histories, judgements, regular, settings, summary
+from seakeep.report.sections import (
+    bands,
+    data,
+    errors,
+    histories,
+    judgements,
+    regular,
+    scales,
+    settings,
+    summary,
+)
 from seakeep.study import StudyResult
 
 __all__ = ["SECTIONS"]
@@ -13,11 +23,13 @@ __all__ = ["SECTIONS"]
 SECTIONS: list[Callable[[StudyResult], Section | None]] = [
     summary.summary,
     errors.errors,
+    scales.scales,
     regular.regular,
     histories.explorer,
     histories.histories,
     judgements.age,
     judgements.coverage,
+    bands.bands,
     judgements.densities,
     judgements.members,
     data.waves,

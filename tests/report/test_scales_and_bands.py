@@ -1,0 +1,78 @@
+"""Tables of errors in two standard deviations, and of bands in parts, hold what was put in."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep.report.sections.bands import bands
+from seakeep.report.sections.scales import scales
+from seakeep.study import StudyResult
+from seakeep.study.judge import band_parts, box_table
+
+
+@pytest.fixture
+def result():
+    """An ensemble in one window of two channels: a wave of SD 2, and a load that stands still."""
+    time = np.arange(1, 13)
+    wave = np.where(time % 2, 2.0, -2.0) * np.sqrt(11 / 12)  # SD 2 with ddof = 1
+    measured = np.stack([wave, np.full(12, 5.0)], axis=1)[None]
+    dims = ("training", "window", "time", "channel")
+    lower, upper = np.full((1, 1, 12, 2), -10.0), np.full((1, 1, 12, 2), 10.0)
+    upper[..., :4, 0] = -9.0  # the first third of the horizon misses the wave
+    cell = ("training", "window", "channel")
+    test = xr.Dataset(
+        {
+            "measured": (dims[1:], measured),
+            "judged": (("training", "window"), [[True]]),
+            "training_std": (("training", "channel"), [[8.0, 0.5]]),
+            "m_lower": (dims, lower),
+            "m_upper": (dims, upper),
+            "m_nrmse": (cell, [[[0.3, np.nan]]]),
+            "m_nammae": (cell, [[[0.3, np.nan]]]),
+            "m_training_nrmse": (cell, [[[0.075, 1.525]]]),
+        },
+        coords={"channel": ["heave", "load"], "time": time},
+    )
+    names = {"units": ["m", "N"], "long_name": ["heave", "load"]}
+    settings = {"tests": {"t": {"label": "sea"}}, "statistics": {"level": 0.95}}
+    groups = {
+        "channels": xr.Dataset(
+            {key: ("name", words) for key, words in names.items()},
+            coords={"name": ["heave", "load"], "channel": ["heave", "load"]},
+        ),
+        "tests/t": test,
+        "statistics/boxes/t": box_table(test, ["m"]),
+        "statistics/bands/t": band_parts(test, ["m"], {}, 0.95),
+    }
+    models = {"m": {"ensemble": True}}
+    attrs = {"settings": json.dumps(settings), "models": json.dumps(models)}
+    return StudyResult(None, attrs, groups)
+
+
+def test_errors_stand_in_both_standard_deviations(result):
+    (table,) = scales(result).tables
+    heave, load, average = table.rows
+    assert heave == ("heave", "0.25", "0.300 (0.075)")
+    assert load == ("load", "0.00", "– (1.525)")
+    assert average == ("average", "", "0.300 (0.800)")
+
+
+def test_bands_stand_by_horizon_and_channel(result):
+    parts, channels = bands(result).tables
+    inside = {row[1]: row[2:4] for row in parts.rows}
+    assert inside["all"] == ("0.83", "0.67 (heave)")
+    assert inside["first third"] == ("0.50", "0.00 (heave)")
+    assert inside["last third"] == ("1.00", "1.00 (heave)")
+    heave = {row[1]: row for row in channels.rows}["heave [m]"]
+    width = (4 * 1.0 + 8 * 20.0) / 12
+    assert heave[3] == f"{width / 2:.2f}"
+    # 2/0.05 times the distance to the bound at -9, of crests and troughs in turn, in a third.
+    assert float(heave[4]) == pytest.approx(width + 40 * 9 / 3, rel=4e-3)  # three digits
+
+
+def test_a_study_without_ensembles_shows_no_bands(result):
+    models = json.dumps({"m": {"ensemble": False}})
+    attrs = {**result.attrs, "models": models}
+    assert bands(StudyResult(None, attrs, result.groups)) is None
