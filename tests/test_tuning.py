@@ -106,7 +106,7 @@ def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tmp_path, mon
     assert "Name it tuned.toml" in capsys.readouterr().err
 
 
-def test_a_campaign_file_states_observables_and_a_ridge_by_roll_out(tmp_path):
+def test_a_campaign_file_states_observables_read_outs_and_a_ridge_by_roll_out(tmp_path):
     from seakeep.study.resolve import build_spec
 
     for path in TUTORIAL.iterdir():
@@ -136,6 +136,10 @@ lags = ["0 T", "1 T"]
 kind = "powers"
 of = ["eta_fwd"]
 powers = [2]
+
+[model.readouts.mooring_bow]
+kind = "hinge"
+of = ["heave"]
 """
     )
     settings = seakeep.read_campaign(tmp_path / "campaign.toml").model()
@@ -145,4 +149,5 @@ powers = [2]
     squares, powers = spec.observables
     assert squares == seakeep.SlowSquares("eta_mid", (0, 1, 2), 0.33, 2.0, (0.0, 1.0), 1.5)
     assert powers == seakeep.Powers("eta_fwd", (2,))
+    assert spec.readouts == (seakeep.ReadOut("mooring_bow", ("heave",), "hinge"),)
     assert isinstance(spec, HankelDMDc)

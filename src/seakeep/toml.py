@@ -489,12 +489,20 @@ def _place(loc: list[str], root: type[BaseModel]) -> tuple[type[BaseModel] | Non
                 table = others
                 continue
             annotation, description = fields[key].annotation, fields[key].description or ""
-        elif typing.get_origin(annotation) is dict:
-            annotation = typing.get_args(annotation)[1]
+        elif (values := _values_in(annotation)) is not None:
+            annotation = values
         else:
             return owner, description, depth
         table = _table_in(annotation)
     return owner, description, len(loc)
+
+
+def _values_in(annotation: Any) -> Any:
+    """Return what the values of a dict may be that an annotation allows, behind unions."""
+    if typing.get_origin(annotation) is dict:
+        return typing.get_args(annotation)[1]
+    found = (_values_in(each) for each in typing.get_args(annotation))
+    return next((values for values in found if values is not None), None)
 
 
 def _table_in(annotation: Any) -> type[BaseModel] | None:

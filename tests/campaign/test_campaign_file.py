@@ -365,6 +365,28 @@ class TestModels:
         path = edited(("ridge = 1", 'alignment = { mode = "dispersion" }'))
         assert read_campaign(path).model().arguments()["alignment"] == {"mode": "dispersion"}
 
+    def test_read_outs_are_tables_or_a_word(self, edited):
+        stated = "ridge = 1\n[model.readouts.heave]\nof = ['pitch']"
+        model = read_campaign(edited(("ridge = 1", stated))).model()
+        assert model.arguments()["readouts"] == (
+            {"channel": "heave", "kind": "auto", "of": ("pitch",)},
+        )
+        model = read_campaign(edited(("ridge = 1", "readouts = 'auto'"))).model()
+        assert model.arguments()["readouts"] == "auto"
+
+    @pytest.mark.parametrize(
+        ("readouts", "message"),
+        [
+            ("[model.readouts.heavy]\nof = ['heave']", "readouts.heavy names 'heavy', which is"),
+            ("[model.readouts.heave]\nof = ['surge']", "'surge', which is not among the states"),
+            ("[model.readouts.heave]\nkind = 'hinge'", "model.readouts.heave.of: missing. Add it"),
+            ("[model.readouts.heave]\nof = ['x']\nkind = 1", "model.readouts.heave.kind: received"),
+            ("readouts = 'all'", "model.readouts: received 'all', which should be 'auto'. Give t"),
+        ],
+    )
+    def test_read_outs_that_do_not_fit_are_refused(self, edited, readouts, message):
+        assert message in refusal(edited(("ridge = 1", f"ridge = 1\n{readouts}")))
+
     def test_named_models(self, edited):
         path = edited(
             ("[model]", "[models.small]"),

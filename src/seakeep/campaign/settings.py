@@ -646,6 +646,30 @@ def _maybe_length(value: object) -> object:
         return value
 
 
+class ReadOutSettings(Table):
+    """``[model.readouts.NAME]``: NAME is read off the forecast states."""
+
+    kind: Literal["auto", "hinge", "stacked"] = Field(
+        default="auto",
+        description="'hinge' (of measured states), 'stacked' (of forecast states) or 'auto': "
+        "whichever of them, or neither, is best on training runs that are held out",
+    )
+    of: Annotated[tuple[str, ...], Field(strict=False, min_length=1)] = Field(
+        description="list of states that bend it, such as ['surge', 'heave', 'pitch']"
+    )
+
+
+def _readout_branch(value: object) -> str:
+    return "<word>" if isinstance(value, str) else "<table>"
+
+
+ReadOuts = Annotated[
+    Annotated[Literal["auto"], Tag("<word>")]
+    | Annotated[dict[str, ReadOutSettings], Tag("<table>")],
+    Discriminator(_readout_branch),
+]
+
+
 class ModelSettings(Table):
     """``[model]`` and ``[models.NAME]``: states, inputs, and the constructor's own keys.
 
@@ -688,6 +712,11 @@ class ModelSettings(Table):
         default=None,
         description="list of tables, such as { kind = 'slow_squares', of = 'eta_cog' }: further "
         "inputs made of the measured ones; kinds 'slow_squares', 'powers' and 'expression'",
+    )
+    readouts: ReadOuts | None = Field(
+        default=None,
+        description="tables [model.readouts.NAME], or 'auto': every load among the states is read "
+        "off the motions among them where that helps",
     )
     window: Window | None = Field(
         default=None, description="training snapshots per run, or periods such as '20 T'"
@@ -744,6 +773,14 @@ class ModelSettings(Table):
                 raise ValueError(f"'{key}' names a channel twice; remove the repetition")
         if both := set(self.states) & set(self.inputs):
             raise ValueError(f"{sorted(both)[0]!r} is among the states and the inputs; choose one")
+        if self.states and isinstance(self.readouts, dict):
+            for name, table in self.readouts.items():
+                if strange := [each for each in (name, *table.of) if each not in self.states]:
+                    raise ValueError(
+                        f"readouts.{name} names {strange[0]!r}, which is not among the states "
+                        f"({', '.join(self.states)});{did_you_mean(strange[0], self.states)} name "
+                        "states of the model"
+                    )
         return self
 
     def arguments(self) -> dict[str, Any]:
@@ -767,6 +804,10 @@ class ModelSettings(Table):
         }
         if self.alignment is not None:
             stated["alignment"] = self.alignment.model_dump(exclude_unset=True)
+        if isinstance(self.readouts, dict):
+            stated["readouts"] = tuple(
+                {"channel": name, **each.model_dump()} for name, each in self.readouts.items()
+            )
         return {**stated, **(self.model_extra or {})}
 
     def unknown_keys(self) -> dict[str, str]:

@@ -13,10 +13,15 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 
-__all__ = ["LinearHinges", "fit_hinges", "hinges", "knots_of"]
+__all__ = ["LinearHinges", "fit_hinges", "floor_of", "hinges", "knots_of"]
 
 KNOTS = 6
 """Knots per state: quantiles from 0.05 to 0.95. Four to ten gave the same within 2 %."""
+FLOOR = 0.002
+"""Quantile of a slack channel that is its floor: what it rests on, less its noise."""
+LOW, FLAT = 0.05, 0.3
+"""Part of the samples in which a slack channel is looked for, and the slope up to which it is one.
+"""
 
 
 def knots_of(states: FloatArray, columns: list[int]) -> FloatArray:
@@ -71,9 +76,30 @@ class LinearHinges:
 
     def __call__(self, states: FloatArray) -> FloatArray:
         """The channel, shape (…), of states, shape (…, N)."""
-        features = _features(states, self.linear, self.columns, self.knots)
-        value: FloatArray = features @ self.weights[1:] + self.weights[0]
-        return np.maximum(value, self.floor)
+        # Term by term: the same bits whatever else is in the array, and no table of all hinges.
+        terms = [(column, None) for column in self.linear]
+        terms += [(c, q) for c, knots in zip(self.columns, self.knots, strict=True) for q in knots]
+        value = np.full(states.shape[:-1], self.weights[0])
+        for (column, knot), weight in zip(terms, self.weights[1:], strict=True):
+            state = states[..., column]
+            value += weight * (state if knot is None else np.maximum(state - knot, 0.0))
+        result: FloatArray = np.maximum(value, self.floor)
+        return result
+
+    def rescaled(self, mean: FloatArray, scale: FloatArray, target: int) -> LinearHinges:
+        """The same function of states with these means and scales, shape (N,), for one of them."""
+        columns, K = self.columns, self.knots.shape[1]
+        each = np.concatenate([scale[self.linear], np.repeat(scale[columns], K)])
+        weights = self.weights[1:] * scale[target] / each
+        constant = self.weights[0] * scale[target] + mean[target]
+        constant -= weights[: len(self.linear)] @ mean[self.linear]
+        return LinearHinges(
+            self.linear,
+            columns,
+            self.knots * scale[columns, None] + mean[columns, None],
+            np.concatenate([[constant], weights]),
+            self.floor * float(scale[target]) + float(mean[target]),
+        )
 
 
 def fit_hinges(
@@ -110,6 +136,35 @@ def fit_hinges(
     weights = np.linalg.solve(gram, deviations.T @ (target - middle))
     constant = middle - float(mean @ weights)
     return LinearHinges(linear, columns, knots, np.concatenate([[constant], weights]), floor)
+
+
+def floor_of(states: FloatArray, target: int) -> float:
+    """Floor of a channel that rests on it, and −inf of one that does not.
+
+    Where a line is slack its load stays as the motion goes on: in the tail of samples in which a
+    linear map of the other states is lowest, the load no longer follows that map. Where it does,
+    no floor is known, and the least value of the training says nothing about higher waves.
+
+    Parameters
+    ----------
+    states : ndarray, shape (sample, N)
+        Measured states, standardised.
+    target : int
+        The channel among them.
+
+    Returns
+    -------
+    float
+        The ``FLOOR`` quantile of the channel, or −inf.
+    """
+    others = np.delete(states, target, axis=1)
+    others = np.concatenate([others, np.ones((len(others), 1))], axis=1)
+    linear = others @ np.linalg.lstsq(others, states[:, target], rcond=None)[0]
+    low = linear <= np.quantile(linear, LOW)
+    across = linear[low] - linear[low].mean()
+    spread = float(across @ across)
+    slope = float(across @ states[low, target]) / spread if spread > 0 else 1.0
+    return float(np.quantile(states[:, target], FLOOR)) if slope < FLAT else -np.inf
 
 
 def _features(

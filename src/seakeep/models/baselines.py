@@ -26,6 +26,7 @@ from seakeep.models.interface import Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.observables import Observable
+from seakeep.models.readouts import ReadOuts
 from seakeep.models.settings import (
     DelayRows,
     HankelSettings,
@@ -87,6 +88,7 @@ class LinearSpec(HankelSettings):
     model: ClassVar[type[LinearModel]]
     delay_rows: DelayRows = field(default="exact", init=False, repr=False)
     rank: int | None = field(default=None, init=False, repr=False)
+    readouts: ReadOuts = field(default=(), init=False, repr=False)
 
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
@@ -304,6 +306,7 @@ class Subspace(HankelSettings):
     delay_rows: DelayRows = field(default="exact", init=False, repr=False)
     ridge_scale: RidgeScale = field(default="per_snapshot", init=False, repr=False)
     rank: int | None = field(default=None, init=False, repr=False)
+    readouts: ReadOuts = field(default=(), init=False, repr=False)
     order: int = field(kw_only=True)
     future: int | None = None
 

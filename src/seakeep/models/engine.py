@@ -28,6 +28,7 @@ from seakeep.models.checks import check_choice
 from seakeep.models.executor import Progress, in_order
 from seakeep.models.inputs import Measured
 from seakeep.models.interface import Drive, Scale, Signature, Span
+from seakeep.models.readouts import FittedReadOut, read_out
 from seakeep.signals.propagation import predict_waves
 from seakeep.signals.time_axis import instant_text
 
@@ -409,11 +410,18 @@ def array_windows(
     )
 
 
-def linear_runs(members: Sequence[Dynamics], groups: Sequence[Windows]) -> list[FloatArray]:
-    """Free runs of linear members, each of shape (member, window, steps, N), physical units."""
+def linear_runs(
+    members: Sequence[Dynamics],
+    groups: Sequence[Windows],
+    readouts: Sequence[FittedReadOut] = (),
+) -> list[FloatArray]:
+    """Free runs of linear members, each of shape (member, window, steps, N), physical units.
+
+    Read-outs see each member's series when its last pass is done.
+    """
     found = []
     for windows in groups:
-        each = [_runs(member, windows) for member in members]
+        each = [read_out(readouts, _runs(member, windows)) for member in members]
         found.append(each[0][None] if len(each) == 1 else np.stack(each))  # one needs no copy
     return found
 

@@ -413,7 +413,8 @@ class HankelEnsemble(_Forecasts):
 
     def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
         """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
-        return linear_runs([self.dynamics(number) for number in members], groups)
+        found = [self.dynamics(number) for number in members]
+        return linear_runs(found, groups, self.signature.readouts)
 
     def system_matrices(self) -> Iterator[FloatArray]:
         """Â of each member."""
@@ -542,6 +543,7 @@ class HankelEnsemble(_Forecasts):
             f"{'exact' if settings.delay_rows == 'exact' else 'regressed'}",
             f"  history       {self.history_samples} samples up to the start of a forecast",
             *self.signature.input_map.describe(self.dt),
+            *(each.describe() for each in self.signature.readouts),
             f"  training      {counted(len(self.arrays.names), 'run')}"
             + (f", {TRAIN_ON[origin['train_on']]}" if len(self.arrays.names) > 1 else ""),
         ]
@@ -632,8 +634,8 @@ class HankelEnsemble(_Forecasts):
         folds : {"run"}, optional
             For runs that train, read to their ends: each is forecast by the same members as they
             learn from the other runs, and the margin goes to the members as they are. What the
-            input map learnt, it learnt from all of them. Members that learn from the run alone
-            are left out there.
+            input map and the read-outs learnt, they learnt from all of them. Members that learn
+            from the run alone are left out there.
         executor, progress
             As in :meth:`forecast`; a step is a member in one of the runs.
 
@@ -851,7 +853,8 @@ class HeldEnsemble(_Forecasts):
 
     def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
         """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
-        return linear_runs([self.members[number] for number in members], groups)
+        found = [self.members[number] for number in members]
+        return linear_runs(found, groups, self.signature.readouts)
 
     def forecast_arrays(
         self,
@@ -901,7 +904,7 @@ class HeldEnsemble(_Forecasts):
         if band == "calibrated":
             warn_of_horizon(self.calibration, "these arrays", int(steps), stacklevel=3)
         with one_blas_thread():
-            out = linear_runs(self.members, [windows])[0][:, 0]
+            out = self.free_runs([windows], range(self.n_members))[0][:, 0]
         kept = out[engine.first_lost(out) < 0]
         values = widened(self.calibration, statistics_of(kept, level), band)
         mean, std, lower, upper = values

@@ -140,6 +140,7 @@ class SingleModel(Forecaster):
             f"  history       {self.history_samples} samples up to the start of a forecast",
             *([f"  regression    {regression}"] if regression else []),
             *signature.input_map.describe(dt),
+            *(each.describe() for each in signature.readouts),
             f"  training      {sum(training.columns)} snapshot pairs of "
             f"{counted(len(training.runs), 'run')}",
         ]

@@ -18,6 +18,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.models.labelled import ChannelLabel, Runs, Stop
+from seakeep.models.readouts import FittedReadOut
 
 __all__ = [
     "Drive",
@@ -232,6 +233,8 @@ class Signature:
     state_scale, input_scale, direct_scale : Scale
         Moments of the states, of the delayed and of the direct regressors over the training
         windows; of an ensemble over all that its members learn from.
+    readouts : tuple of FittedReadOut
+        Channels that are read off the free runs.
     """
 
     dt: float
@@ -243,6 +246,7 @@ class Signature:
     state_scale: Scale = field(repr=False)
     input_scale: Scale = field(repr=False)
     direct_scale: Scale = field(repr=False)
+    readouts: tuple[FittedReadOut, ...] = field(default=(), repr=False)
 
     @property
     def states(self) -> list[str]:

@@ -363,8 +363,8 @@ def mean_period(runs: Mapping[str, xr.Dataset], elevations: Sequence[str]) -> fl
             found.append(encounter_period(wave[np.isfinite(wave)], dt) / dt)
         except (DataError, RequestError) as error:
             raise DataError(
-                f"{name}: observables, a predicted surge and ridge = 'rollout' count in encounter "
-                f"periods, and there is none to be counted: {error} Set "
+                f"{name}: observables, a predicted surge, read-outs and ridge = 'rollout' count "
+                f"in encounter periods, and there is none to be counted: {error} Set "
                 "run.attrs['encounter_period'] (s)."
             ) from None
     return float(np.mean(found))

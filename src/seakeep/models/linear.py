@@ -171,7 +171,7 @@ class HankelDMDcModel(SingleModel):
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)
     ) -> list[FloatArray]:
         """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
-        return linear_runs([self.dynamics], groups)
+        return linear_runs([self.dynamics], groups, self.signature.readouts)
 
     def system_matrices(self) -> Iterator[FloatArray]:
         """Â of each member."""
@@ -371,6 +371,12 @@ class HankelDMDcModel(SingleModel):
                 "the model is driven by regressors that bring delays of their own "
                 f"({', '.join(self.regressors[len(self.inputs) :])}), which a state-space system "
                 "in its inputs cannot represent. Use forecast_arrays."
+            )
+        if read := [each.channel for each in self.signature.readouts if each.function]:
+            raise RequestError(
+                f"the model reads {', '.join(read)} off its other states with hinges, which no "
+                "linear system can represent. Use forecast_arrays, or fit the model without "
+                "readouts to export it."
             )
         return export.matrices(self.A, self.B, self.signature)
 

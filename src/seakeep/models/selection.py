@@ -28,7 +28,9 @@ from seakeep.models.inputs import Measured
 from seakeep.models.interface import Drive, Span
 from seakeep.models.labelled import mean_period
 from seakeep.models.observables import Observable, Observed, Powers, SlowSquares
+from seakeep.models.readouts import FittedReadOut, ReadOut, readouts_asked
 from seakeep.models.settings import HankelSettings
+from seakeep.models.stacking import PERIODS, Held, fit_readouts
 from seakeep.models.training import TrainingData, gather
 
 __all__ = [
@@ -40,6 +42,7 @@ __all__ = [
     "Selected",
     "Trial",
     "default_observables",
+    "readouts_for",
     "search",
     "select",
     "split",
@@ -56,7 +59,7 @@ Scales = tuple[
 """Mean and standard deviation of the states, of the delayed and of the direct regressors."""
 FALLBACK = 1e-3
 """λ per snapshot pair where nothing can be held out."""
-VARIED = ("ridge", "observables", "lead", "input_delays", "state_delays")
+VARIED = ("ridge", "observables", "lead", "input_delays", "state_delays", "readouts")
 """Settings that can be chosen."""
 WORST = 10.0
 """NRMSE at which a channel counts no worse: a run that is lost must not decide alone."""
@@ -191,6 +194,13 @@ class Problem:
             for run in range(len(self.data.names))
             if any(self._starts(run, steps).size for steps in self.horizons)
         ]
+
+    def held(self, candidate: Candidate, ridge: float, steps: int) -> Iterator[Held]:
+        """Free runs, end to end, on each run by the model of the others."""
+        for run in range(len(self.data.names)):
+            if len(self.data.names) > 1 and (starts := self._starts(run, steps)).size:
+                predicted, _ = self.forecast(candidate, [ridge], run, steps)
+                yield Held(run, predicted[0], self._measured(run, starts, steps))
 
     def _starts(self, run: int, steps: int) -> IntArray:
         """Samples from which windows end to end are forecast in a run that is held out."""
@@ -467,11 +477,14 @@ class Selected:
         was chosen.
     note : str
         How it was chosen, in words.
+    readouts : tuple of FittedReadOut
+        Read-outs of these settings, fitted.
     """
 
     settings: HankelSettings
     rows: tuple[dict[str, Any], ...]
     note: str
+    readouts: tuple[FittedReadOut, ...] = ()
 
 
 def select(
@@ -531,10 +544,13 @@ def select(
             "choosing by free runs takes delay_rows = 'exact' and no rank; received delay_rows = "
             f"'{settings.delay_rows}', rank = {settings.rank}. Change them, or state ridge."
         )
-    pieces = dict(runs)
-    if parts is not None or len(pieces) == 1:
-        pieces = split(pieces, 3 if parts is None else parts)
+    pieces = _pieces(runs, parts)
     period = mean_period(runs, list(inputs))
+    labels = labelled.common_labels(runs, states)
+    readouts = readouts_asked(settings.readouts, labels)
+    if "readouts" in vary:
+        asked = readouts or readouts_asked("auto", labels)
+        readouts = tuple(replace(each, kind="auto") for each in asked)
     chosen = settings.observables
     if "observables" in vary and not chosen:
         chosen = default_observables(inputs)
@@ -546,7 +562,7 @@ def select(
         tuple(range(len(settings.observables))),
     )
     problem = _problem(
-        replace(settings, observables=chosen),
+        replace(settings, observables=chosen, ridge_scale="per_snapshot"),
         pieces,
         states,
         inputs,
@@ -556,11 +572,14 @@ def select(
     )
     if problem is None or not problem.folds():
         longest = max(run.sizes["time"] for run in pieces.values())
-        return Selected(
-            replace(settings, ridge=FALLBACK, ridge_scale="per_snapshot"),
+        made = replace(settings, ridge=FALLBACK, ridge_scale="per_snapshot")
+        return _with_readouts(
+            made,
             (),
             f"ridge {FALLBACK:g} per snapshot pair: no window of {round(min(horizon) * period)} "
             f"samples can be held out of parts of at most {longest}",
+            fit_readouts(readouts, _measured(made, runs, states, inputs), ()) if readouts else (),
+            "readouts" in vary,
         )
     found = search(
         problem, base, options, RIDGES, executor=executor, progress=progress, known=known
@@ -581,7 +600,105 @@ def select(
         f"ridge {found.ridge:g} per snapshot pair: the best of {count} settings in free runs on "
         f"{len(problem.folds())} parts held out in turn, mean NRMSE {score:.3f}"
     )
-    return Selected(made, tuple(_rows_of(found, chosen, seed)), note)
+    rows = tuple(_rows_of(found, chosen, seed))
+    fitted: tuple[FittedReadOut, ...] = ()
+    if readouts:
+        held = list(problem.held(found.candidate, found.ridge, round(PERIODS * period)))
+        fitted = fit_readouts(readouts, problem.data, held)
+    return _with_readouts(made, rows, note, fitted, "readouts" in vary)
+
+
+def _with_readouts(
+    settings: HankelSettings,
+    rows: tuple[dict[str, Any], ...],
+    note: str,
+    readouts: tuple[FittedReadOut, ...],
+    chosen: bool,
+) -> Selected:
+    """What was selected, with the kinds of read-outs in the settings where they were chosen."""
+    if chosen:
+        kinds = tuple(
+            ReadOut(each.channel, each.of, each.kind) for each in readouts if each.kind != "none"
+        )
+        settings = replace(settings, readouts=kinds)
+    return Selected(settings, rows, note, readouts)
+
+
+def readouts_for(
+    settings: HankelSettings,
+    runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+) -> tuple[FittedReadOut, ...]:
+    """Fit the read-outs of settings that leave nothing else to be chosen.
+
+    Parameters
+    ----------
+    settings : HankelSettings
+        Delays, λ and input maps as stated.
+    runs : mapping of str to Dataset
+        Training runs, cut at the end of their training windows.
+    states, inputs : sequence of str
+        Channels.
+
+    Returns
+    -------
+    tuple of FittedReadOut
+
+    Raises
+    ------
+    RequestError
+        If a read-out names what is no state, or λ is zero where forecasts are cross-fitted.
+    DataError
+        If a stacked read-out has no forecast to learn from.
+    """
+    readouts = readouts_asked(settings.readouts, labelled.common_labels(runs, states))
+    if not readouts:
+        return ()
+    stacked = [each for each in readouts if each.kind != "hinge"]
+    if not stacked:
+        return fit_readouts(readouts, _measured(settings, runs, states, inputs), ())
+    ridge = float(settings.ridge)
+    if ridge == 0.0:
+        raise RequestError(
+            f"readouts: {stacked[0].channel}: kind = '{stacked[0].kind}' learns from free runs of "
+            "ridge regressions, which take ridge above zero. Raise ridge, or take kind = 'hinge'."
+        )
+    steps = round(PERIODS * mean_period(runs, list(inputs)))
+    base = Candidate(settings.state_delays, settings.input_delays, int(settings.lead), ())
+    base = replace(base, observables=tuple(range(len(settings.observables))))
+    pieces = _pieces(_trained(settings, runs))
+    whole = replace(settings, window=None)
+    problem = _problem(whole, pieces, states, inputs, base, {}, (steps,))
+    if problem is None:
+        return fit_readouts(readouts, _measured(settings, runs, states, inputs), ())
+    return fit_readouts(readouts, problem.data, list(problem.held(base, ridge, steps)))
+
+
+def _trained(settings: HankelSettings, runs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """What training reads of runs that are cut at the end of their training windows."""
+    if settings.window is None:
+        return dict(runs)
+    needs = settings.needs(labelled.common_step(runs))
+    count = needs.snapshots + (0 if needs.inside else needs.history)
+    return {name: run.isel(time=slice(-count, None)) for name, run in runs.items()}
+
+
+def _measured(
+    settings: HankelSettings,
+    runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+) -> TrainingData:
+    """States of the training windows, standardised."""
+    return gather(runs, states, inputs, None, replace(settings, ridge=1.0, standardize=True))
+
+
+def _pieces(runs: Mapping[str, xr.Dataset], parts: int | None = None) -> dict[str, xr.Dataset]:
+    """What is held out in turn: whole runs, or parts where that is asked or one run is alone."""
+    if parts is None and len(runs) > 1:
+        return dict(runs)
+    return split(dict(runs), 3 if parts is None else parts)
 
 
 def default_observables(inputs: Sequence[str]) -> tuple[Observable, ...]:
@@ -665,6 +782,7 @@ def _problem(
         direct_owners=tuple(direct),
         horizons=horizons,
         passes=chain.passes if chain.reads_states == "predicted" else 0,
+        is_per_snapshot=settings.ridge_scale == "per_snapshot",
     )
 
 

@@ -17,6 +17,7 @@ from seakeep.models.inputs import Lead, ProbeAlignment
 from seakeep.models.interface import Fittable, Json, Needs, plain
 from seakeep.models.observables import Observable, Observing, observables_of
 from seakeep.models.observables import to_json as observable_json
+from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
 
 __all__ = [
     "DelayRows",
@@ -100,6 +101,7 @@ class HankelSettings:
     alignment: ProbeAlignment | None = None
     lead: int = 0
     observables: tuple[Observable, ...] = ()
+    readouts: ReadOuts = ()
 
     def __post_init__(self) -> None:
         check_integer("state_delays", self.state_delays, 0)
@@ -115,6 +117,8 @@ class HankelSettings:
         check_integer("lead", self.lead, 0)
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
         object.__setattr__(self, "observables", observables_of(self.observables))
+        object.__setattr__(self, "readouts", readouts_of(self.readouts))
+        self._check_readouts()
         if self.rank is not None and self.ridge != 0:
             ridge = self.ridge if isinstance(self.ridge, str) else f"{self.ridge:g}"
             warnings.warn(
@@ -122,6 +126,26 @@ class HankelSettings:
                 f"ridge = {ridge} is not used. Set ridge=0 to say so.",
                 SeakeepWarning,
                 stacklevel=4,
+            )
+
+    def _check_readouts(self) -> None:
+        """Refuse read-outs that these settings leave no room for."""
+        followed = None
+        if self.alignment is not None and self.alignment.surge == "predicted":
+            followed = self.alignment.surge_channel
+        named = () if self.readouts == "auto" else self.readouts
+        if followed in [each.channel for each in named]:
+            raise RequestError(
+                f"readouts: {followed} is the surge that the alignment follows from pass to pass, "
+                "before any read-out. Read off another channel, or set alignment surge = 'none'."
+            )
+        learns = self.readouts == "auto" or any(each.kind != "hinge" for each in named)
+        if learns and (self.delay_rows != "exact" or self.rank is not None):
+            raise RequestError(
+                "readouts of the kinds 'stacked' and 'auto' learn from free runs on training runs "
+                "that are held out, which takes delay_rows = 'exact' and no rank; received "
+                f"delay_rows = '{self.delay_rows}', rank = {self.rank}. Change them, or take "
+                "kind = 'hinge'."
             )
 
     @property
@@ -161,6 +185,7 @@ class HankelSettings:
         maps = {
             "alignment": None if self.alignment is None else self.alignment.to_json(),
             "observables": [observable_json(each) for each in self.observables],
+            "readouts": readouts_json(self.readouts),
         }
         made: Json = plain({key: maps.get(key, value) for key, value in content.items()})
         return made

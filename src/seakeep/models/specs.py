@@ -31,7 +31,8 @@ from seakeep.models.priors import (
     describe,
     from_description,
 )
-from seakeep.models.selection import select
+from seakeep.models.readouts import FittedReadOut, ReadOuts, readouts_json, readouts_of
+from seakeep.models.selection import readouts_for, select
 from seakeep.models.settings import (
     DelayRows,
     HankelSettings,
@@ -96,6 +97,10 @@ class HankelDMDc(HankelSettings):
         Look-ahead in samples: the input up to j + lead drives the step from j to j + 1.
     observables : sequence of SlowSquares, Powers, Expression or tables, optional
         Further regressors, made of the aligned inputs.
+    readouts : sequence of ReadOut or tables, or "auto", optional
+        Channels that are read off the forecast states, such as loads of lines that fall slack;
+        "auto" reads every load among the states (in N) off the motions among them where that
+        helps.
 
     Raises
     ------
@@ -219,7 +224,23 @@ class HankelDMDc(HankelSettings):
             found = select(self, until(named, stop), list(states), list(inputs))
             ridge = found.settings.ridge
             chosen = replace(self, ridge=ridge, ridge_scale="per_snapshot")
-            return replace(chosen.fit(named, states, inputs, stop), selection=found.note)
+            model = chosen._fitted(named, states, inputs, stop, found.readouts)
+            return replace(model, selection=found.note)
+        readouts: tuple[FittedReadOut, ...] = ()
+        if self.readouts:
+            check_names(states, inputs)
+            readouts = readouts_for(self, until(named, stop), list(states), list(inputs))
+        return self._fitted(named, states, inputs, stop, readouts)
+
+    def _fitted(
+        self,
+        named: dict[str, xr.Dataset],
+        states: Sequence[str],
+        inputs: Sequence[str],
+        stop: Stop,
+        readouts: tuple[FittedReadOut, ...],
+    ) -> HankelDMDcModel:
+        """The model of settings that leave nothing to be chosen."""
         data = gather(named, states, inputs, stop, self)
         solution = identify(
             data.states,
@@ -233,7 +254,7 @@ class HankelDMDc(HankelSettings):
             rank=self.rank,
             all_rows=self.delay_rows == "ridge",
         )
-        signature = data.signature(self)
+        signature = replace(data.signature(self), readouts=readouts)
         return HankelDMDcModel(
             settings=self,
             coefficients=solution.coefficients,
@@ -284,6 +305,8 @@ class BayesianHankelDMDc:
     history, delay_rows, ridge_scale, rank, standardize, alignment, observables
         As in :class:`HankelDMDc`. What an alignment estimates, it estimates once for all members,
         from all that is given up to ``stop``: no member's draw moves another's input.
+    readouts
+        As in :class:`HankelDMDc`; fitted once, with the medians of the priors, for all members.
 
     Raises
     ------
@@ -317,6 +340,7 @@ class BayesianHankelDMDc:
     alignment: ProbeAlignment | None = None
     lead: int | float = 0
     observables: tuple[Observable, ...] = ()
+    readouts: ReadOuts = ()
     seed_sequence: np.random.SeedSequence = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -331,6 +355,7 @@ class BayesianHankelDMDc:
         check_choice("sampling", self.sampling, ("monte_carlo", "sobol"))
         check_choice("train_on", self.train_on, ("all", "runs", "windows"))
         object.__setattr__(self, "observables", observables_of(self.observables))
+        object.__setattr__(self, "readouts", readouts_of(self.readouts))
         object.__setattr__(self, "alignment", self.shared(0.5 * period).alignment)
         object.__setattr__(self, "seed_sequence", _seed_sequence(self.seed))
 
@@ -351,6 +376,21 @@ class BayesianHankelDMDc:
             alignment=self.alignment,
             lead=lead,
             observables=self.observables,
+            readouts=self.readouts,
+        )
+
+    def central(self, dt: float) -> HankelSettings:
+        """Settings at the medians of the priors."""
+
+        def samples(prior: Prior) -> int:
+            return periods_to_samples(float(prior.ppf(0.5)), self.encounter_period, dt)
+
+        return replace(
+            self.shared(dt),
+            state_delays=samples(self.state_delay),
+            input_delays=samples(self.input_delay),
+            ridge=float(self.ridge.ppf(0.5)),
+            window=None if self.train_length is None else samples(self.train_length),
         )
 
     def needs(self, dt: float) -> Needs:
@@ -386,6 +426,7 @@ class BayesianHankelDMDc:
                 "spawn_key": [int(key) for key in seed.spawn_key],
                 "alignment": None if self.alignment is None else self.alignment.to_json(),
                 "observables": [observable_json(each) for each in self.observables],
+                "readouts": readouts_json(self.readouts),
             }
         )
         return made
@@ -403,6 +444,7 @@ class BayesianHankelDMDc:
         )
         stated |= {name: from_description(stated[name]) for name in PRIORS}
         stated["observables"] = observables_of(stated.get("observables", []))
+        stated["readouts"] = readouts_of(stated.get("readouts", []))
         return cls(**stated, seed=seed)
 
     @classmethod
@@ -520,6 +562,9 @@ class BayesianHankelDMDc:
         if shared.maps:
             named, stops = until(named, stops), dict.fromkeys(named)
         states, inputs = list(states), list(inputs)
+        readouts: tuple[FittedReadOut, ...] = ()
+        if self.readouts:
+            readouts = readouts_for(self.central(dt), until(named, stops), states, inputs)
         input_map = Chain(tuple(each.fit(named, states, inputs, None) for each in shared.maps))
         samples = [
             last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name) + 1
@@ -547,6 +592,7 @@ class BayesianHankelDMDc:
             state_scale=scales[0],
             input_scale=scales[1],
             direct_scale=scales[2],
+            readouts=readouts,
         )
         return HankelEnsemble(
             settings=shared,

@@ -19,6 +19,7 @@ from seakeep.files import MARK, check_output, replacing, write_netcdf
 from seakeep.models.inputs import Chain
 from seakeep.models.interface import Json, Scale, Signature
 from seakeep.models.labelled import ChannelLabel
+from seakeep.models.readouts import FittedReadOut
 
 __all__ = [
     "FORMAT_VERSION",
@@ -61,6 +62,7 @@ def signature_json(signature: Signature) -> Json:
         "state_delays": int(signature.state_delays),
         "input_delays": int(signature.input_delays),
         "input_map": signature.input_map.to_json(),
+        "readouts": [each.to_json() for each in signature.readouts],
     }
 
 
@@ -82,6 +84,7 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
         group: Scale(*(numbers(dataset, f"{group}_{name}", (size,)) for name in MOMENTS))
         for group, size in sizes.items()
     }
+    names = [label.name for label in state_labels]
     return Signature(
         dt=dt,
         state_labels=state_labels,
@@ -91,6 +94,7 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
         state_scale=scales["state"],
         input_scale=scales["input"],
         direct_scale=scales["direct"],
+        readouts=tuple(FittedReadOut.from_json(each, names) for each in kept["readouts"]),
     )
 
 

@@ -1,0 +1,248 @@
+"""Read-outs: channels that are read off what a model forecasts, after its free run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Literal, Self, get_args
+
+import numpy as np
+
+from seakeep.arrays import FloatArray
+from seakeep.core.readouts import LinearHinges
+from seakeep.errors import RequestError, did_you_mean
+from seakeep.models.checks import check_choice
+from seakeep.models.labelled import ChannelLabel
+
+__all__ = [
+    "FittedReadOut",
+    "ReadOut",
+    "ReadOutKind",
+    "ReadOuts",
+    "read_out",
+    "readouts_asked",
+    "readouts_json",
+    "readouts_of",
+]
+
+ReadOutKind = Literal["none", "hinge", "stacked"]
+Asked = Literal["hinge", "stacked", "auto"]
+MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+
+
+@dataclass(frozen=True)
+class ReadOut:
+    r"""A channel that is read off the forecast states, such as the load of a line that falls slack.
+
+    A linear model cannot follow a load that stops at a floor. A read-out replaces the forecast
+    of the channel by a function with hinges :math:`\max(0, x - q)` at six knots q per state, fitted
+    by ridge regression (1e-2 per sample, standardised). A channel that rests on a floor in
+    training never falls below it by more than its noise: below the 0.002 quantile of its training.
+
+    Parameters
+    ----------
+    channel : str
+        The state that is read off.
+    of : sequence of str
+        The states that bend it; the motions that tauten the line.
+    kind : {"auto", "hinge", "stacked"}, optional
+        ``"hinge"``: a function of the states in `of`, fitted to measured states. ``"stacked"``: a
+        function of all forecast states and of the hinges of those in `of`, fitted to forecasts of
+        each training run by the model of the others, so that it knows their errors; it takes
+        exact delay rows. ``"auto"``: whichever of these forecasts training runs that are held out
+        better than no read-out, by more than a standard error of the gain; else none.
+
+    Raises
+    ------
+    RequestError
+        If the channel reads itself, or a setting is out of range.
+
+    Examples
+    --------
+    >>> ReadOut("mooring_stern", of=("surge", "heave", "pitch")).kind
+    'auto'
+    """
+
+    channel: str
+    of: tuple[str, ...]
+    kind: Asked = "auto"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.channel, str) or not self.channel:
+            raise RequestError(f"readouts: channel must be a name; received {self.channel!r}.")
+        what = f"readouts: {self.channel}"
+        check_choice(f"{what}: kind", self.kind, get_args(Asked))
+        names: Any = self.of
+        if isinstance(names, str) or not isinstance(names, Iterable):
+            raise RequestError(
+                f"{what}: of must be a list of states; received {names!r}. Write of = ['surge', "
+                "'heave', 'pitch']."
+            )
+        names = tuple(names)
+        if not names or not all(isinstance(each, str) for each in names):
+            raise RequestError(f"{what}: of must name at least one state; received {list(names)}.")
+        if self.channel in names:
+            raise RequestError(
+                f"{what} cannot be read off itself. Leave it out of of = {list(names)}."
+            )
+        object.__setattr__(self, "of", tuple(dict.fromkeys(names)))
+
+
+ReadOuts = tuple[ReadOut, ...] | Literal["auto"]
+"""Read-outs of a model; "auto" for every load among its states."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedReadOut:
+    """A read-out as fitted.
+
+    Parameters
+    ----------
+    channel, of
+        As in :class:`ReadOut`.
+    kind : {"none", "hinge", "stacked"}
+        What it is; what was chosen.
+    column : int
+        Place of the channel among the states.
+    scores : mapping of str to float
+        NRMSE by kind in free runs on training runs that were held out, where kinds were compared.
+    function : LinearHinges or None
+        The channel of forecast states, physical units; None where the forecast stays.
+    """
+
+    channel: str
+    of: tuple[str, ...]
+    kind: ReadOutKind
+    column: int
+    scores: Mapping[str, float]
+    function: LinearHinges | None
+
+    def describe(self) -> str:
+        """Line of a summary."""
+        text = f"{self.channel}: {self.kind}"
+        if self.function is not None:
+            text += f", of {', '.join(self.of)}"
+            if np.isfinite(self.function.floor):
+                text += f", floor {self.function.floor:.4g}"
+        if self.scores:
+            scores = ", ".join(f"{kind} {score:.3f}" for kind, score in self.scores.items())
+            text += f" (NRMSE on held-out runs: {scores})"
+        return f"  read-out      {text}"
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON values; numbers keep all their digits."""
+        function = self.function
+        made = None
+        if function is not None:
+            made = {
+                "linear": list(function.linear),
+                "columns": list(function.columns),
+                "knots": function.knots.tolist(),
+                "weights": function.weights.tolist(),
+                "floor": function.floor if np.isfinite(function.floor) else None,
+            }
+        return {
+            "channel": self.channel,
+            "of": list(self.of),
+            "kind": self.kind,
+            "scores": dict(self.scores),
+            "function": made,
+        }
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any], states: Sequence[str]) -> Self:
+        """Rebuild from :meth:`to_json`; what does not fit the states raises a ValueError."""
+        channel, of, kept = str(content["channel"]), tuple(content["of"]), content["function"]
+        function = None
+        if kept is not None:
+            floor = kept["floor"]
+            function = LinearHinges(
+                [int(each) for each in kept["linear"]],
+                [int(each) for each in kept["columns"]],
+                np.array(kept["knots"], dtype=float),
+                np.array(kept["weights"], dtype=float),
+                -np.inf if floor is None else float(floor),
+            )
+            size = 1 + len(function.linear) + function.knots.size
+            columns = {*function.linear, *function.columns}
+            if (
+                function.weights.shape != (size,)
+                or function.knots.shape[:1] != (len(function.columns),)
+                or not columns <= set(range(len(states)))
+                or not np.all(np.isfinite(function.weights))
+            ):
+                raise ValueError(f"the read-out of {channel} does not fit the states")
+        return cls(
+            channel=channel,
+            of=of,
+            kind=content["kind"],
+            column=list(states).index(channel),
+            scores={str(key): float(value) for key, value in content["scores"].items()},
+            function=function,
+        )
+
+
+def read_out(readouts: Sequence[FittedReadOut], values: FloatArray) -> FloatArray:
+    """Free runs, shape (…, N), physical units, with the channels that are read off them."""
+    found = [(each.column, each.function(values)) for each in readouts if each.function is not None]
+    for column, channel in found:
+        values[..., column] = channel
+    return values
+
+
+def readouts_of(value: object) -> ReadOuts:
+    """Read-outs as they are, or made of tables of their keys, or the word."""
+    if value == "auto":
+        return "auto"
+    if isinstance(value, str | Mapping) or not isinstance(value, Iterable):
+        raise RequestError(
+            f"readouts must be a list or 'auto'; received {value!r}. Write "
+            "readouts=[seakeep.ReadOut('mooring_stern', of=('surge', 'heave', 'pitch'))]."
+        )
+    made = tuple(_of_table(each) if isinstance(each, Mapping) else each for each in value)
+    names = []
+    for each in made:
+        if not isinstance(each, ReadOut):
+            raise RequestError(f"readouts must hold seakeep.ReadOut; received {each!r}.")
+        names.append(each.channel)
+    if double := {name for name in names if names.count(name) > 1}:
+        raise RequestError(
+            f"readouts names {sorted(double)[0]} more than once. Name each channel once."
+        )
+    return made
+
+
+def _of_table(table: Mapping[str, Any]) -> ReadOut:
+    known = [each.name for each in fields(ReadOut)]
+    for key in table:
+        if key not in known:
+            raise RequestError(
+                f"readouts: there is no key '{key}'.{did_you_mean(key, known)} Keys: "
+                f"{', '.join(known)}."
+            )
+    for key in ("channel", "of"):
+        if key not in table:
+            raise RequestError(f"readouts: the table {dict(table)} states no {key}. Add it.")
+    return ReadOut(**table)
+
+
+def readouts_json(readouts: ReadOuts) -> Any:
+    """What :func:`readouts_of` takes, as JSON values."""
+    return readouts if readouts == "auto" else [asdict(each) for each in readouts]
+
+
+def readouts_asked(readouts: ReadOuts, states: Sequence[ChannelLabel]) -> tuple[ReadOut, ...]:
+    """Read-outs of a model with these states; refuses those of, or off, what is no state."""
+    if readouts == "auto":
+        of = tuple(label.name for label in states if label.name in MOTIONS)
+        loads = [label.name for label in states if label.units == "N"]
+        return tuple(ReadOut(name, of) for name in loads) if of else ()
+    names = [label.name for label in states]
+    for each in readouts:
+        for name, what in ((each.channel, "channel"), *((name, "of") for name in each.of)):
+            if name not in names:
+                raise RequestError(
+                    f"readouts: {each.channel}: {what} names '{name}', which is not among the "
+                    f"states ({', '.join(names)}).{did_you_mean(name, names)}"
+                )
+    return readouts
