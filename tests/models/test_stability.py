@@ -6,7 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seakeep import HankelDMDc, SeakeepWarning
+from seakeep import (
+    BayesianHankelDMDc,
+    Fixed,
+    HankelDMDc,
+    RequestError,
+    SeakeepWarning,
+    Uniform,
+    load_model,
+)
 from seakeep.models.forecasts import status_at_clock
 from seakeep.models.linear import modes
 
@@ -154,3 +162,62 @@ def test_a_mean_far_from_zero_is_no_divergence_without_standardisation(oscillato
 def test_a_dead_mode_is_overdamped_and_not_undefined():
     table = modes(np.array([0.5 + 0j, 0j]), 0.1)
     assert list(table["damping_ratio"].values) == [1.0, 1.0]
+
+
+class TestStable:
+    """``stable`` clips what grows, says so, and leaves the rest."""
+
+    @pytest.mark.parametrize(("stable", "radius"), [(True, 0.999), (0.97, 0.97)])
+    @pytest.mark.parametrize("rows", ["exact", "ridge"])
+    def test_the_growing_mode_alone_is_clipped_and_the_model_says_so(
+        self, make_dataset, tmp_path, stable, radius, rows
+    ):
+        run = growing(make_dataset)
+        spec = HankelDMDc(1, 1, 1.0, delay_rows=rows)
+        with pytest.warns(SeakeepWarning, match=r"or set stable = True\."):
+            grows = spec.fit(run, ["heave"], ["eta_fwd"]).eigenvalues
+        model = replace(spec, stable=stable).fit(run, ["heave"], ["eta_fwd"])
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            found = model.eigenvalues
+        assert abs(found[0]) == pytest.approx(radius, rel=1e-9)
+        np.testing.assert_allclose(found[1:], grows[1:], atol=1e-9)
+        assert model.training.clipped == pytest.approx([abs(grows[0])], rel=1e-9)
+        told = f"1 eigenvalue clipped to {radius:g}; the largest was {abs(grows[0]):.6f}"
+        assert told in model.summary()
+        back = load_model(model.save(tmp_path / "m.nc"))
+        assert back.training.clipped == model.training.clipped
+        assert back.settings.stable == stable
+        # The system that is exported is the one that forecasts.
+        state, system = model.initial_state(run, 1.0), model.to_state_space()
+        after = system.A @ state + system.B @ (run.eta_fwd.values[[10]] - model.input_mean)
+        step = model.forecast(run, start=1.0, steps=1)
+        expected = (step.heave.values[0] - model.state_mean[0]) * np.ones(1)
+        np.testing.assert_allclose((system.C @ after), expected, rtol=1e-9)
+
+    def test_a_stable_model_is_the_same_to_the_last_bit(self, run, channels):
+        plain = HankelDMDc(2, 4, 100.0).fit(run, **channels)
+        clipped = HankelDMDc(2, 4, 100.0, stable=True).fit(run, **channels)
+        np.testing.assert_array_equal(plain.coefficients, clipped.coefficients)
+        assert clipped.training.clipped == ()
+        assert "clipped" not in clipped.summary()
+
+    def test_members_are_clipped_too(self, make_dataset):
+        spec = BayesianHankelDMDc(
+            encounter_period=1.0,
+            train_length=None,
+            state_delay=Fixed(0.1),
+            input_delay=Fixed(0.1),
+            ridge=Uniform(1, 2),
+            n_members=2,
+            stable=0.95,
+        )
+        ensemble = spec.fit(growing(make_dataset), ["heave"], ["eta_fwd"])
+        np.testing.assert_allclose(ensemble.spectral_radii(), 0.95, rtol=1e-9)
+        assert len(ensemble.member(0).training.clipped) == 1
+        assert "(stable, clipped to 0.95)" in ensemble.summary()
+
+    @pytest.mark.parametrize("value", [1.0, 0.0, "yes", 2])
+    def test_a_radius_out_of_range_is_refused(self, value):
+        with pytest.raises(RequestError, match="stable must be True, False or a radius above 0"):
+            HankelDMDc(1, 1, 1.0, stable=value)

@@ -726,6 +726,10 @@ class ModelSettings(Table):
     ridge_scale: Literal["absolute", "per_snapshot"] | None = Field(default=None, description="")
     rank: Annotated[int, Field(ge=1)] | None = Field(default=None, description="a positive integer")
     standardize: bool | None = Field(default=None, description="true or false")
+    stable: bool | Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        default=None,
+        description="true, or the radius to which eigenvalues are clipped, such as 0.999",
+    )
     stop: Instant | None = Field(
         default=None, description="end of the training window, s or periods such as '60 T'"
     )

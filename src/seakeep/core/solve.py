@@ -31,7 +31,7 @@ a smooth series small, and τ = 1 one that turns its sign at every sample.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -49,6 +49,7 @@ from seakeep.core.gram import (
     primal_system,
     snapshot_gram,
 )
+from seakeep.core.stability import clip_modes
 from seakeep.errors import DataError, RequestError
 
 __all__ = ["Method", "Solution", "identify", "solve"]
@@ -75,12 +76,15 @@ class Solution:
         Effective λ: what was added to the diagonal.
     rank : int
         Number of singular values used; for the primal and dual forms all of them.
+    clipped : tuple of float
+        Moduli of the eigenvalues that were clipped, largest first.
     """
 
     coefficients: FloatArray
     method: Method
     ridge: float
     rank: int
+    clipped: tuple[float, ...] = ()
 
 
 def identify(
@@ -96,6 +100,7 @@ def identify(
     rank: int | None = None,
     all_rows: bool = True,
     method: Method | None = None,
+    radius: float | None = None,
 ) -> Solution:
     r"""Identify :math:`[\hat A\; \hat B]` from one or several runs.
 
@@ -125,6 +130,8 @@ def identify(
         alone.
     method : {"primal", "dual", "svd"}, optional
         Forces a form; by default shape and conditioning decide.
+    radius : float, optional
+        Eigenvalues outside it are clipped (:func:`seakeep.core.stability.clip_modes`).
 
     Returns
     -------
@@ -164,9 +171,17 @@ def identify(
     effective = ridge * problem.columns if per_snapshot else ridge
     chosen = "svd" if rank is not None else method or problem.choose(effective)
     if chosen == "svd":
-        return _by_singular_values(*problem.matrices(), effective, rank)
-    form = problem.primal if chosen == "primal" else problem.dual
-    return Solution(form(effective), chosen, effective, min(problem.rows, problem.columns))
+        solution = _by_singular_values(*problem.matrices(), effective, rank)
+    else:
+        form = problem.primal if chosen == "primal" else problem.dual
+        count = min(problem.rows, problem.columns)
+        solution = Solution(form(effective), chosen, effective, count)
+    if radius is None or state_delays is None:
+        return solution
+    size = problem.states
+    rows, clipped = clip_modes(solution.coefficients[:, :size], radius)
+    coefficients = np.concatenate([rows, solution.coefficients[:, size:]], axis=1)
+    return replace(solution, coefficients=coefficients, clipped=clipped)
 
 
 def _checked(

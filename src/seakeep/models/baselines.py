@@ -89,6 +89,7 @@ class LinearSpec(HankelSettings):
     delay_rows: DelayRows = field(default="exact", init=False, repr=False)
     rank: int | None = field(default=None, init=False, repr=False)
     readouts: ReadOuts = field(default=(), init=False, repr=False)
+    stable: bool | float = field(default=False, init=False, repr=False)
 
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
@@ -307,6 +308,7 @@ class Subspace(HankelSettings):
     ridge_scale: RidgeScale = field(default="per_snapshot", init=False, repr=False)
     rank: int | None = field(default=None, init=False, repr=False)
     readouts: ReadOuts = field(default=(), init=False, repr=False)
+    stable: bool | float = field(default=False, init=False, repr=False)
     order: int = field(kw_only=True)
     future: int | None = None
 

@@ -476,6 +476,7 @@ class HankelEnsemble(_Forecasts):
                 method=found.solution.method,
                 ridge=found.solution.ridge,
                 rank=found.solution.rank,
+                clipped=found.solution.clipped,
             ),
             coverage=self.coverage,
         )
@@ -571,9 +572,10 @@ class HankelEnsemble(_Forecasts):
             if unstable
             else "stable"
         )
+        clipped = "" if settings.radius is None else f", clipped to {settings.radius:g}"
         lines.append(
             f"  stability     spectral radius {_range(radii, '.6f')}, median "
-            f"{np.median(radii):.6f} ({verdict})"
+            f"{np.median(radii):.6f} ({verdict}{clipped})"
         )
         return "\n".join(lines)
 

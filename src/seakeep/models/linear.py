@@ -143,8 +143,8 @@ class HankelDMDcModel(SingleModel):
             warnings.warn(
                 f"the spectral radius of the model is {abs(values[0]):.6f}: a free run grows by "
                 f"{100 * (abs(values[0]) - 1):.2g} % a step in its worst mode and will diverge if "
-                "it is long. Raise ridge, train on more data, use fewer state delays, or look for "
-                "transients at the ends of the training runs.",
+                "it is long. Raise ridge, train on more data, use fewer state delays, look for "
+                "transients at the ends of the training runs, or set stable = True.",
                 SeakeepWarning,
                 stacklevel=3,  # past the cached property
             )
@@ -399,6 +399,11 @@ class HankelDMDcModel(SingleModel):
         radius = self.spectral_radius
         verdict = "stable" if radius < 1 else "UNSTABLE: long forecasts diverge"
         lines.append(f"  stability     spectral radius {radius:.6f} ({verdict})")
+        if clipped := self.training.clipped:
+            lines.append(
+                f"    {counted(len(clipped), 'eigenvalue')} clipped to {self.settings.radius:g}; "
+                f"the largest was {clipped[0]:.6f}"
+            )
         table = self.modes()
         for mode in range(min(5, table.sizes["mode"])):
             at = table.isel(mode=mode)

@@ -118,6 +118,7 @@ def identify_member(
         per_snapshot=settings.ridge_scale == "per_snapshot",
         rank=settings.rank,
         all_rows=settings.delay_rows == "ridge",
+        radius=settings.radius,
     )
     dynamics = Dynamics(solution.coefficients, draw.state_delays, draw.input_delays, *scales)
     return Member(dynamics, solution, tuple(chosen), tuple(windows))

@@ -78,6 +78,21 @@ def check_ridge(value: object, may_choose: bool = False) -> None:
         )
 
 
+STABLE_RADIUS = 0.999
+"""Radius of ``stable=True``: a mode there decays to a third in a thousand steps, some thirty
+encounter periods."""
+
+
+def check_stable(value: object) -> None:
+    """Refuse what is neither true nor false nor a radius."""
+    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    if not isinstance(value, bool) and not (real and 0 < value < 1):  # type: ignore[operator]
+        raise RequestError(
+            "stable must be True, False or a radius above 0 and below 1, to which eigenvalues are "
+            f"clipped; received {value!r}. True is {STABLE_RADIUS:g}."
+        )
+
+
 @dataclass(frozen=True)
 class HankelSettings:
     """What a model was asked to be; see :class:`seakeep.HankelDMDc` for the meaning of each.
@@ -102,6 +117,7 @@ class HankelSettings:
     lead: int = 0
     observables: tuple[Observable, ...] = ()
     readouts: ReadOuts = ()
+    stable: bool | float = False
 
     def __post_init__(self) -> None:
         check_integer("state_delays", self.state_delays, 0)
@@ -115,6 +131,7 @@ class HankelSettings:
         if not isinstance(self.standardize, bool | np.bool_):
             raise RequestError(f"standardize must be True or False; received {self.standardize!r}.")
         check_integer("lead", self.lead, 0)
+        check_stable(self.stable)
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
         object.__setattr__(self, "observables", observables_of(self.observables))
         object.__setattr__(self, "readouts", readouts_of(self.readouts))
@@ -147,6 +164,13 @@ class HankelSettings:
                 f"delay_rows = '{self.delay_rows}', rank = {self.rank}. Change them, or take "
                 "kind = 'hinge'."
             )
+
+    @property
+    def radius(self) -> float | None:
+        """Radius to which eigenvalues are clipped, if they are."""
+        if self.stable is False:
+            return None
+        return STABLE_RADIUS if self.stable is True else float(self.stable)
 
     @property
     def maps(self) -> tuple[Fittable, ...]:

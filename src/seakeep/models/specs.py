@@ -97,6 +97,10 @@ class HankelDMDc(HankelSettings):
         Look-ahead in samples: the input up to j + lead drives the step from j to j + 1.
     observables : sequence of SlowSquares, Powers, Expression or tables, optional
         Further regressors, made of the aligned inputs.
+    stable : bool or float, optional
+        Clip the eigenvalues of Â outside a radius to it, after the regression: True is 0.999. The
+        modes inside stay as they are, exact delay rows stay exact, and ``training.clipped`` and
+        ``summary()`` say which were moved.
     readouts : sequence of ReadOut or tables, or "auto", optional
         Channels that are read off the forecast states, such as loads of lines that fall slack;
         "auto" reads every load among the states (in N) off the motions among them where that
@@ -253,6 +257,7 @@ class HankelDMDc(HankelSettings):
             per_snapshot=self.ridge_scale == "per_snapshot",
             rank=self.rank,
             all_rows=self.delay_rows == "ridge",
+            radius=self.radius,
         )
         signature = replace(data.signature(self), readouts=readouts)
         return HankelDMDcModel(
@@ -302,7 +307,7 @@ class BayesianHankelDMDc:
         Time step the runs must have, s; None takes theirs.
     lead : int or float, optional
         Look-ahead of the waves: samples as an integer, encounter periods as a float.
-    history, delay_rows, ridge_scale, rank, standardize, alignment, observables
+    history, delay_rows, ridge_scale, rank, standardize, alignment, observables, stable
         As in :class:`HankelDMDc`. What an alignment estimates, it estimates once for all members,
         from all that is given up to ``stop``: no member's draw moves another's input.
     readouts
@@ -341,6 +346,7 @@ class BayesianHankelDMDc:
     lead: int | float = 0
     observables: tuple[Observable, ...] = ()
     readouts: ReadOuts = ()
+    stable: bool | float = False
     seed_sequence: np.random.SeedSequence = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -377,6 +383,7 @@ class BayesianHankelDMDc:
             lead=lead,
             observables=self.observables,
             readouts=self.readouts,
+            stable=self.stable,
         )
 
     def central(self, dt: float) -> HankelSettings:

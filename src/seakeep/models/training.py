@@ -55,6 +55,8 @@ class Training:
         Effective λ.
     rank : int
         Singular values used.
+    clipped : tuple of float
+        Moduli of the eigenvalues that were clipped to ``stable``, largest first.
     """
 
     runs: tuple[str, ...]
@@ -64,6 +66,7 @@ class Training:
     method: Method
     ridge: float
     rank: int
+    clipped: tuple[float, ...] = ()
 
     def to_json(self) -> Json:
         """As JSON values."""
@@ -80,6 +83,7 @@ class Training:
             method=content["method"],
             ridge=float(content["ridge"]),
             rank=int(content["rank"]),
+            clipped=tuple(float(each) for each in content["clipped"]),
         )
         lengths = {len(made.runs), len(made.first), len(made.stop), len(made.columns)}
         if len(lengths) != 1 or made.method not in get_args(Method):
@@ -153,6 +157,7 @@ class TrainingData:
             method=solution.method,
             ridge=solution.ridge,
             rank=solution.rank,
+            clipped=solution.clipped,
         )
 
 

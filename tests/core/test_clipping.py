@@ -1,0 +1,62 @@
+"""Unstable modes moved onto a radius, and nothing else."""
+
+import numpy as np
+import pytest
+
+from seakeep.core.stability import clip_modes
+
+
+def whole(rows):
+    count, size = rows.shape
+    return np.concatenate([rows, np.eye(size - count, size)])
+
+
+def companion(roots):
+    """Top row of the companion matrix of one channel with these eigenvalues."""
+    return -np.poly(roots).real[None, 1:]
+
+
+PAIR = 1.02 * np.exp(0.4j)
+
+
+@pytest.mark.parametrize(
+    "roots",
+    [
+        [1.05, 0.9, 0.5],
+        [-1.2, 0.9, 0.5],
+        [PAIR, np.conj(PAIR), 0.9, -0.3],
+        [PAIR, np.conj(PAIR), 1.1, -1.3, 0.95 * np.exp(1j), 0.95 * np.exp(-1j), 0.2],
+    ],
+)
+def test_the_clipped_channel_has_the_polynomial_with_the_clipped_roots(roots):
+    """With one channel the top row is the polynomial, so that there is only one answer."""
+    roots = np.array(roots)
+    found, moduli = clip_modes(companion(roots), 0.99)
+    moved = np.where(np.abs(roots) > 0.99, 0.99 * roots / np.abs(roots), roots)
+    # Roots as far apart as these are known to ten digits.
+    np.testing.assert_allclose(found, companion(moved), atol=1e-9)
+    np.testing.assert_allclose(moduli, sorted(np.abs(roots)[np.abs(roots) > 0.99])[::-1], rtol=1e-9)
+
+
+@pytest.mark.parametrize("regressed", [3, 12])
+def test_stable_modes_keep_eigenvalues_and_right_eigenvectors(regressed):
+    rng = np.random.default_rng(0)
+    rows = rng.normal(size=(regressed, 12)) / np.sqrt(regressed * 2)
+    before = np.linalg.eigvals(whole(rows))
+    radius = 0.45
+    found, moduli = clip_modes(rows, radius)
+    after, vectors = np.linalg.eig(whole(rows))
+    kept = np.abs(after) <= radius * (1 - 1e-9)
+    assert len(moduli) == np.count_nonzero(np.abs(before) > radius)
+    np.testing.assert_allclose(
+        whole(found) @ vectors[:, kept], vectors[:, kept] * after[kept], atol=1e-9
+    )
+    # Moved modes may share an angle, and a double eigenvalue is known to half the digits.
+    assert np.abs(np.linalg.eigvals(whole(found))).max() == pytest.approx(radius, rel=1e-6)
+
+
+def test_a_stable_matrix_is_left_as_it_is():
+    rows = companion(np.array([0.9, 0.5]))
+    found, moduli = clip_modes(rows, 0.999)
+    assert found is rows
+    assert moduli == ()
