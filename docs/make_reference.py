@@ -64,6 +64,30 @@ the irregular runs, in the part of each run that is used. What that measurement 
 windows of clocks) can count in periods only where `encounter_period` is stated; a message says so. Lengths of
 models become samples by rounding to the nearest integer. Priors of ensembles count in periods anyway.
 
+## Loads of lines that fall slack
+
+A linear model cannot follow a load that stops at a floor. A read-out replaces the forecast of such a channel by a
+function of what the model forecasts, with hinges max(0, x − q) at six knots q of each of the states that bend it:
+
+```toml
+[model.readouts.mooring_stern]
+of = ["surge", "heave", "pitch"]
+kind = "auto"
+```
+
+| `kind` | function of | fitted to |
+|---|---|---|
+| `"hinge"` | the states in `of` and their hinges | measured states of the training runs |
+| `"stacked"` | all forecast states and the hinges of those in `of` | forecasts of each training run by the model of the others, in free runs of 15 T̂ |
+| `"auto"` | what held-out runs choose: one of these where it beats no read-out by two standard errors, else none | – |
+
+Neither reads a measurement after the start of a forecast. A load that rests on a floor in the training runs never falls
+below their 0.002 quantile; a line that is never slack gets no floor, since the least load of the training says nothing
+about higher waves. `readouts = "auto"` asks for this of every channel in newtons, read off the motions among the
+states. `seakeep fit` prints the choice, `seakeep tune --vary readouts` writes it into the file. An ensemble
+fits its read-outs once, with the medians of its priors, and passes every member through them. A model with read-outs
+cannot be exported as a linear system.
+
 ## Tables and keys
 
 This part is generated from the settings themselves.

@@ -3,10 +3,12 @@
 import json
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import seakeep
 from seakeep import HankelDMDc, RequestError
@@ -90,12 +92,16 @@ def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tmp_path, mon
     from seakeep.cli import main
 
     before = (tmp_path / "campaign.toml").read_text()
-    assert main(["tune", "campaign.toml", "--vary", "lead"]) == 0, capsys.readouterr().err
-    assert "held out in turn" in capsys.readouterr().out
+    words = ["tune", "campaign.toml", "--vary", "lead", "--vary", "readouts"]
+    assert main(words) == 0, capsys.readouterr().err
+    told = capsys.readouterr().out
+    assert "held out in turn" in told
+    assert "read-out      mooring_bow: none (NRMSE on held-out runs: none" in told
     assert (tmp_path / "campaign.toml").read_text() == before
     tuned = seakeep.read_campaign(tmp_path / "campaign_tuned.toml").model()
     assert isinstance(tuned.ridge, float)
     assert tuned.ridge_scale == "per_snapshot"
+    assert tuned.readouts == {}  # the tutorial's line is linear
     assert not (tmp_path / "campaign_tuned.scores.json").exists()
     text = (tmp_path / "campaign_tuned.toml").read_text()
     kept = [line for line in before.splitlines() if line.strip()]
@@ -104,6 +110,50 @@ def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tmp_path, mon
     assert "lies in another folder" in capsys.readouterr().err
     assert main(["tune", "campaign.toml", "-o", "tuned"]) == 2
     assert "Name it tuned.toml" in capsys.readouterr().err
+
+
+def test_a_tuned_file_holds_the_read_outs_and_is_else_as_it_was():
+    from seakeep.cli.tuning import _tuned
+
+    chosen = [seakeep.ReadOut("bow", ("heave", "pitch"), "stacked"), seakeep.ReadOut("a", ("b",))]
+    spec = replace(SPEC, ridge=1e-3, lead=3, readouts=chosen)
+    result = seakeep.TuneResult(spec, xr.Dataset(), "")
+    before = """[model]
+ridge = 1  # as it was
+# of the model
+state_delays = 6
+
+[model.readouts.old]
+of = ["heave"]
+
+# of the next table
+[models.other]
+states = ["a"]  # kept
+"""
+    text = _tuned(before, None, result, True)
+    middle = """
+[model.readouts.bow]
+kind = "stacked"
+of = ["heave", "pitch"]
+
+[model.readouts.a]
+kind = "auto"
+of = ["b"]
+
+# of the next table
+[models.other]
+states = ["a"]  # kept
+"""
+    assert text.endswith(middle)
+    assert "# of the model\nstate_delays = 6\n" in text
+    assert "old" not in text
+    assert _tuned(text, None, result, True) == text
+    none = _tuned(text, None, replace(result, spec=replace(spec, readouts=())), True)
+    assert "readouts = {}\n" in none
+    assert none.endswith('\n# of the next table\n[models.other]\nstates = ["a"]  # kept\n')
+    assert _tuned(before, None, result, False).endswith(
+        before[before.index("[model.readouts.old]") :]
+    )
 
 
 def test_a_campaign_file_states_observables_read_outs_and_a_ridge_by_roll_out(tmp_path):

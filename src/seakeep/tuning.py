@@ -17,6 +17,7 @@ from seakeep.errors import RequestError
 from seakeep.files import read_bytes, replacing
 from seakeep.models import HankelDMDc
 from seakeep.models.labelled import Runs, Stop, as_runs, channel_matrix
+from seakeep.models.readouts import FittedReadOut
 from seakeep.models.selection import select
 from seakeep.models.training import check_names, until
 
@@ -42,14 +43,18 @@ class TuneResult:
         bounds ``lower`` and ``upper`` of its 95 % interval, and ``chosen``.
     note : str
         How the choice was made.
+    readouts : tuple of FittedReadOut
+        Read-outs of the settings that were chosen, as all training runs teach them; those that
+        were chosen among have their scores.
     """
 
     spec: HankelDMDc
     table: xr.Dataset
     note: str
+    readouts: tuple[FittedReadOut, ...] = ()
 
     def describe(self) -> str:
-        """Text: how the choice was made, and the best λ of each candidate.
+        """Text: how the choice was made, the best λ of each candidate, and the read-outs.
 
         Returns
         -------
@@ -65,7 +70,7 @@ class TuneResult:
                 f"  {best['score']:.3f} [{best['lower']:.3f}, {best['upper']:.3f}]  ridge "
                 f"{best['ridge']:g}, {what}{'  (chosen)' if part['chosen'].any() else ''}"
             )
-        return "\n".join(lines)
+        return "\n".join([*lines, *(each.describe() for each in self.readouts)])
 
     def figure(self) -> Figure:
         """Draw the error against λ, a line per candidate; needs the extra ``figures``.
@@ -106,7 +111,8 @@ def tune(
         Channels of the model.
     vary : sequence of str, optional
         Out of "ridge" (always chosen), "observables" (none, slow squares, powers, both; or those of
-        the spec), "lead", "input_delays" and "state_delays".
+        the spec), "lead", "input_delays", "state_delays" and "readouts" (none, hinge or stacked,
+        for those of the spec or for every load).
     horizon : sequence of float, optional
         Lengths of the free runs, encounter periods.
     folds : "run" or int, optional
@@ -164,10 +170,11 @@ def tune(
         input_delays=settings.input_delays,
         lead=settings.lead,
         observables=settings.observables,
+        readouts=settings.readouts,
         ridge=settings.ridge,
         ridge_scale="per_snapshot",
     )
-    return TuneResult(chosen, _table(found.rows), found.note)
+    return TuneResult(chosen, _table(found.rows), found.note, found.readouts)
 
 
 def _table(rows: Sequence[dict[str, Any]]) -> xr.Dataset:

@@ -434,6 +434,20 @@ def test_priors_and_seed_of_a_study_are_kept_as_json_values_with_their_source():
     assert settings["seed"] == {"value": 7, "source": "study"}
 
 
+@pytest.mark.parametrize("kind", ["hankel_dmdc", "bayesian_hankel_dmdc"])
+def test_read_outs_are_kept_as_json_values_with_their_source(kind):
+    read = {"heave": {"of": ["pitch"], "kind": "stacked"}}
+    stated = ModelSettings(states=("heave", "pitch"), kind=kind, readouts=read)
+    told = resolve_model(stated, 2.0, 0.1, preset="recommended").to_json()["settings"]
+    expected = [{"channel": "heave", "of": ["pitch"], "kind": "stacked"}]
+    assert told["readouts"] == {"value": expected, "source": "stated"}
+    with pytest.raises(RequestError, match="received delay_rows = 'ridge', rank = None"):
+        resolve_model(stated, 2.0, 0.1, preset="paper")
+    read_by_fir = ModelSettings(states=("heave", "pitch"), kind="fir", readouts="auto")
+    with pytest.raises(RequestError, match="kind = 'fir' has no key 'readouts'"):
+        resolve_model(read_by_fir, 2.0, 0.1)
+
+
 def test_an_unknown_kind_or_key_is_named():
     with pytest.raises(RequestError, match=r"no kind of model 'hankel'.*Kinds: hankel_dmdc"):
         build_spec(ModelSettings(states=("heave",), kind="hankel"), 2.0, 0.1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +15,7 @@ from seakeep.errors import RequestError
 from seakeep.files import check_output, check_place, replacing
 
 if TYPE_CHECKING:
+    from seakeep.models import ReadOut
     from seakeep.tuning import TuneResult
 
 __all__ = ["tune"]
@@ -25,8 +27,8 @@ def tune(
         list[str] | None,
         typer.Option(
             "--vary",
-            help="What to choose beside the ridge: observables, lead, input_delays, state_delays. "
-            "Repeat it for several. Default: observables.",
+            help="What to choose beside the ridge: observables, lead, input_delays, state_delays, "
+            "readouts. Repeat it for several. Default: observables.",
         ),
     ] = None,
     out: Annotated[
@@ -72,21 +74,21 @@ def tune(
             f"kind = '{settings.kind}' cannot be tuned: a Hankel model is. Name another model with "
             "--model, or set kind = 'hankel_dmdc'."
         )
-    kept = target.with_suffix(".scores.json")
+    kept, varied = target.with_suffix(".scores.json"), vary or ["observables"]
     with member_executor(workers, scheduler) as executor, progress_bar("Tuning") as progress:
         found = search(
             spec,
             runs,
             list(settings.states),
             list(settings.inputs),
-            vary=vary or ["observables"],
+            vary=varied,
             stop=stop,
             executor=executor,
             progress=progress,
             resume=kept,
         )
     typer.echo(found.describe())
-    text = _tuned(campaign.read_text(encoding="utf-8"), model, found)
+    text = _tuned(campaign.read_text(encoding="utf-8"), model, found, "readouts" in varied)
     with replacing(target) as place:
         place.write_text(text, encoding="utf-8")
     kept.unlink(missing_ok=True)
@@ -99,7 +101,7 @@ def tune(
         messages().print(f"Wrote {picture}.")
 
 
-def _tuned(text: str, model: str | None, found: TuneResult) -> str:
+def _tuned(text: str, model: str | None, found: TuneResult, reads_out: bool) -> str:
     """The campaign file with the choice in the table of the model, and nothing else changed."""
     import tomlkit
 
@@ -123,9 +125,46 @@ def _tuned(text: str, model: str | None, found: TuneResult) -> str:
             row.update({k: v for k, v in to_json(each).items() if v not in (None, "")})
             tables.append(row)
         values["observables"] = tables.multiline(True)
+    # Blank lines and comments there belong to the next table, if this one is in one place.
+    between = _after(table) if isinstance(table, tomlkit.items.Table) else []
     for key, value in values.items():
         table[key] = value
+    if reads_out:
+        table.pop("readouts", None)
+        table["readouts"] = _readouts(() if spec.readouts == "auto" else spec.readouts)
+    if between:
+        _end(table).extend(between)
     table["ridge"].comment("chosen by seakeep tune, by free runs on held-out training runs")
     first = "# seakeep_file: tuned campaign\n"
     body = tomlkit.dumps(document)
     return body if body.startswith(first) else first + body
+
+
+def _end(table: Any) -> list[Any]:
+    """Keys and items, lines without a key too, of the table that stands last inside a table."""
+    body: list[Any] = table.value.body
+    last: Any = next((item for key, item in reversed(body) if key is not None), None)
+    if hasattr(last, "is_aot") and last.is_aot():
+        last = last[-1]
+    return _end(last) if hasattr(last, "is_table") and last.is_table() else body
+
+
+def _after(table: Any) -> list[Any]:
+    """Take off the lines without a key at the end of a table."""
+    body = _end(table)
+    count = next((n for n, (key, _) in enumerate(reversed(body)) if key is not None), len(body))
+    lines = body[len(body) - count :]
+    del body[len(body) - count :]
+    return lines
+
+
+def _readouts(chosen: Sequence[ReadOut]) -> Any:
+    """Tables ``[model.readouts.NAME]``; an empty one says that none is wanted."""
+    import tomlkit
+
+    tables = tomlkit.table(is_super_table=True) if chosen else tomlkit.inline_table()
+    for each in chosen:
+        row = tomlkit.table()
+        row.update({"kind": each.kind, "of": list(each.of)})
+        tables[each.channel] = row
+    return tables

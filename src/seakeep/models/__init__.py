@@ -9,7 +9,7 @@ from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.observables import OBSERVABLES, Bound, Expression, Powers, SlowSquares
 from seakeep.models.offsets import ProbeOffset, estimate_probe_offset
 from seakeep.models.priors import Fixed, LogUniform, Uniform
-from seakeep.models.readouts import ReadOut
+from seakeep.models.readouts import FittedReadOut, ReadOut
 from seakeep.models.registry import KINDS, load_model
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
 from seakeep.models.summaries import summarize
@@ -24,6 +24,7 @@ __all__ = [
     "ChannelLabel",
     "Expression",
     "FittedAlignment",
+    "FittedReadOut",
     "Fixed",
     "HankelDMDc",
     "HankelDMDcModel",

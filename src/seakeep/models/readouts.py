@@ -50,7 +50,7 @@ class ReadOut:
         function of all forecast states and of the hinges of those in `of`, fitted to forecasts of
         each training run by the model of the others, so that it knows their errors; it takes
         exact delay rows. ``"auto"``: whichever of these forecasts training runs that are held out
-        better than no read-out, by more than a standard error of the gain; else none.
+        better than no read-out, by more than two standard errors of the gain; else none.
 
     Raises
     ------

@@ -24,6 +24,8 @@ LOST = 10.0
 """A free run that is this many times as far from the mean as training ever was teaches nothing."""
 WORST = 10.0
 """NRMSE at which a window counts no worse."""
+SURE = 2.0
+"""Standard errors by which a read-out must be better than none: a linear channel stays linear."""
 ORDER: tuple[ReadOutKind, ...] = ("none", "hinge", "stacked")
 
 
@@ -152,6 +154,6 @@ def _chosen(
     for kind in ORDER[1:]:
         gain = judged["none"] - judged[kind]
         doubt = float(gain.std(ddof=1)) / len(gain) ** 0.5 if len(gain) > 1 else np.inf
-        if gain.mean() > doubt and means[kind] < means[best]:
+        if gain.mean() > SURE * doubt and means[kind] < means[best]:
             best = kind
     return best, means
