@@ -249,6 +249,49 @@ def test_the_recommended_preset_of_the_preparation(tmp_path):
     assert max(found[3:]) < 2e-3
 
 
+MODEL = "[model]\npreset = '{}'\nstates = ['tone_5']\n"
+
+
+def test_the_filters_of_the_preparation_follow_the_preset_of_study_or_model(tmp_path):
+    tone_campaign(tmp_path, TONES[1:2], "paper")
+    file = tmp_path / "campaign.toml"
+    bare = file.read_text().replace("[preparation]\npreset = 'paper'\n", "[preparation]\n{}\n")
+
+    def preparation(model, stated="", **asked):
+        file.write_text(bare.format(stated) + MODEL.format(model))
+        found = read_campaign(file, **asked).settings.preparation
+        return found.preset, found.low_pass, found.anti_alias, found.steps_per_period
+
+    paper = ("paper", (10.0, 10.75), False, None)
+    assert preparation("paper") == paper
+    assert preparation("recommended") == ("recommended", None, True, None)
+    assert preparation("recommended", preset="paper") == paper
+    stated = "anti_alias = true\nlow_pass = [8, 9]\nsteps_per_period = 20"
+    assert preparation("paper", stated) == ("paper", (8.0, 9.0), True, 20)
+    stated = "preset = 'recommended'"
+    assert preparation("paper", stated, preset="paper") == ("recommended", None, True, 32)
+
+
+def two_probes(folder, positions):
+    """A long wave that passes two probes, one after the other, at 2 m/s."""
+    t = np.arange(0, 120, 0.05)
+    waves = 0.05 * np.sin(2 * np.pi * 0.78 * t), 0.05 * np.sin(2 * np.pi * 0.78 * (t - 0.5))
+    columns = {"time [s]": t, "eta_a [m]": waves[0], "eta_b [m]": waves[1]}
+    write_csv(folder / "run.csv", columns)
+    (folder / "campaign.toml").write_text(
+        f"[rig]\nwater_depth = 3.6\n[rig.positions]\n{positions}\n[channels.eta_a]\n"
+        "[channels.eta_b]\n[runs.r]\nfile = 'run.csv'\nwaves = 'regular'\n"
+    )
+    return read_campaign(folder / "campaign.toml").prepare()["r"]
+
+
+def test_a_prepared_run_has_the_celerity_of_its_waves(tmp_path):
+    # A parabola through three samples of a sine of 26 samples a period: some 1e-3 of a step.
+    run = two_probes(tmp_path, "eta_a = 4.0\neta_b = 5.0")
+    assert run.attrs["celerity"] == pytest.approx(2.0, rel=1e-3)
+    assert "celerity" not in two_probes(tmp_path, "eta_a = 4.0\neta_b = 4.0").attrs
+
+
 def wander(t):
     """A motion without a period of its own, so that a lag is unique."""
     rng = np.random.default_rng(5)

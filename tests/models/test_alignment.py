@@ -144,6 +144,31 @@ def test_a_celerity_that_is_given_is_taken(runs):
     assert spec(alignment).fit(runs, STATES, INPUTS).alignment.celerity == 2.5
 
 
+def test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for(runs):
+    own = [run.assign_attrs(celerity=c) for run, c in zip(runs, (2.5, 3.0), strict=True)]
+    slow = drifting_run(7).assign_attrs(celerity=2.0)
+    model = spec(ProbeAlignment(mode="effective")).fit(own, STATES, INPUTS)
+    common = spec(ProbeAlignment(mode="effective", celerity="common")).fit(own, STATES, INPUTS)
+    # The mean slowness of the training runs is that of no run.
+    mean = 2 / (1 / 2.5 + 1 / 3.0)
+    for found, expected in ((model, 2.0), (common, mean)):
+        assert found.alignment.celerity == pytest.approx(mean)
+        assert found.alignment.celerity_of(slow) == pytest.approx(expected)
+        attrs = found.forecast(slow, start=60.0, steps=10).attrs
+        assert attrs["alignment_celerity"] == pytest.approx(expected)
+    stated = spec(ProbeAlignment(mode="effective", celerity=2.0)).fit(own, STATES, INPUTS)
+    xr.testing.assert_allclose(model.aligned_inputs(slow), stated.aligned_inputs(slow))
+    assert model.alignment.celerity_of(drifting_run(8)) == pytest.approx(mean)
+
+
+def test_an_ensemble_and_a_single_model_take_the_celerity_from_the_same_span(runs):
+    alignment = {"mode": "effective"}
+    single = replace(spec(ProbeAlignment(**alignment)), window=300)
+    cut = [run.sel(time=slice(0, 100)) for run in runs]
+    alone = single.fit(runs, STATES, INPUTS, stop=100.0).alignment.celerity
+    assert aligned_ensemble(cut, **alignment).alignment.celerity == alone
+
+
 @pytest.mark.parametrize("key", ["dispersion", "effective", "predicted"])
 def test_a_file_keeps_the_alignment(models, key, tmp_path):
     model, run = models[key], drifting_run(7)
@@ -275,7 +300,7 @@ def test_what_an_alignment_estimates_is_the_same_for_all_members(runs):
     assert {few.member(number).alignment.celerity for number in range(3)} == {
         few.alignment.celerity
     }
-    assert f"celerity {few.alignment.celerity:.4g} m/s; surge measured" in few.summary()
+    assert f"celerity {few.alignment.celerity:.4g} m/s in training" in few.summary()
 
 
 def test_a_predicted_surge_gives_the_same_arrays_with_an_executor(runs):
@@ -302,7 +327,10 @@ def test_an_aligned_ensemble_says_on_what_it_depends_and_comes_back(runs, surge,
     [
         ({"mode": "linear"}, "mode must be 'effective' or 'dispersion'; received 'linear'"),
         ({"surge": True}, "surge must be 'measured', 'predicted' or 'none'; received True"),
-        ({"celerity": -1.0}, r"celerity must be a positive number or None \(m/s\); received -1.0"),
+        (
+            {"celerity": -1.0},
+            r"celerity must be a positive number, 'common' or None \(m/s\); received -1.0",
+        ),
         ({"offset": "3 m"}, "offset must be a number .*; received '3 m'"),
         ({"mode": "dispersion", "celerity": 2.0}, "celerity = 2.0 belongs to mode = 'effective'"),
         ({"highest_frequency": 2.0}, "highest_frequency = 2.0 belongs to mode = 'dispersion'"),

@@ -9,8 +9,9 @@ import pytest
 from scipy import stats
 
 import seakeep
-from seakeep import BayesianHankelDMDc, Fixed, LogUniform, Uniform
+from seakeep import BayesianHankelDMDc, Fixed, LogUniform, ProbeAlignment, Uniform
 from seakeep.campaign import ModelSettings
+from seakeep.campaign.settings import AlignmentSettings
 from seakeep.campaign.store import write_prepared
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.study import (
@@ -415,6 +416,21 @@ def test_a_preset_fills_in_what_is_not_stated_key_by_key_and_says_so():
     assert kept["settings"]["alignment.surge"] == {"value": "none", "source": "stated"}
     assert sources["alignment.mode"] == sources["rank"] == "default"
     assert sources["ridge"] == "stated"
+
+
+def test_the_paper_s_alignment_is_taken_where_the_campaign_can_align():
+    settings = ModelSettings(states=("heave",), inputs=("eta_fwd",), preset="paper")
+    assert resolve_model(settings, 2.0, 0.1).spec.alignment is None
+    found = resolve_model(settings, 2.0, 0.1, aligned=True)
+    assert found.spec.alignment == ProbeAlignment(mode="effective", surge="measured")
+    assert found.sources["alignment.mode"] == "preset"
+    stated = settings.model_copy(update={"alignment": AlignmentSettings(surge="none")})
+    assert resolve_model(stated, 2.0, 0.1, aligned=True).spec.alignment.surge == "none"
+    baseline = ModelSettings(states=("heave",), inputs=("eta_fwd",), kind="fir")
+    found = resolve_model(baseline, 2.0, 0.1, preset="paper", aligned=True)
+    assert (found.preset, found.spec.alignment.surge) == ("recommended", "measured")
+    still = ModelSettings(states=("heave",), kind="mean")
+    assert resolve_model(still, 2.0, 0.1, preset="paper", aligned=True).spec.alignment is None
 
 
 def test_priors_and_seed_of_a_study_are_kept_as_json_values_with_their_source():

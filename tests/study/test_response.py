@@ -50,7 +50,10 @@ def groups(shift=0.9, offset=0.3, ratio=0.8, lead=40.0):
         },
         coords={"run": ["wave", "sea"]},
     )
-    training = xr.Dataset({"m_celerity": ("training", [CELERITY, CELERITY])})
+    training = xr.Dataset(
+        {"m_celerity": (("training", "of_run"), [[CELERITY], [CELERITY]])},
+        coords={"of_run": ["wave"]},
+    )
     return {"tests/t": test, "runs": runs, "spectra": spectra, "training": training}
 
 

@@ -57,6 +57,7 @@ from seakeep.signals import (
     clock_from_correlation,
     clock_from_pulses,
     clock_from_shared,
+    effective_celerity,
     inspect_times,
     low_pass,
     onto_uniform,
@@ -791,6 +792,7 @@ def attributes_of(
         "frame": rig.frame,
         "encounter_period": general.encounter_period,
         "probe_offset": settings.probe_offset,
+        "celerity": celerity_of(run, dt, campaign),
     }
     whole = (float(time[0]), float(time[-1]))
     for use in ("train", "test"):
@@ -812,6 +814,20 @@ def attributes_of(
             f"clock_{logger}_drift_error_ppm": 1e6 * clock.drift_error,
         }
     return {key: value for key, value in attributes.items() if value is not None}
+
+
+def celerity_of(run: xr.Dataset, dt: float, campaign: CampaignSettings) -> float | None:
+    """Effective celerity of the waves of a run that was cut, m/s; None where it is not known."""
+    channels, depth = campaign.celerity_channels, campaign.rig.water_depth
+    if channels is None or depth is None or any(name not in run for name in channels):
+        return None
+    apart = campaign.rig.positions[channels[1]] - campaign.rig.positions[channels[0]]
+    try:
+        first, last = (run[name].to_numpy() for name in channels)
+        found = effective_celerity(first, last, dt, apart, depth)
+    except SeakeepError:  # gaps, still water, or waves that do not run from one to the other
+        return None
+    return found.celerity
 
 
 def version() -> str:

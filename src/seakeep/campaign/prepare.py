@@ -48,7 +48,7 @@ KEPT = 2**30
 """Bytes of columns that are kept from the survey of all runs until each is prepared: campaigns of
 model tests fit; what is beyond is read again."""
 
-FORMAT = 7
+FORMAT = 8
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
 
 
@@ -144,6 +144,7 @@ class Campaign:
         del content["campaign"]["name"], content["campaign"]["description"]
         if self._measures_period:
             content["campaign"]["period_channel"] = self.period_channel()
+        content["celerity_channels"] = self.settings.celerity_channels
         content["format"] = FORMAT
         text = json.dumps(content, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
@@ -531,13 +532,16 @@ class _ReadOnce:
         return columns
 
 
-def read_campaign(path: Path | str) -> Campaign:
+def read_campaign(path: Path | str, preset: str | None = None) -> Campaign:
     """Read a campaign file.
 
     Parameters
     ----------
     path : Path or str
         The TOML file.
+    preset : {"paper", "recommended"}, optional
+        Whose filters runs are prepared with where ``[preparation]`` states no preset; the default
+        is the preset of ``[model]``, or the one that all ``[models.NAME]`` share.
 
     Returns
     -------
@@ -551,4 +555,6 @@ def read_campaign(path: Path | str) -> Campaign:
         every key at fault, the value received, and the remedy.
     """
     path = Path(path).expanduser()
-    return Campaign(path, read_settings(path))
+    settings = read_settings(path)
+    preparation = settings.preparation.filtered_as(preset or settings.preset)
+    return Campaign(path, settings.model_copy(update={"preparation": preparation}))

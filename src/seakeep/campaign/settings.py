@@ -390,6 +390,13 @@ class RedundantSettings(Table):
         return self
 
 
+_FILTERS: dict[str, dict[str, Any]] = {
+    "paper": {"anti_alias": False, "low_pass": (10.0, 10.75)},
+    "recommended": {"anti_alias": True},
+}
+"""Filters before resampling by preset."""
+
+
 class PreparationSettings(Table):
     """``[preparation]``: the common time step and how it is reached.
 
@@ -400,7 +407,9 @@ class PreparationSettings(Table):
     """
 
     preset: Literal["paper", "recommended"] | None = Field(
-        default=None, description="'paper' or 'recommended'"
+        default=None,
+        description="'paper' or 'recommended'; left out, the filters (not the rate) of the preset "
+        "of the study, else of [model]",
     )
     sampling_rate: Positive | None = Field(default=None, description="samples per second, Hz")
     dt: Positive | None = Field(default=None, description="time step in seconds")
@@ -433,10 +442,8 @@ class PreparationSettings(Table):
     @model_validator(mode="before")
     @classmethod
     def _with_preset(cls, received: Any) -> Any:
-        if isinstance(received, dict) and received.get("preset") in ("paper", "recommended"):
-            chain: dict[str, Any] = {"anti_alias": received["preset"] == "recommended"}
-            if received["preset"] == "paper":
-                chain["low_pass"] = [10.0, 10.75]
+        if isinstance(received, dict) and received.get("preset") in _FILTERS:
+            chain: dict[str, Any] = dict(_FILTERS[received["preset"]])
             if not {"sampling_rate", "dt", "steps_per_period"} & set(received):
                 chain["steps_per_period"] = 32
             return {**chain, **received}
@@ -449,6 +456,13 @@ class PreparationSettings(Table):
             raise ValueError(f"state only one of {', '.join(given)}")
         return self
 
+    def filtered_as(self, preset: str | None) -> PreparationSettings:
+        """Take the filters of a preset, unless one is stated; keys that are stated stay."""
+        if self.preset is not None or preset is None:
+            return self
+        filters = {k: v for k, v in _FILTERS[preset].items() if k not in self.model_fields_set}
+        return self.model_copy(update={**filters, "preset": preset})
+
 
 class AlignmentSettings(Table):
     """``alignment`` of a model: the keys of :class:`seakeep.ProbeAlignment`."""
@@ -459,8 +473,10 @@ class AlignmentSettings(Table):
     surge: Literal["measured", "predicted", "none"] = Field(
         default="measured", description="'measured', 'predicted' or 'none'"
     )
-    celerity: Positive | None = Field(
-        default=None, description="m/s, of mode 'effective'; left out, it is estimated"
+    celerity: Positive | Literal["common"] | None = Field(
+        default=None,
+        description="m/s, of mode 'effective'; left out, each run's own by correlation; 'common': "
+        "the mean of the training runs for all",
     )
     offset: Finite = Field(
         default=0.0, description="metres by which the elevation is carried, positive downstream"
@@ -866,6 +882,26 @@ class CampaignSettings(Table):
         used = [name for name, run in self.runs.items() if run.role != "unused"]
         irregular = [name for name in used if self.runs[name].waves == "irregular"]
         return tuple(irregular or used)
+
+    @property
+    def preset(self) -> str | None:
+        """Preset of the model, or the one that all models share."""
+        stated = {each.preset for each in self.all_models().values()}
+        return self.model.preset if self.model else stated.pop() if len(stated) == 1 else None
+
+    @property
+    def celerity_channels(self) -> tuple[str, str] | None:
+        """Elevations, first and last along the waves, between which a run's celerity is found.
+
+        Those that drive the first model that has two at different positions, else all.
+        """
+        waves = [name for name in self.channel_names if is_elevation(name)]
+        for names in (*(model.inputs for model in self.all_models().values()), waves):
+            placed = {n: self.rig.positions[n] for n in names if n in self.rig.positions}
+            if len(set(placed.values())) > 1:
+                first, last = (pick(placed, key=placed.__getitem__) for pick in (min, max))
+                return first, last
+        return None
 
     def all_models(self) -> dict[str, ModelSettings]:
         """Models by the key of their table: ``model`` and ``models.NAME``."""

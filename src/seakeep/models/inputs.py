@@ -175,9 +175,11 @@ class ProbeAlignment:
         Position that the elevation is carried to: the measured surge (an output read during the
         forecast, which is then conditional on it), the surge that the model itself predicts, or
         none, the place at rest.
-    celerity : float, optional
-        c of mode "effective", m/s; by default estimated at fit from the two probes among the
-        inputs that stand farthest apart.
+    celerity : float or "common", optional
+        c of mode "effective", m/s. By default each run's own, ``attrs["celerity"]``, which
+        ``prepare`` finds by correlation; a run without it is carried as "common" has it: with the
+        mean celerity of the training runs, which are correlated up to their stops where they do
+        not state it, between the two probes among the inputs that stand farthest apart.
     offset : float, optional
         Constant distance, m, by which the elevation is carried in all runs, positive downstream;
         the paper's :math:`-x_0` where surge does not count from the place at rest.
@@ -202,7 +204,7 @@ class ProbeAlignment:
 
     mode: Mode = "effective"
     surge: Surge = "measured"
-    celerity: float | None = None
+    celerity: float | Literal["common"] | None = None
     offset: float = 0.0
     surge_channel: str = "surge"
     channels: tuple[str, ...] | None = None
@@ -213,7 +215,9 @@ class ProbeAlignment:
         check_integer("alignment: passes", self.passes, 1)
         check_choice("alignment: mode", self.mode, ("effective", "dispersion"))
         check_choice("alignment: surge", self.surge, ("measured", "predicted", "none"))
-        _check_number("celerity", self.celerity, "m/s", "a positive number or None")
+        if self.celerity != "common":
+            meant = "a positive number, 'common' or None"
+            _check_number("celerity", self.celerity, "m/s", meant)
         _check_number(
             "highest_frequency", self.highest_frequency, "Hz", "a positive number or None"
         )
@@ -312,7 +316,8 @@ class ProbeAlignment:
         last = slice(None if window is None else -window, None)
         windows = {name: run.isel(time=last) for name, run in runs.items()}
         depth = _common_depth(runs)
-        celerity, spread, limit = self.celerity, None, self.highest_frequency
+        celerity = None if self.celerity == "common" else self.celerity
+        spread, limit = None, self.highest_frequency
         elevations = [channel for channel, yes in zip(inputs, carried, strict=True) if yes]
         if self.mode == "dispersion":
             depth = _depth(first, first_name, depth)
@@ -321,7 +326,7 @@ class ProbeAlignment:
                     np.median([_band(run, name, elevations) for name, run in windows.items()])
                 )
         elif celerity is None:
-            celerity, spread = _celerity(windows, elevations, depth)
+            celerity, spread = _celerity(runs, elevations, depth)
         return FittedAlignment(
             settings=self,
             inputs=tuple(inputs),
@@ -359,7 +364,7 @@ class FittedAlignment:
     positions : tuple of float or None
         Position of each input's probe in training, m; None where the run did not state it.
     celerity : float or None
-        The one given, or the one estimated from the training windows, m/s (mode "effective").
+        The one given, or the mean of the training runs, m/s (mode "effective").
     celerity_spread : float or None
         Standard deviation of its estimates over the training runs, m/s.
     water_depth : float or None
@@ -437,15 +442,21 @@ class FittedAlignment:
         farthest = min((float(distance) for distance, yes in places if yes), default=0.0)
         return max(0.0, -farthest) / self._speed(run)
 
-    def _speed(self, run: xr.Dataset) -> float:
-        if self.celerity is not None:
+    def celerity_of(self, run: xr.Dataset) -> float | None:
+        """Celerity at which a run is carried, m/s; None in mode "dispersion"."""
+        if self.celerity is None or self.settings.celerity is not None:
             return self.celerity
+        return float(run.attrs.get("celerity", self.celerity))
+
+    def _speed(self, run: xr.Dataset) -> float:
+        if (celerity := self.celerity_of(run)) is not None:
+            return celerity
         assert self.highest_frequency is not None
         depth = _depth(run, "the run", self.water_depth)
         return float(group_speed(2 * np.pi * self.highest_frequency, depth))
 
     def notes(self, run: xr.Dataset) -> dict[str, str | float]:
-        """Mode, surge, the run's probe offset, and with measured surge ``conditional_on``."""
+        """Mode, surge, celerity, the run's probe offset, with measured surge ``conditional_on``."""
         settings = self.settings
         out: dict[str, str | float] = {
             "alignment_mode": settings.mode,
@@ -453,6 +464,8 @@ class FittedAlignment:
         }
         if settings.surge == "measured":
             out["conditional_on"] = settings.surge_channel
+        if (celerity := self.celerity_of(run)) is not None:
+            out["alignment_celerity"] = celerity
         for key in ("probe_offset", "probe_offset_spread"):
             if key in run.attrs:
                 out[key] = float(run.attrs[key])
@@ -460,8 +473,10 @@ class FittedAlignment:
 
     def describe(self, dt: float) -> list[str]:
         """One line, and one more where the waves are read upstream."""
-        speed = "" if self.celerity is None else f", celerity {self.celerity:.4g} m/s"
         settings = self.settings
+        speed = "" if self.celerity is None else f", celerity {self.celerity:.4g} m/s"
+        if speed and settings.celerity is None:
+            speed += " in training, each run's own in forecasts"
         lines = [f"  alignment     mode {settings.mode}{speed}; surge {settings.surge}"]
         if settings.offset < 0:
             lines.append(
@@ -509,8 +524,8 @@ class FittedAlignment:
             if not self.carried[column]:
                 out.append(None)
             elif self.settings.mode == "effective":
-                assert self.celerity is not None
-                out.append(carry_by_celerity(values[:, column], dt, reach, self.celerity))
+                celerity = self._speed(run)
+                out.append(carry_by_celerity(values[:, column], dt, reach, celerity))
             else:
                 depth = _depth(run, name, self.water_depth)
                 limit = self.highest_frequency
@@ -805,11 +820,14 @@ def _surge_range(windows: Mapping[str, xr.Dataset], channel: str) -> tuple[float
 
 
 def _celerity(
-    windows: Mapping[str, xr.Dataset], elevations: Sequence[str], depth: float | None
+    runs: Mapping[str, xr.Dataset], elevations: Sequence[str], depth: float | None
 ) -> tuple[float, float | None]:
-    """Celerity from the mean lag over the runs, and its standard deviation over them."""
-    lags, apart = [], 0.0
-    for name, run in windows.items():
+    """Celerity from the mean slowness over the runs, and its standard deviation over them."""
+    slowness = []
+    for name, run in runs.items():
+        if "celerity" in run.attrs:
+            slowness.append(1.0 / float(run.attrs["celerity"]))
+            continue
         placed = {c: x for c in elevations if (x := _position(run, c)) is not None}
         if len(set(placed.values())) < 2 or depth is None:
             raise RequestError(
@@ -827,7 +845,7 @@ def _celerity(
             )
         except DataError as error:
             raise DataError(f"{name}, '{first}' and '{last}': {error}") from None
-        lags.append(found.lag / apart)
-    speeds = 1.0 / np.array(lags)
-    spread = float(speeds.std(ddof=1)) if len(lags) > 1 else None
-    return float(1.0 / np.mean(lags)), spread
+        slowness.append(found.lag / apart)
+    speeds = 1.0 / np.array(slowness)
+    spread = float(speeds.std(ddof=1)) if len(slowness) > 1 else None
+    return float(1.0 / np.mean(slowness)), spread

@@ -154,7 +154,7 @@ def _half_wavelengths(model: HankelDMDcModel, part: xr.Dataset) -> tuple[float, 
     channel = next(c for c, yes in zip(model.inputs, alignment.carried, strict=True) if yes)
     period = encounter_period(part[channel].values, model.dt)
     depth = part.attrs.get("water_depth", alignment.water_depth)
-    speed = alignment.celerity
+    speed = alignment.celerity_of(part)
     if speed is None:
         speed = float(phase_speed(2 * np.pi / period, np.inf if depth is None else depth))
     return -0.5 * speed * period, 0.5 * speed * period

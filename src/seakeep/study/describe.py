@@ -128,24 +128,22 @@ def _training(plan: Plan, runs: Runs) -> xr.Dataset:
         out["run"] = ("training", np.array([e.spans[0][0] for e in plan.training], dtype=object))
         out["stop"] = ("training", np.array([e.spans[0][2] for e in plan.training]))
     for model, spec in plan.specs.items():
-        celerities = _celerities(spec, plan, runs)
-        if celerities:
-            out[f"{model}_celerity"] = ("training", np.array(celerities), {"units": "m/s"})
+        if celerities := _celerities(spec, plan, runs):
+            dims = ("training", "of_run")
+            out[f"{model}_celerity"] = (dims, np.array(celerities), {"units": "m/s"})
     return out
 
 
-def _celerities(spec: Spec, plan: Plan, runs: Runs) -> list[float]:
-    """Celerity by which a single model carries the waves to the measured surge, m/s."""
+def _celerities(spec: Spec, plan: Plan, runs: Runs) -> list[list[float]]:
+    """Celerity at which the waves of each run are carried to the measured surge, m/s."""
     wanted = getattr(spec, "alignment", None)
-    if spec.is_ensemble or wanted is None:
-        return []
-    if (wanted.mode, wanted.surge) != ("effective", "measured"):
+    if wanted is None or (wanted.mode, wanted.surge) != ("effective", "measured"):
         return []
     out = []
     for each in plan.training:
         parts = {name: between(runs[name], (begin, stop)) for name, begin, stop in each.spans}
-        fitted = wanted.fit(parts, plan.states, plan.inputs, getattr(spec, "window", None))
-        out.append(float(fitted.celerity or np.nan))
+        fitted = wanted.fit(parts, plan.states, plan.inputs, None)
+        out.append([fitted.celerity_of(run) for run in runs.values()])
     return out
 
 

@@ -17,7 +17,7 @@ from seakeep.models.slow import warn_of_slow_motions
 from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, find_leakage
 from seakeep.study.plan import between
-from seakeep.study.resolve import Spec, build_spec, counts_in_periods
+from seakeep.study.resolve import Spec, build_spec, can_align, counts_in_periods
 from seakeep.toml import Length
 
 __all__ = ["fit_baselines", "fit_campaign", "training_runs", "warn_of_repeats", "warn_of_waves"]
@@ -147,7 +147,8 @@ def read_training(
     warn_of_runs(prepared.values(), [*settings.states, *settings.inputs])
     dt = float(next(iter(prepared.values())).attrs["dt"])
     period = campaign.encounter_period() if counts_in_periods(settings) else None
-    spec = build_spec(settings, period, dt)
+    aligned = can_align(campaign.settings, settings.inputs)
+    spec = build_spec(settings, period, dt, aligned=aligned)
     stop = settings.stop
     if isinstance(stop, Length):
         stop = None if period is None else stop.at(period)

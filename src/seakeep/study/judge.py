@@ -577,7 +577,8 @@ def _with_waves(
         for number, model in enumerate(models):
             if f"{model}_celerity" not in training:
                 continue
-            each = training[f"{model}_celerity"].values[rows]
+            carried = training[f"{model}_celerity"].sel(of_run=data["run"].values.astype(str))
+            each = carried.values[rows, columns]
             celerity[number] = np.median(each)
             turns = frequency * shifts * (1 / speed - 1 / each)
             lead[number] = 360 * np.median(turns)

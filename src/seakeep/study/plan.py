@@ -20,7 +20,7 @@ from seakeep.models import Needs
 from seakeep.models.calibration import BandScale
 from seakeep.models.settings import periods_to_samples
 from seakeep.models.slow import warn_of_slow_motions
-from seakeep.study.resolve import ResolvedModel, Spec, resolve_model
+from seakeep.study.resolve import ResolvedModel, Spec, can_align, resolve_model
 from seakeep.study.settings import Study, StudySettings, TestSetSettings
 
 __all__ = [
@@ -403,8 +403,11 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
     dt = float(next(iter(runs.values())).attrs["dt"])
     period = settings.study.encounter_period or campaign.encounter_period()
     general = settings.study
+    aligned = can_align(campaign.settings, study.inputs)
     models = {
-        name: resolve_model(each, period, dt, preset=general.preset, seed=general.seed)
+        name: resolve_model(
+            each, period, dt, preset=general.preset, seed=general.seed, aligned=aligned
+        )
         for name, each in settings.models.items()
     }
     specs = [each.spec for each in models.values()]

@@ -6,11 +6,12 @@ else the default of the kind.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, Literal, cast
 
 from seakeep.campaign import ModelSettings, PriorSettings
+from seakeep.campaign.settings import CampaignSettings
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.models import KINDS, ProbeAlignment, Spec
 from seakeep.models.observables import Observable, SlowSquares, observables_of
@@ -18,13 +19,15 @@ from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform
 from seakeep.models.settings import periods_to_samples
 from seakeep.toml import Length, lengths, parse_length
 
-__all__ = ["ResolvedModel", "Spec", "build_spec", "counts_in_periods", "resolve_model"]
+__all__ = ["ResolvedModel", "Spec", "build_spec", "can_align", "counts_in_periods", "resolve_model"]
 
 Source = Literal["stated", "preset", "study", "default"]
 
 PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
 OF_THE_DATA = ("dt", "encounter_period")
 """Arguments of a spec that are measured, not set."""
+ALIGNMENTS = {"paper": ProbeAlignment(mode="effective", surge="measured")}
+"""Alignment of a preset, where a campaign has the channels for it."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,16 @@ def counts_in_periods(settings: ModelSettings) -> bool:
     return settings.preset is not None or by_kind or squares or any(lengths(settings))
 
 
-def build_spec(settings: ModelSettings, encounter_period: float | None, dt: float) -> Spec:
+def can_align(campaign: CampaignSettings, inputs: Sequence[str]) -> bool:
+    """Whether a campaign has surge, water depth, and two places at which inputs are measured."""
+    places = {campaign.rig.positions[name] for name in inputs if name in campaign.rig.positions}
+    surge = ProbeAlignment().surge_channel in campaign.channel_names
+    return surge and campaign.rig.water_depth is not None and len(places) > 1
+
+
+def build_spec(
+    settings: ModelSettings, encounter_period: float | None, dt: float, *, aligned: bool = False
+) -> Spec:
     """Turn the table of a model into the settings of a model, or of an ensemble of them.
 
     Parameters
@@ -109,6 +121,8 @@ def build_spec(settings: ModelSettings, encounter_period: float | None, dt: floa
         Mean encounter period, s; a preset and an ensemble need it.
     dt : float
         Time step of the prepared runs, s.
+    aligned : bool, optional
+        Whether the alignment of the preset is taken, :func:`can_align`.
 
     Returns
     -------
@@ -121,7 +135,7 @@ def build_spec(settings: ModelSettings, encounter_period: float | None, dt: floa
         If there is no encounter period to count in, or a key that has no default is missing or
         out of range.
     """
-    return resolve_model(settings, encounter_period, dt).spec
+    return resolve_model(settings, encounter_period, dt, aligned=aligned).spec
 
 
 def resolve_model(
@@ -131,6 +145,7 @@ def resolve_model(
     *,
     preset: str | None = None,
     seed: int | None = None,
+    aligned: bool = False,
 ) -> ResolvedModel:
     """Fill in, key by key, what the table of a model does not state."""
     kind = _kind_of(settings)
@@ -140,6 +155,7 @@ def resolve_model(
             f"kind = '{settings.kind}' has no preset. Remove preset = '{settings.preset}', and "
             f"state its keys: {', '.join(_defaults(kind))}."
         )
+    alignment = ALIGNMENTS.get(settings.preset or preset or "") if aligned else None
     if settings.preset is None and preset is not None:  # a baseline may lack the paper's
         preset = next((p for p in (preset, "recommended") if hasattr(kind, p)), None)
     preset = settings.preset or preset
@@ -169,10 +185,24 @@ def resolve_model(
     from_study = {"seed": seed} if ensemble and seed is not None and "seed" not in stated else {}
     filled: Spec | None = None
     if preset is not None and encounter_period is not None:
-        filled = getattr(kind, preset)(encounter_period, dt)
+        filled = _filled(kind, preset, encounter_period, dt, alignment)
     data = {"encounter_period": encounter_period, "dt": dt}
     spec = _made(kind, filled, {**from_study, **stated}, data)
     return ResolvedModel(settings.kind, preset, spec, _sources(spec, filled, stated, from_study))
+
+
+def _filled(
+    kind: type[Spec],
+    preset: str,
+    encounter_period: float,
+    dt: float,
+    alignment: ProbeAlignment | None,
+) -> Spec:
+    """Settings of a preset, aligned if the kind can be."""
+    made = getattr(kind, preset)(encounter_period, dt)
+    if alignment is not None and "alignment" in _defaults(kind):
+        made = replace(made, alignment=alignment)
+    return cast("Spec", made)
 
 
 def _kind_of(settings: ModelSettings) -> type[Spec]:

@@ -303,7 +303,8 @@ def read_study(path: Path | str) -> Study:
     """
     path = Path(path).expanduser()
     settings = validated(StudySettings, read_toml(path, "study"), path, "study")
-    campaign = read_campaign(expand(settings.study.campaign, path.parent))
+    preset = settings.study.preset
+    campaign = read_campaign(expand(settings.study.campaign, path.parent), preset)
     study = Study(path, settings, campaign)
     if mistakes := _cross_checks(study):
         raise refusal(path, "study", mistakes)

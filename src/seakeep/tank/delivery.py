@@ -40,14 +40,9 @@ MOTIONS = {
     "heave_acceleration": ("acceleration_z", "m/s^2"),
 }
 DERIVED = {
-    # Surge drifts slowly: its rate keeps what the video sees of that.
-    "surge_rate": {
-        "from": "surge_acceleration",
-        "step": "complementary_filter",
-        "position": "surge",
-        "crossover": 0.15,
-    },
-    "heave_rate": {"from": "heave_acceleration", "step": "integrate", "band": [0.2, 5.0]},
+    # Above the band the low-pass filter of [preparation] ends what is integrated, as in the paper.
+    "surge_rate": {"from": "surge_acceleration", "step": "integrate", "band": [0.2, 15.0]},
+    "heave_rate": {"from": "heave_acceleration", "step": "integrate", "band": [0.2, 15.0]},
     "pitch_acceleration": {"from": "pitch_rate", "step": "differentiate"},
 }
 LOW_PASS = {"step": "low_pass", "passband": 10.0, "stopband": 10.75}  # Hz, of the paper
@@ -218,7 +213,7 @@ def campaign_text(
         "derived": low_passed | DERIVED,
         "instruments": _instruments(settings),
         "runs": {n: _run(run, files[n], one_logger) for n, run in settings.runs.items()},
-        "preparation": {"steps_per_period": 32, "gaps": "mask"},
+        "preparation": {"preset": "paper", "gaps": "mask"},
         "model": {
             "kind": "hankel_dmdc", "preset": "paper", "states": states, "inputs": _inputs(settings),
         },
