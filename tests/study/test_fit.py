@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -511,3 +512,9 @@ def test_a_lead_reads_waves_ahead_of_time(halves):
         model = fit_campaign(asked)
     with pytest.warns(SeakeepWarning, match=r"of all reads the waves up to 0\.7 s after"):
         compare(model, asked, steps=20)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeakeepWarning)
+        (whole,) = compare(model, asked)
+    # The step to instant k reads the waves of k + 7: seven instants before the end it is the last.
+    run = asked.prepare()[whole.run]
+    assert float(whole.forecast["time"][-1]) == pytest.approx(float(run["time"][-8]))

@@ -228,7 +228,8 @@ def compare(
         first possible one of the run's test span, its delay history read from before the span
         where the run has it.
     steps : int or str, optional
-        Number of instants, or a length (``"15 T"``); by default to the end of the test span.
+        Number of instants, or a length (``"15 T"``); by default to the end of the test span, or
+        as far as the waves are measured that the models look ahead to.
     progress : callable, optional
         Called as ``progress(done, total, run)`` while runs are prepared.
     members : callable, optional
@@ -336,6 +337,7 @@ def compare_models(
     known_runs = list(prepared.values())
     first = None if start is None else instant_of(start, campaign, known_runs, "start")
     history = max(model.history_samples for model in models.values())
+    lead = max(model.signature.lead_samples for model in models.values())
     found: dict[str, list[Comparison]] = {}
     for label, model in models.items():
         warn_of_repeats(model, campaign, prepared)
@@ -353,7 +355,7 @@ def compare_models(
             )
 
         found[label] = [
-            _compare_run(model, forecast_run, run, name, first, count, history)
+            _compare_run(model, forecast_run, run, name, first, count, history, lead)
             for name, run in prepared.items()
         ]
         for each in found[label]:
@@ -412,6 +414,7 @@ def _compare_run(
     start: float | None,
     steps: int | None,
     history: int,
+    lead: int,
 ) -> Comparison:
     time = run["time"].values
     begin, end = run.attrs.get("test_span", (time[0], time[-1]))
@@ -420,6 +423,8 @@ def _compare_run(
         start = max(float(begin), float(time[first]))
     if steps is None:
         last = int(np.searchsorted(time, float(end) + 0.5 * model.dt)) - 1
+        # The last step reads the input `lead` samples after the instant that it starts from.
+        last = min(last, time.size - max(lead, 1))
         at = int(np.argmin(np.abs(time - start)))
         steps = max(last - at, 1)
     found = forecast_run(run, start, steps)

@@ -20,7 +20,7 @@ from seakeep import statistics
 from seakeep.arrays import FloatArray
 from seakeep.core.calibration import calibrated_bounds
 from seakeep.core.coverage import CoverageTable
-from seakeep.errors import DataError, SeakeepWarning
+from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.models.summaries import STATISTICS
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
@@ -376,7 +376,7 @@ def _divergences(
                 stream = f"jsd.{name}.{variant}.{channel}"
                 table[:, v, c] = _divergence(p, m, segments, variant, settings, stream)
             curves[:, c] = _densities(p, m, settings, f"densities.{name}.{channel}")
-        except DataError as error:
+        except (DataError, RequestError) as error:  # a series that stands still has no density
             warnings.warn(
                 f"the densities of {channel} as forecast by '{model}' and as measured, over the "
                 f"windows of '{name}', cannot be compared and are left out: {error}",
