@@ -564,9 +564,9 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
             r"--scheduler is for ensembles, and",
         ),
         (
-            f"calibrate ensemble.nc {CAMPAIGN} --steps 9 --scale learnt -o c.nc",
+            f"calibrate ensemble.nc {CAMPAIGN} --steps 9 --scale half -o c.nc",
             2,
-            r"scale = 'learnt' is not offered.* Take 'spread'",
+            r"scale must be 'spread', 'constant' or 'learnt'; received 'half'",
         ),
         (
             f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unsen -o c.nc",

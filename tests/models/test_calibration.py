@@ -62,9 +62,16 @@ def moved(ensemble, run):
     return ensemble.calibrate(run.sel(time=slice(None, 110.0)), steps=40, scale="constant")
 
 
-@pytest.mark.parametrize("scale", ["spread", "constant"])
-def test_the_calibrated_band_covers_unseen_windows_as_it_says(calibrated, moved, run, scale):
-    calibrated = {"spread": calibrated, "constant": moved}[scale]
+@pytest.fixture(scope="module")
+def learnt(ensemble, run):
+    return ensemble.calibrate(run.sel(time=slice(None, 110.0)), steps=40, scale="learnt")
+
+
+@pytest.mark.parametrize("scale", ["spread", "constant", "learnt"])
+def test_the_calibrated_band_covers_unseen_windows_as_it_says(
+    calibrated, moved, learnt, run, scale
+):
+    calibrated = {"spread": calibrated, "constant": moved, "learnt": learnt}[scale]
     inside = {"members": [], "calibrated": []}
     for start in np.arange(112.0, 155.0, 4.0):
         for band, found in inside.items():
@@ -214,9 +221,24 @@ def test_runs_without_names_are_known_by_their_samples(run):
         named.calibrate(1.001 * sea(0, 500, "a").assign_attrs(run="a"), steps=250)
 
 
-@pytest.mark.parametrize("scale", ["spread", "constant"])
-def test_a_file_keeps_the_calibration(calibrated, moved, ensemble, run, tmp_path, scale):
-    calibrated = {"spread": calibrated, "constant": moved}[scale]
+def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(learnt, run):
+    one = learnt.forecast_summary(run, 120.0, 30, band="calibrated")
+    several = learnt.summarize_windows(run, [115.0, 120.0], 30, band="calibrated")
+    x, u = (np.stack([run[n].values for n in names], axis=1) for names in (STATES, INPUTS))
+    arrays = learnt.hold().forecast_arrays(x[:1201], u[:1201], u[1201:1230], 30, band="calibrated")
+    half = (one["heave"].sel(statistic="upper") - one["heave"].sel(statistic="mean")).values
+    assert np.ptp(half) > 0.01 * half.mean()  # the scale is no constant
+    for k, name in enumerate(STATES):
+        # Products of matrices of other sizes: other roundings.
+        np.testing.assert_allclose(several[name][1], one[name], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(arrays.upper[:, k], one[name].sel(statistic="upper"), atol=1e-9)
+    assert "learnt from the members' spread" in one["statistic"].attrs["comment"]
+    assert "times a learnt scale and a floor of" in learnt.summary()
+
+
+@pytest.mark.parametrize("scale", ["spread", "constant", "learnt"])
+def test_a_file_keeps_the_calibration(calibrated, moved, learnt, ensemble, run, tmp_path, scale):
+    calibrated = {"spread": calibrated, "constant": moved, "learnt": learnt}[scale]
     calibrated.save(tmp_path / "ensemble.nc")
     kept = seakeep.load_model(tmp_path / "ensemble.nc")
     xr.testing.assert_identical(
@@ -245,6 +267,7 @@ def altered(calibrated, path, **values):
         ({"floor": [0.1]}, r"floor of the calibration is no list of 2 numbers from zero on"),
         ({"margin": [0.1, -1.0]}, r"margin of the calibration is no list of 2 numbers"),
         ({"windows": "gone"}, "a part is missing: 'windows'"),
+        ({"law": [[1.0, 2.0]]}, "law of the calibration is no table of 4 rows of 2 numbers"),
         ({"level": 2.0}, "level must lie between 0 and 1"),
     ],
 )
@@ -283,7 +306,7 @@ def test_folds_are_forecast_by_what_the_other_runs_teach():
         )[name]
         for name, run in runs.items()
     ]
-    expected, floor = found_margin(judged, 0.95, "spread")
+    expected, floor, _ = found_margin(judged, 0.95, "spread")
     np.testing.assert_allclose(found.found.margin, expected.margin, rtol=1e-9)
     np.testing.assert_allclose(found.floor, floor, rtol=1e-9)
     assert found.folds == "run"
@@ -357,9 +380,11 @@ def test_what_is_refused(ensemble, calibrated, run):
         ensemble.calibrate(run, steps=0)
     with pytest.raises(RequestError, match="level must lie between 0 and 1"):
         ensemble.calibrate(run, steps=40, level=95)
-    with pytest.raises(RequestError, match=r"scale = 'learnt' is not offered.* Take 'spread'"):
-        ensemble.calibrate(run, steps=40, scale="learnt")
-    with pytest.raises(RequestError, match="must be 'spread' or 'constant'; received 'x'"):
+    with pytest.raises(RequestError, match=r"learns from some windows and judges others.* is 1\."):
+        ensemble.calibrate(run.sel(time=slice(60.0, 69.0)), steps=40, scale="learnt")
+    with pytest.raises(
+        RequestError, match="must be 'spread', 'constant' or 'learnt'; received 'x'"
+    ):
         ensemble.calibrate(run, steps=40, scale="x")
     with pytest.raises(RequestError, match="folds must be 'run', or None"):
         ensemble.calibrate(run, steps=40, folds="window")

@@ -4,8 +4,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from seakeep.core.calibration import calibrated_bounds, spread_floor, spread_scores
+from seakeep.core.calibration import (
+    band_scale,
+    calibrated_bounds,
+    learn_scale,
+    scaled_scores,
+    spread_floor,
+    wave_envelope,
+)
 from seakeep.errors import DataError, RequestError
+from seakeep.models.calibration import Judged, found_margin
 from seakeep.statistics import band_scores, conformal_margin, coverage
 
 
@@ -90,14 +98,15 @@ def test_a_band_that_follows_the_spread_covers_and_is_narrower_than_a_constant_o
         half = 1.96 * std
         seen, new = slice(None, windows), slice(windows, None)
         floor = spread_floor(mean[seen], y[seen])
-        found = conformal_margin(spread_scores(mean[seen], std[seen], y[seen], floor))
+        scale = band_scale(std, floor)
+        found = conformal_margin(scaled_scores(mean[seen], scale[seen], y[seen]))
         moved = conformal_margin(
             band_scores(mean[seen] - half[seen], mean[seen] + half[seen], y[seen])
         )
-        members = (mean[new], std[new], mean[new] - half[new], mean[new] + half[new])
+        members = (mean[new], mean[new] - half[new], mean[new] + half[new])
         highest = sigma[new] > np.quantile(sigma[new], 2 / 3)
         bands = (
-            calibrated_bounds(*members, found.margin, floor),
+            calibrated_bounds(*members, found.margin, scale[new]),
             calibrated_bounds(*members, moved.margin, None),
         )
         for k, (low, up) in enumerate(bands):
@@ -112,6 +121,59 @@ def test_a_band_that_follows_the_spread_covers_and_is_narrower_than_a_constant_o
     assert widths[0].mean() < 0.98 * widths[1].mean()
 
 
+def learnable(windows, steps, seed):
+    """Errors whose scale goes with the spread, with the waves, and grows over the horizon."""
+    rng = np.random.default_rng(seed)
+    envelope = np.exp(rng.normal(0.0, 0.5, (windows, steps)))
+    std = np.exp(rng.normal(0.0, 0.5, (windows, steps, 1)))
+    horizon = (1.0 + np.arange(steps))[:, None]
+    sigma = 0.4 * std**0.5 * envelope[..., None] ** 0.8 * horizon**0.3
+    mean = rng.standard_normal(sigma.shape)
+    return mean, std, mean + sigma * rng.standard_normal(sigma.shape), envelope, sigma
+
+
+def test_a_learnt_scale_is_the_one_that_the_errors_have():
+    mean, std, y, envelope, sigma = learnable(400, 50, 0)
+    floor = 1e-3 * spread_floor(mean, y)  # the spread alone, and no floor
+    law = learn_scale(mean, std, y, envelope, floor)
+    # 20,000 normal errors know a logarithm of their scale to 1/√40,000; the ridge takes 0.1 %.
+    np.testing.assert_allclose(law[1:, 0], [0.5, 0.3, 0.8], atol=0.03)
+    found = band_scale(std, floor, law, envelope)
+    np.testing.assert_allclose(np.log(found / sigma), 0.0, atol=0.1)
+
+
+def test_a_learnt_band_covers_by_simulation_and_is_narrower():
+    inside, widths = np.empty((2, 2, 60))
+    for repeat in range(60):
+        seen, new = learnable(24, 50, 2 * repeat), learnable(24, 50, 2 * repeat + 1)
+        judged = [
+            Judged(np.stack([mean, std, mean - 2 * std, mean + 2 * std], axis=1), y, envelope)
+            for mean, std, y, envelope in (
+                tuple(each[part] for each in seen[:4]) for part in (slice(0, 12), slice(12, 24))
+            )
+        ]
+        mean, std, y, envelope, _ = new
+        for row, scale in enumerate(("learnt", "spread")):
+            found, floor, law = found_margin(judged, 0.95, scale)
+            half = found.margin * band_scale(std, floor, law, envelope)
+            inside[row, repeat] = (np.abs(y - mean) <= half).mean()
+            widths[row, repeat] = half.mean()
+    # 60 repeats of 1200 errors; the margin itself is known to 0.01 in each.
+    np.testing.assert_allclose(inside.mean(axis=1), 0.95, atol=0.01)
+    assert widths[0].mean() < 0.85 * widths[1].mean()
+
+
+def test_the_envelope_is_that_of_the_waves_that_drive_a_step():
+    rng = np.random.default_rng(5)
+    waves, z, steps = rng.standard_normal((2, 12, 3)), 4, 8
+    found = wave_envelope(waves, steps)
+    for step in range(steps):
+        expected = np.sqrt(np.mean(waves[:, step : step + z + 1] ** 2, axis=(1, 2)))
+        # Differences of running sums.
+        np.testing.assert_allclose(found[:, step], expected, rtol=1e-12)
+    np.testing.assert_array_equal(wave_envelope(np.empty((2, 12, 0)), steps), 1.0)
+
+
 def test_floor_and_scores_by_hand_and_forecasts_that_are_lost():
     mean = np.array([[[0.0], [2.0]], [[np.nan], [np.nan]]])
     y = np.array([[[3.0], [-2.0]], [[0.0], [0.0]]])
@@ -119,11 +181,11 @@ def test_floor_and_scores_by_hand_and_forecasts_that_are_lost():
     assert floor[0] == pytest.approx(np.sqrt((9 + 16) / 2) / 4, rel=1e-15)
     assert spread_floor(mean[1:], y[1:])[0] == 1.0
     std = np.array([[[0.0], [1.0]], [[np.nan], [np.nan]]])
-    scores = spread_scores(mean, std, y, floor)
+    scores = scaled_scores(mean, band_scale(std, floor), y)
     np.testing.assert_allclose(scores[0, :, 0], [3 / floor[0], 4 / np.hypot(1, floor[0])])
     assert np.isinf(scores[1]).all()
     # Neither error nor scale: a channel that never moves.
-    assert spread_scores(y * 0, y * 0, y * 0, np.zeros(1)).max() == 0.0
+    assert scaled_scores(y * 0, y * 0, y * 0).max() == 0.0
 
 
 def test_few_blocks_warrant_less_and_give_the_largest_score():

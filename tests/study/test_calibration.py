@@ -1,5 +1,7 @@
 """Bands of a study calibrated on training data: with 'recommended' by default, never on tests."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -36,9 +38,9 @@ def test_the_paper_has_no_calibration_unless_asked(study_folder, preset, stated,
     assert study.settings.calibrates is expected
 
 
-@pytest.mark.parametrize("scale", ["spread", "constant"])
+@pytest.mark.parametrize("scale", ["spread", "learnt"])
 def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder, scale):
-    stated = [("n_series = 8", 'n_series = 8\nscale = "constant"')] if scale == "constant" else []
+    stated = [] if scale == "spread" else [("n_series = 8", f'n_series = 8\nscale = "{scale}"')]
     study = edited(study_folder, ("length = 6", "length = 3"), *stated)
     found = run_study(study, study_folder / "out")
     plan, runs = make_plan(study)
@@ -60,6 +62,17 @@ def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder
             np.testing.assert_allclose(kept["floor"][k], alone.floor, rtol=1e-9)
             half = alone.found.margin * np.sqrt(cell["bayesian_std"] ** 2 + alone.floor**2)
             lower, upper = cell["bayesian_mean"] - half, cell["bayesian_mean"] + half
+        if scale == "learnt":
+            np.testing.assert_allclose(kept["law"][k], alone.law, rtol=1e-6, atol=1e-9)
+            band = replace(ensemble, calibration=alone)
+            for number, window in enumerate(plan.tests["unseen"]):
+                shown = band.forecast_summary(
+                    runs[window.run], window.start, steps, band="calibrated"
+                )
+                for name in plan.states:
+                    place = {"window": number, "channel": plan.states.index(name)}
+                    lower[place] = shown[name].sel(statistic="lower").values
+                    upper[place] = shown[name].sel(statistic="upper").values
         inside.append(((lower <= cell["measured"]) & (cell["measured"] <= upper)).values)
     by_channel = np.mean(inside, axis=(0, 1, 2))
     np.testing.assert_allclose(table["calibrated_inside"][1:], by_channel, rtol=1e-9)

@@ -74,7 +74,8 @@ def calibrate(
         typer.Option(
             "--scale",
             help="What the half-width follows: 'spread', a factor times that of the members with a "
-            "floor, or 'constant', the members' band moved outwards by as much everywhere.",
+            "floor, 'constant', the members' band moved outwards by as much everywhere, or "
+            "'learnt' from spread, horizon and waves.",
         ),
     ] = "spread",
     folds: Annotated[
@@ -201,7 +202,11 @@ def _table(ensemble: HankelEnsemble) -> Table:
     calibration = ensemble.calibration
     assert calibration is not None
     found, windows, floor = calibration.found, calibration.windows, calibration.floor
-    made = "Margin" if floor is None else "Factor k and floor f, ±k·√(σ² + f²),"
+    made = {
+        "constant": "Margin",
+        "spread": "Factor k and floor f, ±k·√(σ² + f²),",
+        "learnt": "Factor k of a learnt scale and its floor f",
+    }[calibration.scale]
     width = found.margin if floor is None else floor
     title = (
         f"{made} of the {100 * found.level:g} % band, from "

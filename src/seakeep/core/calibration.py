@@ -2,7 +2,8 @@
 
 Split-conformal prediction: the ensemble forecasts windows that its members never saw, and a
 quantile of its errors there makes the band. Either the band of the members is moved outwards by a
-constant margin, or the half-width is a factor times a scale that follows the members' spread.
+constant margin, or the half-width is a factor times a scale that follows the members' spread, or
+one that is learnt from spread, horizon and waves.
 """
 
 from __future__ import annotations
@@ -17,15 +18,20 @@ from seakeep.errors import DataError, RequestError
 
 __all__ = [
     "ConformalMargin",
+    "band_scale",
     "band_scores",
     "calibrated_bounds",
     "conformal_margin",
+    "learn_scale",
+    "scaled_scores",
     "spread_floor",
-    "spread_scores",
+    "wave_envelope",
 ]
 
 FLOOR = 0.25
 """Part of the root mean square error below which the scale of a band never falls."""
+CALM = 0.05
+"""Envelope, in standard deviations of the training waves, below which waves count as none."""
 
 
 @dataclass(frozen=True)
@@ -104,35 +110,160 @@ def spread_floor(mean: FloatArray, measured: FloatArray) -> FloatArray:
     return np.where(count > 0, FLOOR * rms, 1.0)
 
 
-def spread_scores(
-    mean: FloatArray, std: FloatArray, measured: FloatArray, floor: FloatArray
-) -> FloatArray:
-    r"""Errors over :math:`\sqrt{\sigma^2 + f^2}`, σ the members' spread and f the `floor`.
+def wave_envelope(deviations: FloatArray, steps: int) -> FloatArray:
+    """Root mean square of the waves that drive each step.
 
-    Arrays (…, time, channel); infinite where the forecast is lost (NaN), zero where error and scale
-    both are.
+    Parameters
+    ----------
+    deviations : ndarray, shape (window, z + steps, Q)
+        Standardised inputs.
+    steps : int
+        Steps of a window.
+
+    Returns
+    -------
+    ndarray, shape (window, steps)
+        Over the z + 1 rows that drive a step, and over the inputs; 1 without inputs.
     """
-    error, scale = np.abs(measured - mean), np.hypot(std, floor)
+    windows, rows, count = deviations.shape
+    if not count:
+        return np.ones((windows, steps))
+    total = np.zeros((windows, rows + 1))
+    np.cumsum(np.sum(deviations**2, axis=2), axis=1, out=total[:, 1:])
+    length = rows - steps + 1
+    out: FloatArray = np.sqrt((total[:, length:] - total[:, :steps]) / (length * count))
+    return out
+
+
+def _features(std: FloatArray, envelope: FloatArray, floor: FloatArray) -> FloatArray:
+    """What a learnt scale depends on, (…, steps, N, 4): one, spread, horizon and waves, as logs."""
+    unit = np.where(floor > 0, floor, 1.0)
+    spread = np.log(np.hypot(std, unit) / unit)
+    horizon = np.log1p(np.arange(std.shape[-2], dtype=float))[:, None]
+    waves = np.log(np.maximum(envelope, CALM))[..., None]
+    parts = np.broadcast_arrays(1.0, spread, horizon, waves)
+    return np.stack(parts, axis=-1)
+
+
+def learn_scale(
+    mean: FloatArray,
+    std: FloatArray,
+    measured: FloatArray,
+    envelope: FloatArray,
+    floor: FloatArray,
+) -> FloatArray:
+    r"""Learn the logarithm of the scale of the errors, channel by channel.
+
+    Parameters
+    ----------
+    mean, std, measured : ndarray, shape (window, steps, N)
+        Of the forecast, and the measurement; windows that were lost (NaN) are left out.
+    envelope : ndarray, shape (window, steps)
+        From :func:`wave_envelope`.
+    floor : ndarray, shape (N,)
+        From :func:`spread_floor`.
+
+    Returns
+    -------
+    ndarray, shape (4, N)
+        Coefficients of one, :math:`\log\sqrt{1 + \sigma^2/f^2}`, the logarithm of the step's
+        number and that of the envelope.
+
+    Notes
+    -----
+    They make errors that are normal with this scale most likely; that is a convex problem, which
+    Newton's method solves. A small ridge keeps what the windows do not vary in at zero.
+    """
+    kept = ~np.isnan(mean).any(axis=(1, 2))
+    x = _features(std[kept], envelope[kept], floor)
+    ratio = ((measured - mean)[kept] / np.where(floor > 0, floor / FLOOR, 1.0)) ** 2
+    law = np.zeros((4, x.shape[2]))
+    for channel in range(x.shape[2]):
+        rows = x[:, :, channel].reshape(-1, 4)
+        law[:, channel] = _most_likely(rows, ratio[..., channel].ravel())
+    return law
+
+
+def _most_likely(x: FloatArray, squares: FloatArray) -> FloatArray:
+    """Coefficients β of the log-scale xβ of normal errors with these squares."""
+    ridge = 1e-3 * max(len(x), 1) * np.diag([0.0, 1.0, 1.0, 1.0])
+    law = np.zeros(4)
+
+    def cost(beta: FloatArray) -> float:
+        # A scale that is far too small costs more than any number.
+        exponent = np.minimum(-2.0 * (x @ beta), 700.0)
+        return float(np.sum(x @ beta + 0.5 * squares * np.exp(exponent))) + 0.5 * float(
+            beta @ ridge @ beta
+        )
+
+    for _ in range(50):
+        weights = squares * np.exp(-2.0 * (x @ law))
+        gradient = x.T @ (1.0 - weights) + ridge @ law
+        curvature = 2.0 * (x * weights[:, None]).T @ x + ridge + 1e-9 * np.eye(4)
+        step, length = np.linalg.solve(curvature, gradient), 1.0
+        while cost(law - length * step) > cost(law) and length > 1e-6:
+            length *= 0.5
+        law = law - length * step
+        if np.abs(length * step).max() < 1e-9:
+            break
+    return law
+
+
+def band_scale(
+    std: FloatArray,
+    floor: FloatArray,
+    law: FloatArray | None = None,
+    envelope: FloatArray | None = None,
+) -> FloatArray:
+    r"""Scale of the errors: :math:`\sqrt{\sigma^2 + f^2}`, or a learnt one not below f.
+
+    Parameters
+    ----------
+    std : ndarray, shape (…, steps, N)
+        Spread of the members.
+    floor : ndarray, shape (N,)
+        From :func:`spread_floor`.
+    law : ndarray, shape (4, N), optional
+        From :func:`learn_scale`.
+    envelope : ndarray, shape (…, steps), optional
+        From :func:`wave_envelope`; with `law`.
+
+    Returns
+    -------
+    ndarray, shape (…, steps, N)
+    """
+    if law is None or envelope is None:
+        return np.hypot(std, floor)
+    exponent = np.einsum("...nk,kn->...n", _features(std, envelope, floor), law)
+    learnt: FloatArray = np.maximum(floor / FLOOR * np.exp(np.minimum(exponent, 50.0)), floor)
+    return learnt  # NaN where the forecast is lost
+
+
+def scaled_scores(mean: FloatArray, scale: FloatArray, measured: FloatArray) -> FloatArray:
+    """Errors over a scale, (…, time, channel); infinite where the forecast is lost (NaN).
+
+    Zero where error and scale both are.
+    """
+    error = np.abs(measured - mean)
     found = np.divide(error, scale, out=np.zeros_like(error), where=scale != 0)
     return np.where(np.isnan(found), np.inf, found)
 
 
 def calibrated_bounds(
     mean: FloatArray,
-    std: FloatArray,
     lower: FloatArray,
     upper: FloatArray,
     margin: FloatArray,
-    floor: FloatArray | None,
+    scale: FloatArray | None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Bounds of a calibrated band: those of the members moved, or a factor times their spread.
+    """Bounds of a calibrated band: those of the members moved, or a factor times a scale.
 
-    Without a floor the margin is added outside of `lower` and `upper`; with one it is the factor
-    of the scale of :func:`spread_scores` around `mean`.
+    Without a scale the margin is added outside of `lower` and `upper`; with one, of
+    :func:`band_scale`, it is its factor around `mean`.
     """
-    if floor is None:
+    if scale is None:
         return lower - margin, upper + margin
-    half = margin * np.hypot(std, floor)
+    half = margin * scale
     return mean - half, mean + half
 
 

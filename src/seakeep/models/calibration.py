@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Literal, Protocol, get_args
+from typing import Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
 import xarray as xr
@@ -15,19 +15,22 @@ import xarray as xr
 from seakeep.arrays import FloatArray, fraction, whole_number
 from seakeep.core.calibration import (
     ConformalMargin,
+    band_scale,
     band_scores,
     calibrated_bounds,
     conformal_margin,
+    learn_scale,
+    scaled_scores,
     spread_floor,
-    spread_scores,
+    wave_envelope,
 )
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice
 from seakeep.models.engine import Runs as FreeRuns
-from seakeep.models.engine import member_series, read_windows
+from seakeep.models.engine import Windows, member_series, read_windows
 from seakeep.models.executor import Progress
-from seakeep.models.interface import Json
+from seakeep.models.interface import Json, Signature
 from seakeep.models.members import TrainingArrays
 from seakeep.models.summaries import reduce_members
 
@@ -35,8 +38,10 @@ __all__ = [
     "Band",
     "BandScale",
     "Calibration",
+    "Judged",
     "calibrate",
     "check_band",
+    "envelope_of",
     "found_margin",
     "held_out",
     "warn_of_horizon",
@@ -44,10 +49,26 @@ __all__ = [
 ]
 
 Band = Literal["members", "calibrated"]
-BandScale = Literal["spread", "constant"]
-Judged = tuple[FloatArray, FloatArray]
-"""Statistics of windows, (window, 4, steps, N), and the measurement, (window, steps, N)."""
+BandScale = Literal["spread", "constant", "learnt"]
 NUMBERS = ("margin", "block_length", "blocks", "warranted")
+
+
+class Judged(NamedTuple):
+    """Forecasts of windows that no member has read.
+
+    Attributes
+    ----------
+    values : ndarray, shape (window, 4, steps, N)
+        Statistics of the members.
+    measured : ndarray, shape (window, steps, N)
+        The measurement.
+    envelope : ndarray, shape (window, steps)
+        Waves that drive each step; see :func:`envelope_of`.
+    """
+
+    values: FloatArray
+    measured: FloatArray
+    envelope: FloatArray
 
 
 class Ensemble(FreeRuns, Protocol):
@@ -71,8 +92,10 @@ class Calibration:
     found : ConformalMargin
         Margins of the states, or factors of their scale.
     floor : ndarray of shape (N,), or None
-        Least scale of each state, a quarter of its root mean square error, where the band follows
-        the members' spread; None where the margin is constant.
+        Least scale of each state, a quarter of its root mean square error; None where the margin
+        is constant.
+    law : ndarray of shape (4, N), or None
+        Coefficients of a learnt scale (:func:`seakeep.core.calibration.learn_scale`).
     windows : dict of str to int
         Number of windows in each run.
     steps : int
@@ -85,6 +108,7 @@ class Calibration:
 
     found: ConformalMargin
     floor: FloatArray | None
+    law: FloatArray | None
     windows: dict[str, int]
     steps: int
     spans: dict[str, tuple[float, float]]
@@ -93,12 +117,19 @@ class Calibration:
     @property
     def scale(self) -> BandScale:
         """What the half-width follows."""
+        if self.law is not None:
+            return "learnt"
         return "constant" if self.floor is None else "spread"
 
     @property
     def bounds(self) -> str:
         """What the bounds of the band are, in words."""
         level = self.found.level
+        if self.law is not None:
+            return (
+                "the mean minus and plus a calibrated factor times a scale learnt from the "
+                "members' spread, the horizon and the waves, not below a floor"
+            )
         if self.floor is not None:
             return (
                 "the mean minus and plus a calibrated factor times the root of the members' "
@@ -111,9 +142,10 @@ class Calibration:
         """As text; a margin that is infinite is kept as such."""
         arrays: Json = {key: getattr(self.found, key).tolist() for key in NUMBERS}
         floor = None if self.floor is None else self.floor.tolist()
+        law = None if self.law is None else self.law.tolist()
         words = {"level": self.found.level, "windows": self.windows, "steps": self.steps}
         return json.dumps(
-            arrays | words | {"spans": self.spans, "floor": floor, "folds": self.folds}
+            arrays | words | {"spans": self.spans, "floor": floor, "law": law, "folds": self.folds}
         )
 
     @classmethod
@@ -132,7 +164,10 @@ class Calibration:
         found = ConformalMargin(**arrays, level=fraction(kept["level"], "level"))
         spans = {name: (float(a), float(b)) for name, (a, b) in kept["spans"].items()}
         windows = {name: int(count) for name, count in kept["windows"].items()}
-        return cls(found, floor, windows, int(kept["steps"]), spans, kept["folds"])
+        law = None if kept["law"] is None else np.array(kept["law"], dtype=float)
+        if law is not None and (law.shape != (4, channels) or not np.all(np.isfinite(law))):
+            raise ValueError(f"law of the calibration is no table of 4 rows of {channels} numbers")
+        return cls(found, floor, law, windows, int(kept["steps"]), spans, kept["folds"])
 
 
 def _positive(kept: Json, key: str, channels: int) -> FloatArray:
@@ -177,34 +212,51 @@ def calibrate(
             "or runs that do not train; or let each run that trains be forecast by what the "
             "others teach (folds = 'run')."
         )
-    found, floor = found_margin(judged.values(), level, scale)
-    windows = {name: len(measured) for name, (_, measured) in judged.items()}
+    found, floor, law = found_margin(judged.values(), level, scale)
+    windows = {name: len(each.measured) for name, each in judged.items()}
     spans = {
         n: (starts[0], starts[-1] + steps * ensemble.signature.dt) for n, starts in free.items()
     }
-    return Calibration(found, floor, windows, steps, spans, folds)
+    return Calibration(found, floor, law, windows, steps, spans, folds)
 
 
 def found_margin(
     judged: Iterable[Judged], level: float, scale: BandScale
-) -> tuple[ConformalMargin, FloatArray | None]:
-    """Margins of bands in windows that no member has read, and the floor of their scale."""
-    values, measured = (np.concatenate(each) for each in zip(*judged, strict=True))
+) -> tuple[ConformalMargin, FloatArray | None, FloatArray | None]:
+    """Margins of bands in windows that no member has read, the floor of their scale, and its law.
+
+    A learnt scale judges the windows of each run by what the other runs teach, and those of a
+    single run by halves; the law that is kept is that of all windows.
+    """
+    parts = list(judged)
+    values, measured, envelope = (np.concatenate(each) for each in zip(*parts, strict=True))
     mean, std, lower, upper = np.moveaxis(values, 1, 0)
     if scale == "constant":
-        return conformal_margin(band_scores(lower, upper, measured), level), None
+        return conformal_margin(band_scores(lower, upper, measured), level), None, None
     floor = spread_floor(mean, measured)
-    return conformal_margin(spread_scores(mean, std, measured, floor), level), floor
+    if scale == "spread":
+        found = scaled_scores(mean, band_scale(std, floor), measured)
+        return conformal_margin(found, level), floor, None
+    groups = np.repeat(np.arange(len(parts)), [len(each.measured) for each in parts])
+    if len(parts) == 1:
+        groups = np.arange(len(measured)) % 2
+    if len(measured) < 2:
+        raise RequestError(
+            "scale = 'learnt' learns from some windows and judges others, and there is 1. Give "
+            "more or longer runs, fewer steps, or take scale = 'spread'."
+        )
+    scores = np.empty(mean.shape)
+    for group in np.unique(groups):
+        rest, here = groups != group, groups == group
+        law = learn_scale(mean[rest], std[rest], measured[rest], envelope[rest], floor)
+        scales = band_scale(std[here], floor, law, envelope[here])
+        scores[here] = scaled_scores(mean[here], scales, measured[here])
+    law = learn_scale(mean, std, measured, envelope, floor)
+    return conformal_margin(scores, level), floor, law
 
 
 def check_scale(scale: str) -> None:
     """Refuse a scale of the band that there is not."""
-    if scale == "learnt":
-        raise RequestError(
-            "scale = 'learnt' is not offered: a regression of the errors on wave envelope, horizon "
-            "and spread made bands as wide as scale = 'spread', which holds more in other waves. "
-            "Take 'spread'."
-        )
     check_choice("scale", scale, get_args(BandScale))
 
 
@@ -232,7 +284,7 @@ def held_out(
 
     Returns
     -------
-    dict of str to (ndarray of shape (window, 4, steps, N), ndarray of shape (window, steps, N))
+    dict of str to Judged
         Runs in which there is such a window.
     """
     level = fraction(level, "level")
@@ -277,8 +329,22 @@ def _judged(
         measured = np.stack(
             [_measured(ensemble, run, name, start, steps) for _, start in windows.places]
         )
-        found[name] = values, measured
+        found[name] = Judged(values, measured, envelope_of(ensemble.signature, windows))
     return found
+
+
+def envelope_of(signature: Signature, windows: Windows) -> FloatArray:
+    """Root mean square of the waves that drive each step, (window, steps), in training SD.
+
+    Over the input delays, and over the inputs as the map carries them; with a predicted surge
+    those of the first pass.
+    """
+    count = len(signature.inputs)
+    centre, spread = (
+        part[:count] for part in (signature.input_scale.centre, signature.input_scale.spread)
+    )
+    values = (windows.delayed[..., :count] - centre) / np.where(spread > 0, spread, 1.0)
+    return wave_envelope(values, windows.steps)
 
 
 def _counted(progress: Progress, before: int, total: int, name: str) -> Progress:
@@ -397,11 +463,20 @@ def warn_of_horizon(
         )
 
 
-def widened(calibration: Calibration | None, values: FloatArray, band: Band) -> FloatArray:
-    """Statistics of shape (…, 4, steps, N) with the bounds of a band that was checked."""
+def widened(
+    calibration: Calibration | None,
+    values: FloatArray,
+    band: Band,
+    signature: Signature,
+    windows: Windows,
+) -> FloatArray:
+    """Statistics of shape (window, 4, steps, N) with the bounds of a band that was checked."""
     if band == "members" or calibration is None:
         return values
-    mean, std, lower, upper = np.moveaxis(values, -3, 0)
-    margin, floor = calibration.found.margin, calibration.floor
-    bounds = calibrated_bounds(mean, std, lower, upper, margin, floor)
-    return np.stack([mean, std, *bounds], axis=-3)
+    mean, std, lower, upper = np.moveaxis(values, 1, 0)
+    scale = None
+    if calibration.floor is not None:
+        envelope = envelope_of(signature, windows)
+        scale = band_scale(std, calibration.floor, calibration.law, envelope)
+    bounds = calibrated_bounds(mean, lower, upper, calibration.found.margin, scale)
+    return np.stack([mean, std, *bounds], axis=1)

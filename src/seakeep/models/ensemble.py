@@ -307,7 +307,7 @@ class _Forecasts(Forecaster):
             warn_of_horizon(self.calibration, windows.places[0][0], windows.steps)
         with member_series(self, windows, executor, progress) as (series, lost):
             values = reduce_members(series, lost, level)
-        return windows, widened(self.calibration, values, band), lost
+        return windows, widened(self.calibration, values, band, self.signature, windows), lost
 
     def _status(self, lost: npt.NDArray[np.int64], windows: Windows) -> xr.Variable:
         return xr.Variable(("member",), statuses(lost, windows, 0, self.dt))
@@ -560,8 +560,9 @@ class HankelEnsemble(_Forecasts):
             if calibration.floor is None:
                 line += f"wider by {_range(found.margin / self.state_spread, '.2g')} "
             else:
+                what = "a learnt scale" if calibration.scale == "learnt" else "spread"
                 line += (
-                    f"{_range(found.margin, '.2g')} times spread and a floor of "
+                    f"{_range(found.margin, '.2g')} times {what} and a floor of "
                     f"{_range(calibration.floor / self.state_spread, '.2g')} "
                 )
             lines.append(line + "training SD either way")
@@ -628,11 +629,13 @@ class HankelEnsemble(_Forecasts):
             Instants of a window: as many as will be forecast.
         level : float, optional
             Probability that the band is to have.
-        scale : {"spread", "constant"}, optional
+        scale : {"spread", "constant", "learnt"}, optional
             ``"spread"``: the band is :math:`\mu \pm k \sqrt{\sigma^2 + (e/4)^2}`, with mean and
             standard deviation of the members at each instant, e the root mean square error of the
             mean in these windows, and k the quantile. ``"constant"``: the members' own band, moved
-            outwards by as much at every instant.
+            outwards by as much at every instant. ``"learnt"``: the logarithm of the scale is
+            regressed on spread, horizon and waves, cross-fitted over the runs, or over halves of
+            the windows of a single one.
         folds : {"run"}, optional
             For runs that train, read to their ends: each is forecast by the same members as they
             learn from the other runs, and the margin goes to the members as they are. What the
@@ -908,8 +911,10 @@ class HeldEnsemble(_Forecasts):
         with one_blas_thread():
             out = self.free_runs([windows], range(self.n_members))[0][:, 0]
         kept = out[engine.first_lost(out) < 0]
-        values = widened(self.calibration, statistics_of(kept, level), band)
-        mean, std, lower, upper = values
+        values = statistics_of(kept, level)[None]
+        mean, std, lower, upper = widened(self.calibration, values, band, self.signature, windows)[
+            0
+        ]
         return BandForecast(mean, std, lower, upper, len(out) - len(kept))
 
 

@@ -18,7 +18,7 @@ import xarray as xr
 
 from seakeep import statistics
 from seakeep.arrays import FloatArray
-from seakeep.core.calibration import calibrated_bounds
+from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.coverage import CoverageTable
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.models.summaries import STATISTICS
@@ -283,8 +283,14 @@ def band_of(
         return test[f"{model}_lower"].values, test[f"{model}_upper"].values
     mean, std, lower, upper = (test[f"{model}_{key}"].values for key in STATISTICS)
     margin = calibration["margin"].values[:, None, None, :]
-    floor = calibration["floor"].values[:, None, None, :] if "floor" in calibration else None
-    return calibrated_bounds(mean, std, lower, upper, margin, floor)
+    scale = None
+    if "law" in calibration:
+        laws = (calibration["floor"].values, calibration["law"].values)
+        each = zip(std, *laws, test[f"{model}_envelope"].values, strict=True)
+        scale = np.stack([band_scale(*row) for row in each])
+    elif "floor" in calibration:
+        scale = band_scale(std, calibration["floor"].values[:, None, None, :])
+    return calibrated_bounds(mean, lower, upper, margin, scale)
 
 
 def _coverage_row(

@@ -348,7 +348,7 @@ class Plan:
         Samples of the largest draw of all models.
     calibrated_on : tuple of str
         Runs that train, if bands are to be calibrated on them.
-    scale : {"spread", "constant"}
+    scale : {"spread", "constant", "learnt"}
         What the half-width of calibrated bands follows.
     eigenvalues : bool
         Whether those of every model are kept.

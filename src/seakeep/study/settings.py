@@ -145,10 +145,11 @@ class StatisticsSettings(Table):
         description="whether the bands of ensembles are calibrated too, on training data that "
         "members have not read; left out, with preset = 'recommended' alone",
     )
-    scale: Literal["spread", "constant"] = Field(
+    scale: Literal["spread", "constant", "learnt"] = Field(
         default="spread",
         description="what the half-width of a calibrated band follows: 'spread', that of the "
-        "members with a floor, or 'constant', the members' band moved by as much everywhere",
+        "members with a floor, 'constant', the members' band moved by as much everywhere, or "
+        "'learnt' from spread, horizon and waves",
     )
     densities_of: str | None = Field(
         default=None, description="the test set whose densities are compared; left out, the first"

@@ -18,7 +18,7 @@ from seakeep.arrays import FloatArray
 from seakeep.core import metrics
 from seakeep.core.bands import band_error_over_time
 from seakeep.errors import DataError, SeakeepError
-from seakeep.models.calibration import Judged, found_margin, held_out
+from seakeep.models.calibration import Judged, envelope_of, found_margin, held_out
 from seakeep.models.engine import group_series, read_groups
 from seakeep.models.summaries import STATISTICS, reduce_members
 from seakeep.signals import envelope_squared
@@ -41,6 +41,7 @@ DIMS = {
     "lost": ("member",),
     "member_nrmse": ("member", "channel"),
     "member_nammae": ("member", "channel"),
+    "envelope": ("time",),
 }
 """Dimensions of the arrays of a window, after (training, window)."""
 
@@ -88,12 +89,13 @@ def compute(plan: Plan, runs: Runs, unit: Unit) -> Arrays:
         if (numbers := tested_windows(plan, unit.training, test))
     }
     spread = training_moments(plan, runs, training)[1]
-    for test, numbers, series, lost in _series(plan, runs, fitted, tested):
+    for test, numbers, series, lost, envelope in _series(plan, runs, fitted, tested):
         if plan.models[unit.model].is_ensemble:
             measured = measured_windows(plan, runs, plan.tests[test], numbers)
             shown = [k for k, n in enumerate(numbers) if plan.is_shown(unit.training, test, n)]
             found = _judged(series, lost, measured, spread, shown, plan.level)
             found |= {"shown": np.array([numbers[k] for k in shown])} if shown else {}
+            found |= {"envelope": envelope} if plan.scale == "learnt" else {}
             out |= {f"tests/{test}/{key}": each for key, each in found.items()}
         else:
             out[f"tests/{test}/mean"] = np.array(series[0])
@@ -108,8 +110,8 @@ def compute(plan: Plan, runs: Runs, unit: Unit) -> Arrays:
 
 def _series(
     plan: Plan, runs: Runs, fitted: Any, tested: Mapping[str, tuple[int, ...]]
-) -> Iterator[tuple[str, tuple[int, ...], FloatArray, npt.NDArray[np.int64]]]:
-    """Free runs of all members over each test set, (member, window, steps, N), and where lost.
+) -> Iterator[tuple[str, tuple[int, ...], FloatArray, npt.NDArray[np.int64], FloatArray]]:
+    """Free runs of all members over each test set, (member, window, steps, N), where lost, waves.
 
     Test sets of one length run side by side: what a free run prepares serves all of them.
     """
@@ -123,11 +125,12 @@ def _series(
     groups = [([p for test in tests for p in places[test]], n) for n, tests in batches.items()]
     windows = read_groups(fitted.signature, runs, groups)
     with group_series(fitted, windows) as found:
-        for (series, lost), tests in zip(found, batches.values(), strict=True):
+        for (series, lost), tests, each in zip(found, batches.values(), windows, strict=True):
+            envelope = envelope_of(fitted.signature, each)
             first = 0
             for test in tests:
                 mine = slice(first, first + len(tested[test]))
-                yield test, tested[test], series[:, mine], lost[:, mine]
+                yield test, tested[test], series[:, mine], lost[:, mine], envelope[mine]
                 first = mine.stop
 
 
@@ -211,13 +214,14 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> dict[str, A
         judged = list(held_out(fitted, parts, steps, plan.level).values())
     keys = ("margin", "blocks", "warranted")
     if judged:
-        found, floor = found_margin(judged, plan.level, plan.scale)
+        found, floor, law = found_margin(judged, plan.level, plan.scale)
         out = {key: getattr(found, key) for key in keys}
     else:
         floor = np.full(len(plan.states), np.nan)
-        out = dict.fromkeys(keys, floor)
-    out["windows"] = sum(len(measured) for _, measured in judged)
-    return out if floor is None or plan.scale == "constant" else out | {"floor": floor}
+        out, law = dict.fromkeys(keys, floor), np.tile(floor, (4, 1))
+    out["windows"] = sum(len(each.measured) for each in judged)
+    more = {"spread": {"floor": floor}, "learnt": {"floor": floor, "law": law}}
+    return out | more.get(plan.scale, {})
 
 
 def _judged_by_others(plan: Plan, runs: Runs, unit: Unit, steps: int) -> list[Judged]:
@@ -424,7 +428,11 @@ def _collect_calibration(plan: Plan, found: Mapping[int, Arrays]) -> xr.Dataset:
         first = next(iter(found.values()))[name]
         nothing = np.full_like(first, np.nan if first.dtype.kind == "f" else 0)
         rows = [found[k][name] if k in found else nothing for k in range(len(plan.training))]
-        dims = ("training", "channel")[: first.ndim + 1]
+        dims = (
+            "training",
+            *(("law",) if first.ndim > 1 else ()),
+            *(("channel",) * (first.ndim > 0)),
+        )
         variables[name.removeprefix("calibration/")] = (dims, np.stack(rows))
     return xr.Dataset(
         variables,

@@ -135,12 +135,13 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
     )
     if calibrated:
         found = result.groups[f"calibration/{model}"]
-        made = (
-            "the mean, and a factor times the members' spread (with a floor of a quarter of the "
-            "root mean square error) to either side, found"
-            if "floor" in found
-            else "these quantiles, moved outwards by a margin found"
-        )
+        made = "these quantiles, moved outwards by a margin found"
+        if "floor" in found:
+            scale = "a scale learnt from spread, horizon and waves" * ("law" in found)
+            made = (
+                f"the mean, and a factor times {scale or 'the spread of the members'} (with a "
+                "floor of a quarter of the root mean square error) to either side, found"
+            )
         note += (
             f" Calibrated: {made} on training data that "
             "the members had not read, in windows as long as the first test set's. "
