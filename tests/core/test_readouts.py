@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seakeep.core.readouts import KNOTS, fit_hinges, hinges, knots_of
+from seakeep.core.readouts import KNOTS, fit_hinges, floor_of, hinges, knots_of
 
 
 def states_and_load(seed: int = 0, noise: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -53,3 +53,18 @@ def test_a_constant_is_not_regularised():
     target = np.full(len(states), 7.0)
     fitted = fit_hinges(states, target, [0], [], np.empty((0, KNOTS)), ridge=1e6, floor=-np.inf)
     np.testing.assert_allclose(fitted(states[:5]), 7.0, rtol=1e-12)  # rounding of a mean
+
+
+@pytest.mark.parametrize("taut", [0.5, 0.8])
+def test_a_floor_is_found_where_a_line_rests_on_it(taut):
+    rng = np.random.default_rng(3)
+    states = rng.normal(size=(4000, 2))
+    pull = 2.0 * states[:, 0] + 0.3 * states[:, 1]
+    slack = np.maximum(np.quantile(pull, 1 - taut), pull)
+    noise = 0.05 * rng.normal(size=len(pull))
+    floor = floor_of(states, slack + noise, [0, 1])
+    # The 0.002 quantile of all is that of 1 or 0.4 % of the slack ones.
+    assert -3 * 0.05 < floor - np.quantile(pull, 1 - taut) < -2 * 0.05
+    assert floor_of(states, pull + noise, [0, 1]) == -np.inf
+    regular = np.stack([np.sin(np.arange(4000) / 5), np.cos(np.arange(4000) / 5)], axis=1)
+    assert floor_of(regular, 2.0 * regular[:, 0] + noise, [0, 1]) == -np.inf

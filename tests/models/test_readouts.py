@@ -22,6 +22,7 @@ from seakeep import (
 )
 from seakeep.errors import DataError
 from seakeep.models.selection import select
+from seakeep.models.store import write
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "helpers"))
 
@@ -95,6 +96,8 @@ class TestTruth:
         summary = chosen.summary()
         assert "read-out      mooring_bow: none (NRMSE on held-out runs: none 0.0" in summary
         assert f"mooring_stern: {kinds['mooring_stern']}, of surge, heave, pitch, floor" in summary
+        (floor,) = [line for line in summary.splitlines() if "floor" in line]
+        assert " N (NRMSE on held-out runs: none 0." in floor
 
     def test_auto_bends_nothing_where_no_line_is_slack(self):
         taut = moored_runs(slack=False)
@@ -129,6 +132,16 @@ class TestOneEngine:
         )
         assert again.summary() == model.summary()
         assert again.settings == model.settings
+
+    def test_a_file_whose_read_out_does_not_fit_its_states_is_refused(self, chosen, tmp_path):
+        for change in ({"weights": [1.0]}, {"columns": [0, 1, 9]}):
+            dataset = chosen.to_dataset()
+            kept = json.loads(dataset.attrs["signature"])
+            kept["readouts"][1]["function"] |= change
+            dataset.attrs["signature"] = json.dumps(kept)
+            path = write(dataset, tmp_path / "model.nc", "hankel_dmdc")
+            with pytest.raises(DataError, match="read-out of mooring_stern does not fit"):
+                load_model(path)
 
     def test_an_ensemble_of_one_member_is_the_model(self, runs, test_run, chosen, tmp_path):
         one = ensemble(readouts="auto").fit(runs, STATES, INPUTS)
@@ -208,15 +221,21 @@ class TestFitting:
         short = runs["run0"].isel(time=slice(0, 300))
         model = stern("auto").fit(short, STATES, INPUTS)
         assert [each.kind for each in model.signature.readouts] == ["none"]
+        assert "none (no two runs could be held out to judge it)" in model.summary()
         with pytest.raises(DataError, match="free runs of 15 encounter periods on training runs"):
             stern("stacked").fit(short, STATES, INPUTS)
 
     def test_a_training_window_is_all_that_is_read(self, runs):
-        spec = replace(stern("stacked"), window=400)
-        late = {name: run.isel(time=slice(700 - 412, None)) for name, run in runs.items()}
-        fits = [spec.fit(each, STATES, INPUTS) for each in (runs, late)]
-        weights = [fit.signature.readouts[0].function.weights for fit in fits]
-        np.testing.assert_array_equal(*weights)
+        spec = replace(stern("stacked"), window=600)
+        late = {name: run.isel(time=slice(700 - 612, None)) for name, run in runs.items()}
+        for chosen in (["run0", "run1", "run2"], ["run1"]):
+            weights = [
+                spec.fit({name: each[name] for name in chosen}, STATES, INPUTS)
+                .signature.readouts[0]
+                .function.weights
+                for each in (runs, late)
+            ]
+            np.testing.assert_array_equal(*weights)
 
     def test_a_ridge_by_roll_out_fits_them_with_what_it_chose(self, runs, test_run):
         by_rollout = replace(stern("stacked"), ridge="rollout").fit(runs, STATES, INPUTS)

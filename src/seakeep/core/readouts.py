@@ -19,9 +19,10 @@ KNOTS = 6
 """Knots per state: quantiles from 0.05 to 0.95. Four to ten gave the same within 2 %."""
 FLOOR = 0.002
 """Quantile of a slack channel that is its floor: what it rests on, less its noise."""
-LOW, FLAT = 0.05, 0.3
+LOW, FLAT = 0.1, 0.3
 """Part of the samples in which a slack channel is looked for, and the slope up to which it is one.
-"""
+
+On the virtual tank the slope is 0.0 for the line that falls slack and 1.0 for the other."""
 
 
 def knots_of(states: FloatArray, columns: list[int]) -> FloatArray:
@@ -138,33 +139,34 @@ def fit_hinges(
     return LinearHinges(linear, columns, knots, np.concatenate([[constant], weights]), floor)
 
 
-def floor_of(states: FloatArray, target: int) -> float:
+def floor_of(states: FloatArray, target: FloatArray, columns: list[int]) -> float:
     """Floor of a channel that rests on it, and −inf of one that does not.
 
     Where a line is slack its load stays as the motion goes on: in the tail of samples in which a
-    linear map of the other states is lowest, the load no longer follows that map. Where it does,
-    no floor is known, and the least value of the training says nothing about higher waves.
+    linear map of the states that bend it is lowest, the load no longer follows that map. Where it
+    does, no floor is known, and the least value of the training says nothing about higher waves.
 
     Parameters
     ----------
     states : ndarray, shape (sample, N)
-        Measured states, standardised.
-    target : int
-        The channel among them.
+        Measured states.
+    target : ndarray, shape (sample,)
+        The channel.
+    columns : list of int
+        States that bend it.
 
     Returns
     -------
     float
         The ``FLOOR`` quantile of the channel, or −inf.
     """
-    others = np.delete(states, target, axis=1)
-    others = np.concatenate([others, np.ones((len(others), 1))], axis=1)
-    linear = others @ np.linalg.lstsq(others, states[:, target], rcond=None)[0]
+    bending = np.concatenate([states[:, columns], np.ones((len(states), 1))], axis=1)
+    linear = bending @ np.linalg.lstsq(bending, target, rcond=None)[0]
     low = linear <= np.quantile(linear, LOW)
     across = linear[low] - linear[low].mean()
     spread = float(across @ across)
-    slope = float(across @ states[low, target]) / spread if spread > 0 else 1.0
-    return float(np.quantile(states[:, target], FLOOR)) if slope < FLAT else -np.inf
+    slope = float(across @ target[low]) / spread if spread > 0 else 1.0
+    return float(np.quantile(target, FLOOR)) if slope < FLAT else -np.inf
 
 
 def _features(

@@ -104,6 +104,8 @@ class FittedReadOut:
         What it is; what was chosen.
     column : int
         Place of the channel among the states.
+    units : str
+        Of the channel.
     scores : mapping of str to float
         NRMSE by kind in free runs on training runs that were held out, where kinds were compared.
     function : LinearHinges or None
@@ -114,6 +116,7 @@ class FittedReadOut:
     of: tuple[str, ...]
     kind: ReadOutKind
     column: int
+    units: str
     scores: Mapping[str, float]
     function: LinearHinges | None
 
@@ -123,10 +126,12 @@ class FittedReadOut:
         if self.function is not None:
             text += f", of {', '.join(self.of)}"
             if np.isfinite(self.function.floor):
-                text += f", floor {self.function.floor:.4g}"
+                text += f", floor {self.function.floor:.4g} {self.units}".rstrip()
         if self.scores:
             scores = ", ".join(f"{kind} {score:.3f}" for kind, score in self.scores.items())
             text += f" (NRMSE on held-out runs: {scores})"
+        elif self.kind == "none":
+            text += " (no two runs could be held out to judge it)"
         return f"  read-out      {text}"
 
     def to_json(self) -> dict[str, Any]:
@@ -145,6 +150,7 @@ class FittedReadOut:
             "channel": self.channel,
             "of": list(self.of),
             "kind": self.kind,
+            "units": self.units,
             "scores": dict(self.scores),
             "function": made,
         }
@@ -177,6 +183,7 @@ class FittedReadOut:
             of=of,
             kind=content["kind"],
             column=list(states).index(channel),
+            units=str(content["units"]),
             scores={str(key): float(value) for key, value in content["scores"].items()},
             function=function,
         )

@@ -667,21 +667,13 @@ def readouts_for(
     steps = round(PERIODS * mean_period(runs, list(inputs)))
     base = Candidate(settings.state_delays, settings.input_delays, int(settings.lead), ())
     base = replace(base, observables=tuple(range(len(settings.observables))))
-    pieces = _pieces(_trained(settings, runs))
-    whole = replace(settings, window=None)
-    problem = _problem(whole, pieces, states, inputs, base, {}, (steps,))
+    if len(runs) == 1 and settings.window is not None:  # whose parts are shorter
+        runs = {name: run.isel(time=slice(-settings.window, None)) for name, run in runs.items()}
+        settings = replace(settings, window=None)
+    problem = _problem(settings, _pieces(runs), states, inputs, base, {}, (steps,))
     if problem is None:
         return fit_readouts(readouts, _measured(settings, runs, states, inputs), ())
     return fit_readouts(readouts, problem.data, list(problem.held(base, ridge, steps)))
-
-
-def _trained(settings: HankelSettings, runs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
-    """What training reads of runs that are cut at the end of their training windows."""
-    if settings.window is None:
-        return dict(runs)
-    needs = settings.needs(labelled.common_step(runs))
-    count = needs.snapshots + (0 if needs.inside else needs.history)
-    return {name: run.isel(time=slice(-count, None)) for name, run in runs.items()}
 
 
 def _measured(

@@ -105,7 +105,8 @@ def _fitted(
         found = _learnt(kind, target, columns, measured, held)
         scale = data.state_scale
         function = found.rescaled(scale.mean, scale.std, target)
-    return FittedReadOut(readout.channel, readout.of, kind, target, scores, function)
+    units = data.state_labels[target].units
+    return FittedReadOut(readout.channel, readout.of, kind, target, units, scores, function)
 
 
 def _learnt(
@@ -123,7 +124,7 @@ def _learnt(
         states = np.concatenate([each.predicted.reshape(-1, len(linear)) for each in held])
         channel = np.concatenate([each.measured[..., target].ravel() for each in held])
     knots = knots_of(states, columns)
-    floor = floor_of(seen, target)
+    floor = floor_of(seen, seen[:, target], columns)
     return fit_hinges(states, channel, linear, columns, knots, RIDGE, floor)
 
 
