@@ -138,6 +138,12 @@ CALLS = {
         lambda x: statistics.moving_block_bootstrap(x, 2, 9, RNG(0)), X,
     ),
     "statistics.split_bands": (lambda x: statistics.split_bands(x, 0.05, 0.2), TABLE),
+    "statistics.two_way_interval": (
+        lambda a, b: statistics.two_way_interval(
+            lambda x, y: x.mean(axis=(1, 2)), a, b, rng=RNG(0), n_series=9
+        ),
+        TABLE[:9], TABLE[9:18],
+    ),
     "statistics.trend_test": (
         lambda x, t: statistics.trend_test(
             x, rng=RNG(0), time=t, n_series=3, block_length=9
@@ -159,7 +165,7 @@ CALLS = {
 WITHOUT_ARRAYS = {
     "signals.contact_sheet", "signals.froude_factor", "signals.lowpass_taps",
     "signals.pool_drift", "signals.track_video", "metrics.labelled",
-    "core.training_window",
+    "core.training_window", "statistics.overlap_block",
 }  # fmt: skip
 ROOMS = {
     "core": core,

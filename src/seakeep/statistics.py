@@ -49,6 +49,7 @@ from seakeep.core.density import (
 )
 from seakeep.core.divergence import JsdInterval, jensen_shannon
 from seakeep.core.trend import TrendTest, trend_test
+from seakeep.core.two_way import overlap_block, two_way_interval
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.pairing import channel_names, pair
 
@@ -79,8 +80,10 @@ __all__ = [
     "kernel_density",
     "lag_one_correlation",
     "moving_block_bootstrap",
+    "overlap_block",
     "split_bands",
     "trend_test",
+    "two_way_interval",
     "winkler_score",
 ]
 

@@ -35,7 +35,7 @@ __all__ = [
     "write_result",
 ]
 
-FORMAT = 5
+FORMAT = 6
 """Goes into digest and result: raise it when the same settings give other arrays than before."""
 
 RESULT = "study.nc"

@@ -1,0 +1,93 @@
+"""Intervals of differences over training sets and windows hold the truth as often as they say."""
+
+import numpy as np
+import pytest
+
+from seakeep import RequestError
+from seakeep.statistics import overlap_block, two_way_interval
+
+TRIALS = 200
+
+
+def mean_of_difference(a, b):
+    return np.nanmean(a - b, axis=(1, 2))
+
+
+def table(rng, row, column, cell, overlap=1, size=10):
+    """Errors of training sets and windows, neighbours of which share data."""
+
+    def effect(spread):
+        drawn = rng.normal(0, spread, size + overlap - 1)
+        return np.convolve(drawn, np.ones(overlap) / np.sqrt(overlap), "valid")
+
+    return 1 + effect(row)[:, None] + effect(column) + rng.normal(0, cell, (size, size))
+
+
+def coverage(row, column, cell, overlap=1, blocks=(1, 1)):
+    rng, inside = np.random.default_rng(0), 0
+    for _ in range(TRIALS):
+        pair = (table(rng, row, column, cell, overlap) for _ in range(2))
+        low, high = two_way_interval(
+            mean_of_difference, *pair, rng=rng, blocks=blocks, n_series=200
+        )
+        inside += bool(low <= 0.0 <= high)
+    return inside / TRIALS
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "cell", "overlap"),
+    [(0.1, 0.1, 0.1, 1), (0.0, 0.1, 0.1, 1), (0.1, 0.1, 0.0, 1), (0.1, 0.1, 0.1, 2)],
+)
+def test_the_interval_holds_the_truth_as_often_as_it_says(row, column, cell, overlap):
+    # Nominally 0.95: 200 trials have a standard error of 0.015; overlapping neighbours leave five
+    # blocks an axis, of which an interval falls short by some hundredths.
+    assert coverage(row, column, cell, overlap, (overlap, overlap)) > (0.92, 0.88)[overlap - 1]
+
+
+def test_cells_counted_one_by_one_would_be_far_too_sure():
+    """What rows and columns share is no noise of a cell: a plain bootstrap holds it too seldom."""
+    rng, inside = np.random.default_rng(0), 0
+    for _ in range(TRIALS):
+        a, b = (table(rng, 0.1, 0.1, 0.1) for _ in range(2))
+        flat = (a - b).ravel()
+        drawn = flat[rng.integers(0, flat.size, (200, flat.size))].mean(axis=1)
+        low, high = np.quantile(drawn, [0.025, 0.975])
+        inside += bool(low <= 0.0 <= high)
+    assert inside / TRIALS < 0.7
+
+
+def test_pairs_are_kept_and_further_axes_too():
+    rng = np.random.default_rng(1)
+    errors = rng.normal(1.0, 0.3, (6, 8, 2))
+    low, high = two_way_interval(mean_of_difference, errors + 0.5, errors, rng=rng)
+    np.testing.assert_allclose([low, high], 0.5)  # the same cells on both sides: no spread at all
+    assert low.shape == (2,)
+
+
+def test_cells_that_are_not_judged_are_left_out():
+    rng = np.random.default_rng(2)
+    errors = rng.normal(1.0, 0.1, (3, 30))
+    errors[np.arange(30) % 3 != np.arange(3)[:, None]] = np.nan  # runs are left out in turn
+    low, high = two_way_interval(lambda x: np.nanmean(x, axis=(1, 2)), errors, rng=rng)
+    assert low < 1.0 < high
+
+
+def test_too_few_blocks_give_no_interval_and_one_cell_is_conditioned_on():
+    rng = np.random.default_rng(3)
+    errors = rng.normal(1.0, 0.1, (2, 30))
+    mean = lambda x: x.mean(axis=(1, 2))  # noqa: E731
+    assert np.isnan(two_way_interval(mean, errors, rng=rng)).all()
+    assert np.isnan(two_way_interval(mean, errors[:1], rng=rng, blocks=(1, 12))).all()
+    assert np.isfinite(two_way_interval(mean, errors[:1], rng=rng)).all()
+
+
+def test_blocks_are_as_long_as_windows_overlap():
+    apart = [("a", 10.0 * k, 10.0 * k + 10) for k in range(5)]
+    assert overlap_block(apart) == 1
+    assert overlap_block([*apart, *apart]) == 2
+    assert overlap_block([(run, 0.0, 10.0) for run in "abc"]) == 1
+
+
+def test_cells_of_other_shapes_are_refused():
+    with pytest.raises(RequestError, match=r"cells are arrays of one shape .*\(2, 3\), \(3, 2\)"):
+        two_way_interval(np.sum, np.ones((2, 3)), np.ones((3, 2)), rng=np.random.default_rng())
