@@ -350,7 +350,6 @@ class TestWaves:
         fitted = ensemble().fit(sea(), ["heave"], ["eta"])
         (waves,) = compare_waves(fitted, sea(seed=3), 20.0, 300)
         assert not waves.is_untrained
-        assert waves.sd_ratio == pytest.approx(1.0, abs=0.2)
 
 
 class TestUnitsAndNumbers:

@@ -220,11 +220,13 @@ def _cut_lost(out: FloatArray) -> None:
     lost = np.zeros((windows, 1), dtype=bool)
     for first in range(0, steps, length):
         piece = out[:, first : first + length]
-        gone: BoolArray = np.any(~np.isfinite(piece), axis=2)
+        finite = np.isfinite(piece)
+        if finite.all() and not lost.any():
+            continue
+        gone: BoolArray = np.any(~finite, axis=2)
         gone[:, :1] |= lost
-        if gone.any():
-            piece[np.logical_or.accumulate(gone, axis=1)] = np.nan
-            lost = np.any(gone, axis=1, keepdims=True)
+        piece[np.logical_or.accumulate(gone, axis=1)] = np.nan
+        lost = np.any(gone, axis=1, keepdims=True)
 
 
 @dataclass(frozen=True, eq=False)

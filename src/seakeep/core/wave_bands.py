@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from scipy import fft
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray
+from seakeep.arrays import FloatArray, IntArray
 
 __all__ = ["band_edges", "band_energy"]
 
@@ -23,23 +23,25 @@ def band_energy(series: FloatArray, dt: float, first: int, count: int) -> FloatA
     ndarray, shape (channel, band)
         Sums of a Hann-tapered periodogram; they add up to about the variance times the length.
     """
-    taper, bands, inside = _taper_and_bands(len(series), dt, first, count)
-    power = np.abs(fft.rfft(taper * (series - series.mean(axis=0)), axis=0)) ** 2
-    out = np.zeros((series.shape[1], count))
-    for channel, column in enumerate(power[1:].T):
-        out[channel] = np.bincount(bands, column[inside], count) / len(series)
+    taper, bands, begins, stop = _taper_and_bands(len(series), dt, first, count)
+    tapered = np.ascontiguousarray(series.T)
+    tapered = taper * (tapered - tapered.mean(axis=1, keepdims=True))
+    power = np.abs(fft.rfft(tapered)) ** 2
+    out = np.zeros((len(power), count))
+    out[:, bands] = np.add.reduceat(power[:, :stop], begins, axis=1) / len(series)
     return out
 
 
 @lru_cache(maxsize=8)
 def _taper_and_bands(
     length: int, dt: float, first: int, count: int
-) -> tuple[FloatArray, IntArray, BoolArray]:
-    """Hann taper, band of each frequency that lies in one, and which do."""
+) -> tuple[FloatArray, IntArray, IntArray, int]:
+    """Hann taper, bands that hold frequencies, the first of each, and the one after the last."""
     frequency = fft.rfftfreq(length, dt)[1:]
-    bands = np.floor(PER_OCTAVE * np.log2(frequency)).astype(np.intp) - first
-    inside = (bands >= 0) & (bands < count)
-    return np.hanning(length + 2)[1:-1, None], bands[inside], inside
+    band = np.floor(PER_OCTAVE * np.log2(frequency)).astype(np.intp) - first
+    inside = 1 + np.flatnonzero((band >= 0) & (band < count))
+    bands, begins = np.unique(band[inside - 1], return_index=True)
+    return np.hanning(length + 2)[1:-1], bands, inside[begins], int(inside[-1]) + 1
 
 
 def band_edges(first: int, count: int) -> FloatArray:

@@ -467,44 +467,40 @@ def _open_runs(member: Dynamics, windows: Windows) -> FloatArray:
     return cut_lost(values, member, windows)
 
 
-def _excess(scale: Scale, values: FloatArray) -> FloatArray:
-    """How far inputs (window, time, channel) deviate, in the largest deviations of training."""
-    if not values.size:
-        return np.zeros(len(values))
-    reach = np.where(scale.reach > 0, scale.reach, np.inf)
-    farthest = np.maximum(values.max(axis=1) - scale.centre, scale.centre - values.min(axis=1))
-    out: FloatArray = (farthest / reach).max(axis=1)
-    return out
+def _excess(scales: Dynamics | Signature, windows: Windows) -> FloatArray:
+    """Largest deviation of the input of each window over that in training, at least one."""
+    first = windows.delayed.shape[1] - scales.input_delays - windows.steps
+    found = np.ones(len(windows))
+    for scale, values in (
+        (scales.input_scale, windows.delayed[:, first:]),
+        (scales.direct_scale, windows.direct),
+    ):
+        reach = np.where(scale.reach > 0, scale.reach, np.inf)
+        relative = np.abs(values - scale.centre) / reach
+        found = np.maximum(found, relative.max(axis=(1, 2), initial=0.0))
+    return found
 
 
 def cut_lost(values: FloatArray, scales: Dynamics | Signature, windows: Windows) -> FloatArray:
     """NaN from where free runs (window, steps, N) are lost, in physical units; they are changed."""
-    first = windows.delayed.shape[1] - scales.input_delays - windows.steps
-    excess = np.maximum(
-        _excess(scales.input_scale, windows.delayed[:, first:]),
-        _excess(scales.direct_scale, windows.direct),
-    )
-    return _cut_lost(values, scales.state_scale, windows.histories, excess)
-
-
-def _cut_lost(
-    values: FloatArray, scale: Scale, histories: FloatArray, excess: FloatArray
-) -> FloatArray:
-    """NaN from the instant on at which a state is lost; `values` (window, steps, N) are changed."""
-    start = np.abs(histories - scale.centre).max(axis=1, initial=0.0)
-    reach = np.maximum(np.where(scale.reach > 0, scale.reach, np.inf), start)
-    limit = GROWTH * reach * np.maximum(excess, 1.0)[:, None]
+    scale = scales.state_scale
+    start = np.abs(windows.histories - scale.centre).max(axis=1, initial=0.0)
+    reach = np.maximum(np.where(scale.reach > 0, scale.reach, np.inf), start)[:, None]
+    limit = None
     length = max(1, PIECE // max(1, values[:, 0].size))
     before = np.zeros((len(values), 1), dtype=bool)
     for first in range(0, values.shape[1], length):
         piece = values[:, first : first + length]
         with np.errstate(invalid="ignore", over="ignore"):
-            kept = np.abs(piece - scale.centre) <= limit[:, None]
-        lost = ~np.all(kept, axis=-1)
+            distance = np.abs(piece - scale.centre)
+        if np.all(distance <= GROWTH * reach) and not before.any():
+            continue  # whatever the input
+        if limit is None:
+            limit = GROWTH * reach * _excess(scales, windows)[:, None, None]
+        lost = ~np.all(distance <= limit, axis=-1)
         lost[:, :1] |= before
-        if np.any(lost):
-            piece[np.logical_or.accumulate(lost, axis=-1)] = np.nan
-            before = np.any(lost, axis=-1, keepdims=True)
+        piece[np.logical_or.accumulate(lost, axis=-1)] = np.nan
+        before = np.any(lost, axis=-1, keepdims=True)
     return values
 
 

@@ -444,7 +444,9 @@ def scales_of(
     Direct regressors count from the first snapshot pair on: before it they may need inputs that
     are not there.
     """
-    later = [replace(each, first=max(each.first, each.first_column)) for each in windows]
+    later = windows
+    if channels[2]:
+        later = [replace(each, first=max(each.first, each.first_column)) for each in windows]
     return [
         moments(values, spans, names, standardize)
         for values, spans, names in zip(series, (windows, windows, later), channels, strict=True)
@@ -466,33 +468,32 @@ def moments(
     """
     if not names:
         return Scale(*np.zeros((5, 0)))
-    pooled = np.concatenate(
-        list(series)
-        if windows is None
-        else [values[window.samples] for values, window in zip(series, windows, strict=True)]
-    )
+    if windows is not None:
+        series = [values[window.samples] for values, window in zip(series, windows, strict=True)]
+    # Sums along contiguous memory take half the time.
+    pooled = np.ascontiguousarray(np.concatenate(list(series)).T)
     with np.errstate(over="ignore"):
-        mean = pooled.sum(axis=0) / len(pooled)
-        centred = pooled - mean
-        spread = np.sqrt(np.einsum("tc,tc->c", centred, centred) / (len(pooled) - 1))
-    if not np.all(np.isfinite(spread)):
+        mean = pooled.sum(axis=1) / pooled.shape[1]
+        centred = pooled - mean[:, None]
+        spread = np.sqrt(np.einsum("ct,ct->c", centred, centred) / (pooled.shape[1] - 1))
+    if not np.isfinite(spread).all():
         column = int(np.flatnonzero(~np.isfinite(spread))[0])
         raise DataError(
             f"channel '{names[column]}' has a standard deviation that is not finite over the "
-            f"training window: its largest value is {np.abs(pooled[:, column]).max():.3g}. Look "
+            f"training window: its largest value is {np.abs(pooled[column]).max():.3g}. Look "
             "for a fault of the sensor or of its conversion."
         )
+    reach = np.abs(centred, out=centred).max(axis=1)
     # A constant that is not a binary fraction has a spread of rounding, not of zero.
     constant = spread <= 1e-12 * np.abs(mean)
-    spread = np.where(constant, 0.0, spread)
-    # Along contiguous memory, which takes half the time.
-    reach = np.where(constant, 0.0, np.abs(centred.T, order="C").max(axis=1))
+    if constant.any():
+        spread[constant] = reach[constant] = 0.0
     if not standardize:
         return Scale(np.zeros(mean.size), np.ones(mean.size), spread, mean, reach)
-    if np.any(constant):
+    if constant.any():
         column = int(np.flatnonzero(constant)[0])
         raise DataError(
-            f"channel '{names[column]}' is constant ({pooled[0, column]:g}) over the training "
+            f"channel '{names[column]}' is constant ({pooled[column, 0]:g}) over the training "
             "window, so it cannot be standardised. Look for a dead sensor, choose another window, "
             "leave the channel out, or set standardize=False."
         )

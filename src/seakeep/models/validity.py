@@ -37,8 +37,6 @@ class Waves:
         Part of its energy in bands that were not trained, 0 to 1.
     is_gap : bool
         Whether `period` lies between trained periods without being one of them.
-    sd_ratio : float
-        Its standard deviation over that in training.
     """
 
     channel: str
@@ -46,7 +44,6 @@ class Waves:
     trained: tuple[float, float]
     outside: float
     is_gap: bool
-    sd_ratio: float
 
     @property
     def is_untrained(self) -> bool:
@@ -79,14 +76,11 @@ class Coverage:
         Number of the first band.
     shares : ndarray, shape (channel, band)
         Part of the energy in each band.
-    spread : ndarray, shape (channel,)
-        Standard deviations.
     """
 
     channels: tuple[str, ...]
     first: int
     shares: FloatArray
-    spread: FloatArray
 
     @classmethod
     def of(cls, channels: Sequence[str], series: Sequence[FloatArray], dt: float) -> Coverage:
@@ -98,9 +92,7 @@ class Coverage:
             (band_energy(each, dt, first, count) for each in series),
             np.zeros((len(channels), count)),
         )
-        pooled = np.concatenate(list(series))
-        spread = pooled.std(axis=0, ddof=1)
-        return cls(tuple(channels), first, _shares(energy), spread)
+        return cls(tuple(channels), first, _shares(energy))
 
     def compare(self, inputs: FloatArray, dt: float) -> list[Waves]:
         """Compare the inputs (time, channel) of a forecast with those of training."""
@@ -117,7 +109,6 @@ class Coverage:
             known[:-1] |= is_trained[1:]
             peak = int(np.argmax(found[column]))
             inside = np.flatnonzero(is_trained)
-            spread = self.spread[column]
             out.append(
                 Waves(
                     channel=channel,
@@ -125,7 +116,6 @@ class Coverage:
                     trained=(float(periods[inside[-1]]), float(periods[inside[0]])),
                     outside=float(found[column][~known].sum()),
                     is_gap=bool(inside[0] < peak < inside[-1] and not known[peak]),
-                    sd_ratio=float(inputs[:, column].std() / spread) if spread > 0 else np.inf,
                 )
             )
         return out
@@ -133,20 +123,14 @@ class Coverage:
     def to_variables(self) -> dict[str, Any]:
         """Variables of a file."""
         label = {"long_name": "part of the training energy", "units": "1", "first": self.first}
-        return {
-            "wave_shares": (("channel", "band"), self.shares, label),
-            "wave_spread": ("channel", self.spread),
-        }
+        return {"wave_shares": (("channel", "band"), self.shares, label)}
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> Coverage:
         """Rebuild from :meth:`to_variables`."""
         channels = tuple(label.name for label in store.labels(dataset, "inputs"))
         shares = store.numbers(dataset, "wave_shares", (len(channels), None))
-        first = dataset["wave_shares"].attrs["first"]
-        return cls(
-            channels, int(first), shares, store.numbers(dataset, "wave_spread", (len(channels),))
-        )
+        return cls(channels, int(dataset["wave_shares"].attrs["first"]), shares)
 
 
 def compare_waves(model: Model, run: xr.Dataset, start: float, steps: int) -> list[Waves]:
