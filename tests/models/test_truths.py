@@ -1,0 +1,78 @@
+"""Vessels whose law is known: a drift by the square of the wave, and the best λ."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import HankelDMDc, SlowSquares
+from seakeep.core.observables import slow_kernel, slow_squares
+from seakeep.models.selection import select
+
+DT, PERIOD = 0.1, 10  # s, samples
+KERNEL = slow_kernel(1 / (3 * PERIOD), 15)
+NOISE = 0.02
+
+
+def dataset(**channels: np.ndarray) -> xr.Dataset:
+    time = DT * np.arange(len(next(iter(channels.values()))))
+    return xr.Dataset(
+        {name: ("time", values, {"units": "m"}) for name, values in channels.items()},
+        coords={"time": time},
+        attrs={"encounter_period": PERIOD * DT},
+    )
+
+
+def drifting(seed: int, samples: int = 1500) -> tuple[xr.Dataset, np.ndarray]:
+    """A surge that answers the slow square of waves up to two periods ahead, read with noise."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(samples) * DT
+    angles = 2 * np.pi * np.outer(t, rng.uniform(0.7, 1.3, 12)) + rng.uniform(0, 2 * np.pi, 12)
+    eta = 0.2 * np.cos(angles).sum(axis=1)
+    square = slow_squares(eta, (0,), KERNEL, 2 * PERIOD - 15, (0,), DT)[:, 0]
+    known = np.isfinite(square)
+    surge = np.zeros(samples)
+    for k in range(samples - 1):
+        surge[k + 1] = 0.95 * surge[k] + (0.05 * square[k] if known[k] else 0.01)
+    noise = NOISE * surge.std() * rng.standard_normal(samples)
+    return dataset(eta=eta, surge=surge + noise), surge
+
+
+def test_a_quadratic_drift_is_recovered_to_its_noise():
+    runs = [drifting(seed)[0] for seed in range(4)]
+    spec = HankelDMDc(10, 0, 1e-6, delay_rows="exact", ridge_scale="per_snapshot")
+    observed = replace(spec, observables=(SlowSquares("eta", orders=(0,), lags=(0,)),))
+    run, true = drifting(9)
+    errors = []
+    for each in (spec, observed):
+        model = each.fit(runs, ["surge"], ["eta"])
+        forecast = model.forecast(run, start=10.0, steps=1000)
+        at = slice(101, 1101)
+        errors.append(np.sqrt(np.mean((forecast.surge.values - true[at]) ** 2)) / true[at].std())
+    # Over 1000 steps nothing but the waves is read; what is left is the noise of the readings.
+    assert errors[0] > 0.5
+    assert errors[1] < 2 * NOISE
+
+
+def test_the_best_ridge_is_that_of_the_noise():
+    """Coefficients drawn at random: the best λ is the noise's variance over theirs."""
+    rng = np.random.default_rng(0)
+    channels, delays, best = 8, 40, 1e-2
+    pairs = 5 * (90 - delays - 1)  # of the five runs that train in each fold
+    # Regressors have a variance of one, so that λ = σ² / τ² = best × pairs.
+    tau = 1.0 / np.sqrt(best * pairs)
+    weights = tau * rng.standard_normal((channels, delays + 1))
+    runs = {}
+    for number in range(6):
+        eta = rng.standard_normal(90)
+        states = rng.standard_normal((channels, 90))  # the noise
+        for k in range(delays, 89):
+            states[:, k + 1] += weights @ eta[k - delays : k + 1][::-1]
+        named = {f"x{row}": values for row, values in enumerate(states)}
+        runs[f"run{number}"] = dataset(eta=eta, **named)
+    spec = HankelDMDc(0, delays, "rollout", delay_rows="exact")
+    found = select(spec, runs, [f"x{row}" for row in range(channels)], ["eta"], horizon=(4.0,))
+    scores = {row["ridge"]: row["score"] for row in found.rows}
+    # Half a decade is the step of the search.
+    assert np.log10(min(scores, key=scores.get)) == pytest.approx(np.log10(best), abs=0.51)
