@@ -32,7 +32,7 @@ def linear_rig(rig):
         rig,
         quadratic=np.zeros_like(rig.quadratic),
         pool=rig.pool * [1.0, 0.0, 1.0],
-        drift=DriftSettings(reflection=0.0),
+        drift=DriftSettings(scale=0.0),
     )
 
 

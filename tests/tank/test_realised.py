@@ -35,17 +35,18 @@ def test_default_seed_realises_the_papers_waves(settings, realised):
     assert all(row.agrees for row in rows.values())
 
 
-def test_motions_are_those_of_the_feasibility_study(realised):
+def test_motions_and_slack_of_the_page(realised):
     for run in realised[:3]:
-        # Orientation of the design page; slow surge is a handful of swings a run.
+        # Slow surge is a handful of swings per run.
         assert run.spread["heave"] == pytest.approx(0.032, abs=0.003)
         assert np.rad2deg(run.spread["pitch"]) == pytest.approx(2.9, abs=0.2)
         assert run.spread["surge_fast"] == pytest.approx(0.033, abs=0.003)
-        assert run.mean["surge"] == pytest.approx(0.5, abs=0.1)
+        assert run.mean["surge"] == pytest.approx(0.38, abs=0.05)
         assert run.mean["mooring_bow"] == pytest.approx(1.8, abs=0.2)
-        assert 0.1 < run.slack["stern"] < 0.5
         assert run.slack["bow"] == 0.0
-    assert {run.run: run.slack["stern"] for run in realised}["regular_1_5"] == 1.0
+    slack = {run.run: run.slack["stern"] for run in realised}
+    assert 0.01 < max(slack[run.run] for run in realised[:3]) < 0.2  # at times
+    assert 0.6 < slack["regular_1_5"] < 1.0  # mostly
 
 
 def test_test_matrix_is_the_papers_first_table(settings, realised):

@@ -23,6 +23,7 @@ from seakeep.tank.hydrodynamics import (
     Hydrodynamics,
     Kernel,
     excitation_at,
+    far_field_at,
     load_hydrodynamics,
     radiation_kernel,
     response,
@@ -30,7 +31,7 @@ from seakeep.tank.hydrodynamics import (
 from seakeep.tank.moorings import line_table, mooring_stiffness
 from seakeep.tank.seas import Sea
 from seakeep.tank.settings import DriftSettings, TankSettings
-from seakeep.waves import GRAVITY
+from seakeep.waves import GRAVITY, wavenumber
 
 __all__ = [
     "DivergenceError",
@@ -39,6 +40,8 @@ __all__ = [
     "assemble_rig",
     "drift_coefficient",
     "linear_response",
+    "mean_drift",
+    "sea_losses",
     "simulate",
     "tensions",
 ]
@@ -48,6 +51,8 @@ LIMITS = {"surge": 20.0, "heave": 2.0, "pitch": 1.2, "piston": 2.0, "slosh": 2.0
 """Beyond these (m, rad) a simulation has left the physics it was made for."""
 
 STABLE = 2.7  # RK4 is stable for |λ|·dt up to 2.78 on the imaginary and 2.785 on the real axis
+ITERATIONS = 100  # of the losses in a sea; some twenty are enough
+SLOPE = 0.02  # rad/s, to either side for the slope of the drift force
 KERNEL_RATE = 40.0  # rad/s, the fastest motion in the radiation kernel
 
 
@@ -205,19 +210,62 @@ def assemble_rig(settings: TankSettings, hydro: Hydrodynamics | None = None) -> 
     return rig
 
 
-def drift_coefficient(
-    drift: DriftSettings, omega: npt.ArrayLike, density: float = 1000.0
-) -> tuple[FloatArray, FloatArray]:
+def sea_losses(rig: Rig, sea: Sea) -> FloatArray:
+    r"""Linear damping that takes as much energy as all viscous losses do in a sea, (dof, dof).
+
+    Quadratic drag of the speed v is worth :math:`E|v|^3 / E v^2` times its coefficient:
+    :math:`8/(3\pi)` amplitudes of a regular wave, :math:`\sqrt{8/\pi}` standard deviations of an
+    irregular sea. The speeds are those of the linear response with the same losses.
+    """
+    losses = rig.linear_damping
+    flow = np.zeros((len(rig.names) + 1, len(rig.names)))
+    flow[:-1] = np.eye(len(rig.names))
+    if rig.hydro.pool is not None:
+        flow[-1] = [0.0, -1.0, rig.pool[0], 1.0, 0.0]
+    drag = np.append(rig.quadratic, rig.pool[1])
+    weights = np.zeros(drag.size)
+    for _ in range(ITERATIONS):
+        motion = response(rig.hydro, sea.omega, losses, rig.mooring_stiffness, rig.kernel)
+        power = 0.5 * np.abs(sea.omega * sea.amplitude * (flow @ motion.T)) ** 2
+        total = power.sum(axis=1)
+        steady = power.max(axis=1) > 0.5 * total
+        found = drag * np.where(steady, 8 * np.sqrt(2) / (3 * np.pi), np.sqrt(8 / np.pi))
+        found = found * np.sqrt(total)
+        if np.allclose(found, weights, rtol=1e-9, atol=1e-12):
+            break
+        weights = found
+        losses = rig.linear_damping + (flow.T * weights) @ flow
+    return losses
+
+
+def mean_drift(rig: Rig, omega: npt.ArrayLike, losses: FloatArray) -> FloatArray:
+    r"""Mean drift force per metre² of amplitude, N/m², from the balance of energy and momentum.
+
+    A wave carries k/ω of momentum per energy. What the incident wave loses is absorbed by
+    `losses` or goes out again, and what goes out takes momentum along with it (Maruo, Newman):
+    :math:`D = \frac{k}{\omega}\,[P_\mathrm{absorbed} + \int p(\theta)(1 - \cos\theta)\,d\theta]`.
+    """
+    w = np.atleast_1d(np.asarray(omega, dtype=float))
+    motion = response(rig.hydro, w, losses, rig.mooring_stiffness, rig.kernel)
+    absorbed = 0.5 * w**2 * np.einsum("ni,ij,nj->n", motion.conj(), losses, motion).real
+    both = np.column_stack([np.ones(w.size), motion])
+    forms = far_field_at(rig.hydro, w)
+    out, along = np.einsum("ni,nmij,nj->mn", both.conj(), forms, both).real
+    k = wavenumber(w, rig.hydro.water_depth)
+    force: FloatArray = rig.drift.scale * k / w * np.maximum(absorbed + out - along, 0.0)
+    return force
+
+
+def drift_coefficient(rig: Rig, sea: Sea) -> tuple[FloatArray, FloatArray]:
     r"""Mean drift force and wave-drift damping per metre² of amplitude, N/m² and N s/m³.
 
-    The force is the empirical :math:`D = \tfrac12\rho g B\,r / (1 + (\omega_c/\omega)^4)`, the
-    damping Aranha's :math:`(\omega^2/g)\,D' + 4\omega D/g`.
+    Both for each component of a sea; the damping is Aranha's
+    :math:`(\omega^2/g)\,D' + 4\omega D/g`.
     """
-    w = np.asarray(omega, dtype=float)
-    scale = 0.5 * density * GRAVITY * drift.beam * drift.reflection
-    ratio = (drift.corner / w) ** 4
-    force = scale / (1.0 + ratio)
-    slope = scale * 4.0 * ratio / w / (1.0 + ratio) ** 2
+    losses, w = sea_losses(rig, sea), sea.omega
+    low, high = (np.clip(w + d, rig.hydro.omega[0], rig.hydro.omega[-1]) for d in (-SLOPE, SLOPE))
+    force = mean_drift(rig, w, losses)
+    slope = (mean_drift(rig, high, losses) - mean_drift(rig, low, losses)) / (high - low)
     return force, w**2 / GRAVITY * slope + 4.0 * w / GRAVITY * force
 
 
@@ -236,7 +284,7 @@ def _wave_arrays(rig: Rig, sea: Sea) -> tuple[FloatArray, FloatArray, float]:
         return np.zeros((6, 0)), np.zeros((2 * len(rig.names), 0)), 0.0
     force = excitation_at(rig.hydro, sea.omega) * sea.amplitude[:, None]
     surge = linear_response(rig, sea.omega)[:, 0] * sea.amplitude
-    drift, damping = drift_coefficient(rig.drift, sea.omega, rig.hydro.density)
+    drift, damping = drift_coefficient(rig, sea)
     rows = [sea.omega, sea.wavenumber, sea.amplitude, np.sqrt(drift) * sea.amplitude]
     waves = np.stack([*rows, surge.real, surge.imag])
     parts = np.concatenate([force.real.T, force.imag.T])

@@ -27,6 +27,7 @@ __all__ = [
     "Kernel",
     "Pool",
     "excitation_at",
+    "far_field_at",
     "load_hydrodynamics",
     "radiation_kernel",
     "response",
@@ -35,7 +36,7 @@ __all__ = [
 
 
 CONVENTIONS = {
-    "format": "seakeep-hydrodynamics 1",
+    "format": "seakeep-hydrodynamics 2",
     "time_convention": "exp(-i omega t)",
     "wave_direction": "+x",
     "frame": "x downstream, z up, pitch positive bow up, origin at the centre of gravity",
@@ -46,7 +47,7 @@ CONVENTIONS = {
 
 RIGID = ("surge", "heave", "pitch")
 DEGREES = (*RIGID, "piston", "slosh")
-VARIABLES = ("added_mass", "damping", "excitation", "mass", "stiffness")
+VARIABLES = ("added_mass", "damping", "excitation", "mass", "stiffness", "far_field")
 TAIL_END = 40.0  # rad/s; the damping is continued as ω⁻³ from the last frequency to here
 POOL_TAPER = (9.0, 12.0)  # rad/s; above 12 rad/s the solver's pool rows are not clean
 KERNEL_LENGTH = 12.0  # s
@@ -67,8 +68,10 @@ class Hydrodynamics:
     """Frequency-domain coefficients of a hull, as the solver gave them.
 
     `added_mass` and `damping` have the shape (frequency, dof, dof), `excitation` (force per metre
-    of wave amplitude) (frequency, dof), `mass` and `stiffness` (dof, dof). `attrs` are those of
-    the file: conventions, versions, digest of the mesh, dimensions.
+    of wave amplitude) (frequency, dof), `mass` and `stiffness` (dof, dof). `far_field` holds two
+    Hermitian forms in the vector (1, motions per metre), shape (frequency, 2, 1 + dof, 1 + dof):
+    the power of the waves that go out, and its part along x, W/m². `attrs` are those of the file:
+    conventions, versions, digest of the mesh, dimensions.
     """
 
     names: tuple[str, ...]
@@ -78,6 +81,7 @@ class Hydrodynamics:
     excitation: ComplexArray
     mass: FloatArray
     stiffness: FloatArray
+    far_field: ComplexArray
     pool: Pool | None
     attrs: dict[str, Any]
 
@@ -161,7 +165,7 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
             f"{source} has the degrees of freedom {', '.join(names)}; the tank needs "
             f"{', '.join(RIGID)}, with piston and slosh after them for a hull with a moon pool."
         )
-    force = data["excitation"].values
+    force, far_field = data["excitation"].values, data["far_field"].values.astype(float)
     pool = None
     if "piston" in names:
         keys = ("pool_centre", "pool_area", "pool_opening", "pool_length")
@@ -174,6 +178,7 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
         excitation=force[0] + 1j * force[1],
         mass=data["mass"].values,
         stiffness=data["stiffness"].values,
+        far_field=far_field[:, 0] + 1j * far_field[:, 1],
         pool=pool,
         attrs=dict(data.attrs),
     )
@@ -268,6 +273,15 @@ def excitation_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
     """
     wanted = _inside(hydro, omega)
     parts = np.stack([hydro.excitation.real, hydro.excitation.imag], axis=-1)
+    values = scipy.interpolate.CubicSpline(hydro.omega, parts, axis=0)(wanted)
+    result: ComplexArray = np.asarray(values[..., 0] + 1j * values[..., 1], dtype=complex)
+    return result
+
+
+def far_field_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
+    """Forms of the outgoing waves between the solver's frequencies, by cubic splines."""
+    wanted = _inside(hydro, omega)
+    parts = np.stack([hydro.far_field.real, hydro.far_field.imag], axis=-1)
     values = scipy.interpolate.CubicSpline(hydro.omega, parts, axis=0)(wanted)
     result: ComplexArray = np.asarray(values[..., 0] + 1j * values[..., 1], dtype=complex)
     return result

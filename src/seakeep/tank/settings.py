@@ -135,11 +135,9 @@ class VesselSettings(Table):
 
 
 class DriftSettings(Table):
-    """Mean drift force ½ρgB·r/(1 + (corner/ω)⁴) per metre² of amplitude, and its damping."""
+    """Mean drift force: a factor on what energy and momentum allow, and its damping."""
 
-    beam: NotNegative = 0.86
-    reflection: NotNegative = 0.75
-    corner: Positive = 6.0
+    scale: NotNegative = 1.0
     damping: bool = True
 
 
