@@ -67,35 +67,44 @@ def _wave_forces(
     ramp: float,
     waves: FloatArray,
     excitation: FloatArray,
+    signs: FloatArray,
+    drift: FloatArray,
     drift_damping: float,
+    moved: FloatArray,
     force: FloatArray,
 ) -> float:
     """Add wave and drift forces to `force`; return the slow part of surge.
 
-    `real` and `imag` are the components' phases at `place`; `waves` holds a row each of ω, k,
-    amplitude, √D a, and the surge response (re, im) times a; `excitation` the forces times a.
+    `real` and `imag` are the components' phases at `place`; `waves` holds a row each of ω, k, and
+    the surge response (re, im) times the amplitude, `excitation` the forces times the amplitude,
+    `drift` and `signs` the envelopes of the drift force. `moved` is overwritten.
     """
     fast = fast_speed = 0.0
     for n in range(real.size):
-        first = waves[4, n] * real[n] - waves[5, n] * imag[n]
+        first = waves[2, n] * real[n] - waves[3, n] * imag[n]
         fast += first
-        fast_speed += waves[0, n] * (waves[4, n] * imag[n] + waves[5, n] * real[n])
+        fast_speed += waves[0, n] * (waves[2, n] * imag[n] + waves[3, n] * real[n])
     slow = surge - ramp * fast
     shift = slow - place
-    envelope_re = envelope_im = 0.0
-    dofs = force.size
     for n in range(real.size):
         angle = waves[1, n] * shift
         # Second order in k·shift: within a step the vessel moves millimetres.
         c, s = 1.0 - 0.5 * angle * angle, angle
-        re, im = real[n] * c - imag[n] * s, imag[n] * c + real[n] * s
-        envelope_re += waves[3, n] * re
-        envelope_im += waves[3, n] * im
-        for i in range(dofs):
-            force[i] += ramp * (excitation[i, n] * re - excitation[dofs + i, n] * im)
-    slow_speed = surge_speed - ramp * fast_speed
-    force[0] += ramp * ramp * (envelope_re * envelope_re + envelope_im * envelope_im)
-    force[0] -= ramp * ramp * drift_damping * slow_speed
+        moved[0, n], moved[1, n] = real[n] * c - imag[n] * s, imag[n] * c + real[n] * s
+    dofs, count = force.size, signs.size
+    now_re, now_im = moved[0], moved[1]
+    for i in range(dofs):
+        along, across, total = excitation[i], excitation[dofs + i], 0.0
+        for n in range(real.size):
+            total += along[n] * now_re[n] - across[n] * now_im[n]
+        force[i] += ramp * total
+    for i in range(count):
+        along, across, re, im = drift[i], drift[count + i], 0.0, 0.0
+        for n in range(real.size):
+            re += along[n] * now_re[n] - across[n] * now_im[n]
+            im += along[n] * now_im[n] + across[n] * now_re[n]
+        force[0] += ramp * ramp * signs[i] * (re * re + im * im)
+    force[0] -= ramp * ramp * drift_damping * (surge_speed - ramp * fast_speed)
     return slow
 
 
@@ -203,6 +212,8 @@ def integrate(
     waves: FloatArray,
     phase: FloatArray,
     excitation: FloatArray,
+    signs: FloatArray,
+    drift: FloatArray,
     drift_damping: float,
     limits: FloatArray,
 ) -> tuple[Any, ...]:
@@ -222,6 +233,7 @@ def integrate(
     now, ahead, force, held = np.zeros(dofs), np.zeros(dofs), np.zeros(dofs), np.zeros(dofs)
     real, imag = np.zeros((3, count)), np.zeros((3, count))
     slopes, state = np.zeros((2, 4, dofs)), np.zeros((2, dofs))
+    moved = np.zeros((2, count))
     place = start[0, 0]
     for step in range(steps + 1):
         origin = length + step  # column of v at this instant
@@ -240,7 +252,8 @@ def integrate(
             _body_forces(state[0], state[1], stiffness, linear, quadratic, pool, lines, force)
             reached = _wave_forces(
                 real[part], imag[part], state[0, 0], state[1, 0], place,
-                _ramp((step + fraction) * dt, ramp_time), waves, excitation, drift_damping, force,
+                _ramp((step + fraction) * dt, ramp_time), waves, excitation, signs, drift,
+                drift_damping, moved, force,
             )  # fmt: skip
             slopes[0, stage] = state[1]
             for i in range(dofs):

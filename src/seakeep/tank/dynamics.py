@@ -13,17 +13,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.tank.hydrodynamics import (
     Hydrodynamics,
     Kernel,
     excitation_at,
     far_field_at,
+    impedance,
     load_hydrodynamics,
     radiation_kernel,
     response,
@@ -39,6 +41,7 @@ __all__ = [
     "Rig",
     "assemble_rig",
     "drift_coefficient",
+    "drift_envelopes",
     "linear_response",
     "mean_drift",
     "sea_losses",
@@ -224,8 +227,11 @@ def sea_losses(rig: Rig, sea: Sea) -> FloatArray:
         flow[-1] = [0.0, -1.0, rig.pool[0], 1.0, 0.0]
     drag = np.append(rig.quadratic, rig.pool[1])
     weights = np.zeros(drag.size)
+    dynamic = impedance(rig.hydro, sea.omega, rig.mooring_stiffness, rig.kernel)
+    force = excitation_at(rig.hydro, sea.omega)[..., None]
     for _ in range(ITERATIONS):
-        motion = response(rig.hydro, sea.omega, losses, rig.mooring_stiffness, rig.kernel)
+        damped = dynamic - 1j * sea.omega[:, None, None] * losses
+        motion = np.linalg.solve(damped, force)[..., 0]
         power = 0.5 * np.abs(sea.omega * sea.amplitude * (flow @ motion.T)) ** 2
         total = power.sum(axis=1)
         steady = power.max(axis=1) > 0.5 * total
@@ -238,22 +244,30 @@ def sea_losses(rig: Rig, sea: Sea) -> FloatArray:
     return losses
 
 
-def mean_drift(rig: Rig, omega: npt.ArrayLike, losses: FloatArray) -> FloatArray:
-    r"""Mean drift force per metre² of amplitude, N/m², from the balance of energy and momentum.
+def _drift_terms(
+    rig: Rig, omega: FloatArray, losses: FloatArray
+) -> tuple[ComplexArray, ComplexArray]:
+    r"""Wave and motions u per metre of amplitude, and F u, whose product u*·F u is the mean force.
 
     A wave carries k/ω of momentum per energy. What the incident wave loses is absorbed by
     `losses` or goes out again, and what goes out takes momentum along with it (Maruo, Newman):
     :math:`D = \frac{k}{\omega}\,[P_\mathrm{absorbed} + \int p(\theta)(1 - \cos\theta)\,d\theta]`.
+    Every part is a quadratic form in u. Shape (frequency, 1 + dof) each.
     """
-    w = np.atleast_1d(np.asarray(omega, dtype=float))
-    motion = response(rig.hydro, w, losses, rig.mooring_stiffness, rig.kernel)
-    absorbed = 0.5 * w**2 * np.einsum("ni,ij,nj->n", motion.conj(), losses, motion).real
-    both = np.column_stack([np.ones(w.size), motion])
-    forms = far_field_at(rig.hydro, w)
-    out, along = np.einsum("ni,nmij,nj->mn", both.conj(), forms, both).real
-    k = wavenumber(w, rig.hydro.water_depth)
-    force: FloatArray = rig.drift.scale * k / w * np.maximum(absorbed + out - along, 0.0)
-    return force
+    motion = response(rig.hydro, omega, losses, rig.mooring_stiffness, rig.kernel)
+    both = np.column_stack([np.ones(omega.size), motion])
+    out, along = far_field_at(rig.hydro, omega).swapaxes(0, 1)
+    form = out - along
+    form[:, 1:, 1:] += 0.5 * omega[:, None, None] ** 2 * losses
+    ratio = rig.drift.scale * wavenumber(omega, rig.hydro.water_depth) / omega
+    return both, ratio[:, None] * np.einsum("nij,nj->ni", form, both)
+
+
+def mean_drift(rig: Rig, omega: npt.ArrayLike, losses: FloatArray) -> FloatArray:
+    """Mean drift force per metre² of amplitude, N/m², from the balance of energy and momentum."""
+    both, force = _drift_terms(rig, np.atleast_1d(np.asarray(omega, dtype=float)), losses)
+    mean: FloatArray = np.maximum(np.sum(both.conj() * force, axis=1).real, 0.0)
+    return mean
 
 
 def drift_coefficient(rig: Rig, sea: Sea) -> tuple[FloatArray, FloatArray]:
@@ -269,6 +283,35 @@ def drift_coefficient(rig: Rig, sea: Sea) -> tuple[FloatArray, FloatArray]:
     return force, w**2 / GRAVITY * slope + 4.0 * w / GRAVITY * force
 
 
+def drift_envelopes(rig: Rig, sea: Sea) -> tuple[FloatArray, ComplexArray]:
+    r"""Slow drift force of a sea as a sum of squared envelopes.
+
+    With the phases :math:`\theta_n` of the components at the vessel, the force is
+    :math:`\sum_r s_r |\sum_n e_{rn}\,e^{i\theta_n}|^2`. Newman's law is one envelope,
+    :math:`\sqrt{D_n}\,a_n`. The law ``qtf`` is the balance of :func:`mean_drift` for each pair of
+    components, :math:`D_{mn} = \frac12 u_m^* (F_m + F_n)\, u_n` with wave and motions u: it keeps
+    the phases of the motions, and its diagonal is the mean force. It holds neither the
+    second-order potential nor what the water near the hull stores within a group of waves.
+
+    Returns
+    -------
+    tuple of ndarray
+        The signs s, N, shape (envelope,), and e, shape (envelope, component).
+    """
+    losses = sea_losses(rig, sea)
+    if rig.drift.law == "newman":
+        single = np.sqrt(mean_drift(rig, sea.omega, losses)) * sea.amplitude
+        return np.ones(1), single[None].astype(complex)
+    # D is of rank 2 (1 + dof) at most: its envelopes are the eigenvectors of a small matrix.
+    both, force = _drift_terms(rig, sea.omega, losses)
+    basis, factor = np.linalg.qr(np.hstack([both, force]).conj() * sea.amplitude[:, None])
+    first, second = np.hsplit(factor, 2)
+    mixed = first @ second.conj().T
+    values, vectors = np.linalg.eigh(0.5 * (mixed + mixed.conj().T))
+    kept = np.abs(values) > 1e-6 * np.abs(values).max()
+    return values[kept], (basis @ vectors[:, kept]).conj().T
+
+
 def linear_response(rig: Rig, omega: npt.ArrayLike) -> npt.NDArray[np.complex128]:
     """Linear response of the moored vessel as the time loop sees it, shape (frequency, dof).
 
@@ -278,18 +321,21 @@ def linear_response(rig: Rig, omega: npt.ArrayLike) -> npt.NDArray[np.complex128
     return response(rig.hydro, omega, rig.linear_damping, rig.mooring_stiffness, rig.kernel)
 
 
-def _wave_arrays(rig: Rig, sea: Sea) -> tuple[FloatArray, FloatArray, float]:
-    """Rows of `waves`, forces times amplitude, and the wave-drift damping."""
+def _wave_arrays(rig: Rig, sea: Sea) -> tuple[Any, ...]:
+    """Arrays of the waves as `_loop.integrate` takes them, and the wave-drift damping."""
+    dofs = len(rig.names)
     if sea.omega.size == 0:
-        return np.zeros((6, 0)), np.zeros((2 * len(rig.names), 0)), 0.0
+        return np.zeros((4, 0)), np.zeros((2 * dofs, 0)), np.zeros(0), np.zeros((0, 0)), 0.0
     force = excitation_at(rig.hydro, sea.omega) * sea.amplitude[:, None]
     surge = linear_response(rig, sea.omega)[:, 0] * sea.amplitude
-    drift, damping = drift_coefficient(rig, sea)
-    rows = [sea.omega, sea.wavenumber, sea.amplitude, np.sqrt(drift) * sea.amplitude]
-    waves = np.stack([*rows, surge.real, surge.imag])
-    parts = np.concatenate([force.real.T, force.imag.T])
-    total = float(np.sum(damping * sea.amplitude**2)) if rig.drift.damping else 0.0
-    return waves, np.ascontiguousarray(parts), total
+    waves = np.stack([sea.omega, sea.wavenumber, surge.real, surge.imag])
+    signs, envelopes = drift_envelopes(rig, sea)
+    damping = 0.0
+    if rig.drift.damping:
+        damping = float(np.sum(drift_coefficient(rig, sea)[1] * sea.amplitude**2))
+    parts = (np.concatenate([x.real, x.imag]) for x in (force.T, envelopes))
+    excitation, drift = (np.ascontiguousarray(x) for x in parts)
+    return waves, excitation, signs, drift, damping
 
 
 def _kernel_arrays(rig: Rig) -> tuple[npt.NDArray[np.int64], FloatArray]:
@@ -334,7 +380,7 @@ def simulate(
     loop = _loop()
     dofs = len(rig.names)
     steps = max(1, round(duration / rig.step))
-    waves, excitation, drift_damping = _wave_arrays(rig, sea)
+    waves, excitation, *drift = _wave_arrays(rig, sea)
     pairs, kernel = _kernel_arrays(rig)
     state = np.zeros((2, dofs)) if start is None else np.array(start, dtype=float)
     if state.shape != (2, dofs):
@@ -359,7 +405,7 @@ def simulate(
         waves,
         sea.phase - sea.omega * begin,
         excitation,
-        drift_damping,
+        *drift,
         np.array([LIMITS[name] for name in rig.names]),
     )
     if failed >= 0:

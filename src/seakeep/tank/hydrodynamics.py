@@ -28,6 +28,7 @@ __all__ = [
     "Pool",
     "excitation_at",
     "far_field_at",
+    "impedance",
     "load_hydrodynamics",
     "radiation_kernel",
     "response",
@@ -287,6 +288,33 @@ def far_field_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
     return result
 
 
+def impedance(
+    hydro: Hydrodynamics,
+    omega: npt.ArrayLike,
+    stiffness: npt.ArrayLike = 0.0,
+    kernel: Kernel | None = None,
+) -> ComplexArray:
+    r"""Force per motion without viscous losses, shape (frequency, dof, dof).
+
+    :math:`-\omega^2 (M + A) - i\omega B + K_h + K` with the stiffness K besides the hydrodynamic
+    one. A and B are made symmetric, as they are in nature and in the time domain; with a kernel
+    they are those that the time domain sees. Raises RequestError if a frequency lies outside the
+    file's band.
+    """
+    wanted = _inside(hydro, omega)
+    if kernel is None:
+        added, radiated = (
+            scipy.interpolate.CubicSpline(hydro.omega, 0.5 * (m + m.swapaxes(1, 2)), axis=0)(wanted)
+            for m in (hydro.added_mass, hydro.damping)
+        )
+    else:
+        added, radiated = kernel_coefficients(kernel, wanted)
+    w = wanted[:, None, None]
+    dynamic = -(w**2) * (hydro.mass + added) - 1j * w * radiated
+    result: ComplexArray = dynamic + hydro.stiffness + np.asarray(stiffness)
+    return result
+
+
 def response(
     hydro: Hydrodynamics,
     omega: npt.ArrayLike,
@@ -296,19 +324,12 @@ def response(
 ) -> ComplexArray:
     r"""Linear response per metre of wave amplitude, shape (frequency, dof).
 
-    Solves :math:`[-\omega^2 (M + A) - i\omega (B + C) + K_h + K]\,q = X` with linear damping C and
-    stiffness K besides the hydrodynamic ones. With a kernel, A and B are those that the time
-    domain sees. Raises RequestError if a frequency lies outside the file's band.
+    Solves :math:`(Z - i\omega C)\,q = X` with the :func:`impedance` Z and the linear damping C.
+    Raises RequestError if a frequency lies outside the file's band.
     """
     wanted = _inside(hydro, omega)
-    if kernel is None:
-        added = scipy.interpolate.CubicSpline(hydro.omega, hydro.added_mass, axis=0)(wanted)
-        radiated = scipy.interpolate.CubicSpline(hydro.omega, hydro.damping, axis=0)(wanted)
-    else:
-        added, radiated = kernel_coefficients(kernel, wanted)
-    w = wanted[:, None, None]
-    dynamic = -(w**2) * (hydro.mass + added) - 1j * w * (radiated + np.asarray(damping))
-    dynamic = dynamic + hydro.stiffness + np.asarray(stiffness)
+    dynamic = impedance(hydro, wanted, stiffness, kernel)
+    dynamic = dynamic - 1j * wanted[:, None, None] * np.asarray(damping)
     solved = np.linalg.solve(dynamic, excitation_at(hydro, wanted)[..., None])
     result: ComplexArray = np.asarray(solved[..., 0], dtype=complex)
     return result

@@ -135,8 +135,9 @@ class VesselSettings(Table):
 
 
 class DriftSettings(Table):
-    """Mean drift force: a factor on what energy and momentum allow, and its damping."""
+    """Drift force: its law, a factor on what energy and momentum allow, and its damping."""
 
+    law: Literal["newman", "qtf"] = "newman"
     scale: NotNegative = 1.0
     damping: bool = True
 
