@@ -208,7 +208,7 @@ def test_coefficients_are_reproduced_by_the_builder(hydro):
     force = made["excitation"].values[:, 0]
     assert force[0] + 1j * force[1] == pytest.approx(hydro.excitation[at], rel=1e-8)
     outgoing = made["far_field"].values[0].astype(float)
-    outgoing = outgoing[:, 0] + 1j * outgoing[:, 1]
+    outgoing = outgoing[0] + 1j * outgoing[1]
     # Written in single precision; the least elements are sums that all but cancel.
     assert outgoing == pytest.approx(hydro.far_field[at], abs=1e-6 * np.abs(outgoing).max())
 
