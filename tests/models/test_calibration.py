@@ -236,6 +236,16 @@ def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(lear
     assert "times a learnt scale and a floor of" in learnt.summary()
 
 
+def test_a_learnt_band_reads_no_state_after_the_start_and_no_wave_beyond_the_last_step(learnt, run):
+    expected = learnt.forecast_summary(run, 120.0, 30, band="calibrated")
+    poisoned = run.copy(deep=True)
+    for name in STATES:
+        poisoned[name].values[1201:] = np.nan
+    poisoned["eta"].values[1230:] = 1e9
+    found = learnt.forecast_summary(poisoned, 120.0, 30, band="calibrated")
+    xr.testing.assert_identical(found, expected)
+
+
 @pytest.mark.parametrize("scale", ["spread", "constant", "learnt"])
 def test_a_file_keeps_the_calibration(calibrated, moved, learnt, ensemble, run, tmp_path, scale):
     calibrated = {"spread": calibrated, "constant": moved, "learnt": learnt}[scale]

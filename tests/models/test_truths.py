@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep import HankelDMDc, SlowSquares
+from seakeep import HankelDMDc, SlowSquares, tune
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.models.selection import select
 
@@ -53,6 +53,19 @@ def test_a_quadratic_drift_is_recovered_to_its_noise():
     # Over 1000 steps nothing but the waves is read; what is left is the noise of the readings.
     assert errors[0] > 0.5
     assert errors[1] < 2 * NOISE
+
+
+def test_a_search_reads_nothing_after_the_stop():
+    runs = {str(seed): drifting(seed, 800)[0] for seed in range(2)}
+    poisoned = {name: run.copy(deep=True) for name, run in runs.items()}
+    for run in poisoned.values():
+        for channel in ("eta", "surge"):
+            run[channel].values[701:] = np.nan
+    spec = HankelDMDc(5, 5, "rollout", delay_rows="exact")
+    options = {"vary": ("observables", "lead"), "horizon": (15.0,), "stop": 70.0}
+    one, other = (tune(spec, each, ["surge"], ["eta"], **options) for each in (runs, poisoned))
+    assert one.table.identical(other.table)
+    assert np.isfinite(one.table["score"]).all()
 
 
 def test_the_best_ridge_is_that_of_the_noise():
