@@ -353,8 +353,8 @@ def test_a_measure_is_added_by_one_function_and_one_line(tmp_path, monkeypatch):
         "import numpy as np\n"
         "from seakeep.core.metrics import paired\n"
         "from seakeep.metrics import labelled\n"
-        "def mean_absolute_error(*, predicted, measured, training_std=None):\n"
-        "    p, m, spread, judged = paired(predicted, measured, training_std)\n"
+        "def mean_absolute_error(*, predicted, measured, training_std=None, noise_std=None):\n"
+        "    p, m, spread, judged = paired(predicted, measured, training_std, noise_std)\n"
         "    return np.mean(np.abs(p - m), axis=-2) / spread\n"
         "mae = labelled(mean_absolute_error, keeps='channel', label='MAE')\n"
     )
@@ -376,3 +376,60 @@ def test_channels_that_are_no_real_numbers_are_refused(kind):
         metrics.nrmse(predicted=data, measured=labelled(MEASURED))
     with pytest.raises(DataError, match=r"'heave' of measured is of type .*, not a real number"):
         metrics.nrmse(predicted=labelled(MEASURED), measured=data)
+
+
+def test_a_channel_that_is_mostly_noise_is_not_judged():
+    rng = np.random.default_rng(0)
+    measured = np.sin(np.arange(400) / 5)[:, None] * [1.0, 0.1] + 0.1 * rng.standard_normal(
+        (400, 2)
+    )
+    # SDs of 0.71 and 0.12 against noise of 0.1: √2 of it is more than the second moves.
+    found = metrics.nrmse(predicted=0 * measured, measured=measured, noise_std=[0.1, 0.1])
+    assert np.isfinite(found[0])
+    assert np.isnan(found[1])
+    noisy = labelled(measured)
+    for name in noisy:
+        noisy[name].attrs["noise_std"] = 0.1
+    slack = metrics.is_slack(predicted=labelled(0 * measured), measured=noisy)
+    assert [bool(slack[name]) for name in slack] == [False, True]
+    with pytest.raises(RequestError, match=r"noise_std has shape \(3,\); one value for each"):
+        metrics.nrmse(predicted=measured, measured=measured, noise_std=[1.0, 2.0, 3.0])
+
+
+def autoregression(rng, size, phi=0.9):
+    noise = rng.standard_normal(size + 200)
+    out = np.empty_like(noise)
+    last = 0.0
+    for k, each in enumerate(noise):
+        last = out[k] = phi * last + each
+    return out[200:]
+
+
+def test_an_interval_holds_the_value_of_a_long_record_as_often_as_it_says():
+    rng, inside = np.random.default_rng(0), 0
+    truth = 0.5  # an error of a quarter of the variance of the measurement
+    for _ in range(60):
+        measured = autoregression(rng, 400)[:, None]
+        predicted = measured + truth * autoregression(rng, 400)[:, None]
+        pair = both(predicted, measured)
+        low, high = metrics.anrmse(**pair, interval=0.95)
+        assert low < metrics.anrmse(**pair) < high
+        inside += low <= truth <= high
+    # Nominally 0.95; blocks cut some of the dependence: 60 trials have a standard error of 0.03.
+    assert inside >= 0.85 * 60
+
+
+def test_bounds_take_the_place_of_the_value():
+    rng = np.random.default_rng(1)
+    measured = rng.standard_normal((100, 2))
+    pair = both(measured + 0.1 * rng.standard_normal((3, 100, 2)), measured)
+    assert metrics.nrmse(**pair, interval=0.9).shape == (2, 3, 2)
+    of_sets = {key: labelled(measured) for key in ("predicted", "measured")}
+    bounds = metrics.nrmse(**of_sets, interval=0.9)
+    assert bounds["heave"].dims == ("bound",)
+    assert list(bounds["bound"].values) == ["lower", "upper"]
+    assert metrics.nammae(**of_sets, interval=0.9).sel(bound="upper") == 0.0  # a perfect forecast
+    with pytest.raises(RequestError, match="a value at each instant, and no interval over time"):
+        metrics.error_over_time(**pair, interval=0.9)
+    with pytest.raises(RequestError, match="interval must lie between 0 and 1"):
+        metrics.nrmse(**pair, interval=95)

@@ -5,8 +5,17 @@ All take ``predicted=`` and ``measured=`` by keyword, in the same units. Arrays 
 against the variable of the same name in `measured`; words, such as the status of an ensemble's
 members, are no channels. Per-channel measures come back as a Dataset of numbers. A channel whose
 measured standard deviation in the window is below 1 % of its training standard deviation (a slack
-line) is NaN and left out of averages; forecasts carry the training standard deviation in the
-attribute ``training_std`` of each channel.
+line), or more than half of whose variance is noise, is NaN and left out of averages; forecasts
+carry the training standard deviation in the attribute ``training_std`` of each channel, prepared
+runs that of the noise in ``noise_std``.
+
+With ``interval=0.95`` a measure gives the bounds of its interval in the place of its value, along a
+first axis (lower, upper; of Datasets the dimension ``bound``). Predicted and measured samples are
+redrawn together in blocks as long as the errors depend on one another (Politis and White), with the
+same draws for the same call; quantiles are taken further out for few blocks. It is how sure the
+value is in a longer record of this run and this model, not over runs or training sets:
+:func:`seakeep.statistics.two_way_interval`. Extremes (NAMMAE) are redrawn from what was seen, so
+that their bounds are rough.
 
 A measure is one function of arrays in :mod:`seakeep.core.metrics`, and one line here.
 """
@@ -14,16 +23,19 @@ A measure is one function of arrays in :mod:`seakeep.core.metrics`, and one line
 from __future__ import annotations
 
 import functools
+import warnings
 from collections.abc import Callable
 from typing import Any, Literal, Protocol, TypeVar, overload
 
+import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray
+from seakeep.arrays import BoolArray, FloatArray, fraction
 from seakeep.core import metrics as core
-from seakeep.errors import RequestError
-from seakeep.pairing import Paired, pair
+from seakeep.core.bootstrap import block_length, bootstrap_indices, outer_tail
+from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.pairing import pair
 
 __all__ = [
     "Measure",
@@ -36,6 +48,12 @@ __all__ = [
     "normalised_extremes_error",
     "nrmse",
 ]
+
+BOUNDS = ("lower", "upper")
+REDRAWN = 500
+"""Redrawn records of an interval."""
+AT_ONCE = 2_000_000
+"""Values of redrawn records at a time."""
 
 Labels = TypeVar("Labels", covariant=True)
 Numbers = TypeVar("Numbers", covariant=True)
@@ -51,6 +69,8 @@ class Measure(Protocol[Labels, Numbers]):
         predicted: xr.Dataset,
         measured: xr.Dataset,
         training_std: npt.ArrayLike | None = None,
+        noise_std: npt.ArrayLike | None = None,
+        interval: None = None,
     ) -> Labels: ...
     @overload
     def __call__(
@@ -59,7 +79,19 @@ class Measure(Protocol[Labels, Numbers]):
         predicted: npt.ArrayLike,
         measured: npt.ArrayLike,
         training_std: npt.ArrayLike | None = None,
+        noise_std: npt.ArrayLike | None = None,
+        interval: None = None,
     ) -> Numbers: ...
+    @overload
+    def __call__(
+        self,
+        *,
+        predicted: Any,
+        measured: Any,
+        training_std: npt.ArrayLike | None = None,
+        noise_std: npt.ArrayLike | None = None,
+        interval: float,
+    ) -> Any: ...
 
 
 def labelled(
@@ -73,8 +105,8 @@ def labelled(
     Parameters
     ----------
     measure : callable
-        Of arrays ``predicted=``, ``measured=`` (…, time, channel) and ``training_std=``;
-        :func:`seakeep.core.metrics.paired` checks them.
+        Of arrays ``predicted=``, ``measured=`` (…, time, channel), ``training_std=`` and
+        ``noise_std=``; :func:`seakeep.core.metrics.paired` checks them.
     keeps : {"channel", "time", "neither"}
         Which of its last two axes the result still has: of Datasets it is a Dataset, a DataArray
         over time, or a number.
@@ -89,25 +121,41 @@ def labelled(
     name = label or measure.__name__
 
     @functools.wraps(measure)
-    def judged(*, predicted: Any, measured: Any, training_std: Any = None) -> Any:
+    def judged(
+        *,
+        predicted: Any,
+        measured: Any,
+        training_std: Any = None,
+        noise_std: Any = None,
+        interval: float | None = None,
+    ) -> Any:
         if isinstance(predicted, xr.Dataset) != isinstance(measured, xr.Dataset):
             raise RequestError(
                 "predicted and measured must both be Datasets or both be arrays; received "
                 f"{type(predicted).__name__} and {type(measured).__name__}."
             )
+        if interval is not None and keeps == "time":
+            raise RequestError(f"{name} has a value at each instant, and no interval over time.")
+
+        known = {"training_std": training_std, "noise_std": noise_std}
         if not isinstance(predicted, xr.Dataset):
-            values = measure(predicted=predicted, measured=measured, training_std=training_std)
+            arrays = {"predicted": predicted, "measured": measured}
+            values = _valued(measure, arrays, known, interval)
             return values if values.ndim else values.item()
         pairs = pair(predicted=predicted, measured=measured)
-        if training_std is None:
-            training_std = [predicted[each].attrs.get("training_std", 0.0) for each in pairs.names]
-        values = measure(**pairs.arrays, training_std=training_std)
+        for key, data in zip(known, (predicted, measured), strict=True):
+            if known[key] is None:
+                known[key] = [data[each].attrs.get(key, 0.0) for each in pairs.names]
+        values = _valued(measure, pairs.arrays, known, interval)
+        bound = () if interval is None else ("bound",)
         if keeps == "channel":
-            return _per_channel(values, pairs, {"units": units}, name)
+            out = _per_channel(values, (*bound, *pairs.lead), pairs.names, units, name)
+            return out.assign_coords(bound=list(BOUNDS)) if bound else out
         if values.ndim == 0:
             return values.item()
-        dims = (*pairs.lead, "time") if keeps == "time" else pairs.lead
+        dims = (*bound, *pairs.lead, *(("time",) if keeps == "time" else ()))
         coords = {dim: predicted[dim] for dim in dims if dim in predicted.coords}
+        coords |= {each: list(BOUNDS) for each in bound}
         attrs = {"units": units, "long_name": name}
         return xr.DataArray(values, coords, dims, name=measure.__name__, attrs=attrs)
 
@@ -115,14 +163,49 @@ def labelled(
     return judged
 
 
-def _per_channel(values: Any, pairs: Paired, attrs: dict[str, str], label: str) -> xr.Dataset:
-    lead = pairs.lead[: values.ndim - 1]
+def _per_channel(
+    values: Any, lead: tuple[str, ...], names: list[str], units: str, label: str
+) -> xr.Dataset:
     return xr.Dataset(
         {
-            name: (lead, values[..., column], attrs | {"long_name": f"{label} of {name}"})
-            for column, name in enumerate(pairs.names)
+            name: (
+                lead[: values.ndim - 1],
+                values[..., column],
+                {"units": units, "long_name": f"{label} of {name}"},
+            )
+            for column, name in enumerate(names)
         }
     )
+
+
+def _valued(
+    measure: Callable[..., Any],
+    arrays: dict[str, Any],
+    known: dict[str, Any],
+    level: float | None,
+) -> Any:
+    """A measure, or its bounds over redrawn blocks of instants, shape (2, …)."""
+    if level is None:
+        return measure(**arrays, **known)
+    p, m, _, _ = core.paired(arrays["predicted"], arrays["measured"], None)
+    tails = fraction(level, "interval")
+    square = np.nansum(((p - m) / m.std(axis=-2, keepdims=True)) ** 2, axis=-1)
+    square = np.where(np.isfinite(square), square, 0.0).reshape(-1, p.shape[-2]).mean(axis=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeakeepWarning)  # few blocks widen the interval
+        block = 1 if np.ptp(square) == 0 else block_length(square, "politis_white")
+    rows = bootstrap_indices(len(square), REDRAWN, block, np.random.default_rng(0))
+    step = max(1, AT_ONCE // max(p.size, m.size))
+    pieces = [rows[first : first + step] for first in range(0, REDRAWN, step)]
+    axis = max(p.ndim, m.ndim) - 2  # of the draws, behind members and windows
+    found = np.concatenate(
+        [measure(predicted=p[..., at, :], measured=m[..., at, :], **known) for at in pieces], axis
+    )
+    tail = outer_tail(len(square) / block, tails)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a channel that is never judged
+        out: FloatArray = np.nanquantile(found, [tail, 1.0 - tail], axis=axis)
+    return out
 
 
 is_slack: Measure[xr.Dataset, BoolArray] = labelled(core.is_slack, "channel", label="slackness")

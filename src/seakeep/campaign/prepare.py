@@ -34,6 +34,7 @@ from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you
 from seakeep.formats import Columns, Options, read_columns
 from seakeep.quality import as_json, warn_of
 from seakeep.signals import Clock, uniform_step
+from seakeep.signals.quality import noise_floor
 from seakeep.toml import in_seconds, lengths, parse_length
 
 __all__ = ["Campaign", "Progress", "read_campaign"]
@@ -48,7 +49,7 @@ KEPT = 2**30
 """Bytes of columns that are kept from the survey of all runs until each is prepared: campaigns of
 model tests fit; what is beyond is read again."""
 
-FORMAT = 8
+FORMAT = 9
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
 
 
@@ -462,6 +463,8 @@ class Campaign:
                 data = cropped(run).data
                 assert data is not None
                 data.attrs["quality"] = as_json(run.findings)
+                for channel in data.data_vars.values():
+                    channel.attrs["noise_std"] = noise_floor(channel.to_numpy())
                 data.attrs.update(self._attributes(name, data, dt, found, settings))
             except SeakeepError as error:
                 spare(failures, name, error)

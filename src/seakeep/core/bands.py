@@ -89,6 +89,7 @@ def band_error_over_time(
     dt: float,
     frequency: float,
     training_std: npt.ArrayLike | None = None,
+    noise_std: npt.ArrayLike | None = None,
 ) -> BandErrors:
     r"""ε(t) of the slow and of the fast part of the error.
 
@@ -100,9 +101,9 @@ def band_error_over_time(
         Time step, s.
     frequency : float
         Where the bands meet, Hz: below the waves, above the slow drift.
-    training_std : array_like, shape (channel,), optional
-        Standard deviations in training; a channel whose measured SD is below 1 % of it (a slack
-        line) is left out.
+    training_std, noise_std : array_like, shape (channel,), optional
+        Standard deviations in training and of the noise, as for :func:`seakeep.metrics.nrmse`; what
+        is not judged there is left out.
 
     Returns
     -------
@@ -121,7 +122,7 @@ def band_error_over_time(
     The paper tests ε(t) over a horizon that is shorter than a period of the slow surge and finds
     no trend. Slow surge and waves grow old differently, so each has its ε(t).
     """
-    p, m, spread, judged = paired(predicted, measured, training_std)
+    p, m, spread, judged = paired(predicted, measured, training_std, noise_std)
     parts = split_bands(p - m, dt, frequency)
     low, wave = (
         over_channels(np.abs(part) / spread[..., None, :], judged[..., None, :]) for part in parts

@@ -14,6 +14,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+from scipy import special
 
 from seakeep.arrays import (
     FloatArray,
@@ -32,6 +33,7 @@ __all__ = [
     "choose_block_length",
     "lag_one_correlation",
     "moving_block_bootstrap",
+    "outer_tail",
     "resolve_block_length",
     "too_long",
 ]
@@ -335,6 +337,17 @@ def bootstrap_indices(
     starts = allowed[rng.integers(0, allowed.size, size=(n_series, blocks))]
     positions = starts[:, :, None] + np.arange(block_length)
     return positions.reshape(n_series, -1)[:, :n_samples].astype(np.intp, copy=False)
+
+
+def outer_tail(blocks: float, level: float) -> float:
+    """Probability of the tail at which an interval from few blocks ends.
+
+    Student's t in place of the normal quantile, and the bias of a variance from n values, take
+    quantiles further out than (1 − level)/2 (Hesterberg, The American Statistician 69, 2015: the
+    expanded percentile interval).
+    """
+    student = special.stdtrit(blocks - 1.0, 0.5 - level / 2)
+    return float(special.ndtr(np.sqrt(blocks / (blocks - 1.0)) * student))
 
 
 def moving_block_bootstrap(

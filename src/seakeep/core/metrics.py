@@ -25,15 +25,21 @@ __all__ = [
 
 SLACK_PART = 0.01
 """A channel whose measured SD is below this part of its training SD is not judged."""
+NOISE_FACTOR = 2**0.5
+"""Nor is one whose measured SD is below so many SDs of its noise: more than half of its variance
+is noise there, which no model forecasts."""
 
 
 def paired(
-    predicted: npt.ArrayLike, measured: npt.ArrayLike, training_std: npt.ArrayLike | None
+    predicted: npt.ArrayLike,
+    measured: npt.ArrayLike,
+    training_std: npt.ArrayLike | None,
+    noise_std: npt.ArrayLike | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
     """Check two histories and return them with the measured SD and which channels are judged.
 
-    The SD is NaN where a channel is slack, and where the measurement has a gap; the first is not
-    judged, the second is (and found to be NaN).
+    The SD is NaN where a channel is slack or noise, and where the measurement has a gap; the first
+    two are not judged, the third is (and found to be NaN).
     """
     p, m = as_real(predicted, "predicted"), as_real(measured, "measured")
     if m.ndim == 1 and p.ndim >= 1 and p.shape[-1:] == m.shape:
@@ -69,6 +75,14 @@ def paired(
     # A constant that is not a binary fraction has a spread of rounding, not of zero.
     constant = spread <= 1e-12 * np.abs(m).max(axis=-2)
     slack = constant | (spread < SLACK_PART * reference)
+    noise = as_real(0.0 if noise_std is None else noise_std, "noise_std")
+    try:
+        slack = slack | (spread < NOISE_FACTOR * np.broadcast_to(noise, spread.shape))
+    except ValueError:
+        raise RequestError(
+            f"noise_std has shape {noise.shape}; one value for each of the {m.shape[-1]} channels "
+            "is expected."
+        ) from None
     return p, m, np.where(slack, np.nan, spread), ~slack
 
 
@@ -77,18 +91,20 @@ def is_slack(
     predicted: npt.ArrayLike,
     measured: npt.ArrayLike,
     training_std: npt.ArrayLike | None = None,
+    noise_std: npt.ArrayLike | None = None,
 ) -> BoolArray:
-    """Say which channels are not judged, because the measurement barely moves.
+    """Say which channels are not judged, because the measurement barely moves or is noise.
 
     Parameters
     ----------
-    predicted, measured, training_std
+    predicted, measured, training_std, noise_std
         As for :func:`nrmse`.
 
     Returns
     -------
     ndarray of bool, shape (channel,), or Dataset
-        True for a channel whose measured SD is below 1 % of its training SD, or zero.
+        True for a channel whose measured SD is below 1 % of its training SD, or below √2 times
+        that of its noise, or zero.
 
     Raises
     ------
@@ -102,7 +118,7 @@ def is_slack(
     >>> is_slack(predicted=measured, measured=measured)
     array([False,  True])
     """
-    return ~paired(predicted, measured, training_std)[3]
+    return ~paired(predicted, measured, training_std, noise_std)[3]
 
 
 def nrmse(
@@ -110,6 +126,7 @@ def nrmse(
     predicted: npt.ArrayLike,
     measured: npt.ArrayLike,
     training_std: npt.ArrayLike | None = None,
+    noise_std: npt.ArrayLike | None = None,
 ) -> FloatArray:
     """Root mean square error of each channel, divided by its measured standard deviation.
 
@@ -120,6 +137,10 @@ def nrmse(
     training_std : array_like, shape (channel,), optional
         Standard deviations in training, by default the ones that a forecast carries; a channel
         whose measured SD is below 1 % of it (a slack line) is NaN.
+    noise_std : array_like, shape (…, channel), optional
+        Standard deviations of the noise, by default the ones that prepared runs carry
+        (:func:`seakeep.signals.noise_floor`); a channel more than half of whose measured variance
+        is noise is NaN.
 
     Returns
     -------
@@ -142,7 +163,7 @@ def nrmse(
     >>> nrmse(predicted=0.9 * measured, measured=measured).round(2)
     array([0.1, 0.1])
     """
-    p, m, spread, _ = paired(predicted, measured, training_std)
+    p, m, spread, _ = paired(predicted, measured, training_std, noise_std)
     return root_mean_square(p - m) / spread
 
 
@@ -151,12 +172,13 @@ def anrmse(
     predicted: npt.ArrayLike,
     measured: npt.ArrayLike,
     training_std: npt.ArrayLike | None = None,
+    noise_std: npt.ArrayLike | None = None,
 ) -> FloatArray:
     """Average of :func:`nrmse` over the channels that can be judged (paper, equation ANRMSE).
 
     Parameters
     ----------
-    predicted, measured, training_std
+    predicted, measured, training_std, noise_std
         As for :func:`nrmse`.
 
     Returns
@@ -169,7 +191,7 @@ def anrmse(
     RequestError, DataError
         As :func:`nrmse`.
     """
-    p, m, spread, judged = paired(predicted, measured, training_std)
+    p, m, spread, judged = paired(predicted, measured, training_std, noise_std)
     return over_channels(root_mean_square(p - m) / spread, judged)
 
 
@@ -178,12 +200,13 @@ def error_over_time(
     predicted: npt.ArrayLike,
     measured: npt.ArrayLike,
     training_std: npt.ArrayLike | None = None,
+    noise_std: npt.ArrayLike | None = None,
 ) -> FloatArray:
     """Error at each instant in measured SDs, averaged over the channels: ε(t) of the paper.
 
     Parameters
     ----------
-    predicted, measured, training_std
+    predicted, measured, training_std, noise_std
         As for :func:`nrmse`.
 
     Returns
@@ -195,7 +218,7 @@ def error_over_time(
     RequestError, DataError
         As :func:`nrmse`.
     """
-    p, m, spread, judged = paired(predicted, measured, training_std)
+    p, m, spread, judged = paired(predicted, measured, training_std, noise_std)
     return over_channels(np.abs(p - m) / spread[..., None, :], judged[..., None, :])
 
 
@@ -204,12 +227,13 @@ def normalised_extremes_error(
     predicted: npt.ArrayLike,
     measured: npt.ArrayLike,
     training_std: npt.ArrayLike | None = None,
+    noise_std: npt.ArrayLike | None = None,
 ) -> FloatArray:
     """Mean absolute error of minimum and maximum of each channel, in measured SDs.
 
     Parameters
     ----------
-    predicted, measured, training_std
+    predicted, measured, training_std, noise_std
         As for :func:`nrmse`.
 
     Returns
@@ -222,7 +246,7 @@ def normalised_extremes_error(
     RequestError, DataError
         As :func:`nrmse`.
     """
-    p, m, spread, _ = paired(predicted, measured, training_std)
+    p, m, spread, _ = paired(predicted, measured, training_std, noise_std)
     return extremes_error(p, m) / spread
 
 
@@ -231,12 +255,13 @@ def nammae(
     predicted: npt.ArrayLike,
     measured: npt.ArrayLike,
     training_std: npt.ArrayLike | None = None,
+    noise_std: npt.ArrayLike | None = None,
 ) -> FloatArray:
     """Normalised average minimum/maximum absolute error (paper, equation NAMMAE).
 
     Parameters
     ----------
-    predicted, measured, training_std
+    predicted, measured, training_std, noise_std
         As for :func:`nrmse`.
 
     Returns
@@ -249,7 +274,7 @@ def nammae(
     RequestError, DataError
         As :func:`nrmse`.
     """
-    p, m, spread, judged = paired(predicted, measured, training_std)
+    p, m, spread, judged = paired(predicted, measured, training_std, noise_std)
     return over_channels(extremes_error(p, m) / spread, judged)
 
 
@@ -258,12 +283,13 @@ def fit_percent(
     predicted: npt.ArrayLike,
     measured: npt.ArrayLike,
     training_std: npt.ArrayLike | None = None,
+    noise_std: npt.ArrayLike | None = None,
 ) -> FloatArray:
     r"""Fit of each channel as MATLAB's ``compare`` states it, percent.
 
     Parameters
     ----------
-    predicted, measured, training_std
+    predicted, measured, training_std, noise_std
         As for :func:`nrmse`.
 
     Returns
@@ -277,7 +303,7 @@ def fit_percent(
     RequestError, DataError
         As :func:`nrmse`.
     """
-    p, m, spread, _ = paired(predicted, measured, training_std)
+    p, m, spread, _ = paired(predicted, measured, training_std, noise_std)
     norm = np.sqrt(np.sum((p - m) ** 2, axis=-2))
     out: FloatArray = 100.0 * (1.0 - norm / (spread * np.sqrt(m.shape[-2] - 1)))
     return out

@@ -5,8 +5,7 @@ independent of the others, and counting them as such makes intervals far too nar
 columns are redrawn apart from each other, and a cell is taken wherever a drawn row meets a drawn
 column (Owen, Annals of Applied Statistics 1, 2007: the pigeonhole bootstrap). Neighbours that
 overlap are drawn together, in circular blocks. Quantiles are taken further out for the few blocks
-there are: Student's t over the normal quantile, and the bias of a variance from n values
-(Hesterberg, The American Statistician 69, 2015: the expanded percentile interval).
+there are (:func:`seakeep.core.bootstrap.outer_tail`).
 """
 
 from __future__ import annotations
@@ -16,9 +15,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
 
 from seakeep.arrays import FloatArray, IntArray, as_generator, as_real, fraction, whole_number
+from seakeep.core.bootstrap import outer_tail
 from seakeep.errors import RequestError
 
 __all__ = ["overlap_block", "two_way_interval"]
@@ -100,8 +99,7 @@ def two_way_interval(
     held = min((n / block for n, block in zip(shape, blocks, strict=True) if n > 1), default=0.0)
     if held < FEWEST or np.isnan(values).all():
         return np.full(values.shape[1:], np.nan), np.full(values.shape[1:], np.nan)
-    student = special.stdtrit(held - 1.0, 0.5 - part / 2)
-    tail = special.ndtr(np.sqrt(held / (held - 1.0)) * student)
+    tail = outer_tail(held, part)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a statistic that is NaN in all series
         lower, upper = np.nanquantile(values, [tail, 1.0 - tail], axis=0)

@@ -151,8 +151,8 @@ def _apply_prefix(channels: Iterable[tuple[xr.Dataset, str]]) -> None:
     for data, name, each in chosen:
         data[name] = factor * each
         data[name].attrs = {**each.attrs, "units": units}
-        if "training_std" in each.attrs:
-            data[name].attrs["training_std"] = factor * float(each.attrs["training_std"])
+        for key in {"training_std", "noise_std"} & set(each.attrs):
+            data[name].attrs[key] = factor * float(each.attrs[key])
 
 
 def _legend_over(axes: Any, handles: list[Any], labels: list[str]) -> None:

@@ -28,6 +28,7 @@ __all__ = [
     "find_saturation",
     "find_stuck",
     "level_drift",
+    "noise_floor",
     "noise_level",
     "reading_step",
 ]
@@ -58,6 +59,10 @@ LARGEST_GAIN = 2.0
 """Factor between the motions of two sensors beyond which one of them has another unit or
 calibration: a correlation of 0.8 leaves room for 1.25 by what the sensor adds of its own, and a
 wrong unit makes 10 or more."""
+
+NOISE_BAND = (0.5, 0.75)
+"""Part of the Nyquist frequency where the level of the spectrum is that of the noise: above the
+waves and their harmonics, below the edge of an anti-alias filter."""
 
 FLAGS = {"missing": MISSING, "bridged": BRIDGED, "outlier": OUTLIER, "saturated": SATURATED,
          "stuck": STUCK, "replaced": REPLACED}  # fmt: skip
@@ -541,3 +546,45 @@ def energy_above(series: npt.ArrayLike, dt: float, edge: float) -> tuple[float, 
     lines = np.fft.rfftfreq(x.size, dt)
     waves = (lines >= WAVES[0] / period) & (lines <= WAVES[1] / period)
     return float(power[waves & (lines > edge)].sum() / power[waves].sum()), period
+
+
+def noise_floor(series: npt.ArrayLike) -> float:
+    r"""Standard deviation of the noise of a record that is sampled well above its waves.
+
+    The level of the spectrum between one half and three quarters of the Nyquist frequency, taken
+    for that of white noise: the median over the lines, which neither a harmonic nor a spur moves,
+    over ln 2, since the lines of noise are exponentially distributed.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Uniformly sampled; gaps (NaN) are interpolated. A mean and a trend are removed.
+
+    Returns
+    -------
+    float
+        In the unit of the series; 0 of fewer than 64 samples, in which waves leak too far.
+
+    Notes
+    -----
+    Pulses, as of a slack line that dips into the water, are noise by this measure. What an
+    integrated channel has of noise below the band is not seen.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t, rng = np.arange(2000) / 20, np.random.default_rng(0)
+    >>> waves = np.sin(2 * np.pi * 0.6 * t)
+    >>> round(noise_floor(waves + 0.05 * rng.standard_normal(2000)), 2)
+    0.05
+    """
+    x = np.asarray(series, dtype=float)
+    known = np.isfinite(x)
+    if known.sum() < 64:
+        return 0.0
+    at = np.arange(x.size)
+    x = scipy.signal.detrend(np.interp(at, at[known], x[known]))
+    taper = np.hanning(x.size)
+    power = np.abs(np.fft.rfft(x * taper)) ** 2 / np.sum(taper**2)
+    low, high = (round(edge * (power.size - 1)) for edge in NOISE_BAND)
+    return float(np.sqrt(np.median(power[low:high]) / np.log(2.0)))

@@ -195,8 +195,8 @@ def with_degrees(run: xr.Dataset) -> xr.Dataset:
             continue
         out[name] = variable * factor
         out[name].attrs = {**variable.attrs, "units": target}
-        if "training_std" in variable.attrs:
-            out[name].attrs["training_std"] = factor * float(variable.attrs["training_std"])
+        for key in {"training_std", "noise_std"} & set(variable.attrs):
+            out[name].attrs[key] = factor * float(variable.attrs[key])
     return out
 
 

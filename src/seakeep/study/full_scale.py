@@ -58,8 +58,8 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
         factor = froude_factor(str(variable.attrs.get("units", "1")), scale, density_ratio)
         out[name] = variable.assign_coords(time=out["time"]) * factor
         out[name].attrs = dict(variable.attrs)
-        if "training_std" in variable.attrs:
-            out[name].attrs["training_std"] = factor * float(variable.attrs["training_std"])
+        for key in {"training_std", "noise_std"} & set(variable.attrs):
+            out[name].attrs[key] = factor * float(variable.attrs[key])
         if "x_position" in variable.attrs:
             out[name].attrs["x_position"] = scale * float(variable.attrs["x_position"])
     out.attrs = dict(run.attrs) | {"scale": "full", "scale_factor": float(scale)}

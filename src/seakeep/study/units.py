@@ -93,7 +93,9 @@ def compute(plan: Plan, runs: Runs, unit: Unit) -> Arrays:
         if plan.models[unit.model].is_ensemble:
             measured = measured_windows(plan, runs, plan.tests[test], numbers)
             shown = [k for k, n in enumerate(numbers) if plan.is_shown(unit.training, test, n)]
-            found = _judged(series, lost, measured, spread, shown, plan.level)
+            noise = _noise(plan, runs, [plan.tests[test][n] for n in numbers])
+            pair = {"measured": measured, "training_std": spread, "noise_std": noise}
+            found = _judged(series, lost, pair, shown, plan.level)
             found |= {"shown": np.array([numbers[k] for k in shown])} if shown else {}
             found |= {"envelope": envelope} if plan.scale == "learnt" else {}
             out |= {f"tests/{test}/{key}": each for key, each in found.items()}
@@ -137,13 +139,11 @@ def _series(
 def _judged(
     series: FloatArray,
     lost: npt.NDArray[np.int64],
-    measured: FloatArray,
-    spread: FloatArray,
+    pair: Mapping[str, FloatArray],
     shown: Sequence[int],
     level: float,
 ) -> Arrays:
     """Statistics of the members of a test set, their errors, and those that figures show."""
-    pair = {"measured": measured, "training_std": spread}
     reduced = reduce_members(series, lost, level)
     out: Arrays = {key: reduced[:, row] for row, key in enumerate(STATISTICS)}
     out["lost"] = lost.T
@@ -283,6 +283,7 @@ def _collect_test(
         "run": ("window", np.array([w.run for w in windows], dtype=object)),
         "training_mean": (("training", "channel"), moments[:, 0]),
         "training_std": (("training", "channel"), moments[:, 1]),
+        "noise_std": (("window", "channel"), _noise(plan, runs, windows)),
     }
     if (heights := wave_heights(plan, runs, windows)) is not None:
         variables["wave_height"] = (("window", "time"), heights)
@@ -305,6 +306,13 @@ def _collect_test(
     for model in plan.specs:
         _add_errors(out, model, plan.dt, frequency)
     return out
+
+
+def _noise(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray:
+    """SD of the noise of each channel in the run of each window."""
+    return np.array(
+        [[runs[w.run][c].attrs.get("noise_std", 0.0) for c in plan.states] for w in windows]
+    )
 
 
 def wave_heights(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray | None:
@@ -374,6 +382,7 @@ def _add_errors(out: xr.Dataset, model: str, dt: float, frequency: float) -> Non
             "predicted": predicted[training],
             "measured": measured[training],
             "training_std": out["training_std"].values[training],
+            "noise_std": out["noise_std"].values,
         }
         results["nrmse"][training] = metrics.nrmse(**pair)
         results["nammae"][training] = metrics.normalised_extremes_error(**pair)

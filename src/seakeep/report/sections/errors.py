@@ -99,7 +99,8 @@ def error_table(result: StudyResult, test: str) -> Table:
     if left_out:
         note += (
             f" {left_out} values were left out: a channel whose measured SD is below 1 % of its "
-            "training SD (a slack line) is not judged, nor is a forecast that diverged."
+            "training SD (a slack line), or more than half of whose variance is noise, is not judged, "
+            "nor is a forecast that diverged."
         )
     return Table(
         f"errors_{test}",
