@@ -10,7 +10,16 @@ import xarray as xr
 from seakeep import statistics
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.study import read_study, run_study
-from seakeep.study.judge import box_table, coverage_table, joined, skill_table
+from seakeep.study.judge import (
+    MEASURES,
+    box_table,
+    coverage_table,
+    difference_table,
+    joined,
+    median_of,
+    skill_table,
+    verdict,
+)
 from seakeep.study.plan import make_plan, random_stream
 
 
@@ -196,6 +205,54 @@ def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study):
     assert np.isfinite(found.groups["statistics/divergence"]["mean"].sel(model="bayesian")).all()
 
 
+def crossed(rng, models, cells=10):
+    """Errors of models in cells that share training sets and windows."""
+    rows, columns = 0.1 * rng.standard_normal((cells, 1)), 0.1 * rng.standard_normal(cells)
+    shared = 1.0 + rows + columns
+    dims = ("training", "window", "channel")
+    out = xr.Dataset(
+        {
+            f"{model}_{measure}": (dims, (level * shared)[..., None] * [1.0, 2.0])
+            for model, level in models.items()
+            for measure in MEASURES
+        },
+        coords={"channel": ["heave", "pitch"], "time": [0.1, 10.0]},
+    )
+    out["judged"] = (("training", "window"), np.ones((cells, cells), dtype=bool))
+    out["run"] = ("window", np.array(["r"] * cells, dtype=object))
+    out["start"] = ("window", 10.0 * np.arange(cells))
+    return out
+
+
+def test_differences_between_models_have_intervals_and_verdicts():
+    rng = np.random.default_rng(0)
+    test = crossed(rng, {"good": 0.8, "same": 1.0, "noisy": 1.0})
+    noise = 1 + 0.3 * rng.standard_normal((10, 10, 1))
+    test["noisy_nrmse"] = test["noisy_nrmse"] * noise
+    training = xr.Dataset({"begin": ("training", np.zeros(10))})
+    found = difference_table(test, ["good", "same", "noisy"], training, rng)
+    better = found.sel(model="good", other="same", measure="nrmse")
+    # The same cells but for a factor: no draw can tell another change than the factor's.
+    for key in ("change", "lower", "upper"):
+        np.testing.assert_allclose(better[key], -0.2, rtol=1e-12)
+    assert verdict(float(better["lower"][0]), float(better["upper"][0])) == "better"
+    reverse = found.sel(model="same", other="good", measure="nrmse", channel="average")
+    assert verdict(float(reverse["lower"]), float(reverse["upper"])) == "worse"
+    unsure = found.sel(model="noisy", other="same", measure="nrmse", channel="average")
+    assert float(unsure["lower"]) < 0.0 < float(unsure["upper"])
+    assert verdict(float(unsure["lower"]), float(unsure["upper"])) == "cannot tell"
+    assert verdict(np.nan, np.nan) == "cannot tell"
+
+
+def test_medians_leave_out_what_is_not_judged():
+    rng = np.random.default_rng(1)
+    cells = rng.standard_normal((3, 8, 2))
+    cells[0, :5], cells[1] = np.nan, np.nan
+    found = median_of(cells)
+    np.testing.assert_allclose(found[[0, 2]], np.nanmedian(cells[[0, 2]], axis=1))
+    assert np.isnan(found[1]).all()
+
+
 def test_skill_is_the_change_of_the_median_error_against_the_baselines():
     boxes = xr.Dataset(
         {"median": (("model", "measure", "channel"), [[[0.4]], [[0.5]], [[0.8]], [[1.0]]])},
@@ -206,14 +263,21 @@ def test_skill_is_the_change_of_the_median_error_against_the_baselines():
         },
     )
     kinds = {"mine": "hankel_dmdc", "fast": "arx", "slow": "fir", "still": "hold_last"}
-    skill = skill_table(boxes, kinds)
+    median = boxes["median"].values
+    dims = ("model", "other", "measure", "channel")
+    change = (dims, median[:, None] / median - 1)
+    differences = xr.Dataset(
+        {"change": change, "lower": change, "upper": change},
+        coords={**boxes.coords, "other": boxes["model"].values},
+    )
+    skill = skill_table(boxes, differences, kinds)
     assert dict(zip(skill["reference"].values, skill["reference_model"].values, strict=True)) == {
         "hold_last": "still",
         "best_linear": "fast",
     }
     mine = skill["change"].sel(model="mine", measure="nrmse")
     np.testing.assert_allclose(mine, [-0.6, -0.2], rtol=1e-12)
-    assert skill_table(boxes, {"mine": "hankel_dmdc"}) is None
+    assert skill_table(boxes, differences, {"mine": "hankel_dmdc"}) is None
 
 
 BASELINES = """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,13 @@ from seakeep.campaign import Campaign
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
 from seakeep.signals import significant_height, wave_spectrum
+from seakeep.study.fit import find_repeat
 from seakeep.study.judge import wave_frequency
-from seakeep.study.plan import Plan, between, whole_span
+from seakeep.study.plan import Plan, between, training_samples, whole_span
 from seakeep.study.resolve import Spec
 from seakeep.study.settings import Study
 
-__all__ = ["describe_study"]
+__all__ = ["describe_study", "words_of_repeats"]
 
 Runs = Mapping[str, xr.Dataset]
 
@@ -45,8 +47,48 @@ def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset
         "runs": _runs(plan, runs),
         **{f"prepared/{name}": _prepared(run) for name, run in runs.items()},
     }
+    if (repeats := _repeats(study.campaign, plan, runs)) is not None:
+        groups["repeats"] = repeats
     spectra = _spectra(plan, runs)
     return {**groups, **({"spectra": spectra} if spectra is not None else {})}
+
+
+def _repeats(campaign: Campaign, plan: Plan, runs: Runs) -> xr.Dataset | None:
+    """Runs whose test windows repeat input of a training set that they test; None without any."""
+    spans: dict[str, list[float]] = {}
+    for window in (each for windows in plan.tests.values() for each in windows):
+        if campaign.settings.runs[window.run].waves != "regular":
+            edges = spans.setdefault(window.run, [np.inf, -np.inf])
+            edges[0] = min(edges[0], window.start)
+            edges[1] = max(edges[1], window.start + window.steps * plan.dt)
+    found = []
+    for name, edges in spans.items():
+        learnt: dict[str, list[float]] = {}
+        for each in plan.training:
+            for run, begin, stop in each.spans if each.may_test(name) else ():
+                if campaign.settings.runs[run].waves != "regular":
+                    known = learnt.setdefault(run, [begin, stop])
+                    known[:] = min(known[0], begin), max(known[1], stop)
+        pieces = {run: between(runs[run], (begin, stop)) for run, (begin, stop) in learnt.items()}
+        test = between(runs[name], (edges[0], edges[1]))
+        if (repeat := find_repeat(plan.inputs, pieces, name, test, plan.dt)) is not None:
+            found.append(asdict(repeat) | {"words": str(repeat)})
+    if not found:
+        return None
+    columns = {key: [each[key] for each in found] for key in found[0] if key != "run"}
+    return xr.Dataset(
+        {key: ("run", np.array(values)) for key, values in columns.items()},
+        coords={"run": [each["run"] for each in found]},
+    )
+
+
+def words_of_repeats(repeats: xr.Dataset) -> str:
+    """Say which test runs repeat training input, the one that repeats most in full."""
+    worst = repeats.isel(run=int(np.argmax(repeats["share"].values)))
+    others = [str(run) for run in repeats["run"].values if run != worst["run"]]
+    more = f" So does that of {', '.join(others)}." if others else ""
+    words = str(worst["words"].values)
+    return f"{words[:1].upper()}{words[1:]}{more} Tests there show memory, not skill."
 
 
 def _channels(campaign: Campaign, plan: Plan, runs: Runs) -> xr.Dataset:
@@ -127,6 +169,9 @@ def _training(plan: Plan, runs: Runs) -> xr.Dataset:
     if single:
         out["run"] = ("training", np.array([e.spans[0][0] for e in plan.training], dtype=object))
         out["stop"] = ("training", np.array([e.spans[0][2] for e in plan.training]))
+        longest = training_samples(plan.needs) * plan.dt
+        lengths = [min(longest, e.spans[0][2] - e.spans[0][1]) for e in plan.training]
+        out["reads"] = ("training", np.array(lengths), {"units": "s"})
     for model, spec in plan.specs.items():
         if celerities := _celerities(spec, plan, runs):
             dims = ("training", "of_run")

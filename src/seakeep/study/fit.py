@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
@@ -20,7 +21,15 @@ from seakeep.study.plan import between
 from seakeep.study.resolve import Spec, build_spec, can_align, counts_in_periods
 from seakeep.toml import Length
 
-__all__ = ["fit_baselines", "fit_campaign", "training_runs", "warn_of_repeats", "warn_of_waves"]
+__all__ = [
+    "Repeat",
+    "find_repeat",
+    "fit_baselines",
+    "fit_campaign",
+    "training_runs",
+    "warn_of_repeats",
+    "warn_of_waves",
+]
 
 BASELINES = ("hold_last", "mean", "fir", "arx", "subspace")
 CYCLES = 5.0
@@ -292,23 +301,73 @@ def _test_part(run: xr.Dataset, trained: xr.Dataset | None) -> xr.Dataset:
 def _warn_of_repeat(
     inputs: Sequence[str], pieces: Mapping[str, xr.Dataset], name: str, test: xr.Dataset, dt: float
 ) -> None:
+    if (found := find_repeat(inputs, pieces, name, test, dt)) is not None:
+        warnings.warn(
+            f"{found} This test shows memory, not skill: test on another run.",
+            SeakeepWarning,
+            stacklevel=4,
+        )
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """A part of a test run whose input was in the training input, up to a constant phase.
+
+    Parameters
+    ----------
+    run, input : str
+        What is tested, and the channel that repeats.
+    share : float
+        Part of the test record that repeats, 0 to 1.
+    start : float
+        Where the best matching stretch starts, s.
+    source : str
+        The training run that holds it.
+    source_start : float
+        From where on, s.
+    phase : float
+        By which it is turned, rad.
+    correlation : float
+        Of the analytic signals.
+    """
+
+    run: str
+    input: str
+    share: float
+    start: float
+    source: str
+    source_start: float
+    phase: float
+    correlation: float
+
+    def __str__(self) -> str:
+        return (
+            f"the input '{self.input}' of {self.run} repeats training input: "
+            f"{100 * self.share:.0f} % of it, such as from t = {self.start:.4g} s on, is what "
+            f"{self.source} holds from t = {self.source_start:.4g} s on, turned by "
+            f"{np.degrees(self.phase):.0f} degrees (correlation {self.correlation:.3f})."
+        )
+
+
+def find_repeat(
+    inputs: Sequence[str], pieces: Mapping[str, xr.Dataset], name: str, test: xr.Dataset, dt: float
+) -> Repeat | None:
+    """Look for the first input of a test part that repeats what the training pieces hold."""
     for channel in inputs:
         records = {key: piece[channel].values for key, piece in pieces.items() if channel in piece}
         whole = all(np.all(np.isfinite(each)) for each in (*records.values(), test[channel].values))
         if not (records and whole) or min(test.sizes["time"], *map(len, records.values())) < 8:
             continue
-        found = find_leakage(list(records.values()), test[channel].values, dt)
-        if found is None:
-            continue
-        source = list(records)[found.training]
-        begin = float(test["time"][0]) + found.test_start
-        origin = float(pieces[source]["time"][0]) + found.training_start
-        warnings.warn(
-            f"the input '{channel}' of {name} repeats training input: {100 * found.share:.0f} % of "
-            f"it, such as from t = {begin:.4g} s on, is what {source} holds from t = {origin:.4g} "
-            f"s on, turned by {np.degrees(found.phase):.0f} degrees (correlation "
-            f"{found.correlation:.3f}). This test shows memory, not skill: test on another run.",
-            SeakeepWarning,
-            stacklevel=4,
-        )
-        return
+        if (found := find_leakage(list(records.values()), test[channel].values, dt)) is not None:
+            source = list(records)[found.training]
+            return Repeat(
+                run=name,
+                input=channel,
+                share=found.share,
+                start=float(test["time"][0]) + found.test_start,
+                source=source,
+                source_start=float(pieces[source]["time"][0]) + found.training_start,
+                phase=found.phase,
+                correlation=found.correlation,
+            )
+    return None

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -35,10 +35,12 @@ __all__ = [
     "band_parts",
     "box_table",
     "coverage_table",
+    "difference_table",
     "is_regular",
     "joined",
     "judge",
     "regular_response",
+    "verdict",
     "wave_frequency",
 ]
 
@@ -57,6 +59,8 @@ LINEAR = ("fir", "arx", "subspace")
 SHOWN = 5
 """Lost forecasts that a warning names."""
 TREND_SERIES = 500
+DIFFERENCES = 500
+"""Redrawn tables of cells for the interval of a difference between models."""
 NEAR = 0.1
 """Energy within this part of a frequency counts as energy at it."""
 
@@ -73,7 +77,10 @@ def judge(
     for name in settings.tests:
         test = groups[f"tests/{name}"]
         out[f"statistics/boxes/{name}"] = boxes = box_table(test, models)
-        if (skill := skill_table(boxes, kinds)) is not None:
+        rng = random_stream(settings.study.seed, f"differences.{name}")
+        differences = difference_table(test, models, groups["training"], rng)
+        out[f"statistics/differences/{name}"] = differences
+        if (skill := skill_table(boxes, differences, kinds)) is not None:
             out[f"statistics/skill/{name}"] = skill
         if ensembles := [model for model in models if f"{model}_lower" in test]:
             calibrations = {
@@ -134,12 +141,103 @@ def words_of_lost(lost: xr.Dataset) -> str:
     )
 
 
-def skill_table(boxes: xr.Dataset, kinds: Mapping[str, str]) -> xr.Dataset | None:
+def difference_table(
+    test: xr.Dataset, models: Sequence[str], training: xr.Dataset, rng: np.random.Generator
+) -> xr.Dataset:
+    """Change of the median error from one model to another, with its interval.
+
+    ``change`` over (model, other, measure, channel) is the median error over all cells over that of
+    the other model, minus one: −0.2 is better by 20 %. ``lower`` and ``upper`` come from a two-way
+    block bootstrap over training sets and test windows
+    (:func:`seakeep.statistics.two_way_interval`); ``blocks`` of each that overlap are drawn
+    together. Where the interval holds zero the study cannot tell (:func:`verdict`).
+    """
+    ends = test["start"].values + float(test["time"].values[-1])
+    spans = list(zip(test["run"].values.astype(str), test["start"].values, ends, strict=True))
+    order, block = _order_of(training)
+    blocks = block, statistics.overlap_block(spans)
+    judged = test["judged"].values[order]
+    cells = np.stack(
+        [
+            np.stack([test[f"{m}_{measure}"].values[order] for measure in MEASURES], axis=-2)
+            for m in models
+        ],
+        axis=2,
+    )  # (training, window, model, measure, channel)
+    cells = np.concatenate([average_of(cells)[..., None], cells], axis=-1)
+    cells = np.where(judged[..., None, None, None], cells, np.nan)
+
+    def change(drawn: FloatArray) -> FloatArray:
+        middle = median_of(drawn.reshape(len(drawn), -1, *drawn.shape[3:]))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            out: FloatArray = middle[:, :, None] / middle[:, None] - 1.0
+        return out
+
+    found = change(cells[None])[0]
+    bounds = statistics.two_way_interval(
+        change, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES
+    )
+    dims = ("model", "other", "measure", "channel")
+    return xr.Dataset(
+        {
+            key: (dims, values)
+            for key, values in zip(("change", "lower", "upper"), (found, *bounds), strict=True)
+        },
+        coords={
+            "model": list(models),
+            "other": list(models),
+            "measure": list(MEASURES),
+            "channel": ["average", *map(str, test["channel"].values)],
+        },
+        attrs={"blocks": blocks},
+    )
+
+
+def _order_of(training: xr.Dataset) -> tuple[npt.NDArray[np.intp], int]:
+    """Training sets in the order of their instants, and how many neighbours overlap."""
+    count = training.sizes["training"]
+    if "run" not in training:
+        return np.arange(count), 1
+    runs, stops = training["run"].values.astype(str), training["stop"].values
+    reads = training["reads"].values
+    spans = list(zip(runs, stops - reads, stops, strict=True))
+    return np.lexsort((stops, runs)), statistics.overlap_block(spans)
+
+
+def median_of(cells: FloatArray) -> FloatArray:
+    """Median along the second axis, NaN left out."""
+    ordered = np.sort(cells, axis=1)  # NaN last
+    count = np.isfinite(ordered).sum(axis=1, keepdims=True)
+    low, high = np.maximum(count - 1, 0) // 2, count // 2
+    both = [
+        np.take_along_axis(ordered, np.minimum(at, cells.shape[1] - 1), axis=1)
+        for at in (low, high)
+    ]
+    out: FloatArray = np.where(count > 0, 0.5 * (both[0] + both[1]), np.nan)[:, 0]
+    return out
+
+
+def verdict(lower: float, upper: float) -> Literal["better", "worse", "cannot tell"]:
+    """What an interval of a change of error says: a smaller error is better.
+
+    Examples
+    --------
+    >>> verdict(-0.2, -0.1), verdict(-0.1, 0.2)
+    ('better', 'cannot tell')
+    """
+    if upper < 0:
+        return "better"
+    return "worse" if lower > 0 else "cannot tell"
+
+
+def skill_table(
+    boxes: xr.Dataset, differences: xr.Dataset, kinds: Mapping[str, str]
+) -> xr.Dataset | None:
     """How much smaller the median error of each model is than that of the baselines in the study.
 
-    ``change`` over (model, reference, measure) is the median error over that of the reference,
-    minus one: −0.2 is better by 20 %. References are ``hold_last``, ``mean`` and
-    ``best_linear``, the linear baseline of least median ANRMSE; None without any.
+    ``change``, ``lower`` and ``upper`` over (model, reference, measure) are those of
+    :func:`difference_table` for the average over the channels. References are ``hold_last``,
+    ``mean`` and ``best_linear``, the linear baseline of least median ANRMSE; None without any.
     """
     median = boxes["median"].sel(channel="average", drop=True)
     named = {kind: model for model, kind in kinds.items() if kind in ("hold_last", "mean")}
@@ -149,15 +247,9 @@ def skill_table(boxes: xr.Dataset, kinds: Mapping[str, str]) -> xr.Dataset | Non
         named["best_linear"] = min(known, key=known.__getitem__)
     if not named:
         return None
-    references = [median.sel(model=model, drop=True) for model in named.values()]
-    change = xr.concat([median / each - 1 for each in references], dim="reference")
-    return xr.Dataset(
-        {
-            "change": change.transpose("model", "reference", "measure"),
-            "reference_model": ("reference", list(named.values())),
-        },
-        coords={"reference": list(named)},
-    )
+    out = differences.sel(channel="average", other=list(named.values()), drop=True)
+    out = out.rename(other="reference").assign_coords(reference=list(named))
+    return out.assign(reference_model=("reference", list(named.values())))
 
 
 def box_table(test: xr.Dataset, models: Sequence[str]) -> xr.Dataset:

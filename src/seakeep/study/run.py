@@ -13,7 +13,7 @@ import xarray as xr
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models.executor import WorkerLostError, as_finished
-from seakeep.study.describe import describe_study
+from seakeep.study.describe import describe_study, words_of_repeats
 from seakeep.study.judge import judge, words_of_lost
 from seakeep.study.plan import Plan, make_plan, training_samples, warn_of_slow_study
 from seakeep.study.settings import Study
@@ -101,6 +101,8 @@ def run_study(
             _compute_all(plan, runs, folder, units, executor, report)
             report(len(units), len(units), "statistics and densities")
             groups = describe_study(study, plan, runs)
+            if "repeats" in groups:
+                warnings.warn(words_of_repeats(groups["repeats"]), SeakeepWarning, stacklevel=2)
             groups |= collect(study, plan, runs, lambda unit: _arrays(folder, unit))
             groups |= judge(groups, study.settings, list(plan.states))
             if "statistics/lost" in groups:

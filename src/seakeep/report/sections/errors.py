@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from functools import partial
 
+import xarray as xr
+
 from seakeep.report.figures.boxes import FEWEST, average_boxes, channel_boxes
 from seakeep.report.figures.common import HEADING, model_words
 from seakeep.report.section import Drawing, Section
 from seakeep.report.sections.summary import conditional
 from seakeep.report.tables import Table, number, signed
 from seakeep.study import StudyResult
+from seakeep.study.judge import verdict
 
 __all__ = ["error_table", "errors"]
 
@@ -56,21 +59,30 @@ def _skill_table(result: StudyResult) -> Table:
         names = [str(each) for each in data["reference_model"].values]
         for reference, name in zip(data["reference"].values, names, strict=True):
             for model in result.models:
-                at = data["change"].sel(model=model, reference=reference)
+                at = data.sel(model=model, reference=reference)
                 if model != name:
-                    cells = (signed(100 * float(at.sel(measure=key)), 0) for key in HEADING)
+                    cells = (_with_interval(at.sel(measure=key)) for key in HEADING)
                     what = str(reference).replace("_", " ")
                     against = what if name == reference else f"{what} ({model_words(name)})"
                     rows.append((result.label_of(test), against, model_words(model), *cells))
     return Table(
         "skill",
         "Models against the baselines",
-        ("test set", "baseline", "model", *(f"{each} [%]" for each in HEADING.values())),
+        ("test set", "baseline", "model", *(f"{each} [%], 95 %" for each in HEADING.values())),
         tuple(rows),
-        "Change of the median error against the baseline's: −20 % is an error smaller by a fifth. "
+        "Change of the median error against the baseline's: −20 % is an error smaller by a fifth; "
+        "intervals by a two-way block bootstrap over training sets and windows. "
         "Best linear: the linear baseline of least median ANRMSE in the test set.",
         (3, 4),
     )
+
+
+def _with_interval(at: xr.Dataset) -> str:
+    """Relative change with its interval, in percent; cannot be told where that holds zero."""
+    change, low, high = (signed(100 * float(at[k]), 0) for k in ("change", "lower", "upper"))
+    if verdict(float(at["lower"]), float(at["upper"])) == "cannot tell":
+        return f"{change} [{low}, {high}] cannot tell"
+    return f"{change} [{low}, {high}]"
 
 
 def error_table(result: StudyResult, test: str) -> Table:
@@ -99,8 +111,8 @@ def error_table(result: StudyResult, test: str) -> Table:
     if left_out:
         note += (
             f" {left_out} values were left out: a channel whose measured SD is below 1 % of its "
-            "training SD (a slack line), or more than half of whose variance is noise, is not judged, "
-            "nor is a forecast that diverged."
+            "training SD (a slack line), or more than half of whose variance is noise, is not "
+            "judged, nor is a forecast that diverged."
         )
     return Table(
         f"errors_{test}",

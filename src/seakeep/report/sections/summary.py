@@ -13,7 +13,8 @@ from seakeep.report.section import Section
 from seakeep.report.sections.settings import test_overlap, training_overlap, unequal_training
 from seakeep.report.tables import Table, number
 from seakeep.study import StudyResult
-from seakeep.study.judge import words_of_lost
+from seakeep.study.describe import words_of_repeats
+from seakeep.study.judge import verdict, words_of_lost
 
 __all__ = ["findings", "overview_table", "summary"]
 
@@ -22,10 +23,11 @@ def summary(result: StudyResult) -> Section:
     """Return the summary of a study."""
     shares, words = training_overlap(result)
     condition = str(result.attrs.get("conditional_on", ""))
-    lost = result.groups.get("statistics/lost")
+    lost, repeats = (result.groups.get(key) for key in ("statistics/lost", "repeats"))
     notices = [
         str(result.attrs.get("preparation_note", "")),
         words_of_lost(lost) if lost is not None else "",
+        words_of_repeats(repeats) if repeats is not None else "",
         _few_cells(result),
         words if shares else "",
         test_overlap(result),
@@ -88,10 +90,10 @@ def findings(result: StudyResult) -> list[str]:
             at = boxes["median"].sel(measure=measure)
             medians = {m: float(at.sel(model=m)) for m in result.models}
             listed = ", ".join(f"{model_words(m)} {v:.3f}" for m, v in medians.items())
-            verdict = ""
+            told = ""
             if singles and ensembles:
-                verdict = _verdict(medians[singles[0]], medians[ensembles[0]])
-            parts.append(f"median {heading} {listed}{verdict}")
+                told = _verdict(result, test, ensembles[0], singles[0], measure)
+            parts.append(f"median {heading} {listed}{told}")
         label = result.label_of(test)
         said.append(f"{label[:1].upper()}{label[1:]}: {'; '.join(parts)}.")
     said += [unequal] if (unequal := unequal_training(result)) else []
@@ -100,18 +102,20 @@ def findings(result: StudyResult) -> list[str]:
     return said + _fewer_windows(result)
 
 
-def _verdict(single: float, ensemble: float) -> str:
-    def percent(part: float) -> str:
-        return "less than 1 %" if part < 0.005 else f"{100 * part:.0f} %"
-
-    if not np.isfinite(single + ensemble):
-        return ""
-    if ensemble < single:
-        return f" (the ensemble's mean is better by {percent(1 - ensemble / single)})"
-    return (
-        " (the ensemble does not beat the deterministic model: it is worse by "
-        f"{percent(ensemble / single - 1)})"
+def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure: str) -> str:
+    """Whether the ensemble's mean is better than the single model, as far as it can be told."""
+    at = result.groups[f"statistics/differences/{test}"].sel(
+        model=ensemble, other=single, measure=measure, channel="average"
     )
+    change, low, high = (100 * float(at[key]) for key in ("change", "lower", "upper"))
+    if not np.isfinite(change):
+        return ""
+    words = {
+        "better": "the ensemble's mean is better",
+        "worse": "the ensemble's mean is worse",
+        "cannot tell": "cannot tell whether the ensemble's mean is better",
+    }[verdict(low, high)]
+    return f" ({words}: {change:+.0f} % [{low:+.0f}, {high:+.0f}])".replace("-", "−")
 
 
 def _coverage_findings(result: StudyResult, model: str) -> list[str]:
