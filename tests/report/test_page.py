@@ -60,6 +60,12 @@ def page(tmp_path_factory):
     return write_report(run_study(read_study(folder / "study.toml"), folder / "out"))
 
 
+@pytest.fixture(scope="module")
+def result(page):
+    """The result of that study, read once; tests that change it replace its parts."""
+    return read_result(page.parent)
+
+
 def test_the_page_names_nothing_outside_itself(page):
     text = page.read_text("utf-8")
     addresses = re.findall(r"""(?:src|href)\s*=\s*["']([^"']*)["']""", text)
@@ -78,7 +84,7 @@ def test_no_id_stands_twice(page):
     assert len(ids) == len(set(ids))
 
 
-def test_what_it_holds(page):
+def test_what_it_holds(page, result):
     text = page.read_text("utf-8")
     wanted = ["summary", "errors", "explore", "densities", "settings", "versions"]
     found = re.findall(r'<section id="(.*?)">', text)
@@ -86,8 +92,7 @@ def test_what_it_holds(page):
     assert "a &amp; b &lt; c" in text
     assert "noise floor" in text
     assert "@media print" in text
-    digest = read_result(page.parent).attrs["digest"]
-    assert digest in text
+    assert result.attrs["digest"] in text
 
 
 def test_figures_and_tables_are_files_too(page):
@@ -113,21 +118,19 @@ def test_figures_and_tables_are_files_too(page):
         assert not strange, path
 
 
-def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page):
-    found = read_result(page.parent)
+def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page, result):
     path = page.parent / "tables" / "coverage_calibrated_bayesian.csv"
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
-    table = found.groups["statistics/coverage/unseen"].sel(model="bayesian", against="measured")
+    table = result.groups["statistics/coverage/unseen"].sel(model="bayesian", against="measured")
     average = table.sel(channel="average")
     expected = [average["calibrated_inside"], average["calibrated_relative_width"]]
     assert rows[-1] == ["average", *(f"{float(value):.2f}" for value in expected)]
-    windows = found.groups["calibration/bayesian"]["windows"].values
+    windows = result.groups["calibration/bayesian"]["windows"].values
     assert f"A training set had {windows.min()}" in page.read_text("utf-8")
 
 
-def test_models_that_learn_from_unequal_lengths_are_told(page):
-    result = read_result(page.parent)
+def test_models_that_learn_from_unequal_lengths_are_told(result):
     said = unequal_training(result)
     assert said in findings(result)
     training = result.groups["training"]
@@ -166,13 +169,12 @@ def with_models(result, **values):
     return replace(result, attrs={**result.attrs, "models": json.dumps(models)})
 
 
-def test_a_history_shows_the_calibrated_band_around_that_of_the_members(page):
-    found = read_result(page.parent)
-    ((test, training, window), *_) = shown_cells(found)
-    figure = history_figure(found, test, training, window)
-    cell = found.tests[test].isel(training=training, window=window)
-    kept = found.groups["calibration/bayesian"].isel(training=training)
-    for axes, name in zip(figure.axes, found.channels, strict=True):
+def test_a_history_shows_the_calibrated_band_around_that_of_the_members(result):
+    ((test, training, window), *_) = shown_cells(result)
+    figure = history_figure(result, test, training, window)
+    cell = result.tests[test].isel(training=training, window=window)
+    kept = result.groups["calibration/bayesian"].isel(training=training)
+    for axes, name in zip(figure.axes, result.channels, strict=True):
         one = cell.sel(channel=name)
         (lower,) = (line for line in axes.lines if line.get_label() == "calibrated")
         margin, floor = (float(kept[key].sel(channel=name)) for key in ("margin", "floor"))
@@ -182,14 +184,13 @@ def test_a_history_shows_the_calibrated_band_around_that_of_the_members(page):
         np.testing.assert_allclose(lower.get_ydata(), (wider - mean) / spread, rtol=1e-10)
     (legend,) = figure.legends
     assert "calibrated" in [text.get_text() for text in legend.get_texts()]
-    without = {n: g for n, g in found.groups.items() if not n.startswith("calibration/")}
-    plain = history_figure(replace(found, groups=without), test, training, window)
+    without = {n: g for n, g in result.groups.items() if not n.startswith("calibration/")}
+    plain = history_figure(replace(result, groups=without), test, training, window)
     assert "calibrated" not in [text.get_text() for text in plain.legends[0].get_texts()]
 
 
-def test_histories_state_their_unit_and_hide_no_line_behind_another(page):
-    found = read_result(page.parent)
-    figure = history_figure(found, *shown_cells(found)[0])
+def test_histories_state_their_unit_and_hide_no_line_behind_another(result):
+    figure = history_figure(result, *shown_cells(result)[0])
     assert figure.get_supylabel() == "deviation from the training mean, in training SD"
     axes = figure.axes[0]
     lines = {line.get_label(): line for line in axes.lines}
@@ -202,21 +203,20 @@ def test_histories_state_their_unit_and_hide_no_line_behind_another(page):
     assert all(words.x1 <= each.get_tightbbox().x0 + 1 for each in figure.axes)
 
 
-def test_tables_say_what_the_campaign_calls_a_channel(page):
-    found = read_result(page.parent)
-    channels = found.groups["channels"]
+def test_tables_say_what_the_campaign_calls_a_channel(result):
+    channels = result.groups["channels"]
     words = [
         "Trim angle (MRU-5)" if name == "pitch" else "free" if name == "heave" else str(old)
         for name, old in zip(channels["name"].values, channels["long_name"].values, strict=True)
     ]
     told = channels.assign(long_name=("name", words))
-    other = replace(found, groups={**found.groups, "channels": told})
+    other = replace(result, groups={**result.groups, "channels": told})
     assert ("Trim angle (MRU-5)",) in [row[:1] for row in error_table(other, "unseen").rows]
     assert "θ Trim angle (MRU-5); " in dict(summary(other).terms)["in figures"]
     labels = [each["label"] for each in history_data(other)[0]["channels"]]
     assert "Trim angle (MRU-5)" in labels
     # A free name has no symbol: it is said once.
-    lone = replace(found, groups={**found.groups, "channels": _renamed(channels)})
+    lone = replace(result, groups={**result.groups, "channels": _renamed(channels)})
     assert "kraft bug; " in dict(summary(lone).terms)["in figures"]
     assert "kraft bug kraft bug" not in dict(summary(lone).terms)["in figures"]
 
@@ -234,15 +234,15 @@ def _renamed(channels):
     )
 
 
-def test_the_legend_of_the_eigenvalues_stands_over_none_of_them(page):
-    figure = eigenvalue_figure(read_result(page.parent))
+def test_the_legend_of_the_eigenvalues_stands_over_none_of_them(result):
+    figure = eigenvalue_figure(result)
     figure.draw_without_rendering()
     (legend,) = figure.legends
     assert all(legend.get_window_extent().y0 >= axes.get_window_extent().y1 for axes in figure.axes)
 
 
-def test_the_data_quality_is_in_the_page_for_every_run_and_channel(page):
-    text, result = page.read_text("utf-8"), read_result(page.parent)
+def test_the_data_quality_is_in_the_page_for_every_run_and_channel(page, result):
+    text = page.read_text("utf-8")
     assert len(result.prepared) == 3
     for name, run in result.prepared.items():
         assert f'id="figure-quality_{name}"' in text
@@ -265,12 +265,11 @@ def test_each_setting_of_a_model_says_where_it_comes_from(page):
     assert not any("(" in value or "None" in value for value, _ in rows.values())
 
 
-def test_the_published_divergences_stand_beside_a_study_that_asks_for_them(page):
-    plain = read_result(page.parent)
-    assert "paper: EV" not in divergence_table(plain, "bayesian", "paper").columns[-1]
-    settings = plain.settings
+def test_the_published_divergences_stand_beside_a_study_that_asks_for_them(result):
+    assert "paper: EV" not in divergence_table(result, "bayesian", "paper").columns[-1]
+    settings = result.settings
     settings["output"]["paper"] = True
-    asked = replace(plain, attrs={**plain.attrs, "settings": json.dumps(settings)})
+    asked = replace(result, attrs={**result.attrs, "settings": json.dumps(settings)})
     table = divergence_table(asked, "bayesian", "paper")
     assert table.columns[-1] == "paper: EV, another data set"
     assert [row[-1] for row in table.rows if row[0] == "heave"] == [PUBLISHED["heave"]]
@@ -286,10 +285,9 @@ def test_words_and_symbols_are_said_once(page):
     assert plain_symbol("eta_fwd") == "η_fwd"
 
 
-def test_few_cells_are_told_and_drawn_without_a_density(page):
+def test_few_cells_are_told_and_drawn_without_a_density(page, result):
     from matplotlib.figure import Figure
 
-    result = read_result(page.parent)
     count = int(result.tests["unseen"]["judged"].sum())
     assert count < FEWEST
     assert any(f": n = {count})" in notice for notice in summary(result).notices)
@@ -301,8 +299,7 @@ def test_few_cells_are_told_and_drawn_without_a_density(page):
         assert len(bodies) == violins
 
 
-def test_test_windows_that_overlap_are_told(page):
-    result = read_result(page.parent)
+def test_test_windows_that_overlap_are_told(result):
     length = float(result.tests["unseen"]["time"].values[-1])
     start = result.tests["unseen"]["start"]
     for apart, words in ((1.5 * length, ""), (0.5 * length, " 67 %")):
@@ -313,8 +310,7 @@ def test_test_windows_that_overlap_are_told(page):
         assert (words in overlap_of_tests(other)) if words else overlap_of_tests(other) == ""
 
 
-def test_windows_asked_for_that_do_not_fit_are_told(page):
-    result = read_result(page.parent)
+def test_windows_asked_for_that_do_not_fit_are_told(result):
     assert not any("asked for" in text for text in findings(result))
     settings = result.settings
     settings["training"]["windows"] = 30
@@ -322,8 +318,7 @@ def test_windows_asked_for_that_do_not_fit_are_told(page):
     assert findings(many)[-1].startswith("2 training windows were used of the 30 asked for")
 
 
-def test_a_margin_for_windows_of_another_length_is_named(page):
-    result = read_result(page.parent)
+def test_a_margin_for_windows_of_another_length_is_named(result):
     assert "not made for" not in coverage_table(result, "bayesian", calibrated=True).note
     settings = result.settings
     settings["tests"]["long"] = {**settings["tests"]["unseen"], "length": 12.0, "label": ""}
@@ -341,8 +336,7 @@ def test_numbers_have_a_minus_and_zero_has_none():
     assert latex_text("-0.12 [-0.3, 0.1] a-1") == r"$-$0.12 [$-$0.3, 0.1] a-1"
 
 
-def test_small_numbers_keep_two_digits_and_probabilities_are_no_zero(page):
-    result = read_result(page.parent)
+def test_small_numbers_keep_two_digits_and_probabilities_are_no_zero(result):
     for table in (divergence_table(result, "bayesian", "recommended"), *age(result).tables):
         cells = [cell for row in table.rows for k, cell in enumerate(row) if k in table.numeric]
         assert not [cell for cell in cells if re.search(r"\b0\.0000\b", cell)]
@@ -350,8 +344,7 @@ def test_small_numbers_keep_two_digits_and_probabilities_are_no_zero(page):
     assert small_number(0.0) == "0"
 
 
-def test_training_windows_that_do_not_overlap_are_no_warning(page):
-    result = read_result(page.parent)
+def test_training_windows_that_do_not_overlap_are_no_warning(page, result):
     text = page.read_text("utf-8")
     notices = re.findall(r'<p class="notice">(.*?)</p>', text, flags=re.S)
     assert training_overlap(result)[0] == any("A training window" in n for n in notices)
@@ -402,8 +395,8 @@ def test_packing_loses_a_step_of_the_range_at_most():
     np.testing.assert_allclose(found, values, rtol=0, atol=0.5 * step)
 
 
-def test_the_interactive_lines_have_the_dashes_of_the_figures(page):
-    single, ensemble = history_data(read_result(page.parent))[0]["channels"][0]["models"]
+def test_the_interactive_lines_have_the_dashes_of_the_figures(result):
+    single, ensemble = history_data(result)[0]["channels"][0]["models"]
     assert single["dash"] == list(LINES["forecast"]["linestyle"][1])
     assert ensemble["dash"] == list(LINES["ensemble"]["linestyle"][1])
 
@@ -538,8 +531,7 @@ def test_it_prints(opened):
     assert len(pdf) > 100_000
 
 
-def test_models_stand_beside_the_baselines_and_lost_forecasts_are_named(page):
-    result = read_result(page.parent)
+def test_models_stand_beside_the_baselines_and_lost_forecasts_are_named(result):
     change = xr.DataArray(
         [[[-0.2, 0.1]], [[0.0, 0.5]]],
         coords={
