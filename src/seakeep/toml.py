@@ -137,6 +137,12 @@ def _not_negative(length: Length) -> Length:
     return length
 
 
+def _some(length: Length) -> Length:
+    if not length.value > 0:
+        raise ValueError("this length must be positive")
+    return length
+
+
 def _positive(length: Length) -> Length:
     if not 0 < length.value < math.inf:
         raise ValueError("this length must be finite and positive")
@@ -188,10 +194,10 @@ Delay = Annotated[
 """A number of samples, or a :class:`Length` that becomes samples once the step is known."""
 Window = Annotated[
     Annotated[int, Field(ge=2), Tag("<number>")]
-    | Annotated[_Length, AfterValidator(_positive), Tag("<length>")],
+    | Annotated[_Length, AfterValidator(_some), Tag("<length>")],
     _PERIODS,
 ]
-"""The same, of at least two samples."""
+"""The same, of at least two samples; ``"inf T"`` stands for all there are."""
 _Edge = Annotated[Annotated[float, Tag("<number>")] | Annotated[_Length, Tag("<length>")], _PERIODS]
 Span = Annotated[tuple[_Edge, _Edge], Field(strict=False), AfterValidator(_rising)]
 """Start and end, each in seconds or a :class:`Length`."""

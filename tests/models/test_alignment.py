@@ -346,6 +346,8 @@ def test_a_table_of_keys_is_taken_and_a_wrong_key_named():
     assert spec({"surge": "none"}).alignment == ProbeAlignment(surge="none")
     with pytest.raises(RequestError, match=r"unknown key 'modes'. Did you mean 'mode'\? Keys"):
         spec({"modes": "effective"})
+    with pytest.raises(RequestError, match=r"unknown key 'kind'"):
+        spec({"kind": "probe_alignment"})
 
 
 def without(run, *names, positions=True):

@@ -279,6 +279,15 @@ def test_a_mat_file_reproduces_the_forecast(model, make_run, tmp_path):
     np.testing.assert_allclose(outputs[1:], expected, rtol=0, atol=1e-10)
 
 
+def test_a_mat_file_replaces_another_system_and_no_other_file(model, tmp_path):
+    model.to_mat(model.to_mat(tmp_path / "rom.mat"))
+    measured = tmp_path / "run.mat"
+    io.savemat(measured, {"heave": np.zeros(3)})
+    with pytest.raises(RequestError, match=r"run.mat exists and is no state-space system that"):
+        model.to_mat(measured)
+    assert list(io.loadmat(measured)["heave"][0]) == [0.0, 0.0, 0.0]
+
+
 def test_a_mat_file_carries_what_idss_asks_for(model, tmp_path):
     content = io.loadmat(model.to_mat(tmp_path / "rom.mat"))
     names = {key: [str(cell[0]) for cell in content[key][:, 0]] for key in content if "Name" in key}

@@ -127,6 +127,13 @@ def test_a_preset_counts_in_encounter_periods_and_keys_override_it():
     assert spec.delay_rows == "ridge"
 
 
+def test_a_window_of_a_preset_gives_way_to_all_of_the_run():
+    stated = ModelSettings(states=("heave",), inputs=("eta_fwd",), window="inf T")
+    found = resolve_model(stated, encounter_period=2.0, dt=0.1, preset="paper")
+    assert found.spec.window is None
+    assert found.sources["window"] == "stated"
+
+
 def test_a_preset_without_period_says_where_to_state_it():
     settings = ModelSettings(states=("heave",), preset="recommended")
     with pytest.raises(RequestError, match=r"State encounter_period \(s\) in \[campaign\]"):

@@ -735,7 +735,8 @@ class ModelSettings(Table):
         "off the motions among them where that helps",
     )
     window: Window | None = Field(
-        default=None, description="training snapshots per run, or periods such as '20 T'"
+        default=None,
+        description="training snapshots per run, or '20 T'; 'inf T' for all",
     )
     history: Literal["before", "inside"] | None = Field(default=None, description="")
     delay_rows: Literal["ridge", "exact"] | None = Field(default=None, description="")

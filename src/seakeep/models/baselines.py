@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import ClassVar, Self
 
 import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.core.solve import Solution, identify
+from seakeep.core.solve import Solution
 from seakeep.core.subspace import StateSpace, identify_subspace
 from seakeep.errors import RequestError
 from seakeep.models import store
@@ -214,17 +213,7 @@ class ARX(LinearSpec):
 
     def solve(self, data: TrainingData) -> Solution:
         """Rows of the next states."""
-        return identify(
-            data.states,
-            data.delayed,
-            data.windows,
-            state_delays=self.state_delays,
-            input_delays=self.input_delays,
-            direct=data.direct,
-            ridge=float(self.ridge),
-            per_snapshot=self.ridge_scale == "per_snapshot",
-            all_rows=False,
-        )
+        return data.regress(self, self.state_delays)
 
 
 @dataclass(frozen=True)
@@ -263,17 +252,7 @@ class FIR(LinearSpec):
             raise RequestError(
                 "a FIR model is a filter of its inputs and has none; name at least one input."
             )
-        found = identify(
-            data.states,
-            data.delayed,
-            data.windows,
-            state_delays=None,
-            input_delays=self.input_delays,
-            direct=data.direct,
-            ridge=float(self.ridge),
-            per_snapshot=self.ridge_scale == "per_snapshot",
-            all_rows=False,
-        )
+        found = data.regress(self, None)
         size = len(found.coefficients)
         return replace(found, coefficients=np.hstack([np.zeros((size, size)), found.coefficients]))
 
@@ -371,7 +350,7 @@ class Subspace(HankelSettings):
 
 
 @dataclass(frozen=True, eq=False)
-class SubspaceModel(SingleModel):
+class SubspaceModel(SingleModel, store.Saved):
     """What :class:`Subspace` fits.
 
     Parameters
@@ -432,10 +411,10 @@ class SubspaceModel(SingleModel):
             ]
         )
 
-    def save(self, path: str | Path) -> Path:
-        """Write the model as NetCDF; :func:`seakeep.load_model` reads it."""
+    def to_dataset(self) -> xr.Dataset:
+        """The model as a Dataset: what :meth:`save` writes."""
         space = self.space
-        dataset = xr.Dataset(
+        return xr.Dataset(
             {
                 "A": (("latent", "latent_before"), space.A),
                 "B": (("latent", "regressor"), space.B),
@@ -451,7 +430,6 @@ class SubspaceModel(SingleModel):
                 "signature": store.as_json(store.signature_json(self.signature)),
             },
         )
-        return store.write(dataset, path, self.kind)
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset, settings: Subspace) -> SubspaceModel:

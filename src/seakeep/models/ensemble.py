@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
@@ -326,7 +325,7 @@ class _Forecasts(Forecaster):
 
 
 @dataclass(frozen=True, eq=False)
-class HankelEnsemble(_Forecasts):
+class HankelEnsemble(_Forecasts, store.Saved):
     """Members that differ in their settings, or in what they learned from.
 
     Made by :meth:`BayesianHankelDMDc.fit` or :func:`seakeep.load_model`. It holds draws and
@@ -692,21 +691,6 @@ class HankelEnsemble(_Forecasts):
                 "it. Train on several runs, or calibrate on a run that does not train."
             )
         return replace(self, members=members, arrays=self.arrays.only(kept), calibration=None)
-
-    def save(self, path: str | Path) -> Path:
-        """Write draws and training arrays as NetCDF, to a temporary name first.
-
-        Parameters
-        ----------
-        path : str or Path
-            File, overwritten if it exists.
-
-        Returns
-        -------
-        Path
-            The file; :func:`seakeep.load_model` reads it, running no code from it.
-        """
-        return store.write(self.to_dataset(), path, self.kind)
 
     def to_dataset(self) -> xr.Dataset:
         """The ensemble as a Dataset: what :meth:`save` writes."""

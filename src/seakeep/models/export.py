@@ -10,13 +10,16 @@ import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError
-from seakeep.files import replacing
+from seakeep.files import MARK, check_output, replacing
 from seakeep.models.interface import Signature
 
 if TYPE_CHECKING:
     import control
 
 __all__ = ["initial_state", "matrices", "to_control", "to_mat"]
+
+SYSTEM = "state-space system"
+"""What a MATLAB file holds, as its head states it."""
 
 System = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
@@ -114,9 +117,13 @@ def to_mat(system: System, signature: Signature, path: str | Path) -> Path:
         "Notes": "seakeep: x(k+1) = A x(k) + B (u(k) - InputOffset), "
         "y(k) = C x(k) + D (u(k) - InputOffset) + OutputOffset",
     }
-    with replacing(Path(path)) as temporary, temporary.open("wb") as stream:
+    target = Path(path)
+    check_output(target, SYSTEM)
+    with replacing(target) as temporary, temporary.open("wb") as stream:
         io.savemat(stream, content, do_compression=True, oned_as="column")
-    return Path(path)
+        stream.seek(0)  # a text of 116 bytes is the head of a MATLAB file
+        stream.write(f"MATLAB 5.0 MAT-file, {MARK}: {SYSTEM}".ljust(116).encode())
+    return target
 
 
 def _state_names(signature: Signature) -> list[str]:

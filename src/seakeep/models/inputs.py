@@ -265,7 +265,7 @@ class ProbeAlignment:
                 f"alignment must be a seakeep.ProbeAlignment or None; received {value!r}. Write "
                 "alignment=seakeep.ProbeAlignment(mode='effective', surge='measured')."
             )
-        known = list(cls.__dataclass_fields__)
+        known = [each.name for each in fields(cls)]
         for key in value:
             if key not in known:
                 raise RequestError(

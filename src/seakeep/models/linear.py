@@ -32,7 +32,7 @@ __all__ = ["HankelDMDcModel", "modes"]
 
 
 @dataclass(frozen=True, eq=False)
-class HankelDMDcModel(SingleModel):
+class HankelDMDcModel(SingleModel, store.Saved):
     """An identified model; made by :meth:`HankelDMDc.fit` or :func:`seakeep.load_model`.
 
     Parameters
@@ -305,7 +305,7 @@ class HankelDMDcModel(SingleModel):
         Parameters
         ----------
         path : str or Path
-            File to write; its suffix should be ``.mat``.
+            File to write; its suffix should be ``.mat``. It replaces no file but another system.
 
         Returns
         -------
@@ -412,21 +412,6 @@ class HankelDMDcModel(SingleModel):
                 f"{float(at.damping_ratio):.3g}, |eigenvalue| {float(at.modulus):.6f}"
             )
         return "\n".join(lines)
-
-    def save(self, path: str | Path) -> Path:
-        """Write the model as NetCDF, to a temporary name first.
-
-        Parameters
-        ----------
-        path : str or Path
-            File, overwritten if it exists.
-
-        Returns
-        -------
-        Path
-            The file; :func:`seakeep.load_model` reads it, running no code from it.
-        """
-        return store.write(self.to_dataset(), path, self.kind)
 
     def to_dataset(self) -> xr.Dataset:
         """The model as a Dataset: what :meth:`save` writes."""

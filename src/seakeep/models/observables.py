@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from itertools import combinations
 from typing import Any, ClassVar, Protocol, Self
@@ -370,7 +370,7 @@ def from_json(table: Mapping[str, Any]) -> Observable:
     kind = settings.pop("kind", None)
     check_choice("observables: kind", kind, list(OBSERVABLES))
     made = OBSERVABLES[str(kind)]
-    known = list(made.__dataclass_fields__)  # type: ignore[attr-defined]
+    known = [each.name for each in fields(made)]  # type: ignore[arg-type]
     for key in settings:
         if key not in known:
             raise RequestError(

@@ -10,7 +10,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import xarray as xr
 
-from seakeep.core.solve import identify
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.models import labelled, store
 from seakeep.models.checks import check_choice
@@ -246,19 +245,7 @@ class HankelDMDc(HankelSettings):
     ) -> HankelDMDcModel:
         """The model of settings that leave nothing to be chosen."""
         data = gather(named, states, inputs, stop, self)
-        solution = identify(
-            data.states,
-            data.delayed,
-            data.windows,
-            state_delays=self.state_delays,
-            input_delays=self.input_delays,
-            direct=data.direct,
-            ridge=float(self.ridge),
-            per_snapshot=self.ridge_scale == "per_snapshot",
-            rank=self.rank,
-            all_rows=self.delay_rows == "ridge",
-            radius=self.radius,
-        )
+        solution = data.regress(self, self.state_delays, all_rows=self.delay_rows == "ridge")
         signature = replace(data.signature(self), readouts=readouts)
         return HankelDMDcModel(
             settings=self,

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -23,6 +23,7 @@ from seakeep.models.readouts import FittedReadOut
 
 __all__ = [
     "FORMAT_VERSION",
+    "Saved",
     "as_json",
     "checksum",
     "content",
@@ -42,6 +43,36 @@ SCALES = ("state", "input", "direct")
 MOMENTS = ("mean", "std", "spread", "centre", "reach")
 
 Value = TypeVar("Value")
+
+
+class Saved:
+    """What a NetCDF file keeps; it brings its ``kind`` and ``to_dataset``."""
+
+    kind: ClassVar[str]
+
+    def to_dataset(self) -> xr.Dataset:
+        """All that :meth:`save` writes."""
+        raise NotImplementedError
+
+    def save(self, path: str | Path) -> Path:
+        """Write the model as NetCDF, to a temporary name first.
+
+        Parameters
+        ----------
+        path : str or Path
+            File; another model there is replaced.
+
+        Returns
+        -------
+        Path
+            The file; :func:`seakeep.load_model` reads it, running no code from it.
+
+        Raises
+        ------
+        RequestError
+            If the file cannot be written, or another one than a model is there.
+        """
+        return write(self.to_dataset(), path, self.kind)
 
 
 def pack_signature(signature: Signature) -> dict[str, Any]:

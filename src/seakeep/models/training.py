@@ -13,7 +13,7 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray
 from seakeep.core.embedding import History, TrainingWindow, training_window
-from seakeep.core.solve import Method, Solution
+from seakeep.core.solve import Method, Solution, identify
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.inputs import Chain, Measured
@@ -145,6 +145,24 @@ class TrainingData:
             state_scale=self.state_scale,
             input_scale=self.input_scale,
             direct_scale=self.direct_scale,
+        )
+
+    def regress(
+        self, settings: HankelSettings, state_delays: int | None, *, all_rows: bool = False
+    ) -> Solution:
+        """Rows of the next states, or of all delayed ones, from these data."""
+        return identify(
+            self.states,
+            self.delayed,
+            self.windows,
+            state_delays=state_delays,
+            input_delays=settings.input_delays,
+            direct=self.direct,
+            ridge=float(settings.ridge),
+            per_snapshot=settings.ridge_scale == "per_snapshot",
+            rank=settings.rank,
+            all_rows=all_rows,
+            radius=settings.radius,
         )
 
     def training(self, solution: Solution) -> Training:

@@ -6,6 +6,7 @@ else the default of the kind.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, Literal, cast
@@ -179,7 +180,8 @@ def resolve_model(
         stated["observables"] = tuple(_observable(each, encounter_period) for each in tables)
     for key, value in stated.items():
         if isinstance(value, Length) and encounter_period is not None:
-            stated[key] = periods_to_samples(value.value, encounter_period, dt)
+            whole = math.isinf(value.value)  # "inf T": all samples of a run
+            stated[key] = None if whole else periods_to_samples(value.value, encounter_period, dt)
         elif ensemble and key in PRIORS:
             stated[key] = _prior(value)
     from_study = {"seed": seed} if ensemble and seed is not None and "seed" not in stated else {}
