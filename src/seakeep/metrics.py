@@ -50,7 +50,7 @@ __all__ = [
 ]
 
 BOUNDS = ("lower", "upper")
-REDRAWN = 500
+REDRAWN = 300
 """Redrawn records of an interval."""
 AT_ONCE = 2_000_000
 """Values of redrawn records at a time."""

@@ -66,7 +66,10 @@ def ensemble(half=0.2, diverged=1, slack=False):
 
 
 def block_of(table):
-    errors, extremes = comparison_blocks(table)
+    errors, intervals, extremes = comparison_blocks(table)
+    low, high = (float(table[f"anrmse_{bound}"][0]) for bound in ("lower", "upper"))
+    told = f"{low:.3f}–{high:.3f}" if np.isfinite(low) else "–"
+    assert intervals.rows[-1][:2] == ("average", told)
     assert extremes.rows[0][2] == f"{float(table['measured_min'][0, 0]):.4g}"
     return errors
 
@@ -253,8 +256,8 @@ def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path)
     }
     references = {"hold last": ["hold_last"], "best linear": ["arx", "fir"]}
     averages, channels = model_blocks(tables, references)
-    heads = ("model", "ANRMSE", "in training SD", "NAMMAE", "below hold last", "below best linear")
-    assert averages.columns == heads
+    heads = ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
+    assert averages.columns == (*heads, "below hold last", "below best linear")
     ours = averages.rows[0]
     assert ours[:2] == ("ours", "0.100")
     assert ours[-2:] == ("+50 %", "-100 %")  # errors of 0.1 against 0.2 and 0.05

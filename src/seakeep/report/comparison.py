@@ -44,13 +44,14 @@ _IN_UNITS = {
 }
 """Columns of a second table, in the unit of the channel."""
 _STORED = (
-    *("nrmse", "training_nrmse", "fit", "nammae", "sd_ratio", "measured_min", "predicted_min"),
+    *("nrmse", "nrmse_lower", "nrmse_upper", "training_nrmse", "fit"),
+    *("nammae", "nammae_lower", "nammae_upper", "sd_ratio", "measured_min", "predicted_min"),
     *("measured_max", "predicted_max", "coverage", "band_width", "relative_band_width"),
 )
 """Columns of a CSV file."""
 _OF_RUNS = (
-    *("start", "status", "anrmse", "training_anrmse", "conditional_on", "probe_offset"),
-    "probe_offset_spread",
+    *("start", "status", "anrmse", "anrmse_lower", "anrmse_upper", "training_anrmse"),
+    *("conditional_on", "probe_offset", "probe_offset_spread"),
 )
 _OF_BANDS = ("band", "level", "members", "diverged")
 _OF_SCALE = ("scale", "scale_factor")
@@ -75,7 +76,30 @@ def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
         name, title = f"comparison_{run}", f"{run}: {_title(at)}"
         last = (len(rows) - 1,)
         yield Table(name, title, columns, tuple(rows), _note(at), numeric, averages=last)
+        yield _intervals(at, str(run))
         yield _extremes(at, str(run))
+
+
+def _intervals(at: xr.Dataset, run: str) -> Table:
+    """Intervals of the measures: how sure they are, one run and one model given."""
+    rows = [
+        (
+            str(name),
+            _bounds(at.sel(channel=name), "nrmse"),
+            _bounds(at.sel(channel=name), "nammae"),
+        )
+        for name in at["channel"].values
+    ]
+    rows.append(("average", _bounds(at, "anrmse"), _bounds(at, "mean_nammae")))
+    columns = ("channel", "NRMSE, 95 %", "NAMMAE, 95 %")
+    title = f"{run}: intervals over blocks of the forecast"
+    last = (len(rows) - 1,)
+    return Table(f"intervals_{run}", title, columns, tuple(rows), "", (1, 2), averages=last)
+
+
+def _bounds(at: xr.Dataset, key: str) -> str:
+    low, high = (_text(at[f"{key}_{bound}"], "{:.3f}") for bound in ("lower", "upper"))
+    return MISSING if MISSING in (low, high) else f"{low}–{high}"
 
 
 def _extremes(at: xr.Dataset, run: str) -> Table:
@@ -130,6 +154,7 @@ def model_blocks(
     heads = (
         "model",
         "ANRMSE",
+        "95 %",
         "in training SD",
         "NAMMAE",
         *(f"below {each}" for each in references),
@@ -145,6 +170,7 @@ def model_blocks(
             (
                 name,
                 _text(at["anrmse"], "{:.3f}"),
+                _bounds(at, "anrmse"),
                 _text(at["training_anrmse"], "{:.3f}"),
                 _text(at["mean_nammae"], "{:.3f}"),
                 *(_text(100 * (1 - errors[name] / each), "{:+z.0f} %") for each in best.values()),

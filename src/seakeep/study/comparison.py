@@ -473,11 +473,13 @@ def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
         deviations of the training), ``fit`` (%), ``nammae``, ``sd_ratio`` (predicted
         over measured), ``measured_min``, ``measured_max``, ``predicted_min``, ``predicted_max``
         (in ``channel_units``); over ``run``: ``anrmse`` and ``mean_nammae`` over the channels that
-        can be judged, ``training_anrmse`` over all, ``slack_channels`` (how many cannot),
-        ``status``, ``start``, and ``conditional_on``: the measured output that the forecast read
-        after its start, or an empty text; ``probe_offset`` and ``probe_offset_spread`` (m), NaN
-        where the run has none. Of an ensemble also ``coverage``, the part of the measured instants
-        that lie in the band (%), ``band_width``, its mean width (in ``channel_units``), and
+        can be judged; of these four also ``…_lower`` and ``…_upper``, the bounds of a 95 % interval
+        (:mod:`seakeep.metrics`); ``training_anrmse`` over all, ``slack_channels`` (how many
+        cannot), ``status``, ``start``, and ``conditional_on``: the measured output that the
+        forecast read after its start, or an empty text; ``probe_offset`` and
+        ``probe_offset_spread`` (m), NaN where the run has none. Of an ensemble
+        also ``coverage``, the part of the measured instants that lie in the band (%),
+        ``band_width``, its mean width (in ``channel_units``), and
         ``relative_band_width`` (in measured standard deviations); over ``run``:
         ``mean_coverage`` over the channels that can be judged, ``members``, ``diverged``,
         ``level`` and ``band`` ("members" or "calibrated"). At full scale ``scale`` ("full") and
@@ -492,11 +494,17 @@ def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
     return table
 
 
+INTERVAL = 0.95
+"""Probability between the bounds of the measures."""
 _COLUMNS = {
     "nrmse": ("1", "RMS error in measured standard deviations"),
+    "nrmse_lower": ("1", "lower bound of its 95 % interval over blocks of the forecast"),
+    "nrmse_upper": ("1", "upper bound of its 95 % interval over blocks of the forecast"),
     "training_nrmse": ("1", "RMS error in standard deviations of the training"),
     "fit": ("%", "fit as MATLAB's compare states it"),
     "nammae": ("1", "error of minimum and maximum in measured standard deviations"),
+    "nammae_lower": ("1", "lower bound of its 95 % interval over blocks of the forecast"),
+    "nammae_upper": ("1", "upper bound of its 95 % interval over blocks of the forecast"),
     "sd_ratio": ("1", "standard deviation, predicted over measured"),
     "measured_min": ("channel's", "measured minimum"),
     "measured_max": ("channel's", "measured maximum"),
@@ -531,6 +539,7 @@ def _row(comparison: Comparison) -> xr.Dataset:
             name: ("channel", np.array([float(values[channel]) for channel in names]))
             for name, values in each.items()
         }
+        | _interval_entries(p, m, names)
         | _band_entries(comparison, slack)
         | _scale_entries(comparison)
         | {
@@ -550,6 +559,21 @@ def _row(comparison: Comparison) -> xr.Dataset:
             "channel_units": ("channel", [str(p[name].attrs.get("units", "")) for name in names]),
         },
     )
+
+
+def _interval_entries(p: xr.Dataset, m: xr.Dataset, names: Sequence[str]) -> dict[str, Any]:
+    """Bounds of the measures over redrawn blocks of the forecast."""
+    pair = {"predicted": p, "measured": m}
+    out: dict[str, Any] = {}
+    for key, each in (("nrmse", metrics.nrmse), ("nammae", metrics.normalised_extremes_error)):
+        found = each(**pair, interval=INTERVAL)
+        for bound in found["bound"].values:
+            at = found.sel(bound=bound)
+            out[f"{key}_{bound}"] = ("channel", np.array([float(at[name]) for name in names]))
+    for key, average in (("anrmse", metrics.anrmse), ("mean_nammae", metrics.nammae)):
+        for bound, value in zip(metrics.BOUNDS, average(**pair, interval=INTERVAL), strict=True):
+            out[f"{key}_{bound}"] = float(value)
+    return out
 
 
 def _in_training_sd(p: xr.Dataset, m: xr.Dataset) -> xr.Dataset:
