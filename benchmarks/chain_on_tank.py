@@ -71,7 +71,7 @@ def used(run: xr.Dataset) -> xr.Dataset:
 
 
 def true_motions(run: xr.Dataset, truth: xr.Dataset) -> xr.Dataset:
-    """True motions at the instants of a prepared run, surge rate in the band it is integrated in."""
+    """True motions at the instants of a prepared run, surge rate in the chain's band."""
     whole, rate = truth[MOTIONS].copy(), truth["surge_rate"]
     step = float(truth["time"][1] - truth["time"][0])
     whole["surge_rate"] = rate.copy(data=seakeep.signals.band_pass(rate.values, step, BAND))
@@ -175,9 +175,9 @@ def report(folder: Path) -> str:
     ]
     lines += ["raw files of four loggers, prepared as the tank's campaign file says.", ""]
     lines += ["NRMSE of each motion, and beside it the floor: the stated noise alone through the"]
-    lines += ["same chain, over the same SD. Asked for: 0.05, or 1.2 times the floor. Surge rate is"]
-    lines += ["integrated from acceleration: it is held against the truth in the band of 0.2 to 15 Hz."]
-    lines += [""]
+    lines += ["same chain, over the same SD. Asked for: 0.05, or 1.2 times the floor. Surge rate"]
+    lines += ["is integrated from acceleration: it is held against the truth in that band, 0.2 to"]
+    lines += ["15 Hz.", ""]
     lines += ["| motion | " + " | ".join(runs) + " |", "|---|" + "---|" * len(runs)]
     judged = {name: errors(run, delivered.truth[name]) for name, run in runs.items()}
     period, true_period = periods(delivered, runs)
