@@ -42,7 +42,7 @@ class TuneResult:
         (their kinds), ``ridge`` (per snapshot pair), ``score`` (mean NRMSE of free runs), the
         bounds ``lower`` and ``upper`` of its 95 % interval, and ``chosen``.
     note : str
-        How the choice was made.
+        How the choice was made, and the best λ of each candidate.
     readouts : tuple of FittedReadOut
         Read-outs of the settings that were chosen, as all training runs teach them; those that
         were chosen among have their scores.
@@ -60,17 +60,7 @@ class TuneResult:
         -------
         str
         """
-        lines = [self.note]
-        keys = ("observables", "lead", "state_delays", "input_delays")
-        rows = self.table.to_dataframe()
-        for values, part in rows.groupby(list(keys), sort=False):
-            best = part.iloc[int(part["score"].to_numpy().argmin())]
-            what = ", ".join(f"{key} {value}" for key, value in zip(keys, values, strict=True))
-            lines.append(
-                f"  {best['score']:.3f} [{best['lower']:.3f}, {best['upper']:.3f}]  ridge "
-                f"{best['ridge']:g}, {what}{'  (chosen)' if part['chosen'].any() else ''}"
-            )
-        return "\n".join([*lines, *(each.describe() for each in self.readouts)])
+        return "\n".join([self.note, *(each.describe() for each in self.readouts)])
 
     def figure(self) -> Figure:
         """Draw the error against λ, a line per candidate; needs the extra ``figures``.
@@ -163,18 +153,8 @@ def tune(
         known=known,
         seed=seed,
     )
-    settings = found.settings
-    chosen = replace(
-        spec,
-        state_delays=settings.state_delays,
-        input_delays=settings.input_delays,
-        lead=settings.lead,
-        observables=settings.observables,
-        readouts=settings.readouts,
-        ridge=settings.ridge,
-        ridge_scale="per_snapshot",
-    )
-    return TuneResult(chosen, _table(found.rows), found.note, found.readouts)
+    chosen = replace(found.settings, select=None)
+    return TuneResult(chosen, _table(found.rows), found.describe(), found.readouts)
 
 
 def _table(rows: Sequence[dict[str, Any]]) -> xr.Dataset:

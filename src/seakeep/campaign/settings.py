@@ -25,6 +25,7 @@ from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.formats import Options
 from seakeep.toml import (
+    Count,
     Delay,
     Duration,
     Finite,
@@ -54,6 +55,7 @@ __all__ = [
     "RedundantSettings",
     "RigSettings",
     "RunSettings",
+    "SelectSettings",
 ]
 
 
@@ -464,6 +466,10 @@ class PreparationSettings(Table):
         return self.model_copy(update={**filters, "preset": preset})
 
 
+def _listed(value: object) -> object:
+    return tuple(value) if isinstance(value, list | tuple) else (value,)
+
+
 class AlignmentSettings(Table):
     """``alignment`` of a model: the keys of :class:`seakeep.ProbeAlignment`."""
 
@@ -488,6 +494,14 @@ class AlignmentSettings(Table):
     highest_frequency: Positive | None = Field(
         default=None, description="Hz, of mode 'dispersion'; left out, it is estimated"
     )
+    passes: Count = Field(
+        default=2, description="how often a forecast runs, with surge = 'predicted'"
+    )
+    optional: bool = Field(
+        default=False,
+        description="true or false: whether a model goes without where surge, positions or depth "
+        "are missing",
+    )
 
     @model_validator(mode="after")
     def _keys_fit_mode(self) -> AlignmentSettings:
@@ -495,6 +509,18 @@ class AlignmentSettings(Table):
             if getattr(self, key) is not None and self.mode != mode:
                 raise ValueError(f"'{key}' goes with mode = '{mode}' alone; remove it")
         return self
+
+
+class SelectSettings(Table):
+    """``select`` of a model: the keys of :class:`seakeep.Select`."""
+
+    observables: bool = Field(
+        default=False, description="true or false: whether free runs choose among observables"
+    )
+    horizon: Annotated[tuple[Duration, ...], BeforeValidator(_listed), Field(min_length=1)] = Field(
+        default=(15.0, 45.0),
+        description="a length of free runs in encounter periods, such as '15 T', or a list of them",
+    )
 
 
 class RunSettings(Table):
@@ -753,6 +779,11 @@ class ModelSettings(Table):
     alignment: AlignmentSettings | None = Field(
         default=None, description="a table, such as { mode = 'dispersion', surge = 'predicted' }"
     )
+    select: SelectSettings | None = Field(
+        default=None,
+        description="a table, such as { observables = true, horizon = '15 T' }: what is chosen by "
+        "free runs on training runs that are held out",
+    )
     train_length: NumberOrPrior | None = Field(
         default=None, description="a prior or a number, in encounter periods; for an ensemble"
     )
@@ -823,8 +854,9 @@ class ModelSettings(Table):
             for key in type(self).model_fields
             if key not in apart and getattr(self, key) is not None
         }
-        if self.alignment is not None:
-            stated["alignment"] = self.alignment.model_dump(exclude_unset=True)
+        for key in ("alignment", "select"):
+            if key in stated:
+                stated[key] = stated[key].model_dump(exclude_unset=True)
         if isinstance(self.readouts, dict):
             stated["readouts"] = tuple(
                 {"channel": name, **each.model_dump()} for name, each in self.readouts.items()

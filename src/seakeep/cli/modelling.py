@@ -52,7 +52,8 @@ def fit(
     """Identify a model, or an ensemble, from a campaign.
 
     Reads the runs that train. The table [model] sets the kind of model and its settings:
-    kind = 'bayesian_hankel_dmdc' is an ensemble.
+    kind = 'bayesian_hankel_dmdc' is an ensemble. A table with states and inputs alone takes the
+    preset recommended: what is tried on training runs that are held out is printed with the choice.
 
     Example: seakeep fit docs/tutorial/campaign.toml -o model.nc
 
@@ -65,8 +66,8 @@ def fit(
 
     read = read_campaign(campaign)
     check_output(out, "model", read_files(read))
-    with progress_bar("Preparing") as progress:
-        identified = fit_campaign(read, model, progress)
+    with member_executor(workers, scheduler) as executor, progress_bar("Fitting") as progress:
+        identified = fit_campaign(read, model, progress, executor=executor)
     if isinstance(identified, HankelEnsemble):
         with (
             member_executor(workers, scheduler) as executor,

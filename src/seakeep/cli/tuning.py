@@ -118,13 +118,12 @@ def _tuned(text: str, model: str | None, found: TuneResult, reads_out: bool) -> 
         "ridge": spec.ridge,
         "ridge_scale": spec.ridge_scale,
     }
-    if spec.observables:
-        tables = tomlkit.array()
-        for each in spec.observables:
-            row = tomlkit.inline_table()
-            row.update({k: v for k, v in to_json(each).items() if v not in (None, "")})
-            tables.append(row)
-        values["observables"] = tables.multiline(True)
+    tables = tomlkit.array()
+    for each in spec.observables:
+        row = tomlkit.inline_table()
+        row.update({k: v for k, v in to_json(each).items() if v not in (None, "")})
+        tables.append(row)
+    values["observables"] = tables.multiline(bool(spec.observables))
     # Blank lines and comments there belong to the next table, if this one is in one place.
     between = _after(table) if isinstance(table, tomlkit.items.Table) else []
     for key, value in values.items():

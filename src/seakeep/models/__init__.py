@@ -11,6 +11,7 @@ from seakeep.models.offsets import ProbeOffset, estimate_probe_offset
 from seakeep.models.priors import Fixed, LogUniform, Uniform
 from seakeep.models.readouts import FittedReadOut, ReadOut
 from seakeep.models.registry import KINDS, load_model
+from seakeep.models.settings import Select
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
 from seakeep.models.summaries import summarize
 from seakeep.models.validity import Waves, compare_waves
@@ -38,6 +39,7 @@ __all__ = [
     "ProbeAlignment",
     "ProbeOffset",
     "ReadOut",
+    "Select",
     "Signature",
     "SlowSquares",
     "Spec",

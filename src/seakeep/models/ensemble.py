@@ -347,6 +347,8 @@ class HankelEnsemble(_Forecasts, store.Saved):
         Waves that they were trained in.
     calibration : Calibration, optional
         What makes the calibrated band; see :meth:`calibrate`.
+    selection : str
+        How free runs chose what the settings left open; empty where they stated all.
     """
 
     kind: ClassVar[str] = "bayesian_hankel_dmdc"
@@ -357,6 +359,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
     signature: Signature
     coverage: Coverage
     calibration: Calibration | None = None
+    selection: str = ""
 
     def __repr__(self) -> str:
         return (
@@ -550,6 +553,8 @@ class HankelEnsemble(_Forecasts, store.Saved):
         lines += [
             f"    {name}: {span_text(*span, self.dt)}" for name, span in self.training_spans.items()
         ]
+        if self.selection:
+            lines.append("  chosen        " + self.selection.replace("\n", "\n  "))
         if (calibration := self.calibration) is not None:
             found, count_of = calibration.found, sum(calibration.windows.values())
             line = (
@@ -717,6 +722,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
                 runs=json.dumps(place),
                 signature=store.as_json(store.signature_json(self.signature)),
                 calibration=calibration,
+                selection=self.selection,
             )
         )
 
@@ -760,6 +766,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
             calibration=Calibration.from_json(
                 dataset.attrs["calibration"], len(signature.state_labels)
             ),
+            selection=str(dataset.attrs["selection"]),
         )
 
 

@@ -17,6 +17,7 @@ import math
 import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -194,7 +195,10 @@ class ProbeAlignment:
     passes : int, optional
         With a predicted surge, how often a forecast runs: the first pass holds the surge at its
         mean over the last encounter period before the start, each further one follows the slow
-        part of the surge that the pass before predicted. A third changes nothing on the tank.
+        part of the surge that the pass before predicted.
+    optional : bool, optional
+        Whether a model goes without the alignment where the training runs do not carry what it
+        needs: the surge that it predicts among the states, the water depth, positions of probes.
 
     Raises
     ------
@@ -210,9 +214,14 @@ class ProbeAlignment:
     channels: tuple[str, ...] | None = None
     highest_frequency: float | None = None
     passes: int = 2
+    optional: bool = False
 
     def __post_init__(self) -> None:
         check_integer("alignment: passes", self.passes, 1)
+        if not isinstance(self.optional, bool):
+            raise RequestError(
+                f"alignment: optional must be True or False; received {self.optional!r}."
+            )
         check_choice("alignment: mode", self.mode, ("effective", "dispersion"))
         check_choice("alignment: surge", self.surge, ("measured", "predicted", "none"))
         if self.celerity != "common":
@@ -280,7 +289,7 @@ class ProbeAlignment:
         states: Sequence[str],
         inputs: Sequence[str],
         window: int | None,
-    ) -> FittedAlignment:
+    ) -> FittedAlignment | Chain:
         """Complete the settings from training runs that end where training ends.
 
         Parameters
@@ -294,8 +303,9 @@ class ProbeAlignment:
 
         Returns
         -------
-        FittedAlignment
-            With celerity, depth, band and positions.
+        FittedAlignment or Chain
+            With celerity, depth, band and positions; an empty chain where an optional alignment
+            is missing something.
 
         Raises
         ------
@@ -307,6 +317,8 @@ class ProbeAlignment:
         """
         first_name, first = next(iter(runs.items()))
         labelled.check_channels(first, inputs, first_name)
+        if self.optional and self.missing(runs, states, inputs):
+            return Chain()
         carried = _elevations(self, first, inputs)
         if self.surge == "predicted" and self.surge_channel not in states:
             raise RequestError(
@@ -342,6 +354,33 @@ class ProbeAlignment:
             else _surge_range(windows, self.surge_channel),
             period=labelled.mean_period(windows, elevations) if self.surge == "predicted" else None,
         )
+
+    def missing(
+        self, runs: Mapping[str, xr.Dataset], states: Sequence[str], inputs: Sequence[str]
+    ) -> str:
+        """What an optional alignment goes without, in words.
+
+        Parameters
+        ----------
+        runs : mapping of str to Dataset
+            Training runs.
+        states, inputs : sequence of str
+            Channels of the model.
+
+        Returns
+        -------
+        str
+            Empty where nothing is missing.
+        """
+        name, first = next(iter(runs.items()))
+        if self.surge == "predicted" and self.surge_channel not in states:
+            return f"'{self.surge_channel}' is not among the states"
+        placed = self.channels or [each for each in inputs if _position(first, each) is not None]
+        if not placed:
+            return f"{name} states no position of a wave probe"
+        if self.mode == "dispersion" and _common_depth(runs) is None:
+            return "the runs state no water depth"
+        return ""
 
     def to_json(self) -> Json:
         """Settings as JSON values."""
@@ -411,7 +450,7 @@ class FittedAlignment:
         states: Sequence[str],
         inputs: Sequence[str],
         window: int | None,
-    ) -> FittedAlignment:
+    ) -> FittedAlignment | Chain:
         """Fit the settings anew."""
         return self.settings.fit(runs, states, inputs, window)
 
@@ -635,10 +674,16 @@ class _Carried:
 
 def _slow(surge: FloatArray, period: float) -> FloatArray:
     """Surge below ``SURGE_CUTOFF``, without delay; `period` in samples."""
-    sections = signal.butter(4, 2 * SURGE_CUTOFF / period, output="sos")
     result: FloatArray = signal.sosfiltfilt(
-        sections, surge, padlen=min(len(surge) - 1, round(5 * period))
+        _sections(period), surge, padlen=min(len(surge) - 1, round(5 * period))
     )
+    return result
+
+
+@lru_cache
+def _sections(period: float) -> FloatArray:
+    """Low-pass filter of the surge: its design takes longer than its use."""
+    result: FloatArray = signal.butter(4, 2 * SURGE_CUTOFF / period, output="sos")
     return result
 
 
@@ -744,7 +789,9 @@ class Chain:
         return cls(tuple(maps))
 
 
-MAPS: dict[str, type[InputMap]] = {each.kind: each for each in (Lead, FittedAlignment, Observed)}
+MAPS: dict[str, type[InputMap]] = {
+    each.kind: each for each in (Lead, FittedAlignment, Observed, Chain)
+}
 """Input maps by their kind, as files name them."""
 
 

@@ -48,7 +48,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
     coverage : Coverage
         Waves that it was trained in.
     selection : str
-        How λ was chosen; empty where it was stated.
+        How free runs chose what the settings left open; empty where they stated all.
     """
 
     kind: ClassVar[str] = "hankel_dmdc"
@@ -395,7 +395,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
             *self.lines(f"{_regression(self.settings, self.training)}; delay rows {rows}"),
         ]
         if self.selection:
-            lines.append(f"  chosen        {self.selection}")
+            lines.append("  chosen        " + self.selection.replace("\n", "\n  "))
         radius = self.spectral_radius
         verdict = "stable" if radius < 1 else "UNSTABLE: long forecasts diverge"
         lines.append(f"  stability     spectral radius {radius:.6f} ({verdict})")

@@ -13,7 +13,7 @@ import json
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import astuple, dataclass, field, replace
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -21,15 +21,15 @@ import xarray as xr
 from seakeep.arrays import BoolArray, FloatArray, IntArray
 from seakeep.core import metrics
 from seakeep.core.path import Moments, free_runs, lagged, ridge_path
-from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.errors import RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.executor import Progress, in_order
-from seakeep.models.inputs import Measured
+from seakeep.models.inputs import Chain, Measured
 from seakeep.models.interface import Drive, Span
 from seakeep.models.labelled import mean_period
 from seakeep.models.observables import Observable, Observed, Powers, SlowSquares
 from seakeep.models.readouts import FittedReadOut, ReadOut, readouts_asked
-from seakeep.models.settings import HankelSettings
+from seakeep.models.settings import HankelSettings, Select
 from seakeep.models.stacking import PERIODS, Held, fit_readouts
 from seakeep.models.training import TrainingData, gather
 
@@ -45,10 +45,11 @@ __all__ = [
     "readouts_for",
     "search",
     "select",
+    "settle",
     "split",
 ]
 
-RIDGES = tuple(float(f"{10 ** (exponent / 2):.3g}") for exponent in range(-10, -1))
+RIDGES = tuple(float(f"{10 ** (exponent / 2):.3g}") for exponent in range(-8, -1))
 """λ per snapshot pair that are tried, half a decade apart.
 
 On the virtual tank and on both measured sets the best lies between 3e-4 and 3e-2; the error is flat
@@ -57,6 +58,13 @@ Scales = tuple[
     tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]
 ]
 """Mean and standard deviation of the states, of the delayed and of the direct regressors."""
+Settings = TypeVar("Settings", bound=HankelSettings)
+Chosen = TypeVar("Chosen")
+ALIKE = 0.03
+"""Part of the lowest error by which the chosen λ may be worse.
+
+On the virtual tank the error falls by that much over the last decade of λ: less than from one
+seed to the next. The larger λ is quicker to solve for, and its free runs decay sooner."""
 FALLBACK = 1e-3
 """λ per snapshot pair where nothing can be held out."""
 VARIED = ("ridge", "observables", "lead", "input_delays", "state_delays", "readouts")
@@ -348,13 +356,20 @@ def _pooled(
     return values.mean(axis=0), values.std(axis=0, ddof=1)
 
 
-def split(runs: dict[str, xr.Dataset], parts: int) -> dict[str, xr.Dataset]:
-    """Parts of runs, end to end: what is held out in turn where there is one run alone."""
+def split(
+    runs: Mapping[str, xr.Dataset], parts: int, before: int = 0, after: int = 0
+) -> dict[str, xr.Dataset]:
+    """Parts of runs, end to end: what is held out in turn where there is one run alone.
+
+    Each part comes with as many samples `before` and `after` it as a snapshot pair reads, so that
+    every pair of the run is in one of the parts.
+    """
     out = {}
     for name, run in runs.items():
-        edges = np.linspace(0, run.sizes["time"], parts + 1).astype(int)
+        edges = np.linspace(before, run.sizes["time"] - after, parts + 1).astype(int)
         for number, (first, stop) in enumerate(itertools.pairwise(edges), start=1):
-            out[f"{name}, part {number}"] = run.isel(time=slice(first, stop))
+            samples = slice(max(first - before, 0), stop + after)
+            out[f"{name}, part {number}"] = run.isel(time=samples)
     return out
 
 
@@ -398,7 +413,7 @@ def search(
     options : mapping of str to sequence
         Values to try of fields of :class:`Candidate`.
     ridges : sequence of float
-        λ to try.
+        λ to try, in ascending order.
     executor : Executor, optional
         Judges candidates and folds side by side; the result is the same.
     progress : callable, optional
@@ -409,7 +424,8 @@ def search(
     Returns
     -------
     Choice
-        Never a model that grows: λ is raised until the spectral radius is below one.
+        The best columns, and the largest λ that is as good as the best; never a model that grows:
+        λ is raised until the spectral radius is below one.
     """
     known = {} if known is None else known
     trials: dict[Candidate, Trial] = {}
@@ -419,8 +435,8 @@ def search(
         for candidate, trial in _judged(problem, tried, ridges, executor, progress, known):
             trials.setdefault(candidate, trial)
         best = min(trials, key=lambda each: float(trials[each].means.min()))
-    order = np.argsort(trials[best].means, kind="stable")
-    chosen = int(order[0])
+    means = trials[best].means
+    chosen = int(np.flatnonzero(means <= (1.0 + ALIKE) * means.min())[-1])
     while problem.radius(best, ridges[chosen]) >= 1.0 and chosen + 1 < len(ridges):
         chosen += 1
     return Choice(best, ridges[chosen], tuple(trials.items()))
@@ -465,12 +481,12 @@ def _unit(problem: Problem, item: tuple[Candidate, Sequence[float], int]) -> lis
 
 
 @dataclass(frozen=True, eq=False)
-class Selected:
+class Selected(Generic[Chosen]):
     """What free runs chose, and on what evidence.
 
     Parameters
     ----------
-    settings : HankelSettings
+    settings : HankelDMDc or BayesianHankelDMDc
         Complete: nothing is left to be chosen.
     rows : tuple of dict
         One per candidate and λ: settings, mean score, bounds of its 95 % interval, and whether it
@@ -481,26 +497,106 @@ class Selected:
         Read-outs of these settings, fitted.
     """
 
-    settings: HankelSettings
+    settings: Chosen
     rows: tuple[dict[str, Any], ...]
     note: str
     readouts: tuple[FittedReadOut, ...] = ()
 
+    def describe(self) -> str:
+        """Text: how the choice was made, and the best λ of each candidate."""
+        keys = ("observables", "lead", "state_delays", "input_delays")
+        groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
+        for row in self.rows:
+            groups.setdefault(tuple(row[key] for key in keys), []).append(row)
+        lines = [self.note]
+        for values, part in groups.items():
+            best = min(part, key=lambda row: (not row["chosen"], row["score"]))
+            what = ", ".join(f"{key} {value}" for key, value in zip(keys, values, strict=True))
+            lines.append(
+                f"  {best['score']:.3f} [{best['lower']:.3f}, {best['upper']:.3f}]  ridge "
+                f"{best['ridge']:g}, {what}{'  (chosen)' if best['chosen'] else ''}"
+            )
+        return "\n".join(lines)
+
+
+def settle(
+    settings: Settings,
+    chosen: Select | None,
+    runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+    *,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> Selected[Settings]:
+    """Choose all that settings leave open.
+
+    Parameters
+    ----------
+    settings : HankelSettings
+        What was asked for.
+    chosen : Select, optional
+        What is chosen beside λ, and how.
+    runs, states, inputs
+        As in :func:`select`.
+    executor, progress
+        As in :func:`search`.
+
+    Returns
+    -------
+    Selected
+        With λ as a number.
+
+    Raises
+    ------
+    RequestError
+        As :func:`select`; if λ is stated as zero and something is to be chosen.
+    """
+    alignment = settings.alignment
+    lacking = alignment.missing(runs, states, inputs) if alignment and alignment.optional else ""
+    without = f"no alignment: {lacking}" if lacking else ""
+    stated = not isinstance(settings.ridge, str)
+    if stated and chosen is None:
+        return Selected(settings, (), without)
+    if settings.ridge == 0:
+        raise RequestError(
+            "free runs choose at λ above zero, and ridge = 0 is stated. Set ridge = 'rollout', or "
+            "remove select."
+        )
+    asked = chosen or Select()
+    vary = ["ridge"] + ["observables"] * asked.observables
+    vary += ["readouts"] * (settings.readouts == "auto")
+    found = select(
+        settings,
+        runs,
+        states,
+        inputs,
+        vary=vary,
+        ridges=(float(settings.ridge),) if stated else None,
+        horizon=asked.horizon,
+        period=asked.period,
+        executor=executor,
+        progress=progress,
+    )
+    return replace(found, note="; ".join(filter(None, (found.note, without))))
+
 
 def select(
-    settings: HankelSettings,
+    settings: Settings,
     runs: Mapping[str, xr.Dataset],
     states: Sequence[str],
     inputs: Sequence[str],
     *,
     vary: Sequence[str] = ("ridge",),
+    ridges: Sequence[float] | None = None,
     horizon: Sequence[float] = (15.0, 45.0),
     parts: int | None = None,
+    period: float | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
     known: MutableMapping[str, Any] | None = None,
     seed: int = 0,
-) -> Selected:
+) -> Selected[Settings]:
     """Choose settings by free runs on training runs that are held out in turn.
 
     Parameters
@@ -513,11 +609,15 @@ def select(
         Channels.
     vary : sequence of str
         Names out of ``VARIED``; λ is always chosen.
+    ridges : sequence of float, optional
+        λ to try, as the settings count it; by default ``RIDGES`` per snapshot pair.
     horizon : sequence of float
         Lengths of the windows that are judged, encounter periods.
     parts : int, optional
         Number of parts into which each run is cut, to hold out one part in turn; by default runs
         are held out whole, and a single run in three parts.
+    period : float, optional
+        Encounter period, s; by default that of the runs.
     executor, progress, known
         As in :func:`search`.
     seed : int
@@ -544,48 +644,58 @@ def select(
             "choosing by free runs takes delay_rows = 'exact' and no rank; received delay_rows = "
             f"'{settings.delay_rows}', rank = {settings.rank}. Change them, or state ridge."
         )
-    pieces = _pieces(runs, parts)
-    period = mean_period(runs, list(inputs))
+    parts = 3 if parts is None and len(runs) == 1 else parts
+    step = labelled.common_step(runs)
+    samples = mean_period(runs, list(inputs)) if period is None else period / step
     labels = labelled.common_labels(runs, states)
     readouts = readouts_asked(settings.readouts, labels)
     if "readouts" in vary:
         asked = readouts or readouts_asked("auto", labels)
         readouts = tuple(replace(each, kind="auto") for each in asked)
-    chosen = settings.observables
-    if "observables" in vary and not chosen:
-        chosen = default_observables(inputs)
-    options = _options(settings, vary, period, len(chosen))
+    wanted = [settings.observables]
+    if "observables" in vary and not settings.observables:
+        defaults = default_observables(inputs, samples * step)
+        wanted = list(dict.fromkeys([defaults, defaults[1:], ()]))
     base = Candidate(
         settings.state_delays,
         settings.input_delays,
         int(settings.lead),
         tuple(range(len(settings.observables))),
     )
-    problem = _problem(
-        replace(settings, observables=chosen, ridge_scale="per_snapshot"),
-        pieces,
-        states,
-        inputs,
-        base,
-        options,
-        tuple(round(each * period) for each in horizon),
-    )
-    if problem is None or not problem.folds():
-        longest = max(run.sizes["time"] for run in pieces.values())
-        made = replace(settings, ridge=FALLBACK, ridge_scale="per_snapshot")
+    if ridges is None:
+        settings = replace(settings, ridge=FALLBACK, ridge_scale="per_snapshot")
+        ridges = RIDGES
+    for chosen in wanted:  # runs may be too short for the longest
+        options = _options(settings, vary, samples, len(chosen))
+        problem = _problem(
+            replace(settings, observables=chosen),
+            runs,
+            states,
+            inputs,
+            base,
+            options,
+            tuple(round(each * samples) for each in horizon),
+            parts,
+        )
+        if problem is not None and problem.folds():
+            break
+    else:
+        longest = max(run.sizes["time"] for run in runs.values())
         return _with_readouts(
-            made,
+            settings,
             (),
-            f"ridge {FALLBACK:g} per snapshot pair: no window of {round(min(horizon) * period)} "
-            f"samples can be held out of parts of at most {longest}",
-            fit_readouts(readouts, _measured(made, runs, states, inputs), ()) if readouts else (),
+            f"ridge {settings.ridge:g} per snapshot pair: no window of "
+            f"{round(min(horizon) * samples)} samples can be held out of runs of at most {longest}",
+            fit_readouts(readouts, _measured(settings, runs, states, inputs), ())
+            if readouts
+            else (),
             "readouts" in vary,
         )
     found = search(
-        problem, base, options, RIDGES, executor=executor, progress=progress, known=known
+        problem, base, options, ridges, executor=executor, progress=progress, known=known
     )
     best = dict(found.trials)[found.candidate]
-    score = float(best.means[RIDGES.index(found.ridge)])
+    score = float(best.means[list(ridges).index(found.ridge)])
     made = replace(
         settings,
         state_delays=found.candidate.state_delays,
@@ -593,28 +703,27 @@ def select(
         lead=found.candidate.lead,
         observables=tuple(chosen[number] for number in found.candidate.observables),
         ridge=found.ridge,
-        ridge_scale="per_snapshot",
     )
     count = sum(len(trial.means) for _, trial in found.trials)
     note = (
-        f"ridge {found.ridge:g} per snapshot pair: the best of {count} settings in free runs on "
+        f"ridge {found.ridge:g} per snapshot pair: out of {count} settings in free runs on "
         f"{len(problem.folds())} parts held out in turn, mean NRMSE {score:.3f}"
     )
-    rows = tuple(_rows_of(found, chosen, seed))
+    rows = tuple(_rows_of(found, ridges, chosen, seed))
     fitted: tuple[FittedReadOut, ...] = ()
     if readouts:
-        held = list(problem.held(found.candidate, found.ridge, round(PERIODS * period)))
+        held = list(problem.held(found.candidate, found.ridge, round(PERIODS * samples)))
         fitted = fit_readouts(readouts, problem.data, held)
     return _with_readouts(made, rows, note, fitted, "readouts" in vary)
 
 
 def _with_readouts(
-    settings: HankelSettings,
+    settings: Settings,
     rows: tuple[dict[str, Any], ...],
     note: str,
     readouts: tuple[FittedReadOut, ...],
     chosen: bool,
-) -> Selected:
+) -> Selected[Settings]:
     """What was selected, with the kinds of read-outs in the settings where they were chosen."""
     if chosen:
         kinds = tuple(
@@ -670,7 +779,8 @@ def readouts_for(
     if len(runs) == 1 and settings.window is not None:  # whose parts are shorter
         runs = {name: run.isel(time=slice(-settings.window, None)) for name, run in runs.items()}
         settings = replace(settings, window=None)
-    problem = _problem(settings, _pieces(runs), states, inputs, base, {}, (steps,))
+    parts = 3 if len(runs) == 1 else None
+    problem = _problem(settings, runs, states, inputs, base, {}, (steps,), parts)
     if problem is None:
         return fit_readouts(readouts, _measured(settings, runs, states, inputs), ())
     return fit_readouts(readouts, problem.data, list(problem.held(base, ridge, steps)))
@@ -686,20 +796,18 @@ def _measured(
     return gather(runs, states, inputs, None, replace(settings, ridge=1.0, standardize=True))
 
 
-def _pieces(runs: Mapping[str, xr.Dataset], parts: int | None = None) -> dict[str, xr.Dataset]:
-    """What is held out in turn: whole runs, or parts where that is asked or one run is alone."""
-    if parts is None and len(runs) > 1:
-        return dict(runs)
-    return split(dict(runs), 3 if parts is None else parts)
+def default_observables(
+    inputs: Sequence[str], period: float | None = None
+) -> tuple[Observable, ...]:
+    """Slow squares of the elevation at the vessel, or of all, and powers of all elevations.
 
-
-def default_observables(inputs: Sequence[str]) -> tuple[Observable, ...]:
-    """Slow squares of the elevation at the vessel, or of all, and powers of all elevations."""
+    `period` is the encounter period, s; by default that of the training runs.
+    """
     elevations = tuple(name for name in inputs if name.startswith("eta"))
     if not elevations:
         return ()
     at_vessel = tuple(name for name in elevations if name == "eta_cog") or elevations
-    return SlowSquares(at_vessel), Powers(elevations)
+    return SlowSquares(at_vessel, period=period), Powers(elevations)
 
 
 def _options(
@@ -728,6 +836,7 @@ def _problem(
     base: Candidate,
     options: Mapping[str, Sequence[Any]],
     horizons: tuple[int, ...],
+    parts: int | None,
 ) -> Problem | None:
     """The columns of all candidates; None where the runs are too short for them."""
     leads = [base.lead, *options.get("lead", ())]
@@ -747,14 +856,16 @@ def _problem(
         ridge=1.0,
         standardize=True,
     )
-    try:
-        data = gather(runs, states, inputs, None, wide)
-    except DataError:
-        if any(run.sizes["time"] > max(delays, widest.state_delays) + 2 for run in runs.values()):
-            raise
+    made = [each.fit(dict(runs), states, inputs, settings.window) for each in wide.maps]
+    chain = Chain(tuple(made))
+    before = max(widest.state_delays, chain.history(delays))
+    after = max(chain.lead_samples - 1, 0)
+    pieces = dict(runs) if parts is None else split(runs, parts, before, after)
+    if any(run.sizes["time"] < before + 2 + after for run in pieces.values()):
         return None
+    data = gather(pieces, states, inputs, None, wide)
     chain, drives, offsets = data.input_map, [], []
-    for (name, run), x in zip(runs.items(), data.states, strict=True):
+    for (name, run), x in zip(pieces.items(), data.states, strict=True):
         size = run.sizes["time"]
         span = Span(0, size - 1, size - chain.lead_samples)
         values = labelled.channel_matrix(run, list(inputs), name)
@@ -779,7 +890,7 @@ def _problem(
 
 
 def _rows_of(
-    found: Choice, observables: Sequence[Observable], seed: int
+    found: Choice, ridges: Sequence[float], observables: Sequence[Observable], seed: int
 ) -> Iterator[dict[str, Any]]:
     """Rows of the table: windows are drawn again 400 times for the interval of each score."""
     rng = np.random.default_rng(seed)
@@ -796,9 +907,9 @@ def _rows_of(
                 "lead": candidate.lead,
                 "observables": ", ".join(observables[k].kind for k in candidate.observables)
                 or "none",
-                "ridge": RIDGES[number],
+                "ridge": ridges[number],
                 "score": float(score),
                 "lower": float(lower[number]),
                 "upper": float(upper[number]),
-                "chosen": candidate == found.candidate and RIDGES[number] == found.ridge,
+                "chosen": candidate == found.candidate and ridges[number] == found.ridge,
             }

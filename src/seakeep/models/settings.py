@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import numbers
 import warnings
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 from typing import ClassVar, Literal, Self
 
 import numpy as np
@@ -24,6 +25,7 @@ __all__ = [
     "HankelSettings",
     "History",
     "RidgeScale",
+    "Select",
     "check_integer",
     "check_ridge",
     "periods_to_samples",
@@ -91,6 +93,67 @@ def check_stable(value: object) -> None:
             "stable must be True, False or a radius above 0 and below 1, to which eigenvalues are "
             f"clipped; received {value!r}. True is {STABLE_RADIUS:g}."
         )
+
+
+@dataclass(frozen=True)
+class Select:
+    """What free runs on held-out training runs choose, beside λ.
+
+    Parameters
+    ----------
+    observables : bool, optional
+        Whether they choose among the observables: those that are stated, or slow squares and
+        powers of the wave elevations, none, one, or all of them.
+    horizon : float or sequence of float, optional
+        Lengths of the free runs, encounter periods.
+    period : float, optional
+        Encounter period, s; by default that of the training runs.
+
+    Raises
+    ------
+    RequestError
+        If a setting is out of range.
+    """
+
+    observables: bool = False
+    horizon: tuple[float, ...] = (15.0, 45.0)
+    period: float | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.observables, bool):
+            raise RequestError(
+                f"select: observables must be True or False; received {self.observables!r}."
+            )
+        given = self.horizon if isinstance(self.horizon, tuple | list) else (self.horizon,)
+        for value in (*given, *(() if self.period is None else (self.period,))):
+            real = isinstance(value, numbers.Real) and not isinstance(value, bool)
+            if not real or not 0 < value < math.inf:
+                raise RequestError(
+                    "select: horizon (encounter periods) and period (s) must be positive; "
+                    f"received {value!r}."
+                )
+        if not given:
+            raise RequestError("select: horizon is empty. Write horizon=(15, 45).")
+        object.__setattr__(self, "horizon", tuple(float(each) for each in given))
+
+    @classmethod
+    def of(cls, value: object) -> Self | None:
+        """Return settings as they are, or made of a table of their keys; None stays None."""
+        if value is None or isinstance(value, cls):
+            return value
+        known = list(cls.__dataclass_fields__)
+        if not isinstance(value, Mapping):
+            raise RequestError(
+                f"select must be a seakeep.Select or None; received {value!r}. Write "
+                "select=seakeep.Select(observables=True)."
+            )
+        for key in value:
+            if key not in known:
+                raise RequestError(
+                    f"select: unknown key '{key}'.{did_you_mean(str(key), known)} Keys: "
+                    f"{', '.join(known)}."
+                )
+        return cls(**value)
 
 
 @dataclass(frozen=True)
@@ -206,10 +269,12 @@ class HankelSettings:
     def to_json(self) -> Json:
         """Settings as JSON values."""
         content = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
+        select = content.get("select")
         maps = {
             "alignment": None if self.alignment is None else self.alignment.to_json(),
             "observables": [observable_json(each) for each in self.observables],
             "readouts": readouts_json(self.readouts),
+            "select": None if select is None else asdict(select),
         }
         made: Json = plain({key: maps.get(key, value) for key, value in content.items()})
         return made

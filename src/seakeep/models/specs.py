@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, ClassVar, Self
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 import xarray as xr
 
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled, store
 from seakeep.models.checks import check_choice
 from seakeep.models.draws import Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble
+from seakeep.models.executor import Progress
 from seakeep.models.inputs import Chain, ProbeAlignment
 from seakeep.models.interface import Json, Needs, Signature, Span, plain
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
-from seakeep.models.members import TrainingArrays, reach
+from seakeep.models.members import TrainingArrays, reach, spectral_radius
 from seakeep.models.observables import Observable, observables_of
 from seakeep.models.observables import to_json as observable_json
 from seakeep.models.priors import (
@@ -31,12 +33,13 @@ from seakeep.models.priors import (
     from_description,
 )
 from seakeep.models.readouts import FittedReadOut, ReadOuts, readouts_json, readouts_of
-from seakeep.models.selection import readouts_for, select
+from seakeep.models.selection import Selected, default_observables, readouts_for, settle
 from seakeep.models.settings import (
     DelayRows,
     HankelSettings,
     History,
     RidgeScale,
+    Select,
     check_integer,
     periods_to_samples,
 )
@@ -54,7 +57,10 @@ from seakeep.models.validity import Coverage
 __all__ = ["BayesianHankelDMDc", "HankelDMDc"]
 
 PAPER_RIDGE = 100.0
-PAPER_SNAPSHOTS = 640
+STATE_PERIODS, INPUT_PERIODS, LEAD_PERIODS = 1.0, 3.0, 0.75
+"""Delays and look-ahead that we recommend; a search from there gains a twentieth at most."""
+ALIGNMENT = ProbeAlignment(mode="dispersion", surge="predicted", passes=3, optional=True)
+"""Of what we recommend. The third pass takes a tenth off the error on the virtual tank."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +110,8 @@ class HankelDMDc(HankelSettings):
         Channels that are read off the forecast states, such as loads of lines that fall slack;
         "auto" reads every load among the states (in N) off the motions among them where that
         helps.
+    select : Select, optional
+        What `fit` chooses by free runs beside λ; a mapping of its keys is taken too.
 
     Raises
     ------
@@ -132,6 +140,15 @@ class HankelDMDc(HankelSettings):
     is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
     may_choose: ClassVar[bool] = True
+    select: Select | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "select", Select.of(self.select))
+
+    def around(self, dt: float, input_delays: int | None = None) -> tuple[int, int]:
+        """Samples around the start that a forecast reads, whichever observables are chosen."""
+        return _around_any(super().around(dt, input_delays), self.select, self.observables, dt)
 
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
@@ -164,7 +181,7 @@ class HankelDMDc(HankelSettings):
 
     @classmethod
     def recommended(cls, encounter_period: float, dt: float) -> Self:
-        """Settings we recommend: as the paper, but all of the runs, exact rows, λ per snapshot.
+        """Settings we recommend: what the data do not decide is stated, the rest `fit` chooses.
 
         Parameters
         ----------
@@ -176,15 +193,66 @@ class HankelDMDc(HankelSettings):
         Returns
         -------
         HankelDMDc
-            s one period, z five periods, λ = 100/640 times the number of columns.
+            All of the runs, exact delay rows, s one period, z three periods, waves read 0.75
+            periods ahead and carried by dispersion to the surge predicted in three passes, where
+            surge is a state and the runs state water depth and positions of the probes.
+            Observables (none, slow squares and powers of the elevations, or both), λ, and read-outs
+            of the loads are chosen by free runs of 15 and 45 periods on training runs that are held
+            out in turn; where nothing can be held out there are none, and λ is 1e-3 per snapshot
+            pair.
         """
+
+        def samples(periods: float) -> int:
+            return periods_to_samples(periods, encounter_period, dt)
+
         return cls(
-            state_delays=periods_to_samples(1, encounter_period, dt),
-            input_delays=periods_to_samples(5, encounter_period, dt),
-            ridge=PAPER_RIDGE / PAPER_SNAPSHOTS,
+            state_delays=samples(STATE_PERIODS),
+            input_delays=samples(INPUT_PERIODS),
+            ridge="rollout",
             delay_rows="exact",
             ridge_scale="per_snapshot",
+            alignment=ALIGNMENT,
+            lead=samples(LEAD_PERIODS),
+            readouts="auto",
+            select=Select(observables=True, period=encounter_period),
         )
+
+    def settled(
+        self,
+        runs: Runs,
+        states: Sequence[str],
+        inputs: Sequence[str],
+        stop: Stop = None,
+        *,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+    ) -> Selected[HankelDMDc]:
+        """Choose by free runs what the settings leave to be chosen; nothing is fitted.
+
+        Parameters
+        ----------
+        runs, states, inputs, stop
+            As in :meth:`fit`.
+        executor : concurrent.futures.Executor, optional
+            Works on several candidates side by side; the result is the same.
+        progress : callable, optional
+            Called as ``progress(done, total, what)``.
+
+        Returns
+        -------
+        Selected
+            ``settings``, complete; ``rows``, what was tried; ``describe()``.
+
+        Raises
+        ------
+        RequestError, DataError
+            As :meth:`fit`.
+        """
+        check_names(states, inputs)
+        named = until(as_runs(runs), stop)
+        channels = list(states), list(inputs)
+        found = settle(self, self.select, named, *channels, executor=executor, progress=progress)
+        return replace(found, settings=replace(found.settings, select=None))
 
     def fit(
         self,
@@ -192,6 +260,9 @@ class HankelDMDc(HankelSettings):
         states: Sequence[str],
         inputs: Sequence[str],
         stop: Stop = None,
+        *,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
     ) -> HankelDMDcModel:
         """Identify a model; the settings are not changed by it.
 
@@ -207,11 +278,13 @@ class HankelDMDc(HankelSettings):
         stop : float, sequence or mapping of float, optional
             Last instant of the training window, s; one for all runs, or one a run. By default
             each run's end.
+        executor, progress
+            As in :meth:`settled`, where something is to be chosen.
 
         Returns
         -------
         HankelDMDcModel
-            The model, immutable.
+            The model, immutable; its ``settings`` are complete.
 
         Raises
         ------
@@ -219,16 +292,15 @@ class HankelDMDc(HankelSettings):
             If a channel is unknown, or `stop` lies outside a run.
         DataError
             If a run is too short, has gaps or times that are not uniform, another step than the
-            first, or a constant channel while ``standardize`` is set.
+            first, or a constant channel while ``standardize`` is set; if the model that was chosen
+            grows.
         """
         named = as_runs(runs)
-        if isinstance(self.ridge, str):
-            check_names(states, inputs)
-            found = select(self, until(named, stop), list(states), list(inputs))
-            ridge = found.settings.ridge
-            chosen = replace(self, ridge=ridge, ridge_scale="per_snapshot")
-            model = chosen._fitted(named, states, inputs, stop, found.readouts)
-            return replace(model, selection=found.note)
+        if isinstance(self.ridge, str) or self.select is not None:
+            found = self.settled(named, states, inputs, stop, executor=executor, progress=progress)
+            model = found.settings._fitted(named, states, inputs, stop, found.readouts)
+            _check_growth(model)
+            return replace(model, selection=found.describe())
         readouts: tuple[FittedReadOut, ...] = ()
         if self.readouts:
             check_names(states, inputs)
@@ -256,7 +328,29 @@ class HankelDMDc(HankelSettings):
         )
 
 
-PAPER_RIDGE_PER_SNAPSHOT = 100.0 / 640
+def _check_growth(model: HankelDMDcModel) -> None:
+    """Refuse a model that was chosen and grows."""
+    radius = spectral_radius(model.dynamics)
+    if radius >= 1.0:
+        raise DataError(
+            f"the model that was chosen grows: its spectral radius is {radius:.6f} at ridge = "
+            f"{model.settings.ridge:g} per snapshot pair. Look for transients at the ends of the "
+            "training runs, use fewer state delays, clip its eigenvalues (stable=True), or state the "
+            "ridge to have it as it is."
+        )
+
+
+def _around_any(
+    around: tuple[int, int], select: Select | None, observables: tuple[Observable, ...], dt: float
+) -> tuple[int, int]:
+    """Samples around the start, with those of observables that may be chosen."""
+    if select is None or not select.observables or observables:
+        return around
+    reach = [each.reach(dt) for each in default_observables(("eta",), select.period)]
+    before, after = zip(around, *reach, strict=True)
+    return max(before), max(after)
+
+
 PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
 
 
@@ -279,8 +373,9 @@ class BayesianHankelDMDc:
         Length of the training window, encounter periods; None takes all of a run up to ``stop``.
     state_delay, input_delay : prior
         Longest delay of states and inputs, encounter periods.
-    ridge : prior
-        λ.
+    ridge : prior or "rollout"
+        λ. "rollout" chooses one by free runs, as :class:`HankelDMDc` does at the medians of the
+        delays, and draws log-uniformly over 0.3 to 3 times that.
     n_members : int, optional
         Number of members.
     seed : int, SeedSequence or Generator, optional
@@ -294,7 +389,8 @@ class BayesianHankelDMDc:
         Time step the runs must have, s; None takes theirs.
     lead : int or float, optional
         Look-ahead of the waves: samples as an integer, encounter periods as a float.
-    history, delay_rows, ridge_scale, rank, standardize, alignment, observables, stable
+    history, delay_rows, ridge_scale, rank, standardize, alignment, observables, stable,
+    select
         As in :class:`HankelDMDc`. What an alignment estimates, it estimates once for all members,
         from all that is given up to ``stop``: no member's draw moves another's input.
     readouts
@@ -318,7 +414,7 @@ class BayesianHankelDMDc:
     train_length: Prior | None
     state_delay: Prior
     input_delay: Prior
-    ridge: Prior
+    ridge: Prior | Literal["rollout"]
     n_members: int = 100
     seed: int | np.random.SeedSequence | np.random.Generator = 0
     sampling: Sampling = "monte_carlo"
@@ -334,12 +430,14 @@ class BayesianHankelDMDc:
     observables: tuple[Observable, ...] = ()
     readouts: ReadOuts = ()
     stable: bool | float = False
+    select: Select | None = None
     seed_sequence: np.random.SeedSequence = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for name in ("train_length", "state_delay", "input_delay", "ridge"):
-            if name != "train_length" or self.train_length is not None:
-                check_prior(name, getattr(self, name))
+        for name in PRIORS:
+            value = getattr(self, name)
+            if (name, value) not in (("train_length", None), ("ridge", "rollout")):
+                check_prior(name, value)
         check_integer("n_members", self.n_members, 1)
         period = self.encounter_period
         # Without dt any step shorter than the period will do; the runs' own is checked at fit.
@@ -349,6 +447,7 @@ class BayesianHankelDMDc:
         check_choice("train_on", self.train_on, ("all", "runs", "windows"))
         object.__setattr__(self, "observables", observables_of(self.observables))
         object.__setattr__(self, "readouts", readouts_of(self.readouts))
+        object.__setattr__(self, "select", Select.of(self.select))
         object.__setattr__(self, "alignment", self.shared(0.5 * period).alignment)
         object.__setattr__(self, "seed_sequence", _seed_sequence(self.seed))
 
@@ -373,19 +472,20 @@ class BayesianHankelDMDc:
             stable=self.stable,
         )
 
-    def central(self, dt: float) -> HankelSettings:
-        """Settings at the medians of the priors."""
+    def central(self, dt: float) -> HankelDMDc:
+        """The single model at the medians of the priors."""
 
         def samples(prior: Prior) -> int:
             return periods_to_samples(float(prior.ppf(0.5)), self.encounter_period, dt)
 
-        return replace(
-            self.shared(dt),
-            state_delays=samples(self.state_delay),
-            input_delays=samples(self.input_delay),
-            ridge=float(self.ridge.ppf(0.5)),
-            window=None if self.train_length is None else samples(self.train_length),
-        )
+        shared = self.shared(dt)
+        values = {each.name: getattr(shared, each.name) for each in fields(shared)} | {
+            "state_delays": samples(self.state_delay),
+            "input_delays": samples(self.input_delay),
+            "window": None if self.train_length is None else samples(self.train_length),
+            "ridge": self.ridge if isinstance(self.ridge, str) else float(self.ridge.ppf(0.5)),
+        }
+        return HankelDMDc(**values, select=self.select)
 
     def needs(self, dt: float) -> Needs:
         """Samples that its greediest draw asks of its runs: the upper ends of the priors count."""
@@ -398,7 +498,8 @@ class BayesianHankelDMDc:
                 top = float(prior.ppf(1.0 - 1e-6))
             return periods_to_samples(top, self.encounter_period, dt)
 
-        before, after = shared.around(dt, samples(self.input_delay))
+        around = shared.around(dt, samples(self.input_delay))
+        before, after = _around_any(around, self.select, self.observables, dt)
         return Needs(
             1 if self.train_length is None else samples(self.train_length),
             max(samples(self.state_delay), before),
@@ -413,7 +514,7 @@ class BayesianHankelDMDc:
         made: Json = plain(
             content
             | {
-                **{name: describe(getattr(self, name)) for name in PRIORS},
+                **{name: _described(getattr(self, name)) for name in PRIORS},
                 "encounter_period": float(self.encounter_period),
                 "n_members": int(self.n_members),
                 "seed": str(seed.entropy),
@@ -421,6 +522,7 @@ class BayesianHankelDMDc:
                 "alignment": None if self.alignment is None else self.alignment.to_json(),
                 "observables": [observable_json(each) for each in self.observables],
                 "readouts": readouts_json(self.readouts),
+                "select": None if self.select is None else asdict(self.select),
             }
         )
         return made
@@ -436,7 +538,9 @@ class BayesianHankelDMDc:
         seed = np.random.SeedSequence(
             int(stated.pop("seed")), spawn_key=[int(key) for key in stated.pop("spawn_key")]
         )
-        stated |= {name: from_description(stated[name]) for name in PRIORS}
+        stated |= {
+            name: from_description(stated[name]) for name in PRIORS if stated[name] != "rollout"
+        }
         stated["observables"] = observables_of(stated.get("observables", []))
         stated["readouts"] = readouts_of(stated.get("readouts", []))
         return cls(**stated, seed=seed)
@@ -504,21 +608,69 @@ class BayesianHankelDMDc:
         Returns
         -------
         BayesianHankelDMDc
-            All of the runs, the paper's delays, exact delay rows, and a ridge per snapshot,
-            log-uniform over 0.3 to 3 times 100/640.
+            As there, with half to one and a half times the delay of the states, two to four
+            periods of the inputs, and 0.3 to 3 times the λ that free runs choose.
         """
         return cls(
             encounter_period=encounter_period,
             train_length=None,
-            state_delay=Uniform(0.5, 1.5),
-            input_delay=Uniform(2.5, 7.5),
-            ridge=LogUniform(0.3 * PAPER_RIDGE_PER_SNAPSHOT, 3 * PAPER_RIDGE_PER_SNAPSHOT),
+            state_delay=Uniform(0.5 * STATE_PERIODS, 1.5 * STATE_PERIODS),
+            input_delay=Uniform(INPUT_PERIODS - 1, INPUT_PERIODS + 1),
+            ridge="rollout",
             n_members=n_members,
             seed=seed,
             dt=dt,
             delay_rows="exact",
             ridge_scale="per_snapshot",
+            alignment=ALIGNMENT,
+            lead=LEAD_PERIODS,
+            readouts="auto",
+            select=Select(observables=True, period=encounter_period),
         )
+
+    def settled(
+        self,
+        runs: Runs,
+        states: Sequence[str],
+        inputs: Sequence[str],
+        stop: Stop = None,
+        *,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+    ) -> Selected[BayesianHankelDMDc]:
+        """Choose what is left to be chosen, at the medians of the priors; see HankelDMDc.settled.
+
+        Parameters
+        ----------
+        runs, states, inputs, stop, executor, progress
+            As in :meth:`HankelDMDc.settled`.
+
+        Returns
+        -------
+        Selected
+            ``settings``, with a prior for λ.
+
+        Raises
+        ------
+        RequestError, DataError
+            As :meth:`HankelDMDc.fit`.
+        """
+        central = self.central(labelled.common_step(as_runs(runs)))
+        found = central.settled(runs, states, inputs, stop, executor=executor, progress=progress)
+        ridge, scale = self.ridge, self.ridge_scale
+        if isinstance(ridge, str):
+            best = float(found.settings.ridge)
+            ridge, scale = LogUniform(0.3 * best, 3.0 * best), "per_snapshot"
+        spec = replace(
+            self,
+            ridge=ridge,
+            ridge_scale=scale,
+            observables=found.settings.observables,
+            readouts=found.settings.readouts,
+            select=None,
+            seed=self.seed_sequence,
+        )
+        return Selected(spec, found.rows, found.note, found.readouts)
 
     def fit(
         self,
@@ -526,12 +678,15 @@ class BayesianHankelDMDc:
         states: Sequence[str],
         inputs: Sequence[str],
         stop: Stop = None,
+        *,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
     ) -> HankelEnsemble:
         """Draw the members and gather what they learn from; their matrices are made on demand.
 
         Parameters
         ----------
-        runs, states, inputs, stop
+        runs, states, inputs, stop, executor, progress
             As in :meth:`HankelDMDc.fit`.
 
         Returns
@@ -547,6 +702,25 @@ class BayesianHankelDMDc:
         """
         named = as_runs(runs)
         check_names(states, inputs)
+        if isinstance(self.ridge, str) or self.select is not None:
+            found = self.settled(named, states, inputs, stop, executor=executor, progress=progress)
+            ensemble = found.settings._drawn(named, states, inputs, stop, found.readouts)
+            return replace(ensemble, selection=found.describe())
+        readouts: tuple[FittedReadOut, ...] = ()
+        if self.readouts:
+            central = self.central(labelled.common_step(named))
+            readouts = readouts_for(central, until(named, stop), list(states), list(inputs))
+        return self._drawn(named, states, inputs, stop, readouts)
+
+    def _drawn(
+        self,
+        named: dict[str, xr.Dataset],
+        states: Sequence[str],
+        inputs: Sequence[str],
+        stop: Stop,
+        readouts: tuple[FittedReadOut, ...],
+    ) -> HankelEnsemble:
+        """The ensemble of settings that leave nothing to be chosen."""
         stops = stop_instants(stop, list(named))
         dt = labelled.common_step(named)
         if self.dt is not None:
@@ -556,9 +730,6 @@ class BayesianHankelDMDc:
         if shared.maps:
             named, stops = until(named, stops), dict.fromkeys(named)
         states, inputs = list(states), list(inputs)
-        readouts: tuple[FittedReadOut, ...] = ()
-        if self.readouts:
-            readouts = readouts_for(self.central(dt), until(named, stops), states, inputs)
         input_map = Chain(tuple(each.fit(named, states, inputs, None) for each in shared.maps))
         samples = [
             last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name) + 1
@@ -596,6 +767,10 @@ class BayesianHankelDMDc:
             signature=signature,
             coverage=Coverage.of(inputs, trained, dt),
         )
+
+
+def _described(prior: Prior | str | None) -> dict[str, Any] | str | None:
+    return prior if isinstance(prior, str) else describe(prior)
 
 
 def _seed_sequence(seed: object) -> np.random.SeedSequence:

@@ -578,9 +578,13 @@ class CarriedElevation:
             return one
         x = scaled[:, None] if scaled.ndim and chosen.ndim == 3 else scaled
         # Clenshaw's recurrence from the highest polynomial down.
-        newer, older = np.zeros_like(chosen[0]), np.zeros_like(chosen[0])
+        newer, older, spare = (np.zeros_like(chosen[0]) for _ in range(3))
+        twice = 2.0 * x
         for term in chosen[:0:-1]:
-            newer, older = term + 2.0 * x * newer - older, newer
+            np.multiply(twice, newer, out=spare)
+            spare += term
+            spare -= older
+            newer, older, spare = spare, newer, older
         result: FloatArray = chosen[0] + x * newer - older
         return result
 

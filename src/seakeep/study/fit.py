@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepError, SeakeepWarning
-from seakeep.models import KINDS, Model, compare_waves
+from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, compare_waves
 from seakeep.models.slow import warn_of_slow_motions
 from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, find_leakage
@@ -78,7 +79,11 @@ def training_runs(
 
 
 def fit_campaign(
-    campaign: Campaign, model: str | None = None, progress: Progress | None = None
+    campaign: Campaign,
+    model: str | None = None,
+    progress: Progress | None = None,
+    *,
+    executor: Executor | None = None,
 ) -> Model:
     """Identify the model, or the ensemble, that a campaign describes from its training runs.
 
@@ -89,7 +94,10 @@ def fit_campaign(
     model : str, optional
         Key in ``[models.NAME]``; by default the table ``[model]``.
     progress : callable, optional
-        Called as ``progress(done, total, run)`` while runs are prepared.
+        Called as ``progress(done, total, what)`` while runs are prepared, and while settings are
+        chosen.
+    executor : concurrent.futures.Executor, optional
+        Tries settings side by side; the result does not depend on it.
 
     Returns
     -------
@@ -114,7 +122,13 @@ def fit_campaign(
     settings = campaign.model(model)
     spec, prepared, runs, stop = read_training(campaign, model, progress)
     dt = float(next(iter(prepared.values())).attrs["dt"])
-    identified = spec.fit(runs, list(settings.states), list(settings.inputs), stop=stop)
+    channels = list(settings.states), list(settings.inputs)
+    if isinstance(spec, HankelDMDc | BayesianHankelDMDc):
+        identified: Model = spec.fit(
+            runs, *channels, stop=stop, executor=executor, progress=progress
+        )
+    else:
+        identified = spec.fit(runs, *channels, stop=stop)
     both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
     warn_of_repeats(identified, campaign, both)
     for name, run in (both | _prepared_tests(campaign, both)).items():

@@ -14,7 +14,7 @@ from typing import Any, Literal, cast
 from seakeep.campaign import ModelSettings, PriorSettings
 from seakeep.campaign.settings import CampaignSettings
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.models import KINDS, ProbeAlignment, Spec
+from seakeep.models import KINDS, ProbeAlignment, Select, Spec
 from seakeep.models.observables import Observable, SlowSquares, observables_of
 from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform
 from seakeep.models.settings import periods_to_samples
@@ -25,6 +25,8 @@ __all__ = ["ResolvedModel", "Spec", "build_spec", "can_align", "counts_in_period
 Source = Literal["stated", "preset", "study", "default"]
 
 PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
+TABLES = {"alignment": ProbeAlignment, "select": Select}
+"""Arguments of a spec that are tables of their own."""
 OF_THE_DATA = ("dt", "encounter_period")
 """Arguments of a spec that are measured, not set."""
 ALIGNMENTS = {"paper": ProbeAlignment(mode="effective", surge="measured")}
@@ -44,8 +46,8 @@ class ResolvedModel:
     spec : Spec
         The settings.
     sources : mapping of str to str
-        Key → "stated", "preset", "study" (its seed) or "default"; keys of an alignment are named
-        ``alignment.KEY``.
+        Key → "stated", "preset", "study" (its seed) or "default"; keys of tables are named
+        ``alignment.KEY`` and ``select.KEY``.
     """
 
     kind: str
@@ -84,14 +86,15 @@ def _defaults(kind: type[Spec]) -> dict[str, Any]:
 
 
 def _values(spec: Spec) -> dict[str, Any]:
-    """Settings of a spec as JSON values; those of an alignment one by one."""
+    """Settings of a spec as JSON values; those of its tables one by one."""
     known = _defaults(type(spec))
     out = {key: value for key, value in spec.to_json().items() if key in known}
     if "seed" in out:
         out["seed"] = int(out["seed"])
-    if (alignment := out.get("alignment")) is not None:
-        del out["alignment"]
-        out |= {f"alignment.{key}": value for key, value in alignment.items()}
+    for name in TABLES:
+        if (table := out.get(name)) is not None:
+            del out[name]
+            out |= {f"{name}.{k}": v for k, v in table.items() if k not in ("period",)}
     return out
 
 
@@ -99,7 +102,8 @@ def counts_in_periods(settings: ModelSettings) -> bool:
     """Whether a model is stated in encounter periods: by a preset, a key, or as an ensemble."""
     by_kind = _kind_of(settings).is_ensemble
     squares = any(each.get("kind") == SlowSquares.kind for each in settings.observables or ())
-    return settings.preset is not None or by_kind or squares or any(lengths(settings))
+    named = _preset(settings) is not None or settings.select is not None
+    return named or by_kind or squares or any(lengths(settings))
 
 
 def can_align(campaign: CampaignSettings, inputs: Sequence[str]) -> bool:
@@ -159,7 +163,8 @@ def resolve_model(
     alignment = ALIGNMENTS.get(settings.preset or preset or "") if aligned else None
     if settings.preset is None and preset is not None:  # a baseline may lack the paper's
         preset = next((p for p in (preset, "recommended") if hasattr(kind, p)), None)
-    preset = settings.preset or preset
+    else:
+        preset = _preset(settings)
     stated = settings.arguments()
     stated.pop("stop", None)
     known = list(_defaults(kind))
@@ -175,15 +180,14 @@ def resolve_model(
             f"{what} counts in encounter periods, and the campaign has none. State "
             "encounter_period (s) in [campaign]."
         )
+    if "select" in stated:
+        stated["select"] = _select(stated["select"], encounter_period)
     if "observables" in stated:
         tables = stated["observables"]
         stated["observables"] = tuple(_observable(each, encounter_period) for each in tables)
-    for key, value in stated.items():
-        if isinstance(value, Length) and encounter_period is not None:
-            whole = math.isinf(value.value)  # "inf T": all samples of a run
-            stated[key] = None if whole else periods_to_samples(value.value, encounter_period, dt)
-        elif ensemble and key in PRIORS:
-            stated[key] = _prior(value)
+    stated = {
+        key: _converted(key, value, ensemble, encounter_period, dt) for key, value in stated.items()
+    }
     from_study = {"seed": seed} if ensemble and seed is not None and "seed" not in stated else {}
     filled: Spec | None = None
     if preset is not None and encounter_period is not None:
@@ -207,6 +211,14 @@ def _filled(
     return cast("Spec", made)
 
 
+def _preset(settings: ModelSettings) -> str | None:
+    """What a table names, or takes where it states none of the keys that have no default."""
+    kind = _kind_of(settings)
+    needed = {key for key, default in _defaults(kind).items() if default is MISSING}
+    none = not needed & set(settings.arguments()) and hasattr(kind, "recommended")
+    return settings.preset or ("recommended" if none else None)
+
+
 def _kind_of(settings: ModelSettings) -> type[Spec]:
     if settings.kind not in KINDS:
         raise RequestError(
@@ -219,9 +231,12 @@ def _kind_of(settings: ModelSettings) -> type[Spec]:
 def _made(
     kind: type[Spec], filled: Spec | None, given: dict[str, Any], data: Mapping[str, float | None]
 ) -> Spec:
-    if isinstance(given.get("alignment"), dict):
-        before = getattr(filled, "alignment", None) or ProbeAlignment()
-        given = {**given, "alignment": replace(before, **given["alignment"])}
+    for name, table in TABLES.items():
+        if isinstance(given.get(name), dict):
+            before = getattr(filled, name, None) or table()
+            given = {**given, name: replace(before, **given[name])}
+    if given.get("observables") is not None and "select" in _defaults(kind):
+        given.setdefault("select", None)  # those that are stated are not chosen
     if filled is not None:
         return cast("Spec", replace(cast("Any", filled), **given))
     needed = [key for key, default in _defaults(kind).items() if default is MISSING]
@@ -242,8 +257,8 @@ def _sources(
     spec: Spec, filled: Spec | None, stated: Mapping[str, Any], from_study: Mapping[str, Any]
 ) -> dict[str, Source]:
     """Where each setting comes from; a preset counts where it differs from the default."""
-    alignment = stated.get("alignment") or {}
-    known = {*stated, *(f"alignment.{key}" for key in alignment)}
+    tables = {f"{name}.{key}" for name in TABLES for key in stated.get(name) or {}}
+    known = {*stated, *tables}
     defaults = _defaults(type(spec))
     by_preset = {} if filled is None else _values(filled)
 
@@ -259,6 +274,15 @@ def _sources(
     return {key: source(key) for key in _values(spec)}
 
 
+def _select(table: dict[str, Any], encounter_period: float | None) -> dict[str, Any]:
+    """Keys of a table ``select``, which counts in encounter periods."""
+    made = {"period": encounter_period, **table}
+    if "horizon" in table:
+        given = table["horizon"]
+        made["horizon"] = tuple(each.value if isinstance(each, Length) else each for each in given)
+    return made
+
+
 def _observable(table: Mapping[str, Any], encounter_period: float | None) -> Observable:
     """An observable of its table, which counts in encounter periods: 2 or '2 T', '0.33 /T'."""
 
@@ -272,6 +296,14 @@ def _observable(table: Mapping[str, Any], encounter_period: float | None) -> Obs
     if isinstance(made, SlowSquares) and made.period is None:
         return replace(made, period=encounter_period)
     return made
+
+
+def _converted(key: str, value: Any, ensemble: bool, period: float | None, dt: float) -> Any:
+    """Value of a key as the constructor takes it: lengths in samples, priors of an ensemble."""
+    if isinstance(value, Length) and period is not None:
+        whole = math.isinf(value.value)  # "inf T": all samples of a run
+        return None if whole else periods_to_samples(value.value, period, dt)
+    return _prior(value) if ensemble and key in PRIORS and value != "rollout" else value
 
 
 def _prior(stated: PriorSettings | float) -> Prior:
