@@ -497,7 +497,8 @@ def test_the_presets():
     assert (paper.delay_rows, paper.ridge_scale, paper.n_members) == ("ridge", "absolute", 100)
     ours = BayesianHankelDMDc.recommended(encounter_period=1.64, n_members=5)
     assert (ours.train_length, ours.delay_rows) == (None, "exact")
-    assert ours.ridge.ppf(0.5) == pytest.approx(100 / 640 * 0.9**0.5)
+    assert (ours.ridge, ours.lead, ours.alignment.passes) == ("rollout", 0.75, 3)
+    assert [ours.input_delay.ppf(q) for q in (0, 0.5, 1)] == [2, 3, 4]
 
 
 def test_all_of_the_runs_train_where_no_length_is_drawn(run):

@@ -67,7 +67,11 @@ def test_scores_are_those_of_plain_fits_and_forecasts():
             plain.append(np.mean(errors))
         # The house rule for results: sums in another order, and an eigendecomposition of them.
         assert scores[ridge] == pytest.approx(np.mean(plain), abs=1e-10)
-    assert found.settings.ridge == min(scores, key=scores.get)
+    # The largest that is as good as the best.
+    near = [ridge for ridge, score in scores.items() if score <= 1.03 * min(scores.values())]
+    assert found.settings.ridge == max(near)
+    chosen = [row["ridge"] for row in found.rows if row["chosen"]]
+    assert chosen == [found.settings.ridge]
 
 
 def test_a_model_chooses_its_ridge_and_says_how(tmp_path):
@@ -77,7 +81,8 @@ def test_a_model_chooses_its_ridge_and_says_how(tmp_path):
     assert model.settings.ridge == chosen.settings.ridge
     assert model.settings.ridge_scale == "per_snapshot"
     assert "in free runs on 3 parts held out in turn, mean NRMSE" in model.selection
-    assert model.selection in model.summary()
+    for line in model.selection.splitlines():
+        assert line.strip() in model.summary()
     again = load_model(model.save(tmp_path / "model.nc"))
     assert again.selection == model.selection
 
@@ -112,7 +117,7 @@ def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all():
     short = {"run": runs(1)["run0"].isel(time=slice(0, 200))}
     fallen = select(SPEC, short, STATES, INPUTS, horizon=(15.0,))
     assert fallen.settings.ridge == 1e-3
-    assert "no window of 150 samples can be held out of parts of at most 67" in fallen.note
+    assert "no window of 150 samples can be held out of runs of at most 200" in fallen.note
 
 
 def test_what_is_known_is_not_found_again():

@@ -201,7 +201,13 @@ def test_the_paper_preset_has_the_papers_numbers():
 def test_the_recommended_preset_uses_all_of_the_runs_and_exact_rows():
     spec = HankelDMDc.recommended(encounter_period=1.64, dt=1.64 / 32)
     assert spec == HankelDMDc(
-        32, 160, 100 / 640, window=None, delay_rows="exact", ridge_scale="per_snapshot"
+        *(32, 96, "rollout"),
+        window=None,
+        delay_rows="exact",
+        ridge_scale="per_snapshot",
+        alignment={"mode": "dispersion", "surge": "predicted", "passes": 3, "optional": True},
+        lead=24,
+        select={"observables": True, "horizon": (15, 45), "period": 1.64},
     )
 
 

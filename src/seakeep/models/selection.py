@@ -232,7 +232,8 @@ class Problem:
                     predicted=measured, measured=measured, training_std=scale[1]
                 )
                 errors = np.where(np.isfinite(errors), np.minimum(errors, WORST), WORST)
-                yield np.nanmean(np.where(judged, errors, np.nan), axis=-1)
+                moved = judged.any(axis=-1)
+                yield np.mean(errors[:, moved], axis=-1, where=judged[moved])
 
     def _measured(self, run: int, starts: IntArray, steps: int) -> FloatArray:
         states = self.data.states[run]
@@ -457,13 +458,14 @@ def _judged(
         for fold in folds
         if _key(candidate, fold) not in known
     ]
-    found = in_order(_unit, problem, todo, executor, progress, "candidate and fold")
-    for (candidate, _, fold), scores in zip(todo, found, strict=True):
+    made = in_order(_unit, problem, todo, executor, progress, "candidate and fold")
+    for (candidate, _, fold), scores in zip(todo, made, strict=True):
         known[_key(candidate, fold)] = [each.tolist() for each in scores]
     for candidate in dict.fromkeys(candidates):
         scores, weights = [], []
         for fold in folds:
-            horizons = [np.array(each) for each in known[_key(candidate, fold)]]
+            found = [np.array(each) for each in known[_key(candidate, fold)]]
+            horizons = [each for each in found if each.shape[1]]  # in others nothing moves
             scores += horizons
             weights += [
                 np.full(each.shape[1], 1.0 / (len(folds) * len(horizons) * each.shape[1]))

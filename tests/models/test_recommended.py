@@ -1,0 +1,136 @@
+"""What `recommended` chooses at fit, what it goes without, and what it refuses."""
+
+import dataclasses
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import (
+    BayesianHankelDMDc,
+    DataError,
+    HankelDMDc,
+    ProbeAlignment,
+    RequestError,
+    Select,
+    load_model,
+)
+from seakeep.models.inputs import FittedAlignment
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from test_selection import DT, INPUTS, PERIOD, STATES, runs, sea
+
+T = PERIOD * DT
+SHORT = Select(observables=True, horizon=10, period=T)
+SPEC = dataclasses.replace(HankelDMDc.recommended(T, DT), select=SHORT)
+
+
+def test_columns_and_ridge_are_chosen_and_the_model_says_from_what(tmp_path):
+    model = SPEC.fit(runs(), STATES, INPUTS)
+    settings = model.settings
+    kinds = [each.kind for each in settings.observables]
+    assert "slow_squares" in kinds  # the drift is made of one
+    assert isinstance(settings.ridge, float)
+    assert settings.select is None
+    first, *rest = model.selection.splitlines()
+    assert first.startswith(f"ridge {settings.ridge:g} per snapshot pair: out of 28 settings")
+    assert first.endswith("no alignment: 'surge' is not among the states")
+    tried = ["none", "slow_squares", "powers", "slow_squares, powers"]
+    for line, names in zip(rest, tried, strict=True):
+        assert f"observables {names}, lead" in line
+        assert ("(chosen)" in line) == (names == ", ".join(kinds))
+    again = load_model(model.save(tmp_path / "model.nc"))
+    assert (again.settings, again.selection) == (settings, model.selection)
+    # The settings that were chosen give the same model again.
+    same = settings.fit(runs(), STATES, INPUTS)
+    np.testing.assert_array_equal(same.coefficients, model.coefficients)
+    assert model.history_samples <= SPEC.needs(DT).history + 1
+    assert model.lead_samples <= SPEC.needs(DT).lead
+
+
+def test_where_nothing_can_be_held_out_the_ridge_is_a_default():
+    short = sea(0, samples=200).assign_attrs(encounter_period=T)
+    model = SPEC.fit(short, STATES, INPUTS)
+    assert (model.settings.ridge, model.settings.ridge_scale) == (1e-3, "per_snapshot")
+    assert model.settings.observables == ()
+    assert "can be held out of runs of at most 200" in model.selection
+
+
+def test_an_ensemble_draws_around_what_was_chosen(tmp_path):
+    single = SPEC.fit(runs(), STATES, INPUTS)
+    spec = BayesianHankelDMDc.recommended(T, n_members=8)
+    ensemble = dataclasses.replace(spec, select=SHORT).fit(runs(), STATES, INPUTS)
+    assert ensemble.settings.observables == single.settings.observables
+    assert ensemble.selection == single.selection
+    assert ensemble.selection.splitlines()[-1].strip() in ensemble.summary()
+    ratio = ensemble.draws.ridge.values / single.settings.ridge
+    assert np.all((ratio >= 0.3) & (ratio <= 3))
+    assert len(set(ratio)) == 8
+    assert ensemble.settings.lead == single.settings.lead == 8
+    again = load_model(ensemble.save(tmp_path / "ensemble.nc"))
+    assert (again.selection, again.origin) == (ensemble.selection, ensemble.origin)
+    kept = BayesianHankelDMDc.from_json(spec.to_json())
+    assert (kept.ridge, kept.select) == ("rollout", spec.select)
+
+
+def rig(run: xr.Dataset, depth: float | None, position: float | None) -> xr.Dataset:
+    run = run.rename(drift="surge").assign_attrs(encounter_period=T)
+    if depth is not None:
+        run.attrs["water_depth"] = depth
+    if position is not None:
+        run["eta"].attrs["x_position"] = position
+    return run
+
+
+@pytest.mark.parametrize(
+    ("depth", "position", "missing"),
+    [
+        (2.0, -1.0, ""),
+        (None, -1.0, "the runs state no water depth"),
+        (2.0, None, "the run states no position of a wave probe"),
+    ],
+)
+def test_an_optional_alignment_is_left_out_where_the_rig_is_not_known(depth, position, missing):
+    given = {"the run": rig(sea(0), depth, position)}
+    alignment = ProbeAlignment(mode="dispersion", surge="predicted", optional=True)
+    assert alignment.missing(given, ["heave", "surge"], ["eta"]) == missing
+    spec = HankelDMDc(6, 12, 1.0, alignment=alignment)
+    model = spec.fit(given, ["heave", "surge"], ["eta"])
+    assert isinstance(model.alignment, FittedAlignment) == (not missing)
+    needed = dataclasses.replace(spec, alignment=dataclasses.replace(alignment, optional=False))
+    if depth is None:
+        with pytest.raises(RequestError, match="needs the water depth"):
+            needed.fit(given, ["heave", "surge"], ["eta"])
+
+
+def test_what_grows_is_not_chosen():
+    run = runs(1)["run0"]
+    grown = run.assign(heave=("time", np.exp(0.02 * np.arange(700)), {"units": "m"}))
+    with pytest.raises(DataError, match="the model that was chosen grows: its spectral radius is"):
+        HankelDMDc(2, 2, "rollout", delay_rows="exact").fit(grown, ["heave"], INPUTS)
+
+
+def test_columns_are_chosen_at_a_ridge_that_is_stated():
+    found = dataclasses.replace(SPEC, ridge=0.02).settled(runs(), STATES, INPUTS)
+    assert found.settings.ridge == 0.02
+    assert {row["ridge"] for row in found.rows} == {0.02}
+    with pytest.raises(RequestError, match="choose at λ above zero, and ridge = 0 is stated"):
+        dataclasses.replace(SPEC, ridge=0).settled(runs(), STATES, INPUTS)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("yes", r"select must be a seakeep.Select or None; received 'yes'"),
+        ({"observable": True}, r"select: unknown key 'observable'. Did you mean 'observables'\?"),
+        ({"observables": 1}, r"select: observables must be True or False; received 1"),
+        ({"horizon": (15, 0)}, r"horizon \(encounter periods\) .* must be positive; received 0"),
+        ({"horizon": ()}, r"select: horizon is empty"),
+    ],
+)
+def test_what_select_is_not(given, message):
+    with pytest.raises(RequestError, match=message):
+        HankelDMDc(2, 2, "rollout", select=given)
