@@ -207,6 +207,7 @@ def test_the_recommended_preset_uses_all_of_the_runs_and_exact_rows():
         ridge_scale="per_snapshot",
         alignment={"mode": "dispersion", "surge": "predicted", "passes": 3, "optional": True},
         lead=24,
+        readouts="auto",
         select={"observables": True, "horizon": (15, 45), "period": 1.64},
     )
 

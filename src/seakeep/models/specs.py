@@ -335,7 +335,7 @@ def _check_growth(model: HankelDMDcModel) -> None:
         raise DataError(
             f"the model that was chosen grows: its spectral radius is {radius:.6f} at ridge = "
             f"{model.settings.ridge:g} per snapshot pair. Look for transients at the ends of the "
-            "training runs, use fewer state delays, clip its eigenvalues (stable=True), or state the "
+            "training runs, use fewer state delays, clip eigenvalues (stable=True), or state the "
             "ridge to have it as it is."
         )
 
