@@ -28,6 +28,9 @@ kind = "fading"
 [models.pair]
 kind = "bayesian_hankel_dmdc"
 n_members = 2
+ridge = { log_uniform = [0.05, 0.5] }
+observables = []
+readouts = {}
 [tests.unseen]
 runs = ["unseen"]
 windows = 2

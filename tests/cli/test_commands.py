@@ -107,7 +107,11 @@ def test_fit_prints_what_was_identified_on_stdout_and_the_rest_on_stderr(run, pl
     assert "5 states, 2 inputs, dt 0.08 s" in out
     assert "spectral radius" in out
     assert "Wrote again.nc" in err
-    assert "Preparing 1/2: first" in err
+    assert "Fitting 1/2: first" in err
+    assert "candidate and fold 6" in err
+    for kinds in ("none", "slow_squares", "powers", "slow_squares, powers"):
+        assert f"observables {kinds}, lead 12" in out
+    assert out.count("(chosen)") == 1
     assert seakeep.load_model(place / "again.nc").states[0] == "heave"
 
 

@@ -22,9 +22,15 @@ preset = "recommended"
 [training]
 windows = 2
 [models.deterministic]
+ridge = 0.15
+observables = []
+readouts = {}
 [models.bayesian]
 kind = "bayesian_hankel_dmdc"
 n_members = 3
+ridge = { log_uniform = [0.05, 0.5] }
+observables = []
+readouts = {}
 train_length = { uniform = [10, 20] }
 [tests.unseen]
 runs = ["unseen"]

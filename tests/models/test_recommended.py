@@ -1,6 +1,7 @@
 """What `recommended` chooses at fit, what it goes without, and what it refuses."""
 
 import dataclasses
+import pickle
 import sys
 from pathlib import Path
 
@@ -36,7 +37,7 @@ def test_columns_and_ridge_are_chosen_and_the_model_says_from_what(tmp_path):
     assert isinstance(settings.ridge, float)
     assert settings.select is None
     first, *rest = model.selection.splitlines()
-    assert first.startswith(f"ridge {settings.ridge:g} per snapshot pair: out of 28 settings")
+    assert first.startswith(f"ridge {settings.ridge:g} per snapshot pair: out of 36 settings")
     assert first.endswith("no alignment: 'surge' is not among the states")
     tried = ["none", "slow_squares", "powers", "slow_squares, powers"]
     for line, names in zip(rest, tried, strict=True):
@@ -70,6 +71,9 @@ def test_an_ensemble_draws_around_what_was_chosen(tmp_path):
     assert np.all((ratio >= 0.3) & (ratio <= 3))
     assert len(set(ratio)) == 8
     assert ensemble.settings.lead == single.settings.lead == 8
+    np.testing.assert_array_equal(  # what a worker gets
+        pickle.loads(pickle.dumps(ensemble)).member(0).A, ensemble.member(0).A
+    )
     again = load_model(ensemble.save(tmp_path / "ensemble.nc"))
     assert (again.selection, again.origin) == (ensemble.selection, ensemble.origin)
     kept = BayesianHankelDMDc.from_json(spec.to_json())

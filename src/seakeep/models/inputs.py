@@ -376,7 +376,7 @@ class ProbeAlignment:
         if self.surge == "predicted" and self.surge_channel not in states:
             return f"'{self.surge_channel}' is not among the states"
         placed = self.channels or [each for each in inputs if _position(first, each) is not None]
-        if not placed:
+        if not placed and self.surge != "none":
             return f"{name} states no position of a wave probe"
         if self.mode == "dispersion" and _common_depth(runs) is None:
             return "the runs state no water depth"

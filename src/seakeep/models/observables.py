@@ -450,6 +450,10 @@ class Observed:
     dt: float
     period: float | None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Fields alone: what is bound are functions, which a worker makes anew."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
     @cached_property
     def bound(self) -> tuple[Bound, ...]:
         """The observables, ready for these inputs."""

@@ -6,6 +6,7 @@ bit whether or not a study was interrupted, and whatever the number of workers.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +21,7 @@ from seakeep.core.bands import band_error_over_time
 from seakeep.errors import DataError, SeakeepError
 from seakeep.models.calibration import Judged, envelope_of, found_margin, held_out
 from seakeep.models.engine import group_series, read_groups
+from seakeep.models.interface import Json
 from seakeep.models.summaries import STATISTICS, reduce_members
 from seakeep.signals import envelope_squared
 from seakeep.study.judge import BAND_ERRORS, MEASURES
@@ -101,6 +103,8 @@ def compute(plan: Plan, runs: Runs, unit: Unit) -> Arrays:
             out |= {f"tests/{test}/{key}": each for key, each in found.items()}
         else:
             out[f"tests/{test}/mean"] = np.array(series[0])
+    if plan.models[unit.model].is_ensemble:
+        out["origin"] = np.array(json.dumps(fitted.origin))
     if plan.calibrated_on and plan.models[unit.model].is_ensemble:
         margins = band_margins(plan, runs, unit, fitted)
         out |= {f"calibration/{key}": np.asarray(value) for key, value in margins.items()}
@@ -172,10 +176,13 @@ def measured_windows(
     return np.stack(out)
 
 
-def fit_training(plan: Plan, runs: Runs, model: str, training: TrainingSet) -> Any:
-    """Fit a model of the study to a training set."""
+def fit_training(
+    plan: Plan, runs: Runs, model: str, training: TrainingSet, origin: Json | None = None
+) -> Any:
+    """Fit a model of the study to a training set; an ensemble may be chosen already: `origin`."""
     parts = {name: between(runs[name], (begin, stop)) for name, begin, stop in training.spans}
-    return plan.specs[model].fit(parts, list(plan.states), list(plan.inputs))
+    spec = plan.specs[model] if origin is None else plan.specs[model].from_json(origin)
+    return spec.fit(parts, list(plan.states), list(plan.inputs))
 
 
 def training_moments(plan: Plan, runs: Runs, training: TrainingSet) -> FloatArray:
@@ -202,12 +209,12 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> dict[str, A
 
     The windows lie in the training spans, clear of what the members have read. Where these read
     all of it (runs left out, or pooled), each run is forecast by an ensemble that learnt from the
-    others. No test window is looked at.
+    others, with the settings that were chosen from all of them. No test window is looked at.
     """
     training = plan.training[unit.training]
     steps = next(iter(plan.tests.values()))[0].steps
     if training.left_out or len(training.runs) > 1:
-        judged = _judged_by_others(plan, runs, unit, steps)
+        judged = _judged_by_others(plan, runs, unit, steps, fitted.origin)
     else:
         names = plan.calibrated_on
         parts = {name: between(runs[name], runs[name].attrs["train_span"]) for name in names}
@@ -224,7 +231,7 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> dict[str, A
     return out | more.get(plan.scale, {})
 
 
-def _judged_by_others(plan: Plan, runs: Runs, unit: Unit, steps: int) -> list[Judged]:
+def _judged_by_others(plan: Plan, runs: Runs, unit: Unit, steps: int, origin: Json) -> list[Judged]:
     """Forecasts of the runs of a training set, each by what the other ones teach."""
     training = plan.training[unit.training]
     groups = [each.left_out for each in plan.training if each is not training and each.left_out]
@@ -234,7 +241,7 @@ def _judged_by_others(plan: Plan, runs: Runs, unit: Unit, steps: int) -> list[Ju
         held = {n: between(runs[n], (b, e)) for n, b, e in training.spans if n in group}
         if rest and held:
             others = TrainingSet(f"{training.name}, calibration", rest)
-            ensemble = fit_training(plan, runs, unit.model, others)
+            ensemble = fit_training(plan, runs, unit.model, others, origin)
             judged += held_out(ensemble, held, steps, plan.level).values()
     return judged
 
@@ -247,7 +254,8 @@ def collect(study: Study, plan: Plan, runs: Runs, read: Read) -> dict[str, xr.Da
     for model, each in plan.models.items():
         mine = {unit.training: arrays for unit, arrays in found.items() if unit.model == model}
         if each.is_ensemble:
-            groups[f"draws/{model}"] = draws_of(plan, runs, model)
+            origin = json.loads(str(mine[min(mine)]["origin"]))
+            groups[f"draws/{model}"] = draws_of(plan, runs, model, origin)
             if plan.calibrated_on:
                 groups[f"calibration/{model}"] = _collect_calibration(plan, mine)
         if plan.eigenvalues:
@@ -262,9 +270,13 @@ def collect(study: Study, plan: Plan, runs: Runs, read: Read) -> dict[str, xr.Da
     return groups
 
 
-def draws_of(plan: Plan, runs: Runs, model: str) -> xr.Dataset:
-    """Draws of an ensemble: the same for every training set, all of which hold the largest."""
-    draws: xr.Dataset = fit_training(plan, runs, model, plan.training[0]).draws
+def draws_of(plan: Plan, runs: Runs, model: str, origin: Json) -> xr.Dataset:
+    """Draws of an ensemble: the same for every training set, all of which hold the largest.
+
+    A λ that is drawn around one that was chosen is that of the first training set.
+    """
+    origin = {**origin, "readouts": []}  # no matter here, and long to fit
+    draws: xr.Dataset = fit_training(plan, runs, model, plan.training[0], origin).draws
     return draws
 
 
