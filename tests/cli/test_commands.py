@@ -108,10 +108,6 @@ def test_fit_prints_what_was_identified_on_stdout_and_the_rest_on_stderr(run, pl
     assert "spectral radius" in out
     assert "Wrote again.nc" in err
     assert "Fitting 1/2: first" in err
-    assert "candidate and fold 6" in err
-    for kinds in ("none", "slow_squares", "powers", "slow_squares, powers"):
-        assert f"observables {kinds}, lead 12" in out
-    assert out.count("(chosen)") == 1
     assert seakeep.load_model(place / "again.nc").states[0] == "heave"
 
 
@@ -730,8 +726,10 @@ def test_an_unforeseen_error_asks_for_a_report(run, monkeypatch):
 
 def test_a_diverging_forecast_is_told_and_ends_with_1(run, place):
     text = (place / CAMPAIGN).read_text()
-    unstable = text.replace(
-        'preset = "recommended"', "state_delays = 60\ninput_delays = 5\nridge = 0.0", 1
+    unstable = (
+        text.replace('state_delays = "1 T"', "state_delays = 60", 1)
+        .replace("ridge = 0.15625", "ridge = 0.0", 1)
+        .replace('input_delays = "5 T"', "input_delays = 5")
     )
     (place / "docs/tutorial/unstable.toml").write_text(unstable)
     status, _, err = run("fit docs/tutorial/unstable.toml -o unstable.nc")

@@ -43,6 +43,9 @@ def test_the_draft_can_be_fitted_and_judged_as_it_stands(tmp_path, monkeypatch, 
     assert main(["fit", "draft.toml", "-o", "draft.nc"]) == 0
     assert main(["compare", "draft.nc", "draft.toml"]) == 0
     printed = capsys.readouterr().out
+    for kinds in ("none", "slow_squares", "powers", "slow_squares, powers"):
+        assert f"observables {kinds}, lead" in printed
+    assert printed.count("(chosen)") == 1
     assert "pitch" in printed
     assert "mooring_bow" not in printed  # loads are left to the user
 

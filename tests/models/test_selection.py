@@ -59,14 +59,8 @@ def test_scores_are_those_of_plain_fits_and_forecasts():
             for start in range(12, 700 - 150, 150):
                 forecast = model.forecast(given[held], start=start * DT, steps=150)
                 measured = given[held].isel(time=slice(start + 1, start + 151))
-                errors.append(
-                    np.mean(  # no worse than the mean
-                        [
-                            min(metrics.nrmse(predicted=forecast[n], measured=measured[n]), 1.0)
-                            for n in STATES
-                        ]
-                    )
-                )
+                each = [metrics.nrmse(predicted=forecast[n], measured=measured[n]) for n in STATES]
+                errors.append(np.mean(np.minimum(each, 1.0)))  # no worse than the mean
             plain.append(np.mean(errors))
         # The house rule for results: sums in another order, and an eigendecomposition of them.
         assert scores[ridge] == pytest.approx(np.mean(plain), abs=1e-10)

@@ -423,7 +423,7 @@ def test_a_preset_fills_in_what_is_not_stated_key_by_key_and_says_so():
     assert kept["settings"]["ridge_scale"] == {"value": "per_snapshot", "source": "preset"}
     assert kept["settings"]["alignment.surge"] == {"value": "none", "source": "stated"}
     assert sources["alignment.mode"] == sources["select.observables"] == "preset"
-    assert sources["alignment.offset"] == sources["select.horizon"] == sources["rank"] == "default"
+    assert sources["rank"] == sources["stable"] == "default"
     assert sources["ridge"] == "stated"
 
 

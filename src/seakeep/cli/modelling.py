@@ -66,14 +66,12 @@ def fit(
 
     read = read_campaign(campaign)
     check_output(out, "model", read_files(read))
-    with member_executor(workers, scheduler) as executor, progress_bar("Fitting") as progress:
-        identified = fit_campaign(read, model, progress, executor=executor)
-    if isinstance(identified, HankelEnsemble):
-        with (
-            member_executor(workers, scheduler) as executor,
-            progress_bar("Stability") as progress,
-        ):
-            identified.spectral_radii(executor=executor, progress=quietly(progress))
+    with member_executor(workers, scheduler) as executor:
+        with progress_bar("Fitting") as progress:
+            identified = fit_campaign(read, model, progress, executor=executor)
+        if isinstance(identified, HankelEnsemble):
+            with progress_bar("Stability") as progress:
+                identified.spectral_radii(executor=executor, progress=quietly(progress))
     typer.echo(identified.summary())
     identified.save(out)
     messages().print(f"Wrote {out}. Judge it with: seakeep compare {out} {campaign}")

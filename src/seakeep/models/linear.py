@@ -366,11 +366,11 @@ class HankelDMDcModel(SingleModel, store.Saved):
         return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
 
     def _system(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        if self.signature.direct_scale.mean.size:
+        if more := self.regressors[len(self.inputs) :]:
             raise RequestError(
-                "the model is driven by regressors that bring delays of their own "
-                f"({', '.join(self.regressors[len(self.inputs) :])}), which a state-space system "
-                "in its inputs cannot represent. Use forecast_arrays."
+                f"the model is driven by observables too ({', '.join(more)}), which a state-space "
+                "system in its inputs cannot represent. Use forecast_arrays, or fit a model with "
+                "observables=[]."
             )
         if read := [each.channel for each in self.signature.readouts if each.function]:
             raise RequestError(

@@ -260,8 +260,6 @@ def _sources(
     tables = {f"{name}.{key}" for name in TABLES for key in stated.get(name) or {}}
     known = {*stated, *tables}
     defaults = _defaults(type(spec))
-    for name, table in TABLES.items():
-        defaults |= {f"{name}.{each.name}": each.default for each in fields(table)}
     by_preset = {} if filled is None else _values(filled)
 
     def source(key: str) -> Source:
