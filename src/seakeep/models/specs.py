@@ -82,7 +82,7 @@ class HankelDMDc(HankelSettings):
         λ ≥ 0; zero takes the solution of least norm. "rollout" chooses λ per snapshot pair by the
         error of free runs on training runs that are held out in turn; it takes exact delay rows.
     window : int, optional
-        m, snapshots a run; None takes all up to ``stop``.
+        m, snapshots per run; None takes all up to ``stop``.
     history : {"before", "inside"}, optional
         Whether the delay history of the first snapshot lies before the window or inside it.
     delay_rows : {"ridge", "exact"}, optional
