@@ -3,6 +3,7 @@
 import json
 import shutil
 import sys
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,12 +12,13 @@ import pytest
 import xarray as xr
 
 import seakeep
-from seakeep import HankelDMDc, RequestError
+from seakeep import HankelDMDc, RequestError, metrics
 from seakeep.models import processes
+from seakeep.models.selection import WORST
 
 sys.path.insert(0, str(Path(__file__).parent / "models"))
 
-from test_selection import INPUTS, SPEC, STATES, runs
+from test_selection import DT, INPUTS, PERIOD, SPEC, STATES, runs
 
 TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorial"
 
@@ -30,6 +32,31 @@ def test_the_choice_is_in_the_spec_the_table_and_the_text():
     assert "(chosen)" in result.describe()
     model = result.spec.fit(runs(), STATES, INPUTS)
     assert model.settings.ridge == result.spec.ridge
+
+
+def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts():
+    given, powers = runs(), seakeep.Powers("eta", (2,))
+    spec = replace(SPEC, lead=4, observables=(powers,))
+    table = seakeep.tune(spec, given, STATES, INPUTS, horizon=(15,)).table
+    assert set(table["observables"].values.tolist()) == {"none", "powers"}
+    steps, first = 15 * PERIOD, spec.input_delays
+    for trial in range(0, table.sizes["trial"], 4):
+        row, folds = table.isel(trial=trial), []
+        chosen = (powers,) if row["observables"] == "powers" else ()
+        settings = {"ridge": float(row["ridge"]), "ridge_scale": "per_snapshot"}
+        plain = replace(spec, observables=chosen, **settings)
+        for held, run in given.items():
+            model = plain.fit([r for name, r in given.items() if name != held], STATES, INPUTS)
+            scores = []
+            for at in range(first, run.sizes["time"] - model.lead_samples - steps + 1, steps):
+                forecast = model.forecast(run, at * DT, steps)
+                measured = run[STATES].isel(time=slice(at + 1, at + 1 + steps))
+                errors = metrics.nrmse(predicted=forecast, measured=measured)
+                counted = [min(float(errors[state]), WORST) for state in STATES]
+                scores.append(np.mean(counted))
+            folds.append(np.mean(scores))
+        # The house rule for results: sums in another order, and an eigendecomposition of them.
+        assert float(row["score"]) == pytest.approx(np.mean(folds), abs=1e-10)
 
 
 def test_the_result_is_the_same_for_any_number_of_workers():
@@ -131,7 +158,7 @@ of = ["heave"]
 [models.other]
 states = ["a"]  # kept
 """
-    text = _tuned(before, None, result, True)
+    text = _tuned(before, None, result, ["readouts"])
     middle = """
 [model.readouts.bow]
 kind = "stacked"
@@ -148,13 +175,53 @@ states = ["a"]  # kept
     assert text.endswith(middle)
     assert "# of the model\nstate_delays = 6\n" in text
     assert "old" not in text
-    assert _tuned(text, None, result, True) == text
-    none = _tuned(text, None, replace(result, spec=replace(spec, readouts=())), True)
+    assert _tuned(text, None, result, ["readouts"]) == text
+    none = _tuned(text, None, replace(result, spec=replace(spec, readouts=())), ["readouts"])
     assert "readouts = {}\n" in none
     assert none.endswith('\n# of the next table\n[models.other]\nstates = ["a"]  # kept\n')
-    assert _tuned(before, None, result, False).endswith(
-        before[before.index("[model.readouts.old]") :]
-    )
+    assert _tuned(before, None, result, []).endswith(before[before.index("[model.readouts.old]") :])
+
+
+def test_a_tuned_file_holds_rank_and_alignment():
+    from seakeep.cli.tuning import _tuned
+
+    before = """[model]
+preset = "recommended"
+rank = 3
+
+[model.alignment]
+mode = "effective"
+celerity = 2.0
+
+[next]
+"""
+    aligned = seakeep.ProbeAlignment(mode="dispersion", surge="predicted", passes=3)
+    spec = replace(SPEC, ridge=0.0, rank=64, alignment=aligned)
+    result = seakeep.TuneResult(spec, xr.Dataset(), "")
+    read = tomllib.loads(_tuned(before, None, result, ["rank", "alignment"]))
+    assert read["model"]["alignment"] == {
+        "mode": "dispersion",
+        "surge": "predicted",
+        "passes": 3,
+    }
+    assert (read["model"]["rank"], read["model"]["ridge"]) == (64, 0.0)
+    assert "next" in read
+    plain = replace(SPEC, ridge=1e-3)
+    result = replace(result, spec=plain)
+    read = tomllib.loads(_tuned(before, None, result, ["rank", "alignment"]))
+    assert not {"rank", "alignment", "preset"} & set(read["model"])
+    kept = tomllib.loads(_tuned(before, None, result, ["ridge"]))["model"]
+    assert kept["alignment"] == {"mode": "effective", "celerity": 2.0}
+
+
+def test_the_figure_shows_ranks_beside_ridges():
+    pytest.importorskip("matplotlib")
+    result = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["rank"], horizon=(15,))
+    ridge, rank = result.figure().axes
+    assert ridge.get_xlabel() == "ridge per snapshot pair (1)"
+    assert rank.get_xlabel() == "singular values kept (1)"
+    np.testing.assert_array_equal(rank.lines[0].get_xdata(), [23, 16])
+    assert "rank 23" in result.describe() or "rank 16" in result.describe()
 
 
 def test_a_campaign_file_states_observables_read_outs_and_a_ridge_by_roll_out(tmp_path):

@@ -39,8 +39,9 @@ class TuneResult:
         The settings that were chosen; ``spec.fit(runs, states, inputs)`` fits the model.
     table : Dataset
         Over ``trial``: ``state_delays``, ``input_delays``, ``lead`` (samples), ``observables``
-        (their kinds), ``ridge`` (per snapshot pair), ``score`` (mean NRMSE of free runs), the
-        bounds ``lower`` and ``upper`` of its 95 % interval, and ``chosen``.
+        (their kinds), ``alignment``, ``ridge`` (per snapshot pair) or ``rank`` (0 for none),
+        ``score`` (mean NRMSE of free runs), the bounds ``lower`` and ``upper`` of its 95 %
+        interval, and ``chosen``.
     note : str
         How the choice was made, and the best λ of each candidate.
     readouts : tuple of FittedReadOut
@@ -101,8 +102,10 @@ def tune(
         Channels of the model.
     vary : sequence of str, optional
         Out of "ridge" (always chosen), "observables" (none, slow squares, powers, both; or those of
-        the spec), "lead", "input_delays", "state_delays" and "readouts" (none, hinge or stacked,
-        for those of the spec or for every load).
+        the spec), "lead", "input_delays", "state_delays", "rank" (truncated singular values in the
+        place of the ridge), "alignment" (none, dispersion or one celerity, to the surge that is
+        predicted or to the place at rest: what the runs allow) and "readouts" (none, hinge or
+        stacked, for those of the spec or for every load).
     horizon : sequence of float, optional
         Lengths of the free runs, encounter periods.
     folds : "run" or int, optional
@@ -138,7 +141,12 @@ def tune(
     named = until(as_runs(runs), stop)
     known: MutableMapping[str, Any] = {}
     if resume is not None:
-        asked = {"spec": spec.to_json(), "horizon": list(horizon), "folds": folds}
+        asked = {
+            "spec": spec.to_json(),
+            "vary": sorted(vary),
+            "horizon": list(horizon),
+            "folds": folds,
+        }
         known = _Kept(Path(resume), _digest(asked, named, [*states, *inputs]))
     found = select(
         spec,
@@ -161,11 +169,15 @@ def _table(rows: Sequence[dict[str, Any]]) -> xr.Dataset:
     """Rows as a Dataset over ``trial``."""
     words = {
         "ridge": "λ per snapshot pair",
+        "rank": "number of singular values kept; 0 for all",
         "score": "mean NRMSE of free runs",
         "lower": "lower bound of the 95 % interval of the score",
         "upper": "upper bound of the 95 % interval of the score",
     }
-    keys = ("state_delays", "input_delays", "lead", "observables", "ridge", "score")
+    keys = (
+        *("state_delays", "input_delays", "lead", "observables", "alignment", "ridge", "rank"),
+        "score",
+    )
     return xr.Dataset(
         {
             key: (

@@ -1,13 +1,17 @@
 """Settings chosen by free runs on training runs that are held out."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
+from drifting import INPUTS as PROBES
+from drifting import STATES as DRIFTING
+from drifting import drifting_run
 
-from seakeep import HankelDMDc, RequestError, SlowSquares, load_model, metrics
-from seakeep.models.selection import RIDGES, select
+from seakeep import HankelDMDc, ProbeAlignment, RequestError, SlowSquares, load_model, metrics
+from seakeep.models.selection import RIDGES, WORST, select
 
 DT, PERIOD = 0.1, 10  # s, samples
 STATES, INPUTS = ["heave", "drift"], ["eta"]
@@ -144,6 +148,95 @@ def test_what_is_known_is_not_found_again():
 def test_what_cannot_be_chosen_is_refused(spec, vary, message):
     with pytest.raises(RequestError, match=message):
         select(spec, runs(), STATES, INPUTS, vary=vary)
+
+
+def growing(seed: int, samples: int = 120) -> xr.Dataset:
+    """A motion that grows by half a per cent a step: the truth has no stable model."""
+    rng = np.random.default_rng(seed)
+    heave, eta = np.zeros(samples), rng.standard_normal(samples)
+    heave[0] = 1.0
+    for k in range(samples - 1):
+        heave[k + 1] = 1.005 * heave[k] + 0.5 * eta[k]
+    return xr.Dataset(
+        {"heave": ("time", heave, {"units": "m"}), "eta": ("time", eta, {"units": "m"})},
+        coords={"time": DT * np.arange(samples)},
+        attrs={"encounter_period": PERIOD * DT},
+    )
+
+
+def test_what_grows_is_never_chosen():
+    given = {f"run{seed}": growing(seed) for seed in range(3)}
+    spec = HankelDMDc(2, 2, "rollout", delay_rows="exact")
+    found = select(spec, given, ["heave"], ["eta"], horizon=(1.0,))
+    ranked = sorted(found.rows, key=lambda row: row["score"])
+    stable = []
+    for row in ranked:
+        settings = replace(spec, ridge=row["ridge"], ridge_scale="per_snapshot")
+        model = settings.fit(given, ["heave"], ["eta"])
+        stable.append(bool(np.abs(np.linalg.eigvals(model.A)).max() < 1))
+    assert not stable[0]  # over ten steps the truth itself is best
+    assert found.settings.ridge == ranked[stable.index(True)]["ridge"]
+
+
+def test_ranks_are_judged_as_plain_fits_are_and_one_may_be_chosen():
+    given = runs()
+    found = select(SPEC, given, STATES, INPUTS, vary=("rank",), horizon=(15.0,))
+    rows = [row for row in found.rows if row["rank"]]
+    assert [row["rank"] for row in rows] == [23, 16]  # of 7 × 2 + 13 columns, half an octave apart
+    assert {row["ridge"] for row in rows} == {0.0}
+    for row in rows:
+        plain = []
+        for held in given:
+            spec = replace(SPEC, ridge=0.0, rank=row["rank"])
+            others = [run for name, run in given.items() if name != held]
+            model = spec.fit(others, STATES, INPUTS)
+            forecasts = model.forecast_windows(given[held], DT * np.arange(12, 550, 150), 150)
+            measured = np.stack(
+                [
+                    np.stack([given[held][n].values[at + 1 : at + 151] for n in STATES], axis=-1)
+                    for at in range(12, 550, 150)
+                ]
+            )
+            predicted = np.stack([forecasts[n].values for n in STATES], axis=-1)
+            errors = metrics.nrmse(predicted=predicted, measured=measured)
+            plain.append(np.minimum(errors, WORST).mean())
+        # Squared singular values: half of the digits of the smallest that is kept.
+        assert row["score"] == pytest.approx(np.mean(plain), rel=1e-6)
+    only = [row for row in found.rows if row["chosen"]]
+    assert found.settings.rank == (only[0]["rank"] or None)
+
+
+def test_a_vessel_that_drifts_gets_an_alignment_and_the_measured_surge_is_no_choice():
+    given = {f"run{seed}": drifting_run(seed, samples=600) for seed in (1, 2)}
+    spec = HankelDMDc(4, 12, "rollout", delay_rows="exact")
+    options = {"vary": ("alignment",), "horizon": (15.0,)}
+    found = select(spec, given, DRIFTING, PROBES, **options)
+    best = {}
+    for row in found.rows:
+        best[row["alignment"]] = min(row["score"], best.get(row["alignment"], np.inf))
+    # Surge does not matter to "none"; carried over no distance it would be the same twice.
+    assert set(best) == {"none", "dispersion, predicted", "effective, predicted"}
+    assert best["dispersion, predicted"] < 0.8 * best["none"]
+    assert found.settings.alignment.surge == "predicted"
+    stated = replace(spec, alignment=ProbeAlignment(mode="dispersion", surge="measured"))
+    with ThreadPoolExecutor(2) as pool:
+        again = select(stated, given, DRIFTING, PROBES, **options, executor=pool)
+    keys = ("alignment", "ridge", "score", "chosen")
+    one, other = ({tuple(row[key] for key in keys) for row in each.rows} for each in (found, again))
+    assert one == other  # in another order
+    assert again.settings.alignment == found.settings.alignment
+    # Without positions and depth there is nothing to carry by.
+    bare = {name: run.drop_attrs() for name, run in given.items()}
+    for name, run in bare.items():
+        bare[name] = run.assign_attrs(encounter_period=given[name].attrs["encounter_period"])
+    assert {row["alignment"] for row in select(spec, bare, DRIFTING, PROBES, **options).rows} == {
+        "none"
+    }
+
+
+def test_read_outs_leave_no_choice_of_the_rank():
+    with pytest.raises(RequestError, match="vary names 'rank', and read-outs learn from free runs"):
+        select(SPEC, runs(), STATES, INPUTS, vary=("rank", "readouts"))
 
 
 def test_a_word_for_the_ridge_is_refused():

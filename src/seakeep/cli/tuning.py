@@ -15,7 +15,7 @@ from seakeep.errors import RequestError
 from seakeep.files import check_output, check_place, replacing
 
 if TYPE_CHECKING:
-    from seakeep.models import ReadOut
+    from seakeep.models import ProbeAlignment, ReadOut
     from seakeep.tuning import TuneResult
 
 __all__ = ["tune"]
@@ -28,7 +28,7 @@ def tune(
         typer.Option(
             "--vary",
             help="What to choose beside the ridge: observables, lead, input_delays, state_delays, "
-            "readouts. Repeat it for several. Default: observables.",
+            "rank, alignment, readouts. Repeat it for several. Default: observables.",
         ),
     ] = None,
     out: Annotated[
@@ -88,7 +88,7 @@ def tune(
             resume=kept,
         )
     typer.echo(found.describe())
-    text = _tuned(campaign.read_text(encoding="utf-8"), model, found, "readouts" in varied)
+    text = _tuned(campaign.read_text(encoding="utf-8"), model, found, varied)
     with replacing(target) as place:
         place.write_text(text, encoding="utf-8")
     kept.unlink(missing_ok=True)
@@ -101,7 +101,7 @@ def tune(
         messages().print(f"Wrote {picture}.")
 
 
-def _tuned(text: str, model: str | None, found: TuneResult, reads_out: bool) -> str:
+def _tuned(text: str, model: str | None, found: TuneResult, varied: Sequence[str]) -> str:
     """The campaign file with the choice in the table of the model, and nothing else changed."""
     import tomlkit
 
@@ -126,17 +126,39 @@ def _tuned(text: str, model: str | None, found: TuneResult, reads_out: bool) -> 
     values["observables"] = tables.multiline(bool(spec.observables))
     # Blank lines and comments there belong to the next table, if this one is in one place.
     between = _after(table) if isinstance(table, tomlkit.items.Table) else []
+    table.pop("rank", None)
+    if spec.rank is not None:
+        values["rank"] = spec.rank
     for key, value in values.items():
         table[key] = value
-    if reads_out:
+    stated = set(varied)
+    if "alignment" in varied:
+        table.pop("alignment", None)
+        if spec.alignment is not None:
+            table["alignment"] = _alignment(spec.alignment)
+        elif table.pop("preset", None):  # which may bring an alignment, and read-outs
+            stated.add("readouts")
+    if "readouts" in stated:
         table.pop("readouts", None)
-        table["readouts"] = _readouts(() if spec.readouts == "auto" else spec.readouts)
+        table["readouts"] = "auto" if spec.readouts == "auto" else _readouts(spec.readouts)
     if between:
         _end(table).extend(between)
     table["ridge"].comment("chosen by seakeep tune, by free runs on held-out training runs")
     first = "# seakeep_file: tuned campaign\n"
     body = tomlkit.dumps(document)
     return body if body.startswith(first) else first + body
+
+
+def _alignment(chosen: ProbeAlignment) -> Any:
+    """The keys of an alignment that differ from their defaults, mode and surge always."""
+    import tomlkit
+
+    default = type(chosen)().to_json()
+    row = tomlkit.inline_table()
+    for key, value in chosen.to_json().items():
+        if key in ("mode", "surge") or value != default[key]:
+            row[key] = value
+    return row
 
 
 def _end(table: Any) -> list[Any]:

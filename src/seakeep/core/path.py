@@ -16,7 +16,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray, IntArray
 
-__all__ = ["Moments", "free_runs", "lagged", "ridge_path"]
+__all__ = ["Moments", "free_runs", "lagged", "ridge_path", "truncated_path"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +125,31 @@ def ridge_path(gram: FloatArray, right: FloatArray, ridges: Sequence[float]) -> 
     weights = 1.0 / (np.maximum(values, 0.0) + np.asarray(ridges)[:, None])
     result: FloatArray = (turned * weights[:, None, :]) @ vectors.T
     return result
+
+
+def truncated_path(gram: FloatArray, right: FloatArray, ranks: Sequence[int]) -> FloatArray:
+    """Coefficients of least squares on the largest singular values, at several ranks.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (p, p)
+        Products of the regressors, whose eigenvalues are the squared singular values.
+    right : ndarray, shape (N, p)
+        Products of the targets with the regressors.
+    ranks : sequence of int
+        Numbers of singular values that are kept, each at least 1.
+
+    Returns
+    -------
+    ndarray, shape (len(ranks), N, p)
+    """
+    values, vectors = np.linalg.eigh(gram)
+    values, vectors = values[::-1], vectors[:, ::-1]
+    # Below this an eigenvalue of the Gram matrix is rounding.
+    sound = int(np.count_nonzero(values > len(gram) * np.finfo(float).eps * values[0]))
+    turned = (right @ vectors[:, :sound]) / values[:sound]
+    kept = [min(rank, sound) for rank in ranks]
+    return np.stack([turned[:, :rank] @ vectors[:, :rank].T for rank in kept])
 
 
 def lagged(series: FloatArray, first: int, count: int, lags: int) -> FloatArray:

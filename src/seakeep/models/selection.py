@@ -20,11 +20,18 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray, IntArray
 from seakeep.core import metrics
-from seakeep.core.path import Moments, free_runs, lagged, ridge_path
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.core.path import Moments, free_runs, lagged, ridge_path, truncated_path
+from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.executor import Progress, in_order
-from seakeep.models.inputs import Chain, Measured
+from seakeep.models.inputs import (
+    Chain,
+    FittedAlignment,
+    Measured,
+    Mode,
+    ProbeAlignment,
+    Surge,
+)
 from seakeep.models.interface import Drive, Span
 from seakeep.models.labelled import mean_period
 from seakeep.models.observables import Observable, Observed, Powers, SlowSquares
@@ -67,7 +74,12 @@ On the virtual tank the error falls by that much over the last decade of λ: les
 seed to the next. The larger λ is quicker to solve for, and its free runs decay sooner."""
 FALLBACK = 1e-3
 """λ per snapshot pair where nothing can be held out."""
-VARIED = ("ridge", "observables", "lead", "input_delays", "state_delays", "readouts")
+RANKS = tuple(round(2 ** (exponent / 2)) for exponent in range(18, 7, -1))
+"""Numbers of singular values that are tried, half an octave apart: 512 to 16."""
+VARIED = (
+    *("ridge", "rank", "observables", "lead", "input_delays", "state_delays", "alignment"),
+    "readouts",
+)
 """Settings that can be chosen."""
 WORST = 1.0
 """NRMSE at which a channel counts no worse: a forecast that is no better than the mean is none.
@@ -87,12 +99,18 @@ class Candidate:
         Look-ahead of the delayed regressors, samples.
     observables : tuple of int
         Those that are taken, by their place among all.
+    alignment : int
+        That which is taken, by its place among all.
+    truncated : bool
+        Whether singular values are cut off instead of λ.
     """
 
     state_delays: int
     input_delays: int
     lead: int
     observables: tuple[int, ...]
+    alignment: int = 0
+    truncated: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,18 +119,21 @@ class Trial:
 
     Parameters
     ----------
-    scores : ndarray, shape (λ, window)
+    levels : tuple of float
+        λ, or numbers of singular values.
+    scores : ndarray, shape (level, window)
         NRMSE averaged over the channels, by window of all folds and horizons.
     weights : ndarray, shape (window,)
         They sum to one; folds and horizons count alike.
     """
 
+    levels: tuple[float, ...]
     scores: FloatArray
     weights: FloatArray
 
     @property
     def means(self) -> FloatArray:
-        """Score at each λ."""
+        """Score at each level."""
         result: FloatArray = self.scores @ self.weights
         return result
 
@@ -188,12 +209,31 @@ class Problem:
     def _direct(self, candidate: Candidate) -> BoolArray:
         return np.isin(self.direct_owners, candidate.observables)
 
-    def radius(self, candidate: Candidate, ridge: float) -> float:
+    def levels(self, candidate: Candidate, ridges: Sequence[float]) -> tuple[float, ...]:
+        """What is tried of a candidate: these λ, or ranks below its number of columns."""
+        if not candidate.truncated:
+            return tuple(ridges)
+        return tuple(rank for rank in RANKS if rank < len(self.columns(candidate)))
+
+    def _path(
+        self,
+        candidate: Candidate,
+        levels: Sequence[float],
+        gram: FloatArray,
+        right: FloatArray,
+        count: int,
+    ) -> FloatArray:
+        """Coefficients at each level, shape (level, N, p)."""
+        if candidate.truncated:
+            return truncated_path(gram, right, [int(level) for level in levels])
+        factor = count if self.is_per_snapshot else 1
+        return ridge_path(gram, right, [factor * level for level in levels])
+
+    def radius(self, candidate: Candidate, level: float) -> float:
         """Spectral radius of the model that a candidate gives of all runs."""
         scales, gram, right, count = self._system(candidate, range(len(self.data.names)))
-        ridge *= count if self.is_per_snapshot else 1
         size = len(scales[0][0]) * (candidate.state_delays + 1)
-        top = ridge_path(gram, right, [ridge])[0, :, :size]
+        top = self._path(candidate, [level], gram, right, count)[0, :, :size]
         square = np.concatenate([top, np.eye(size - len(top), size)])
         return float(np.abs(np.linalg.eigvals(square)).max())
 
@@ -205,11 +245,11 @@ class Problem:
             if any(self._starts(run, steps).size for steps in self.horizons)
         ]
 
-    def held(self, candidate: Candidate, ridge: float, steps: int) -> Iterator[Held]:
+    def held(self, candidate: Candidate, level: float, steps: int) -> Iterator[Held]:
         """Free runs, end to end, on each run by the model of the others."""
         for run in range(len(self.data.names)):
             if len(self.data.names) > 1 and (starts := self._starts(run, steps)).size:
-                predicted, _ = self.forecast(candidate, [ridge], run, steps)
+                predicted, _ = self.forecast(candidate, [level], run, steps)
                 yield Held(run, predicted[0], self._measured(run, starts, steps))
 
     def _starts(self, run: int, steps: int) -> IntArray:
@@ -218,13 +258,13 @@ class Problem:
         return np.arange(window.first_column, window.last - steps + 1, steps)
 
     def judge(
-        self, candidate: Candidate, ridges: Sequence[float], fold: int
+        self, candidate: Candidate, levels: Sequence[float], fold: int
     ) -> Iterator[FloatArray]:
-        """Scores, shape (λ, window), for each horizon that fits into the run that is held out."""
+        """Scores, shape (level, window), for each horizon that fits into the held-out run."""
         for steps in self.horizons:
             starts = self._starts(fold, steps)
             if starts.size:
-                predicted, scale = self.forecast(candidate, ridges, fold, steps)
+                predicted, scale = self.forecast(candidate, levels, fold, steps)
                 measured = self._measured(fold, starts, steps)
                 with np.errstate(over="ignore", invalid="ignore"):
                     errors = metrics.nrmse(
@@ -242,7 +282,7 @@ class Problem:
         return np.stack([states[at + 1 : at + 1 + steps] for at in starts])
 
     def forecast(
-        self, candidate: Candidate, ridges: Sequence[float], fold: int, steps: int
+        self, candidate: Candidate, levels: Sequence[float], fold: int, steps: int
     ) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
         """Free runs of a candidate on a run that is held out.
 
@@ -250,8 +290,8 @@ class Problem:
         ----------
         candidate : Candidate
             Columns.
-        ridges : sequence of float
-            λ.
+        levels : sequence of float
+            λ, or numbers of singular values of a truncated candidate.
         fold : int
             The run that is held out.
         steps : int
@@ -259,7 +299,7 @@ class Problem:
 
         Returns
         -------
-        predicted : ndarray, shape (λ, window, steps, N)
+        predicted : ndarray, shape (level, window, steps, N)
             In the standardised deviations of `data`.
         scale : (ndarray, ndarray), each of shape (N,)
             Mean and standard deviation of the states that trained, likewise.
@@ -268,8 +308,7 @@ class Problem:
         others = [run for run in range(len(data.names)) if run != fold]
         (x, u, w), gram, right, count = self._system(candidate, others)
         kept, direct = self._delayed(candidate), self._direct(candidate)
-        factor = count if self.is_per_snapshot else 1
-        weights = ridge_path(gram, right, [factor * ridge for ridge in ridges])
+        weights = self._path(candidate, levels, gram, right, count)
         size = len(x[0]) * (s + 1)
         top, rest = weights[..., :size], weights[..., size:]
         starts = self._starts(fold, steps)
@@ -384,19 +423,19 @@ class Choice:
     ----------
     candidate : Candidate
         Columns.
-    ridge : float
-        λ.
+    level : float
+        λ, or the number of singular values of a truncated candidate.
     trials : tuple of (Candidate, Trial)
         All that was tried, in order.
     """
 
     candidate: Candidate
-    ridge: float
+    level: float
     trials: tuple[tuple[Candidate, Trial], ...]
 
 
 def search(
-    problem: Problem,
+    problems: Sequence[Problem],
     base: Candidate,
     options: Mapping[str, Sequence[Any]],
     ridges: Sequence[float],
@@ -409,8 +448,8 @@ def search(
 
     Parameters
     ----------
-    problem : Problem
-        Training runs.
+    problems : sequence of Problem
+        Training runs, one per alignment.
     base : Candidate
         Where the search starts.
     options : mapping of str to sequence
@@ -427,40 +466,50 @@ def search(
     Returns
     -------
     Choice
-        The best columns, and the largest λ that is as good as the best; never a model that grows:
-        λ is raised until the spectral radius is below one.
+        The best columns, and the largest λ (or the smallest rank) that is as good as the best.
+        Where that model grows, the best of all that were tried and do not.
     """
     known = {} if known is None else known
     trials: dict[Candidate, Trial] = {}
     best = base
     for key, values in (("", [None]), *options.items()):
         tried = [replace(best, **{key: value}) if key else best for value in values]
-        for candidate, trial in _judged(problem, tried, ridges, executor, progress, known):
+        for candidate, trial in _judged(problems, tried, ridges, executor, progress, known):
             trials.setdefault(candidate, trial)
         best = min(trials, key=lambda each: float(trials[each].means.min()))
     means = trials[best].means
-    chosen = int(np.flatnonzero(means <= (1.0 + ALIKE) * means.min())[-1])
-    while problem.radius(best, ridges[chosen]) >= 1.0 and chosen + 1 < len(ridges):
-        chosen += 1
-    return Choice(best, ridges[chosen], tuple(trials.items()))
+    alike = int(np.flatnonzero(means <= (1.0 + ALIKE) * means.min())[-1])
+    every = [
+        (float(score), candidate, level)
+        for candidate, trial in trials.items()
+        for score, level in zip(trial.means, trial.levels, strict=True)
+    ]
+    wanted = [(best, trials[best].levels[alike])]
+    wanted += [each[1:] for each in sorted(every, key=lambda each: each[0])]
+    still = (each for each in wanted if problems[each[0].alignment].radius(*each) < 1.0)
+    return Choice(*next(still, wanted[0]), tuple(trials.items()))
 
 
 def _judged(
-    problem: Problem,
+    problems: Sequence[Problem],
     candidates: Sequence[Candidate],
     ridges: Sequence[float],
     executor: Executor | None,
     progress: Progress | None,
     known: MutableMapping[str, list[list[list[float]]]],
 ) -> Iterator[tuple[Candidate, Trial]]:
-    folds = problem.folds()
+    folds = problems[0].folds()
+
+    def levels(candidate: Candidate) -> tuple[float, ...]:
+        return problems[candidate.alignment].levels(candidate, ridges)
+
     todo = [
-        (candidate, tuple(ridges), fold)
+        (candidate, levels(candidate), fold)
         for candidate in dict.fromkeys(candidates)
         for fold in folds
         if _key(candidate, fold) not in known
     ]
-    made = in_order(_unit, problem, todo, executor, progress, "candidate and fold")
+    made = in_order(_unit, tuple(problems), todo, executor, progress, "candidate and fold")
     for (candidate, _, fold), scores in zip(todo, made, strict=True):
         known[_key(candidate, fold)] = [each.tolist() for each in scores]
     for candidate in dict.fromkeys(candidates):
@@ -473,15 +522,18 @@ def _judged(
                 np.full(each.shape[1], 1.0 / (len(folds) * len(horizons) * each.shape[1]))
                 for each in horizons
             ]
-        yield candidate, Trial(np.concatenate(scores, axis=1), np.concatenate(weights))
+        kept = np.concatenate(scores, axis=1), np.concatenate(weights)
+        yield candidate, Trial(levels(candidate), *kept)
 
 
 def _key(candidate: Candidate, fold: int) -> str:
     return json.dumps([*astuple(candidate), fold])
 
 
-def _unit(problem: Problem, item: tuple[Candidate, Sequence[float], int]) -> list[FloatArray]:
-    return list(problem.judge(*item))
+def _unit(
+    problems: Sequence[Problem], item: tuple[Candidate, Sequence[float], int]
+) -> list[FloatArray]:
+    return list(problems[item[0].alignment].judge(*item))
 
 
 @dataclass(frozen=True, eq=False)
@@ -508,17 +560,21 @@ class Selected(Generic[Chosen]):
 
     def describe(self) -> str:
         """Text: how the choice was made, and the best λ of each candidate."""
-        keys = ("observables", "lead", "state_delays", "input_delays")
+        keys = ["observables", "lead", "state_delays", "input_delays"]
+        if len({row["alignment"] for row in self.rows}) > 1:
+            keys.append("alignment")
         groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
         for row in self.rows:
-            groups.setdefault(tuple(row[key] for key in keys), []).append(row)
+            candidate = (*(row[key] for key in keys), row["rank"] > 0)
+            groups.setdefault(candidate, []).append(row)
         lines = [self.note]
         for values, part in groups.items():
             best = min(part, key=lambda row: (not row["chosen"], row["score"]))
-            what = ", ".join(f"{key} {value}" for key, value in zip(keys, values, strict=True))
+            what = ", ".join(f"{key} {value}" for key, value in zip(keys, values, strict=False))
+            level = f"rank {best['rank']}" if best["rank"] else f"ridge {best['ridge']:g}"
             lines.append(
-                f"  {best['score']:.3f} [{best['lower']:.3f}, {best['upper']:.3f}]  ridge "
-                f"{best['ridge']:g}, {what}{'  (chosen)' if best['chosen'] else ''}"
+                f"  {best['score']:.3f} [{best['lower']:.3f}, {best['upper']:.3f}]  {level}, "
+                f"{what}{'  (chosen)' if best['chosen'] else ''}"
             )
         return "\n".join(lines)
 
@@ -637,17 +693,7 @@ def select(
     RequestError
         If `vary` names something else, or the delay rows are not exact.
     """
-    for name in vary:
-        if name not in VARIED:
-            raise RequestError(
-                f"vary names '{name}'.{did_you_mean(name, VARIED)} Choose among "
-                f"{', '.join(VARIED)}."
-            )
-    if settings.delay_rows != "exact" or settings.rank is not None:
-        raise RequestError(
-            "choosing by free runs takes delay_rows = 'exact' and no rank; received delay_rows = "
-            f"'{settings.delay_rows}', rank = {settings.rank}. Change them, or state ridge."
-        )
+    _check_asked(settings, vary)
     parts = 3 if parts is None and len(runs) == 1 else parts
     step = labelled.common_step(runs)
     samples = mean_period(runs, list(inputs)) if period is None else period / step
@@ -656,6 +702,9 @@ def select(
     if "readouts" in vary:
         asked = readouts or readouts_asked("auto", labels)
         readouts = tuple(replace(each, kind="auto") for each in asked)
+    alignments = [settings.alignment]
+    if "alignment" in vary:
+        alignments = _alignments(settings.alignment, runs, states, inputs)
     wanted = [settings.observables]
     if "observables" in vary and not settings.observables:
         defaults = default_observables(inputs, samples * step)
@@ -671,17 +720,22 @@ def select(
         ridges = RIDGES
     for chosen in wanted:  # runs may be too short for the longest
         options = _options(settings, vary, samples, len(chosen))
-        problem = _problem(
-            replace(settings, observables=chosen),
-            runs,
-            states,
-            inputs,
-            base,
-            options,
-            tuple(round(each * samples) for each in horizon),
-            parts,
-        )
-        if problem is not None and problem.folds():
+        options["alignment"] = list(range(len(alignments)))
+        made = [
+            _problem(
+                replace(settings, observables=chosen, alignment=alignment),
+                runs,
+                states,
+                inputs,
+                base,
+                options,
+                tuple(round(each * samples) for each in horizon),
+                parts,
+            )
+            for alignment in alignments
+        ]
+        problems = [problem for problem in made if problem is not None and problem.folds()]
+        if len(problems) == len(alignments):
             break
     else:
         longest = max(run.sizes["time"] for run in runs.values())
@@ -696,29 +750,56 @@ def select(
             "readouts" in vary,
         )
     found = search(
-        problem, base, options, ridges, executor=executor, progress=progress, known=known
+        problems, base, options, ridges, executor=executor, progress=progress, known=known
     )
-    best = dict(found.trials)[found.candidate]
-    score = float(best.means[list(ridges).index(found.ridge)])
-    made = replace(
+    taken = found.candidate
+    best = dict(found.trials)[taken]
+    score = float(best.means[best.levels.index(found.level)])
+    complete = replace(
         settings,
         state_delays=found.candidate.state_delays,
         input_delays=found.candidate.input_delays,
         lead=found.candidate.lead,
         observables=tuple(chosen[number] for number in found.candidate.observables),
-        ridge=found.ridge,
+        alignment=alignments[taken.alignment],
+        rank=int(found.level) if taken.truncated else None,
+        ridge=0.0 if taken.truncated else found.level,
+    )
+    level = (
+        f"rank {found.level:g}" if taken.truncated else f"ridge {found.level:g} per snapshot pair"
     )
     count = sum(len(trial.means) for _, trial in found.trials)
     note = (
-        f"ridge {found.ridge:g} per snapshot pair: out of {count} settings in free runs on "
-        f"{len(problem.folds())} parts held out in turn, mean NRMSE {score:.3f}"
+        f"{level}: out of {count} settings in free runs on {len(problems[0].folds())} parts held "
+        f"out in turn, mean NRMSE {score:.3f}"
     )
-    rows = tuple(_rows_of(found, ridges, chosen, seed))
+    rows = tuple(_rows_of(found, chosen, alignments, seed))
     fitted: tuple[FittedReadOut, ...] = ()
     if readouts:
-        held = list(problem.held(found.candidate, found.ridge, round(PERIODS * samples)))
+        problem = problems[taken.alignment]
+        held = list(problem.held(taken, found.level, round(PERIODS * samples)))
         fitted = fit_readouts(readouts, problem.data, held)
-    return _with_readouts(made, rows, note, fitted, "readouts" in vary)
+    return _with_readouts(complete, rows, note, fitted, "readouts" in vary)
+
+
+def _check_asked(settings: HankelSettings, vary: Sequence[str]) -> None:
+    """Refuse what cannot be chosen."""
+    for name in vary:
+        if name not in VARIED:
+            raise RequestError(
+                f"vary names '{name}'.{did_you_mean(name, VARIED)} Choose among "
+                f"{', '.join(VARIED)}."
+            )
+    if settings.delay_rows != "exact" or settings.rank is not None:
+        raise RequestError(
+            "choosing by free runs takes delay_rows = 'exact' and no rank; received delay_rows = "
+            f"'{settings.delay_rows}', rank = {settings.rank}. Change them, or state ridge."
+        )
+    if "rank" in vary and (settings.readouts or "readouts" in vary):
+        raise RequestError(
+            "vary names 'rank', and read-outs learn from free runs of ridge regressions. Leave out "
+            "'rank', or the read-outs."
+        )
 
 
 def _with_readouts(
@@ -829,7 +910,43 @@ def _options(
     ):
         if name in vary:
             found[name] = [round(each * period) for each in periods]
+    if "rank" in vary:
+        found["truncated"] = [False, True]
     return found
+
+
+def _alignments(
+    stated: ProbeAlignment | None,
+    runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+) -> list[ProbeAlignment | None]:
+    """Alignments that these runs allow and that differ, the stated one first, and none.
+
+    None reads the measured surge: what is read after a start is no choice of a setting.
+    """
+    base = replace(stated or ProbeAlignment(), optional=False)
+    found: list[ProbeAlignment | None] = []
+    modes: tuple[Mode, ...] = ("dispersion", "effective")
+    surges: tuple[Surge, ...] = ("predicted", "none")
+    for mode, surge in itertools.product(modes, surges):
+        made = replace(
+            base,
+            mode=mode,
+            surge=surge,
+            celerity=base.celerity if mode == "effective" else None,
+            highest_frequency=base.highest_frequency if mode == "dispersion" else None,
+        )
+        try:
+            fitted = made.fit(runs, states, inputs, None)
+        except (RequestError, DataError):
+            continue  # no depth, no positions, or no surge among the states
+        assert isinstance(fitted, FittedAlignment)
+        if surge == "predicted" or any(np.any(fitted.offsets(run)) for run in runs.values()):
+            found.append(made)
+    found.append(None)
+    first = None if stated is None else replace(stated, optional=False)
+    return sorted(found, key=lambda each: each != first)
 
 
 def _problem(
@@ -894,7 +1011,10 @@ def _problem(
 
 
 def _rows_of(
-    found: Choice, ridges: Sequence[float], observables: Sequence[Observable], seed: int
+    found: Choice,
+    observables: Sequence[Observable],
+    alignments: Sequence[ProbeAlignment | None],
+    seed: int,
 ) -> Iterator[dict[str, Any]]:
     """Rows of the table: windows are drawn again 400 times for the interval of each score."""
     rng = np.random.default_rng(seed)
@@ -904,16 +1024,19 @@ def _rows_of(
         weights = trial.weights[drawn]
         totals = (trial.scores[:, drawn] * weights).sum(axis=2) / weights.sum(axis=1)
         lower, upper = np.quantile(totals, [0.025, 0.975], axis=1)
-        for number, score in enumerate(trial.means):
+        aligned = alignments[candidate.alignment]
+        for number, (level, score) in enumerate(zip(trial.levels, trial.means, strict=True)):
             yield {
                 "state_delays": candidate.state_delays,
                 "input_delays": candidate.input_delays,
                 "lead": candidate.lead,
                 "observables": ", ".join(observables[k].kind for k in candidate.observables)
                 or "none",
-                "ridge": ridges[number],
+                "alignment": "none" if aligned is None else f"{aligned.mode}, {aligned.surge}",
+                "ridge": 0.0 if candidate.truncated else level,
+                "rank": int(level) if candidate.truncated else 0,
                 "score": float(score),
                 "lower": float(lower[number]),
                 "upper": float(upper[number]),
-                "chosen": candidate == found.candidate and ridges[number] == found.ridge,
+                "chosen": candidate == found.candidate and level == found.level,
             }

@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 __all__ = ["Figure", "tuning_figure"]
 
@@ -25,8 +26,19 @@ def tuning_figure(table: xr.Dataset) -> Figure:
     Figure
         One line per candidate with its 95 % intervals; the choice is marked.
     """
-    figure, axes = plt.subplots(figsize=(7.0, 4.2), layout="constrained")
-    keys = ("observables", "lead", "state_delays", "input_delays")
+    truncated = table["rank"].values > 0
+    shown = [("ridge", "ridge per snapshot pair (1)", ~truncated)]
+    if truncated.any():
+        shown.append(("rank", "singular values kept (1)", truncated))
+    figure, panels = plt.subplots(
+        *(1, len(shown)),
+        figsize=(7.0, 4.2),
+        layout="constrained",
+        sharey=True,
+        squeeze=False,
+        width_ratios=[2, 1][: len(shown)],
+    )
+    keys = ("observables", "lead", "state_delays", "input_delays", "alignment")
     varied = [key for key in keys if len(np.unique(table[key].values)) > 1]
     names = np.array(
         [
@@ -35,26 +47,33 @@ def tuning_figure(table: xr.Dataset) -> Figure:
             for row in range(table.sizes["trial"])
         ]
     )
-    for number, name in enumerate(dict.fromkeys(names.tolist())):
-        part = table.isel(trial=np.flatnonzero(names == name))
-        marker = MARKERS[number % len(MARKERS)]
-        (line,) = axes.semilogx(
-            part["ridge"], part["score"], marker=marker, markersize=4, label=name
-        )
-        axes.fill_between(
-            part["ridge"], part["lower"], part["upper"], color=line.get_color(), alpha=0.12
-        )
-    best = table.isel(trial=np.flatnonzero(table["chosen"].values))
-    axes.semilogx(
-        *(best["ridge"], best["score"], "o"),
-        markersize=11,
-        fillstyle="none",
-        color="k",
-        label="chosen",
-    )
-    axes.set_xlabel("ridge per snapshot pair (1)")
-    axes.set_ylabel("mean NRMSE of free runs (1)")
-    axes.set_ylim(bottom=0.0)
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize="small")
+    numbers = {name: number for number, name in enumerate(dict.fromkeys(names.tolist()))}
+    for axes, (key, words, rows) in zip(panels[0], shown, strict=True):
+        for name, number in numbers.items():
+            part = table.isel(trial=np.flatnonzero((names == name) & rows))
+            if not part.sizes["trial"]:
+                continue
+            colour, marker = f"C{number % 10}", MARKERS[number % len(MARKERS)]
+            axes.semilogx(
+                part[key], part["score"], color=colour, marker=marker, markersize=4, label=name
+            )
+            axes.fill_between(part[key], part["lower"], part["upper"], color=colour, alpha=0.12)
+        best = table.isel(trial=np.flatnonzero(table["chosen"].values & rows))
+        if best.sizes["trial"]:
+            axes.semilogx(
+                *(best[key], best["score"], "o"),
+                markersize=11,
+                fillstyle="none",
+                color="k",
+                label="chosen",
+            )
+        if key == "rank":  # few octaves, each with its number
+            axes.xaxis.set_major_locator(LogLocator(base=2))
+            axes.xaxis.set_major_formatter("{x:g}")
+            axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.set_xlabel(words)
+        axes.set_ylim(bottom=0.0)
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize="small")
+    panels[0, 0].set_ylabel("mean NRMSE of free runs (1)")
     return figure
