@@ -545,13 +545,15 @@ def test_models_stand_beside_the_baselines_and_lost_forecasts_are_named(result):
         },
         dims=("model", "reference", "measure"),
     )  # fmt: skip
-    skill = xr.Dataset({"change": change, "reference_model": ("reference", ["bayesian"])})
+    changes = {"change": change, "lower": change - 0.15, "upper": change + 0.15}
+    skill = xr.Dataset({**changes, "reference_model": ("reference", ["bayesian"])})
     cell = {"model": "m", "test": "unseen", "training": "t0", "window": 1, "run": "r", "start": 2.0}
     lost = xr.Dataset({key: ("cell", [value]) for key, value in cell.items()})
     groups = {**result.groups, "statistics/skill/unseen": skill, "statistics/lost": lost}
     judged = replace(result, groups=groups)
     table = errors(judged).tables[0]
-    assert table.rows == (("a & b < c", "best linear (Bayesian)", "deterministic", "-20", "+10"),)
+    found = ("-20 [-35, -5]", "+10 [-5, +25] cannot tell")
+    assert table.rows == (("a & b < c", "best linear (Bayesian)", "deterministic", *found),)
     (notice,) = (text for text in summary(judged).notices if "diverged and are left out" in text)
     assert "window 1 of 'unseen' (r from 2 s)" in notice
 
