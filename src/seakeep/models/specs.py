@@ -389,8 +389,9 @@ class BayesianHankelDMDc:
         Time step the runs must have, s; None takes theirs.
     lead : int or float, optional
         Look-ahead of the waves: samples as an integer, encounter periods as a float.
-    history, delay_rows, ridge_scale, rank, standardize, alignment, observables, stable,
-    select
+    history, delay_rows, ridge_scale, rank, standardize, observables, stable, select
+        As in :class:`HankelDMDc`.
+    alignment
         As in :class:`HankelDMDc`. What an alignment estimates, it estimates once for all members,
         from all that is given up to ``stop``: no member's draw moves another's input.
     readouts
