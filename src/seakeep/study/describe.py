@@ -12,6 +12,7 @@ import xarray as xr
 from seakeep.campaign import Campaign
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
+from seakeep.models.inputs import FittedAlignment
 from seakeep.signals import significant_height, wave_spectrum
 from seakeep.study.fit import find_repeat
 from seakeep.study.judge import wave_frequency
@@ -188,7 +189,9 @@ def _celerities(spec: Spec, plan: Plan, runs: Runs) -> list[list[float]]:
     for each in plan.training:
         parts = {name: between(runs[name], (begin, stop)) for name, begin, stop in each.spans}
         fitted = wanted.fit(parts, plan.states, plan.inputs, None)
-        out.append([fitted.celerity_of(run) for run in runs.values()])
+        if not isinstance(fitted, FittedAlignment):  # an optional one that went without
+            return []
+        out.append([fitted.celerity_of(run) or np.nan for run in runs.values()])
     return out
 
 
