@@ -359,7 +359,7 @@ class Repeat:
             f"the input '{self.input}' of {self.run} repeats training input: "
             f"{100 * self.share:.0f} % of it, such as from t = {self.start:.4g} s on, is what "
             f"{self.source} holds from t = {self.source_start:.4g} s on, turned by "
-            f"{np.degrees(self.phase):.0f} degrees (correlation {self.correlation:.3f})."
+            f"{np.degrees(self.phase):z.0f} degrees (correlation {self.correlation:.3f})."
         )
 
 
