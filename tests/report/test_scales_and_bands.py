@@ -1,4 +1,4 @@
-"""Tables of errors in two standard deviations, and of bands in parts, hold what was put in."""
+"""Tables of errors in two standard deviations, of bands and of choices hold what was put in."""
 
 import json
 
@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from seakeep.report.sections.bands import bands
+from seakeep.report.sections.chosen import chosen
 from seakeep.report.sections.scales import scales
 from seakeep.study import StudyResult
 from seakeep.study.judge import band_parts, box_table
@@ -76,3 +77,17 @@ def test_a_study_without_ensembles_shows_no_bands(result):
     models = json.dumps({"m": {"ensemble": False}})
     attrs = {**result.attrs, "models": models}
     assert bands(StudyResult(None, attrs, result.groups)) is None
+
+
+def test_choices_stand_with_the_look_ahead(result):
+    tried = "ridge 0.001: the best\n  0.3 ridge 0.001, observables none"
+    group = xr.Dataset(
+        {"words": ("training", [tried, ""]), "look_ahead": ("training", [1.5, 0.0])},
+        coords={"training": ["a", "b"]},
+    )
+    known = StudyResult(None, result.attrs, {**result.groups, "chosen/m": group})
+    (table,) = chosen(known).tables
+    words = "ridge 0.001: the best; 0.3 ridge 0.001, observables none"
+    assert table.rows == (("m", "a", "1.50", words),)
+    nothing = {**result.groups, "chosen/m": group.isel(training=[1])}
+    assert chosen(StudyResult(None, result.attrs, nothing)) is None

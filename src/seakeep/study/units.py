@@ -84,7 +84,11 @@ def compute(plan: Plan, runs: Runs, unit: Unit) -> Arrays:
         fitted = fit_training(plan, runs, unit.model, training)
     except SeakeepError as error:
         raise DataError(f"training set '{training.name}', model '{unit.model}': {error}") from error
-    out: Arrays = {}
+    ahead = (max(fitted.signature.lead_samples, 1) - 1) * plan.dt
+    out: Arrays = {
+        "chosen/words": np.array(getattr(fitted, "selection", "")),
+        "chosen/look_ahead": np.array(ahead),
+    }
     tested = {
         test: numbers
         for test in plan.tests
@@ -253,6 +257,7 @@ def collect(study: Study, plan: Plan, runs: Runs, read: Read) -> dict[str, xr.Da
     groups = {f"tests/{test}": _collect_test(study, plan, runs, found, test) for test in plan.tests}
     for model, each in plan.models.items():
         mine = {unit.training: arrays for unit, arrays in found.items() if unit.model == model}
+        groups[f"chosen/{model}"] = _collect_chosen(plan, mine)
         if each.is_ensemble:
             origin = json.loads(str(mine[min(mine)]["origin"]))
             groups[f"draws/{model}"] = draws_of(plan, runs, model, origin)
@@ -439,6 +444,25 @@ def true_channels(study: Study, plan: Plan, runs: Runs, test: str) -> FloatArray
             )
         )
     return np.stack(out)
+
+
+def _collect_chosen(plan: Plan, found: Mapping[int, Arrays]) -> xr.Dataset:
+    """How a model's settings were chosen on each training set, and how far it looks ahead."""
+    rows = [found[k] for k in sorted(found)]
+    return xr.Dataset(
+        {
+            "words": (
+                "training",
+                np.array([str(row["chosen/words"]) for row in rows], dtype=object),
+            ),
+            "look_ahead": (
+                "training",
+                np.array([float(row["chosen/look_ahead"]) for row in rows]),
+                {"units": "s", "long_name": "waves read after the instant that is forecast"},
+            ),
+        },
+        coords={"training": [plan.training[k].name for k in sorted(found)]},
+    )
 
 
 def _collect_calibration(plan: Plan, found: Mapping[int, Arrays]) -> xr.Dataset:

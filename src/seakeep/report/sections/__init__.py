@@ -7,6 +7,7 @@ from collections.abc import Callable
 from seakeep.report.section import Section
 from seakeep.report.sections import (
     bands,
+    chosen,
     data,
     errors,
     histories,
@@ -34,6 +35,7 @@ SECTIONS: list[Callable[[StudyResult], Section | None]] = [
     judgements.members,
     data.waves,
     data.data,
+    chosen.chosen,
     settings.settings,
     settings.versions,
 ]
