@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any, ClassVar, Literal, Self
 
@@ -198,7 +198,8 @@ class ProbeAlignment:
         part of the surge that the pass before predicted.
     optional : bool, optional
         Whether a model goes without the alignment where the training runs do not carry what it
-        needs: the surge that it predicts among the states, the water depth, positions of probes.
+        needs: water depth and elevations; and without the surge where that is no state, or no
+        position of a probe is stated.
 
     Raises
     ------
@@ -305,7 +306,7 @@ class ProbeAlignment:
         -------
         FittedAlignment or Chain
             With celerity, depth, band and positions; an empty chain where an optional alignment
-            is missing something.
+            cannot be made.
 
         Raises
         ------
@@ -318,7 +319,12 @@ class ProbeAlignment:
         first_name, first = next(iter(runs.items()))
         labelled.check_channels(first, inputs, first_name)
         if self.optional and self.missing(runs, states, inputs):
-            return Chain()
+            still = replace(self, surge="none")  # for probes that stand elsewhere in other runs
+            return (
+                Chain()
+                if still.missing(runs, states, inputs)
+                else still.fit(runs, states, inputs, window)
+            )
         carried = _elevations(self, first, inputs)
         if self.surge == "predicted" and self.surge_channel not in states:
             raise RequestError(
@@ -378,6 +384,8 @@ class ProbeAlignment:
         placed = self.channels or [each for each in inputs if _position(first, each) is not None]
         if not placed and self.surge != "none":
             return f"{name} states no position of a wave probe"
+        if not placed and not any(each.startswith("eta") for each in inputs):
+            return "no input is a wave elevation"
         if self.mode == "dispersion" and _common_depth(runs) is None:
             return "the runs state no water depth"
         return ""

@@ -614,7 +614,7 @@ def settle(
     """
     alignment = settings.alignment
     lacking = alignment.missing(runs, states, inputs) if alignment and alignment.optional else ""
-    without = f"no alignment: {lacking}" if lacking else ""
+    without = f"not aligned to the surge: {lacking}" if lacking else ""
     stated = not isinstance(settings.ridge, str)
     if stated and chosen is None:
         return Selected(settings, (), without)
