@@ -237,6 +237,10 @@ def _made(
             given = {**given, name: replace(before, **given[name])}
     if given.get("observables") is not None and "select" in _defaults(kind):
         given.setdefault("select", None)  # those that are stated are not chosen
+    if given.get("delay_rows") == "ridge" or given.get("rank") is not None:
+        # Free runs are tried with exact rows alone: what a preset would choose by them is left out.
+        yields = {"select": None, "readouts": ()}
+        given = {**{key: value for key, value in yields.items() if key in _defaults(kind)}, **given}
     if filled is not None:
         return cast("Spec", replace(cast("Any", filled), **given))
     needed = [key for key, default in _defaults(kind).items() if default is MISSING]
