@@ -19,7 +19,12 @@ from seakeep.report.sections.judgements import PUBLISHED, age, coverage_table, d
 from seakeep.report.sections.settings import settings as settings_of
 from seakeep.report.sections.settings import test_overlap as overlap_of_tests
 from seakeep.report.sections.settings import training_overlap, unequal_training
-from seakeep.report.sections.summary import findings, plain_symbol, summary
+from seakeep.report.sections.summary import (
+    findings,
+    glossary,
+    plain_symbol,
+    summary,
+)
 from seakeep.report.style import LINES
 from seakeep.report.tables import latex_text, number, probability, small_number
 from seakeep.study import StudyResult, read_result, read_study, run_study
@@ -76,7 +81,9 @@ def test_the_page_names_nothing_outside_itself(page):
     text = page.read_text("utf-8")
     addresses = re.findall(r"""(?:src|href)\s*=\s*["']([^"']*)["']""", text)
     assert addresses
-    assert all(each.startswith(("#", "data:")) for each in addresses)
+    beside = [each for each in addresses if not each.startswith(("#", "data:"))]
+    assert all(each.startswith(("figures/", "tables/", "histories/")) for each in beside)
+    assert all((page.parent / each).exists() for each in beside)
     assert "@import" not in text
     # What is left of addresses are names of XML, which nobody fetches.
     assert set(re.findall(r"https?://[^\s\"'<>]*", text)) <= {
@@ -92,7 +99,7 @@ def test_no_id_stands_twice(page):
 
 def test_what_it_holds(page, result):
     text = page.read_text("utf-8")
-    wanted = ["summary", "errors", "explore", "densities", "settings", "versions"]
+    wanted = ["summary", "errors", "explore", "densities", "settings", "versions", "words"]
     found = re.findall(r'<section id="(.*?)">', text)
     assert [each for each in found if each in wanted] == wanted
     assert "a &amp; b &lt; c" in text
@@ -218,13 +225,13 @@ def test_tables_say_what_the_campaign_calls_a_channel(result):
     told = channels.assign(long_name=("name", words))
     other = replace(result, groups={**result.groups, "channels": told})
     assert ("Trim angle (MRU-5)",) in [row[:1] for row in error_table(other, "unseen").rows]
-    assert "θ Trim angle (MRU-5); " in dict(summary(other).terms)["in figures"]
-    labels = [each["label"] for each in history_data(other)[0]["channels"]]
+    assert "θ Trim angle (MRU-5); " in dict(glossary(other).terms)["in figures"]
+    labels = [each["label"] for each in history_data(other)["channels"]]
     assert "Trim angle (MRU-5)" in labels
     # A free name has no symbol: it is said once.
     lone = replace(result, groups={**result.groups, "channels": _renamed(channels)})
-    assert "kraft bug; " in dict(summary(lone).terms)["in figures"]
-    assert "kraft bug kraft bug" not in dict(summary(lone).terms)["in figures"]
+    assert "kraft bug; " in dict(glossary(lone).terms)["in figures"]
+    assert "kraft bug kraft bug" not in dict(glossary(lone).terms)["in figures"]
 
 
 def _renamed(channels):
@@ -247,16 +254,15 @@ def test_the_legend_of_the_eigenvalues_stands_over_none_of_them(result):
     assert all(legend.get_window_extent().y0 >= axes.get_window_extent().y1 for axes in figure.axes)
 
 
-def test_the_data_quality_is_in_the_page_for_every_run_and_channel(page, result):
+def test_the_data_quality_of_every_run_and_channel_is_a_link_away(page, result):
     text = page.read_text("utf-8")
     assert len(result.prepared) == 3
     for name, run in result.prepared.items():
-        assert f'id="figure-quality_{name}"' in text
+        assert f'href="figures/quality_{name}.png"' in text
         assert (page.parent / "figures" / f"quality_{name}.png").exists()
         with (page.parent / "tables" / f"quality_{name}.csv").open(encoding="utf-8") as file:
             rows = list(csv.reader(file))
         assert len(rows) == 1 + len(run.data_vars)
-    assert text.count("data:image/png;base64,") >= 3
     with (page.parent / "tables" / "runs.csv").open(encoding="utf-8", newline="") as file:
         assert [row[0] for row in csv.reader(file)] == ["run", *result.prepared]
 
@@ -272,18 +278,22 @@ def test_each_setting_of_a_model_says_where_it_comes_from(page):
 
 
 def test_the_published_divergences_stand_beside_a_study_that_asks_for_them(result):
-    assert "paper: EV" not in divergence_table(result, "bayesian", "paper").columns[-1]
+    columns = divergence_table(result, "bayesian", "paper").columns
+    assert not any("paper" in each for each in columns)
     settings = result.settings
     settings["output"]["paper"] = True
     asked = replace(result, attrs={**result.attrs, "settings": json.dumps(settings)})
     table = divergence_table(asked, "bayesian", "paper")
-    assert table.columns[-1] == "paper: EV, another data set"
-    assert [row[-1] for row in table.rows if row[0] == "heave"] == [PUBLISHED["heave"]]
+    assert table.columns[-4:] == ("paper: EV", "paper: q0.025", "paper: q0.975", "paper: U")
+    assert [row[-4:] for row in table.rows if row[0] == "heave"] == [PUBLISHED["heave"]]
+    # U is the distance of the quantiles, to the rounding of the last digit.
+    for _, low, high, width in PUBLISHED.values():
+        assert float(high) - float(low) == pytest.approx(float(width), abs=1.01e-4)
 
 
 def test_words_and_symbols_are_said_once(page):
     text = page.read_text("utf-8")
-    assert text.count("Words and symbols") == 1
+    assert text.count(">Words and symbols<") == 2  # the heading, and its place among the contents
     for term in ("cell", "T̂", "NAMMAE", "HDMDc, BHDMDc", "EV, U"):
         assert f"<dt>{term}</dt>" in text
     assert "θ pitch; z\u0307 heave rate" in text
@@ -402,7 +412,7 @@ def test_packing_loses_a_step_of_the_range_at_most():
 
 
 def test_the_interactive_lines_have_the_dashes_of_the_figures(result):
-    single, ensemble = history_data(result)[0]["channels"][0]["models"]
+    single, ensemble = history_data(result)["models"]
     assert single["dash"] == list(LINES["forecast"]["linestyle"][1])
     assert ensemble["dash"] == list(LINES["ensemble"]["linestyle"][1])
 
@@ -486,7 +496,7 @@ def test_nothing_is_asked_for_and_nothing_complained_of(opened, page):
 
 def test_the_time_histories_zoom_choose_and_show_members(opened):
     from selenium.webdriver import ActionChains
-    from selenium.webdriver.support.ui import Select
+    from selenium.webdriver.support.ui import Select, WebDriverWait
 
     canvas = opened.find_element("id", "history")
     whole = state(opened, "range")
@@ -503,12 +513,23 @@ def test_the_time_histories_zoom_choose_and_show_members(opened):
     assert state(opened, "range") != whole
     ActionChains(opened).double_click(canvas).perform()
     assert state(opened, "range") == whole
+    assert state(opened, "channel") == "heave"
     Select(opened.find_element("id", "pick-channel")).select_by_index(1)
     assert state(opened, "channel") == "pitch"
-    first = state(opened, "cell")
-    Select(opened.find_element("id", "pick-cell")).select_by_index(1)
-    assert state(opened, "cell") != first
+    opening = state(opened, "cell")
+    for place in ("pick-window", "pick-training"):  # each in a file that is loaded now
+        before = state(opened, "cell")
+        Select(opened.find_element("id", place)).select_by_index(1)
+        WebDriverWait(opened, 10).until(lambda _, old=before: state(opened, "cell") != old)
     assert state(opened, "channel") == "pitch"
+    for place in ("pick-training", "pick-window"):
+        Select(opened.find_element("id", place)).select_by_index(0)
+    assert state(opened, "cell") == opening
+    ActionChains(opened).move_to_element(opened.find_element("tag name", "h1")).perform()
+    assert re.search(
+        r"NRMSE of pitch in this window: deterministic \d\.\d{3}, Bayesian mean \d\.\d{3}$",
+        opened.find_element("id", "history-readout").text,
+    )
     assert "members" not in state(opened, "drawn")
     opened.find_element("css selector", "#history-show input[value=members]").click()
     assert "members" in state(opened, "drawn")
@@ -516,7 +537,9 @@ def test_the_time_histories_zoom_choose_and_show_members(opened):
         "Bayesian members", "Bayesian band", "measured", "deterministic", "Bayesian mean"
     ]  # fmt: skip
     ActionChains(opened).move_to_element(canvas).perform()
-    assert "measured" in opened.find_element("id", "history-readout").text
+    told = opened.find_element("id", "history-readout").text
+    assert re.search(r"measured -?[\d.e-]+ deg", told)
+    assert re.search(r"wave elevation.* m\b", told)
     assert opened.get_log("browser") == []
 
 
@@ -551,7 +574,7 @@ def test_models_stand_beside_the_baselines_and_lost_forecasts_are_named(result):
     lost = xr.Dataset({key: ("cell", [value]) for key, value in cell.items()})
     groups = {**result.groups, "statistics/skill/unseen": skill, "statistics/lost": lost}
     judged = replace(result, groups=groups)
-    table = errors(judged).tables[0]
+    table = errors(judged).tables[1]
     found = ("-20 [-35, -5]", "+10 [-5, +25] cannot tell")
     assert table.rows == (("a & b < c", "best linear (Bayesian)", "deterministic", *found),)
     (notice,) = (text for text in summary(judged).notices if "diverged and are left out" in text)

@@ -1,72 +1,64 @@
-"""The words on regular waves claim no more than their numbers."""
+"""The table on regular waves says what of the error is offset, amplitude and phase."""
 
 import json
 
 import numpy as np
+import pytest
 import xarray as xr
 
-from seakeep.report.sections.regular import response_words
+from seakeep.report.sections.regular import regular
 from seakeep.study import StudyResult
 
 
-def result(offsets, shift=2.0, ratio=0.5, slack=0.0):
-    """A study of one test set; falling back to the training mean makes shift / ratio SDs."""
+def result(offset, wave=0.3, rest=0.1, slack=0.0):
+    """A study of one model in regular waves of two lengths."""
     names = ["surge", "mooring_stern"]
-    each = {"sd_ratio": ratio, "mean_shift": shift}
-    parts = {"error_wave": 0.3, "error_rest": 0.1, "amplitude_ratio": 0.9, "phase_lead": 5.0}
+    parts = {"error_offset": offset, "error_wave": wave, "error_rest": rest}
+    parts |= {"amplitude_ratio": 0.9, "phase_lead": -5.0}
     response = xr.Dataset(
-        {
-            **{key: ("channel", [value, value]) for key, value in each.items()},
-            **{key: (("model", "channel"), [[value, value]]) for key, value in parts.items()},
-            "error_offset": (("model", "channel"), [list(offsets)]),
-            "celerity": ("model", [np.nan]),
-            "celerity_phase": ("model", [np.nan]),
-        },
+        {key: (("model", "channel"), [[value, value]]) for key, value in parts.items()},
         coords={"model": ["m"], "channel": names},
-        attrs={"frequency": 0.86, "energy_share": 0.2, "height_ratio": 0.95, "surge_shift": 0.0},
     )
     runs = xr.Dataset(
-        {"slack": (("run", "name"), [[np.nan, slack]])}, coords={"run": ["wave"], "name": names}
+        {"slack": (("run", "name"), [[np.nan, slack], [np.nan, 0.0]])},
+        coords={"run": ["short", "long"], "name": names},
     )
-    test = xr.Dataset({"run": ("window", ["wave"])}, coords={"channel": names})
-    settings = {"tests": {"t": {"label": ""}}}
+    settings = {"tests": {"short": {"label": "regular, λ/L 1.5"}, "long": {"label": ""}}}
     groups = {
         "channels": xr.Dataset(
-            {"long_name": ("name", ["surge", "stern mooring load"])},
-            coords={"channel": names, "name": names},
+            {
+                "long_name": ("name", ["surge", "stern mooring load"]),
+                "channel": ("channel", names),
+            },
+            coords={"name": names},
         ),
-        "statistics/response/t": response,
         "runs": runs,
-        "tests/t": test,
     }
-    return StudyResult(None, {"settings": json.dumps(settings), "models": '{"m": {}}'}, groups)
+    for name in settings["tests"]:
+        groups[f"statistics/response/{name}"] = response
+        groups[f"tests/{name}"] = xr.Dataset({"run": ("window", [name])}, coords={"channel": names})
+    models = {"m": {"kind": "hankel_dmdc", "ensemble": False}}
+    attrs = {"settings": json.dumps(settings), "models": json.dumps(models)}
+    return StudyResult(None, attrs, groups)
 
 
-def words(*arguments, **keywords):
-    return response_words(result(*arguments, **keywords), "t")
+def test_one_table_holds_all_waves_side_by_side():
+    (table,) = regular(result(0.4)).tables
+    assert table.columns[2:6] == (
+        "λ/L 1.5: amplitude", "λ/L 1.5: phase [°]", "λ/L 1.5: offset [SD]", "λ/L 1.5: share"
+    )  # fmt: skip
+    # 0.16 of 0.16 + 0.09 + 0.01 of the mean square is the offset's.
+    assert table.rows[0] == ("surge", "m", *("0.90", "-5", "0.40", "62 %") * 2)
 
 
-def test_an_offset_of_the_size_of_a_fall_back_is_explained_by_it():
-    said = words((4.4, 3.0))  # 4 SD expected: factors 1.1 and 1.33
-    assert "accounts for the offset within a factor of 1.5" in said
-    assert "does not account" not in said
+@pytest.mark.parametrize(("part", "told"), [(0.0, False), (0.512, True)])
+def test_a_slack_line_is_named_with_its_share(part, told):
+    words = regular(result(0.4, slack=part)).words
+    assert len(words) == told
+    if told:
+        assert "stern mooring load in 51 % of short." in words[0]
 
 
-def test_an_offset_of_another_size_is_not_explained():
-    said = words((4.4, 1.3))  # a factor of 3 below what a fall-back makes
-    assert "accounts for the offset in surge within a factor of 1.5" in said
-    assert "in measured SDs, of 4.0 in stern mooring load: that does not account" in said
-    alone = words((10.0, 1.3))
-    assert "steady drift" not in alone
-    assert "of 4.0 in surge, 4.0 in stern mooring load: that does not account" in alone
-
-
-def test_a_slack_line_is_named_with_its_share():
-    assert "Slack line: stern mooring load in 51 %" in words((4.4, 3.0), slack=0.512)
-    assert "lack line" not in words((4.4, 3.0), slack=0.0)
-
-
-def test_heights_are_said_to_be_heights():
-    assert "0.95 times as high (heights counted as 4 standard deviations of the" in words(
-        (0.1, 0.1)
-    )
+def test_a_forecast_without_error_has_no_share_of_it():
+    (table,) = regular(result(0.0, wave=0.0, rest=0.0)).tables
+    assert table.rows[0][5] == "–"

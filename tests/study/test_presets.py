@@ -10,7 +10,7 @@ from seakeep import Uniform
 from seakeep.campaign import ModelSettings, read_campaign
 from seakeep.campaign.settings import is_elevation
 from seakeep.study import describe, judge, read_study
-from seakeep.study.reproduce import Size, study_text
+from seakeep.study.reproduce import ACTS, Size, study_text
 from seakeep.study.resolve import build_spec, can_align, resolve_model
 
 pytest.importorskip("numba", reason="the campaign is the virtual tank's")
@@ -83,8 +83,10 @@ def through_study(folder, preset):
 
 
 def through_reproduce(folder, preset):
-    path = folder / "study.toml"
-    path.write_text(study_text(preset, Size(), 0), encoding="utf-8")
+    act = next(act for act in ACTS if act.preset == preset and not act.without_drift)
+    path = folder / act.name / "study.toml"
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(study_text(act, Size(), 0), encoding="utf-8")
     return of_study(path)
 
 

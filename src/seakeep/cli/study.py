@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, TypeVar, cast
 
 import typer
 
@@ -17,8 +17,11 @@ from seakeep.errors import RequestError
 
 if TYPE_CHECKING:
     from seakeep.study import StudyResult
+    from seakeep.study.settings import Preset
 
 __all__ = ["report", "reproduce", "study"]
+
+Found = TypeVar("Found")
 
 Workers = Annotated[
     int | None,
@@ -48,16 +51,29 @@ def study(
 
     Example: seakeep study examples/ntnu_ship_section/study.toml -o ship-study
     """
+    from seakeep.report.sections.summary import findings, overview_table
     from seakeep.study import read_study, run_study
 
     asked = read_study(study_file)
     folder = out or study_file.parent / f"{study_file.stem}-results"
-    _run(
+    found, page = _run(
         folder,
         checked_count(workers, scheduler),
         scheduler,
         lambda executor, tell: run_study(asked, folder, executor=executor, progress=tell),
+        _write_study,
     )
+    print_table(overview_table(found), note=False)
+    for text in findings(found):
+        results().print(text, soft_wrap=True)
+    results().print(f"\nReport: {page}", soft_wrap=True)
+
+
+def _write_study(_: Path, found: StudyResult) -> Path:
+    from seakeep.report.page import write_report
+
+    with _Progress("Report") as tell:
+        return write_report(found, tell)
 
 
 def reproduce(
@@ -68,8 +84,9 @@ def reproduce(
         bool, typer.Option("--quick", help="All stages with small counts, in a minute.")
     ] = False,
     preset: Annotated[
-        str, typer.Option("--preset", help="paper, or recommended (our choices).")
-    ] = "paper",
+        str | None,
+        typer.Option("--preset", help="paper or recommended: the acts of this preset alone."),
+    ] = None,
     seed: Annotated[
         int,
         typer.Option("--seed", help="Seed of waves, noise, windows, draws.", min=0, max=2**64 - 1),
@@ -77,30 +94,37 @@ def reproduce(
     workers: Workers = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """Reproduce the paper's study on the virtual tank.
+    """Reproduce the paper's study on the virtual tank, in three acts.
 
-    Needs no data. Virtual campaign, preparation, deterministic and Bayesian identification,
-    validation in irregular and regular waves, statistics, figures, tables and a report.
+    Needs no data. The paper's procedure, the same on channels with their slow drift, and the
+    recommended model, all on the same six runs; statistics, figures, tables and a report.
 
     Example: seakeep reproduce --quick --out quick
     """
-    if preset not in ("paper", "recommended"):
+    if preset not in (None, "paper", "recommended"):
         raise RequestError(f"--preset must be paper or recommended; received '{preset}'.")
-    from seakeep.study.reproduce import Size
+    from seakeep.report.acts import acts_table
+    from seakeep.study.reproduce import ACTS, Size
     from seakeep.study.reproduce import reproduce as reproduce_study
 
-    chosen: Literal["paper", "recommended"] = "paper" if preset == "paper" else "recommended"
+    chosen = cast("Preset | None", preset)
     size = Size.quick() if quick else Size()
     # The few units of the quick study are done before another process has started.
     count = 1 if quick and workers is None else checked_count(workers, scheduler)
-    _run(
+
+    found, page = _run(
         out,
         count,
         scheduler,
         lambda executor, tell: reproduce_study(
             out, chosen, size=size, seed=seed, executor=executor, progress=tell
         ),
+        _write_reproduction,
     )
+    print_table(acts_table(found), note=False)
+    for act in (act for act in ACTS if act.name in found):
+        results().print(f"{act.title}: {act.sentence}", soft_wrap=True)
+    results().print(f"\nReport: {page}", soft_wrap=True)
 
 
 def report(
@@ -112,13 +136,26 @@ def report(
 
     Example: seakeep report reproduction
     """
-    from seakeep.report.page import write_report
     from seakeep.study import read_result
+    from seakeep.study.reproduce import read_reproduction
 
-    found = read_result(folder)
-    with _Progress("Report") as tell:
-        page = write_report(found, tell)
+    if acts := read_reproduction(folder):
+        page = _write_reproduction(folder, acts)
+    else:
+        page = _write_study(folder, read_result(folder))
     typer.echo(str(page))
+
+
+def _write_reproduction(folder: Path, found: dict[str, StudyResult]) -> Path:
+    """Write the page of each act, and the one over them."""
+    from seakeep.report.acts import write_reproduction
+    from seakeep.report.page import write_report
+
+    for name, each in found.items():  # all acts have the same runs
+        with _Progress(f"Report of {each.attrs['study']}") as tell:
+            write_report(each, tell, pictures=name == next(reversed(found)))
+    with _Progress("Report") as tell:
+        return write_reproduction(folder, found, tell)
 
 
 class _Progress:
@@ -156,23 +193,18 @@ def _run(
     folder: Path,
     workers: int,
     scheduler: str | None,
-    work: Callable[[Executor | None, Report], StudyResult],
-) -> None:
+    work: Callable[[Executor | None, Report], Found],
+    write: Callable[[Path, Found], Path],
+) -> tuple[Found, Path]:
+    """Do the work and write its report; what was stopped is kept."""
     from seakeep.models.executor import make_executor
-    from seakeep.report.page import write_report
-    from seakeep.report.sections.summary import findings, overview_table
 
     try:
         with make_executor(workers, scheduler) as executor, _Progress("Study") as tell:
             found = work(executor, tell)
-        with _Progress("Report") as tell:
-            page = write_report(found, tell)
+        return found, write(folder, found)
     except KeyboardInterrupt as stop:
         stop.add_note(
             f"What was finished is kept in {folder}; the same command goes on where it stopped."
         )
         raise
-    print_table(overview_table(found), note=False)
-    for text in findings(found):
-        results().print(text, soft_wrap=True)
-    results().print(f"\nReport: {page}", soft_wrap=True)

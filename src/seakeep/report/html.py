@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup, escape
 
+from seakeep.report.tables import shade
+
 if TYPE_CHECKING:
     from jinja2 import Environment
 
@@ -33,6 +35,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     made.globals["source"] = _source
+    made.filters["shade"] = shade
     made.filters["minus"] = lambda text: re.sub(r"(?<![\w)])-(?=\d)", "−", text)
     return made
 
@@ -43,13 +46,17 @@ def _source(name: str) -> Markup:
     return Markup(folder.joinpath(name).read_text("utf-8"))
 
 
-def inline_svg(text: str, name: str) -> Markup:
+def inline_svg(text: str, name: str, words: str) -> Markup:
     """Turn an SVG file into an element that may stand inside a page beside others."""
     text = text[text.index("<svg") :]
+    label = f"title-{name}"
+    title = f'role="img" aria-labelledby="{label}"><title id="{label}">{escape(words)}</title>'
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
+    text = re.sub(r"<title>.*?</title>", "", text, flags=re.S)
     text = re.sub(r'\bid="', f'id="{name}-', text)
     text = re.sub(r'href="#', f'href="#{name}-', text)
-    return Markup(re.sub(r"url\(#", f"url(#{name}-", text))
+    text = re.sub(r"url\(#", f"url(#{name}-", text)
+    return Markup(text.replace(">", f" {title}", 1))
 
 
 def inline_picture(png: bytes, words: str) -> Markup:

@@ -27,7 +27,7 @@ class Drawing:
     draw : callable
         Draws it.
     raster : bool, optional
-        Too many points for vectors: PNG alone, folded away on the page until it is wanted.
+        Too many points for vectors: a PNG file beside the page, which links to it.
     """
 
     name: str
@@ -46,15 +46,17 @@ class Section:
         Name of its place on the page.
     title : str
         Heading.
+    words : sequence of str
+        Paragraphs.
     points : sequence of str
         Results, as a list.
+    links : sequence of (str, str)
+        Addresses of other files, and words for them.
     notices : sequence of str
         Paragraphs that stand out.
     terms : sequence of (str, str)
         Words and what they mean.
-    words : sequence of str
-        Paragraphs.
-    histories : list of dict, optional
+    histories : dict, optional
         Data of an interactive plot, from :func:`seakeep.report.sections.histories.history_data`.
     figures : sequence of Drawing
         Figures.
@@ -64,10 +66,11 @@ class Section:
 
     key: str
     title: str
+    words: tuple[str, ...] = ()
     points: tuple[str, ...] = ()
+    links: tuple[tuple[str, str], ...] = ()
     notices: tuple[str, ...] = ()
     terms: tuple[tuple[str, str], ...] = ()
-    words: tuple[str, ...] = ()
-    histories: list[dict[str, Any]] | None = None
+    histories: dict[str, Any] | None = None
     figures: tuple[Drawing, ...] = ()
     tables: tuple[Table, ...] = ()

@@ -25,6 +25,7 @@ __all__ = [
     "plain_cell",
     "probability",
     "rich_table",
+    "shade",
     "signed",
     "small_number",
     "write_csv",
@@ -58,6 +59,8 @@ class Table:
         Rows that are averages of others.
     folded : bool
         Whether a page folds it away until it is wanted.
+    heat : tuple of int
+        Columns of errors whose size a page shows as a shade; such a table stands before figures.
     """
 
     name: str
@@ -69,6 +72,26 @@ class Table:
     elsewhere: tuple[int, ...] = ()
     averages: tuple[int, ...] = ()
     folded: bool = False
+    heat: tuple[int, ...] = ()
+
+
+SHADES = (0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
+"""Errors in SD at which the shade of a cell changes."""
+
+
+def shade(text: str) -> int:
+    """Shade of a cell: how many of the steps an error is beyond; 0 of no number.
+
+    Examples
+    --------
+    >>> shade("0.05"), shade("0.34"), shade("4.6"), shade("–")
+    (0, 2, 6, 0)
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        return 0
+    return sum(value >= step for step in SHADES)
 
 
 def number(value: float, digits: int = 3) -> str:

@@ -39,7 +39,9 @@ __all__ = [
     "is_regular",
     "joined",
     "judge",
+    "median_of",
     "regular_response",
+    "training_order",
     "verdict",
     "wave_frequency",
 ]
@@ -154,7 +156,7 @@ def difference_table(
     """
     ends = test["start"].values + float(test["time"].values[-1])
     spans = list(zip(test["run"].values.astype(str), test["start"].values, ends, strict=True))
-    order, block = _order_of(training)
+    order, block = training_order(training)
     blocks = block, statistics.overlap_block(spans)
     judged = test["judged"].values[order]
     cells = np.stack(
@@ -193,7 +195,7 @@ def difference_table(
     )
 
 
-def _order_of(training: xr.Dataset) -> tuple[npt.NDArray[np.intp], int]:
+def training_order(training: xr.Dataset) -> tuple[npt.NDArray[np.intp], int]:
     """Training sets in the order of their instants, and how many neighbours overlap."""
     count = training.sizes["training"]
     if "run" not in training:
@@ -467,8 +469,9 @@ def _divergences(
     curves = np.full((7, len(channels), 512), np.nan)
     for c, channel in enumerate(channels):
         p, m = predicted[:, :, c], measured[:, c]
-        if not len(p) or np.ptp(m) == 0 or np.any(np.ptp(p, axis=1) == 0):
-            continue
+        inside = p.reshape(len(p), -1, test.sizes["time"])
+        if not len(p) or np.ptp(m) == 0 or np.any(np.ptp(inside, axis=2).max(axis=1) == 0):
+            continue  # what stands still has no density
         try:
             for v, variant in enumerate(VARIANTS):
                 stream = f"jsd.{name}.{variant}.{channel}"

@@ -413,6 +413,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
     specs = [each.spec for each in models.values()]
     needs = needs_of(specs, dt)
     training = choose_training(settings, runs, training_names, needs)
+    default = "whole" if settings.training.scheme == "leave_out" else "test"
     tests = {
         name: choose_tests(
             name,
@@ -421,7 +422,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
             testing[name],
             steps=periods_to_samples(test.length, period, dt),
             needs=needs,
-            whole=settings.training.scheme == "leave_out",
+            whole=(test.part or default) == "whole",
             seed=settings.study.seed,
         )
         for name, test in settings.tests.items()

@@ -1,9 +1,14 @@
-"""The paper's study on the virtual tank: played, prepared, identified, judged, from nothing."""
+"""The paper's study on the virtual tank in three acts: played, prepared, identified, judged.
+
+All acts forecast the same windows of the same six runs. The first takes the slow drift out of the
+channels that carry it, the second leaves it in, the third gives it to the recommended model.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import re
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,39 +16,95 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from seakeep.campaign import read_campaign, write_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
-from seakeep.study.store import StudyResult, storing, versions
+from seakeep.study.store import StudyResult, read_result, storing, versions
 
-__all__ = ["Size", "reproduce"]
+__all__ = ["ACTS", "SLOW", "Act", "Size", "read_reproduction", "reproduce"]
 
 NOTE = (
     "Virtual tank: a made-up vessel in made-up seas, so no number here replicates the paper's. Its "
     "raw files come from four loggers with clocks of their own, with noise, drop-outs and slap, "
     "and were prepared as a tank's would be."
 )
+WAVES = "√(2E Δf); 100 components at equal spacing, as the paper prints it"
 
-WAVES = {
-    "paper": "√(2E Δf); 100 components at equal spacing, as printed",
-    "recommended": "√(2E Δf); 100 components at jittered frequencies, which do not repeat",
-}
+SLOW = ("surge", "mooring_bow", "mooring_stern")
+"""Channels that slow drift moves; all others move with the waves."""
+HIGH_PASS = 0.15
+"""Hz: below the slowest wave that is played (0.28 Hz), far above the drift (0.03 Hz)."""
+HIGHEST = 9.0
+"""Hz, the other edge of that band: just below the Nyquist frequency after resampling (9.75 Hz)."""
 
 STUDY_FILE = "reproduction's study file"
+CAMPAIGN_FILE = "reproduction's campaign file"
+
+
+@dataclass(frozen=True)
+class Act:
+    """One of the three studies.
+
+    Parameters
+    ----------
+    name : str
+        Folder of its study.
+    title : str
+        Words for headings.
+    sentence : str
+        What is done in it.
+    preset : {"paper", "recommended"}
+        Of its models.
+    without_drift : bool
+        Whether slow drift is removed from the channels that carry it.
+    """
+
+    name: str
+    title: str
+    sentence: str
+    preset: Preset
+    without_drift: bool = False
+
+
+ACTS = (
+    Act(
+        "paper",
+        "(a) the paper's procedure",
+        f"Surge and both mooring loads have lost what is slower than {HIGH_PASS:g} Hz, their slow "
+        "drift. That is inferred: behind the integration filter the paper's source has a comment, "
+        "“along with detrending”.",
+        "paper",
+        without_drift=True,
+    ),
+    Act(
+        "raw",
+        "(b) the same on raw channels",
+        "The same models in the same windows forecast the channels as measured, drift included.",
+        "paper",
+    ),
+    Act(
+        "recommended",
+        "(c) the recommended model",
+        "The recommended model learns from the two other irregular runs and forecasts the "
+        "channels as measured, in the same windows; it reads no motion measured after the start.",
+        "recommended",
+    ),
+)
 
 
 @dataclass(frozen=True)
 class Size:
-    """Counts of the study; nothing else differs between the quick and the full one.
+    """Counts of the studies; nothing else differs between the quick and the full ones.
 
     Parameters
     ----------
     training, tests : int
         Windows.
     members : int
-        Members of the ensemble.
+        Members of the ensembles.
     series : int
         Bootstrapped series.
     """
@@ -55,28 +116,28 @@ class Size:
 
     @classmethod
     def quick(cls) -> Size:
-        """Counts that show all stages in less than a minute."""
+        """Counts that show all stages in a minute."""
         return cls(training=2, tests=2, members=10, series=20)
 
 
 def reproduce(
     out: Path | str,
-    preset: Preset = "paper",
+    preset: Preset | None = None,
     *,
     size: Size | None = None,
     seed: int = 0,
     executor: Executor | None = None,
     progress: Progress | None = None,
-) -> StudyResult:
-    """Play the virtual campaign and run the paper's study on it.
+) -> dict[str, StudyResult]:
+    """Play the virtual campaign and run the paper's study on it, in three acts.
 
     Parameters
     ----------
     out : Path or str
-        Folder: ``campaign/`` for the raw files and the truth, ``study.toml``, and the results.
+        Folder: ``campaign/`` for the raw files and the truth, and a folder per act with its
+        ``study.toml`` and its results.
     preset : {"paper", "recommended"}, optional
-        The paper's choices, or ours: leave-one-run-out, windows without overlap, waves that do not
-        repeat.
+        Play the acts of this preset alone: the first two, or the third.
     size : Size, optional
         Counts; the default is the paper's.
     seed : int, optional
@@ -88,34 +149,72 @@ def reproduce(
 
     Returns
     -------
-    StudyResult
-        All that was found; a study that was stopped goes on.
+    dict of str to StudyResult
+        All that was found, by act; what was stopped goes on.
 
     Raises
     ------
     RequestError
-        If the tank's libraries are not installed, or the folder holds another study.
+        If the tank's libraries are not installed, or a folder holds another study.
     StorageError
         If the disk is full.
     """
     out, counts = Path(out), size or Size()
-    with storing(out):
-        out.mkdir(parents=True, exist_ok=True)
-    check_output(out / "study.toml", STUDY_FILE)
-    nominal = _play(out / "campaign", preset, seed, progress)
-    with storing(out), replacing(out / "study.toml") as temporary:
-        temporary.write_text(study_text(preset, counts, seed), encoding="utf-8")
-    return run_study(
-        read_study(out / "study.toml"),
-        out,
-        executor=executor,
-        progress=progress,
-        extra={"nominal": nominal},
-        notes={"preparation_note": NOTE, "waves_note": WAVES[preset]},
-    )
+    acts = [act for act in ACTS if preset in (None, act.preset)]
+    for act in acts:
+        with storing(out):
+            (out / act.name).mkdir(parents=True, exist_ok=True)
+        check_output(out / act.name / "study.toml", STUDY_FILE)
+    nominal = _play(out / "campaign", seed, progress)
+    detrended = out / "campaign" / "detrended.toml"
+    text = (out / "campaign" / "campaign.toml").read_text(encoding="utf-8")
+    _write(detrended, detrended_text(text), CAMPAIGN_FILE)
+    raw = read_campaign(out / "campaign" / "campaign.toml")
+    write_prepared(raw, progress=_named(progress, "preparing "))  # for two acts
+    found = {}
+    for act in acts:
+        path = out / act.name / "study.toml"
+        _write(path, study_text(act, counts, seed), STUDY_FILE)
+        found[act.name] = run_study(
+            read_study(path),
+            path.parent,
+            executor=executor,
+            progress=_named(progress, f"{act.title}: "),
+            extra={"nominal": nominal},
+            notes={"preparation_note": f"{act.sentence} {NOTE}", "waves_note": WAVES},
+        )
+    return found
 
 
-def _play(folder: Path, preset: Preset, seed: int, progress: Progress | None) -> xr.Dataset:
+def read_reproduction(out: Path | str) -> dict[str, StudyResult]:
+    """Read the results of the acts that a folder holds; empty where it holds none.
+
+    Parameters
+    ----------
+    out : Path or str
+        Folder of :func:`reproduce`.
+
+    Returns
+    -------
+    dict of str to StudyResult
+        By act.
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`seakeep.study.read_result`.
+    """
+    played = [act.name for act in ACTS if (Path(out) / act.name / "study.toml").exists()]
+    return {name: read_result(Path(out) / name) for name in played}
+
+
+def _write(path: Path, text: str, kind: str) -> None:
+    check_output(path, kind)
+    with storing(path.parent), replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _play(folder: Path, seed: int, progress: Progress | None) -> xr.Dataset:
     """Play the campaign unless it lies there already; return its nominal spectra."""
     try:
         from seakeep.tank.play import play
@@ -126,14 +225,13 @@ def _play(folder: Path, preset: Preset, seed: int, progress: Progress | None) ->
             f"the virtual tank needs {error.name}, which is not installed. Install it with: pip "
             "install 'seakeep[tank]'"
         ) from error
-    spacing = "equal" if preset == "paper" else "jittered"
-    settings = with_waves(default_settings(), seed, spacing)
+    settings = with_waves(default_settings(), seed, "equal")
     made = json.dumps({"settings": settings.model_dump(mode="json"), "versions": versions()})
     digest = hashlib.sha256(made.encode()).hexdigest()
     mark = folder / "played.txt"
     if not mark.exists() or mark.read_text(encoding="utf-8").strip() != digest:
         with storing(folder):
-            play(settings, folder, progress=_playing(progress))
+            play(settings, folder, progress=_named(progress, "playing "))
             mark.write_text(digest + "\n", encoding="utf-8")
     frequency = np.linspace(0.2, 1.5, 261)
     spectra = {
@@ -153,37 +251,57 @@ def _play(folder: Path, preset: Preset, seed: int, progress: Progress | None) ->
     )
 
 
-def _playing(progress: Progress | None) -> Progress | None:
+def _named(progress: Progress | None, words: str) -> Progress | None:
     if progress is None:
         return None
     report = progress
-    return lambda done, total, name: report(done, total, f"playing {name}")
+    return lambda done, total, name: report(done, total, f"{words}{name}")
 
 
-def study_text(preset: Preset, size: Size, seed: int) -> str:
-    """Study file of the reproduction."""
-    paper = preset == "paper"
-    training = (
-        ['scheme = "halves"', f"windows = {size.training}", 'placement = "random"']
-        if paper
-        else ['scheme = "leave_out"', 'leave_out = "run"']
-    )
-    placement = "random" if paper else "apart"
-    alignment = ['alignment = { mode = "effective", surge = "measured" }'] if paper else []
+def detrended_text(campaign: str) -> str:
+    """Campaign file in which the drifting channels have lost what is slower than the waves.
+
+    What was measured keeps a name of its own, ``NAME_with_drift``: the waves are still carried to
+    where the vessel is.
+    """
+    text = campaign
+    for name in SLOW:
+        text = re.sub(
+            rf"^\[(channels|derived)\.{name}\]", rf"[\1.{name}_with_drift]", text, flags=re.M
+        )
+        text = re.sub(
+            rf'^(from|position) = "{name}"', rf'\1 = "{name}_with_drift"', text, flags=re.M
+        )
+    made = [
+        f'[derived.{name}]\nfrom = "{name}_with_drift"\nstep = "band_pass"\n'
+        f"band = [{HIGH_PASS:g}, {HIGHEST:g}]  # Hz\n"
+        for name in SLOW
+    ]
+    head = f"# {MARK}: {CAMPAIGN_FILE}\n# campaign.toml without slow drift in three channels.\n"
+    return "\n".join([head + text, *made])
+
+
+def study_text(act: Act, size: Size, seed: int) -> str:
+    """Study file of an act."""
+    paper = act.preset == "paper"
+    surge = "surge_with_drift" if act.without_drift else "surge"
+    aligned = f'alignment = {{ mode = "effective", surge = "measured", surge_channel = "{surge}" }}'
+    alignment = [aligned] if paper else []
+    halves = ['scheme = "halves"', f"windows = {size.training}", 'placement = "random"']
     lines = [
-        "# The paper's study on the virtual tank; written by `seakeep reproduce`.",
+        f"# The paper's study on the virtual tank, {act.title}; written by `seakeep reproduce`.",
         f"# {MARK}: {STUDY_FILE}",
         "[study]",
-        'name = "Virtual CK-14e"',
+        f'name = "Virtual CK-14e, {act.title}"',
         'description = "HDMDc and BHDMDc of a moored vessel with a moon pool in head seas; data '
         'of the virtual towing tank"',
-        'campaign = "campaign/campaign.toml"',
-        'truth = "campaign/truth"',
-        f'preset = "{preset}"',
+        f'campaign = "../campaign/{"detrended" if act.without_drift else "campaign"}.toml"',
+        *([] if act.without_drift else ['truth = "../campaign/truth"']),
+        f'preset = "{act.preset}"',
         f"seed = {seed}",
         "",
         "[training]",
-        *training,
+        *(halves if paper else ['scheme = "leave_out"', 'leave_out = "run"']),
         "",
         "[models.deterministic]",
         'kind = "hankel_dmdc"',
@@ -194,21 +312,42 @@ def study_text(preset: Preset, size: Size, seed: int) -> str:
         f"n_members = {size.members}",
         *alignment,
         "",
+        "[models.mean]",
+        'kind = "mean"',
+        "",
+        "[models.hold_last]",
+        'kind = "hold_last"',
+        "",
+        "[models.fir]",
+        'kind = "fir"',
+        'preset = "recommended"',
+        'lead = "2 T"  # what the recommended model reads: so the windows of all acts are the same',
+        'input_delays = "5 T"  # of them 3 T before the instant',
+        *alignment,
+        "",
+        "[tests.irregular]",
+        'waves = "irregular"',
+        'label = "irregular"',
+        "length = 15",
+        f"windows = {size.tests}",
+        'part = "test"',
+        "",
     ]
-    sets = {"irregular": ('waves = "irregular"', "irregular", 15)}
-    for name, ratio in (("regular_1_5", "1.5"), ("regular_2", "2"), ("regular_3", "3")):
-        sets[name] = (f'runs = ["{name}"]', f"regular, λ/L {ratio}", 5)
-    if not paper:
-        sets["irregular_long"] = ('waves = "irregular"', "irregular, long horizon", 45)
-    for name, (runs, label, length) in sets.items():
+    for name, ratio in REGULAR.items():
         lines += [
             f"[tests.{name}]",
-            runs,
-            f'label = "{label}"',
-            f"length = {length}",
+            f'runs = ["{name}"]',
+            f'label = "regular, λ/L {ratio}"',
+            "length = 5",
             f"windows = {size.tests}",
-            f'placement = "{placement}"',
+            f"startup = {STARTUP}  # s: all acts have room for their delays, and the same windows",
             "",
         ]
     lines += ["[statistics]", f"n_series = {size.series}", "", "[output]", "paper = true", ""]
     return "\n".join(lines)
+
+
+REGULAR = {"regular_1_5": "1.5", "regular_2": "2", "regular_3": "3"}
+"""Runs in regular waves, and their λ/L."""
+STARTUP = 20
+"""s of a run in regular waves before the first window: longer than any model's history."""

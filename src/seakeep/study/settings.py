@@ -120,6 +120,11 @@ class TestSetSettings(Table):
     placement: Placement = Field(
         default="random", description="'random' as in the paper, or 'apart': without overlap"
     )
+    part: Literal["test", "whole"] | None = Field(
+        default=None,
+        description="where windows are placed: in the 'test' spans, or in 'whole' runs; left out, "
+        "in whole runs with scheme = 'leave_out' alone",
+    )
     startup: Annotated[float, Field(ge=0, allow_inf_nan=False)] = Field(
         default=0.0, description="seconds cut off the start of each test span"
     )

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from seakeep.arrays import FloatArray
 from seakeep.report.figures.common import (
     HEADING,
+    judged_models,
     model_colour,
     model_words,
     short_label,
@@ -33,6 +34,9 @@ NARROW = 14
 FEWEST = 10
 """Values from which on a density is drawn; of fewer, points and box alone."""
 
+HATCHES = ("", "////", "----", "xxxx", "\\\\\\\\")
+"""Of the boxes of one model after the other."""
+
 JITTER = np.random.default_rng(7).uniform(-1, 1, 4096)
 """Sideways places of the single values; the same in every figure."""
 
@@ -42,9 +46,17 @@ DECADE = 10.0
 
 
 def draw_box_violin(
-    axes: Any, values: npt.ArrayLike, place: float, width: float, colour: str
+    axes: Any,
+    values: npt.ArrayLike,
+    place: float,
+    width: float,
+    colour: str,
+    hatch: str = "",
 ) -> None:
-    """Draw one box-violin; a logarithmic axis has no place for values that are not positive."""
+    """Draw one box-violin; the hatch tells models apart in grey print.
+
+    A logarithmic axis has no place for values that are not positive.
+    """
     logarithmic = axes.get_yscale() == "log"
     x = np.asarray(values, dtype=float).ravel()
     x = x[np.isfinite(x) & (not logarithmic or x > 0)]
@@ -68,6 +80,7 @@ def draw_box_violin(
         box.upper_quartile,
         facecolor="white",
         edgecolor=colour,
+        hatch=hatch,
         linewidth=1.0,
         alpha=0.75,
         zorder=3,
@@ -97,11 +110,11 @@ def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
             for place, test in enumerate(tests):
                 for number, model in enumerate(result.models):
                     values = average_of(_cells(result, test, model, measure))
-                    _draw_beside(axes, result, values, place, number, model)
+                    _draw_beside(axes, result, values, place, number, result.models)
             labels = [_narrow(result.label_of(test)) for test in tests]
             _finish(axes, labels, heading)
             axes.set_xlim(-0.6, len(tests) - 0.4)
-        _legend(figure, result)
+        _legend(figure, result, result.models)
         return figure
 
 
@@ -109,20 +122,20 @@ def channel_boxes(result: StudyResult, test: str) -> Figure:
     """NRMSE and NAMMAE of all cells of a test set, channel by channel."""
     with figure_style():
         figure = new_figure(8.5, 5.6)
-        logarithmic = _span_decades(result, test)
+        logarithmic, models = _span_decades(result, test), judged_models(result)
         for axes, measure in zip(figure.subplots(2, 1, sharex=True), HEADING, strict=True):
             tallest = 0.0
             if logarithmic:
                 axes.set_yscale("log")
-            for number, model in enumerate(result.models):
+            for number, model in enumerate(models):
                 cells = _cells(result, test, model, measure)
                 for place in range(cells.shape[1]):
-                    _draw_beside(axes, result, cells[:, place], place, number, model)
+                    _draw_beside(axes, result, cells[:, place], place, number, models)
                     column = cells[:, place][np.isfinite(cells[:, place])]
                     if column.size:
                         tallest = max(tallest, box_statistics(column).upper_whisker)
             if logarithmic:
-                shown = [_cells(result, test, model, measure) for model in result.models]
+                shown = [_cells(result, test, model, measure) for model in models]
                 axes.set_ylim(0.8 * np.nanmin(shown), 1.25 * np.nanmax(shown))
             heading = "NRMSE" if measure == "nrmse" else "NAMMAE"
             _finish(axes, [short_label(name) for name in result.channels], heading)
@@ -132,7 +145,7 @@ def channel_boxes(result: StudyResult, test: str) -> Figure:
                 axes.set_ylim(0, 1.15 * tallest)
                 axes.set_title("values above the axis are not shown", loc="right", fontsize=7)
         axes.set_xlim(-0.6, len(result.channels) - 0.4)
-        _legend(figure, result)
+        _legend(figure, result, models)
         return figure
 
 
@@ -140,7 +153,9 @@ def _span_decades(result: StudyResult, test: str) -> bool:
     """Whether the channels' medians differ by so much that a common axis would hide most."""
     far = False
     for measure in HEADING:
-        cells = np.concatenate([_cells(result, test, model, measure) for model in result.models])
+        cells = np.concatenate(
+            [_cells(result, test, model, measure) for model in judged_models(result)]
+        )
         known = cells[:, np.isfinite(cells).any(axis=0)]
         if not known.size or np.nanmin(known) <= 0:
             return False
@@ -150,11 +165,18 @@ def _span_decades(result: StudyResult, test: str) -> bool:
 
 
 def _draw_beside(
-    axes: Any, result: StudyResult, values: FloatArray, place: int, number: int, model: str
+    axes: Any,
+    result: StudyResult,
+    values: FloatArray,
+    place: int,
+    number: int,
+    models: Sequence[str],
 ) -> None:
-    width = 0.84 / len(result.models)
-    centre = place + width * (number - 0.5 * (len(result.models) - 1))
-    draw_box_violin(axes, values, centre, 0.92 * width, model_colour(result, model))
+    """Draw the box-violin of the model of a number beside those of the others."""
+    width = 0.84 / len(models)
+    centre = place + width * (number - 0.5 * (len(models) - 1))
+    colour = model_colour(result, models[number])
+    draw_box_violin(axes, values, centre, 0.92 * width, colour, HATCHES[number % len(HATCHES)])
 
 
 def _narrow(label: str) -> str:
@@ -185,11 +207,16 @@ def _plain_decades(axes: Any) -> None:
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _legend(figure: Figure, result: StudyResult) -> None:
+def _legend(figure: Figure, result: StudyResult, models: Sequence[str]) -> None:
     from matplotlib.patches import Patch
 
     handles = [
-        Patch(color=model_colour(result, model), label=model_words(model), alpha=0.6)
-        for model in result.models
+        Patch(
+            facecolor="white",
+            edgecolor=model_colour(result, model),
+            hatch=HATCHES[number % len(HATCHES)],
+            label=model_words(model),
+        )
+        for number, model in enumerate(models)
     ]
     figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 5))

@@ -9,12 +9,30 @@ from seakeep.conventions import canonical_channel
 from seakeep.report.style import COLOURS, LINES
 from seakeep.study import StudyResult
 
-__all__ = ["HEADING", "grid_of_axes", "line_of", "model_colour", "model_words", "short_label"]
+__all__ = [
+    "HEADING",
+    "grid_of_axes",
+    "judged_models",
+    "line_of",
+    "model_colour",
+    "model_words",
+    "short_label",
+]
 
 
 FURTHER = ("#CC79A7", "#E69F00", "#009E73", "#56B4E9", "#8C564B", "#56606B", "#9467BD")
 HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
 """Names of the paper for the averages of the two measures over the channels."""
+
+
+BASELINES = ("mean", "hold_last", "fir", "arx", "subspace")
+"""Kinds of models that others are compared with."""
+
+
+def judged_models(result: StudyResult) -> list[str]:
+    """Models that are no baselines; all where none is left."""
+    own = [m for m in result.models if result.model_settings[m].get("kind") not in BASELINES]
+    return own or result.models
 
 
 def model_colour(result: StudyResult, model: str) -> str:
@@ -39,10 +57,11 @@ def model_words(model: str) -> str:
 
     Examples
     --------
-    >>> model_words("bayesian")
-    'Bayesian'
+    >>> model_words("bayesian"), model_words("hold_last"), model_words("fir")
+    ('Bayesian', 'hold last', 'FIR')
     """
-    return "Bayesian" if model == "bayesian" else model.replace("_", " ")
+    known = {"bayesian": "Bayesian", "fir": "FIR", "arx": "ARX"}
+    return known.get(model, model.replace("_", " "))
 
 
 def short_label(channel: str) -> str:

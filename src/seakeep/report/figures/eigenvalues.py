@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from seakeep.report.figures.common import model_colour, model_words
+from seakeep.report.figures.common import judged_models, model_colour, model_words
 from seakeep.report.style import figure_style, new_figure
 from seakeep.study import StudyResult
 
@@ -27,7 +27,7 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
         plane, decay = figure.subplots(1, 2)
         circle = np.exp(1j * np.linspace(0, np.pi, 400))
         plane.plot(circle.real, circle.imag, color="#56606B", linewidth=0.8)
-        order = sorted(result.models, key=lambda model: not result.is_ensemble(model))
+        order = sorted(judged_models(result), key=lambda model: not result.is_ensemble(model))
         for model in order:
             data = result.groups[f"eigenvalues/{model}"]
             values = (data["real"].values + 1j * data["imag"].values).ravel()

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from seakeep.arrays import FloatArray
-from seakeep.report.figures.common import line_of, model_colour, model_words
+from seakeep.report.figures.common import judged_models, line_of, model_colour, model_words
 from seakeep.report.style import figure_style, new_figure
 from seakeep.study import StudyResult
 from seakeep.study.judge import average_of
@@ -51,7 +51,8 @@ def error_over_time_figure(result: StudyResult) -> Figure:
         for each in grid[-1]:
             each.set_xlabel("time in encounter periods")
         handles = [
-            Line2D([], [], **line_of(result, m), label=model_words(m)) for m in result.models
+            Line2D([], [], **line_of(result, m), label=model_words(m))
+            for m in judged_models(result)
         ]
         figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 5))
         return figure
@@ -61,7 +62,7 @@ def _draw_band(axes: Any, result: StudyResult, trend: Any) -> float:
     """Draw ε(t) of a band for all models; return the largest mean."""
     time = trend["time"].values / float(result.attrs["encounter_period"])
     tallest = 0.0
-    for model in result.models:
+    for model in judged_models(result):
         at = trend.sel(model=model)
         style = line_of(result, model)
         lower, upper = at["lower_quartile"].values, at["upper_quartile"].values

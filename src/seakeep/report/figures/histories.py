@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from seakeep.report.figures.common import line_of, model_words, short_label
+from seakeep.report.figures.common import judged_models, line_of, model_words, short_label
 from seakeep.report.style import LINES, THIN, figure_style, new_figure
 from seakeep.study import StudyResult
 from seakeep.study.judge import band_of
@@ -15,7 +15,7 @@ from seakeep.study.judge import band_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["history_figure", "shown_cells"]
+__all__ = ["draw_channel", "history_figure", "shown_cells"]
 
 EDGE: dict[str, Any] = {"linewidth": 0.7, "linestyle": (0, (1, 1))}
 """Bounds of a calibrated band."""
@@ -35,12 +35,18 @@ def shown_cells(result: StudyResult) -> list[tuple[str, int, int]]:
     return cells
 
 
-def history_figure(result: StudyResult, test: str, training: int, window: int) -> Figure:
-    """All channels of one cell over time."""
+def history_figure(
+    result: StudyResult,
+    test: str,
+    training: int,
+    window: int,
+    names: Sequence[str] | None = None,
+) -> Figure:
+    """Channels of one cell over time; all of them unless `names` are given."""
     with figure_style():
         cell = result.tests[test].isel(training=training, window=window)
-        names = result.channels
-        figure = new_figure(7.5, 0.9 + 0.95 * len(names))
+        names = result.channels if names is None else names
+        figure = new_figure(7.5, 0.9 + (0.95 if len(names) > 1 else 1.4) * len(names))
         axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
         alone = result.tests[test].isel(training=[training], window=[window])
         bands = {
@@ -48,10 +54,14 @@ def history_figure(result: StudyResult, test: str, training: int, window: int) -
             for model in result.models
             if (found := result.groups.get(f"calibration/{model}")) is not None
         }
-        for k, (each, name) in enumerate(zip(axes, names, strict=True)):
+        for each, name in zip(axes, names, strict=True):
+            k = result.channels.index(name)
             edges = {model: [edge[0, 0, :, k] for edge in band] for model, band in bands.items()}
-            _draw_channel(each, result, cell.sel(channel=name), name, edges)
-        figure.supylabel("deviation from the training mean, in training SD", fontsize=8)
+            draw_channel(each, result, cell.sel(channel=name), name, edges)
+        figure.supylabel(
+            "deviation from the training mean, in training SD" if len(names) > 1 else "training SD",
+            fontsize=8,
+        )
         axes[-1].set_xlabel(r"time after the last measured state, in encounter periods")
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper right", ncols=min(len(handles), 5))
@@ -65,9 +75,10 @@ def history_figure(result: StudyResult, test: str, training: int, window: int) -
         return figure
 
 
-def _draw_channel(
+def draw_channel(
     axes: Any, result: StudyResult, cell: Any, name: str, edges: Mapping[str, Sequence[Any]]
 ) -> None:
+    """Draw what was measured and the forecasts of all models but baselines."""
     mean, spread = float(cell["training_mean"]), float(cell["training_std"])
 
     def standard(key: str) -> Any:
@@ -78,7 +89,7 @@ def _draw_channel(
     banded = any(result.is_ensemble(model) for model in result.models)
     solid = THIN if banded else LINES["measured"]
     axes.plot(time, standard("measured"), label="measured", **solid)
-    for model in result.models:
+    for model in judged_models(result):
         style = line_of(result, model)
         if result.is_ensemble(model):
             axes.fill_between(

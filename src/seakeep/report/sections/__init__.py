@@ -38,5 +38,6 @@ SECTIONS: list[Callable[[StudyResult], Section | None]] = [
     chosen.chosen,
     settings.settings,
     settings.versions,
+    summary.glossary,
 ]
 """A section is one function here; where it has nothing to show it returns None."""

@@ -11,25 +11,100 @@ from seakeep.report.figures.spectra import spectrum_figure
 from seakeep.report.quality_sheet import channel_rows, clock_rows, quality_figure
 from seakeep.report.section import Drawing, Section
 from seakeep.report.style import shown_unit
-from seakeep.report.tables import Table
+from seakeep.report.tables import Table, number
 from seakeep.study import StudyResult
+from seakeep.waves import phase_speed
 
-__all__ = ["data", "waves"]
+__all__ = ["data", "position_table", "wave_table", "waves"]
 
 
 def waves(result: StudyResult) -> Section | None:
-    """Return the spectra of the waves."""
-    if "spectra" not in result.groups:
+    """Return the waves that were tested, where they were measured, and their spectra."""
+    tables = [wave_table(result)] if "spectra" in result.groups else []
+    tables += [positions] if (positions := position_table(result)) is not None else []
+    figures = []
+    if "spectra" in result.groups:
+        regular = bool(np.isfinite(result.groups["runs"]["wave_frequency"].values).any())
+        figures.append(
+            Drawing(
+                "spectrum",
+                "Power spectral density of the wave elevation: nominal where it is known, and "
+                "measured (mean over the irregular runs, or over all where none is) with the "
+                "paper's Welch segments and with long ones."
+                + (" Vertical lines: the regular waves." if regular else ""),
+                partial(spectrum_figure, result),
+            )
+        )
+    if not (tables or figures):
         return None
-    regular = bool(np.isfinite(result.groups["runs"]["wave_frequency"].values).any())
-    figure = Drawing(
-        "spectrum",
-        "Power spectral density of the wave elevation: nominal where it is known, and measured "
-        "(mean over the irregular runs, or over all where none is) with the paper's Welch segments "
-        "and with long ones." + (" Vertical lines: the regular waves." if regular else ""),
-        partial(spectrum_figure, result),
+    return Section("waves", "Waves", figures=tuple(figures), tables=tuple(tables))
+
+
+def wave_table(result: StudyResult) -> Table:
+    """Waves of each run as they were measured, and what they are used for."""
+    runs, heights = result.groups["runs"], result.groups["spectra"]["significant_height"]
+    rows = []
+    for name in result.prepared:
+        at = runs.sel(run=name)
+        frequency, depth = float(at["wave_frequency"]), float(at["water_depth"])
+        speed = np.nan
+        if np.isfinite(frequency + depth):
+            speed = float(phase_speed(2 * np.pi * frequency, depth))
+        height = float(heights.sel(run=name))
+        # A sine has a height of 2√2 standard deviations, a sea one of 4.
+        height *= np.sqrt(0.5) if np.isfinite(frequency) else 1.0
+        spans = [
+            f"{use} {float(at[f'{use}_begin']):.0f} to {float(at[f'{use}_end']):.0f} s"
+            for use in ("train", "test")
+            if np.isfinite(at[f"{use}_begin"])
+        ]
+        rows.append(
+            (
+                name,
+                str(at["sea_state"].values) or str(at["waves"].values),
+                number(height),
+                number(frequency),
+                number(speed / frequency, 2),
+                number(speed, 2),
+                ", ".join(spans) or "test",
+            )
+        )
+    return Table(
+        "waves",
+        "Waves tested, as measured",
+        ("run", "sea", "height [m]", "frequency [Hz]", "length [m]", "phase speed [m/s]", "used"),
+        tuple(rows),
+        f"From {result.groups['spectra'].attrs['channel']}. Height: of regular waves 2√2, of a sea "
+        "4 standard deviations of the elevation. Length and speed: linear theory at the depth of "
+        "the campaign.",
+        (2, 3, 4, 5),
     )
-    return Section("waves", "Waves", figures=(figure,))
+
+
+def position_table(result: StudyResult) -> Table | None:
+    """Where the waves were measured; None where no position is known."""
+    run = next(iter(result.prepared.values()))
+    used = {str(name) for name in result.groups["channels"]["name"].values}
+    rows = [
+        (
+            str(name),
+            str(channel.attrs.get("long_name", name)),
+            f"{float(channel.attrs['x_position']):.2f}",
+            "yes" if name in used else "",
+        )
+        for name, channel in run.data_vars.items()
+        if "x_position" in channel.attrs
+    ]
+    if not rows:
+        return None
+    return Table(
+        "positions",
+        "Positions of the wave probes",
+        ("channel", "words", "x [m]", "used"),
+        tuple(rows),
+        str(result.groups["channels"].attrs.get("frame", "")),
+        (2,),
+    )
 
 
 def data(result: StudyResult) -> Section:

@@ -9,7 +9,7 @@ import xarray as xr
 from seakeep.report.figures.boxes import FEWEST, average_boxes, channel_boxes
 from seakeep.report.figures.common import HEADING, model_words
 from seakeep.report.section import Drawing, Section
-from seakeep.report.sections.summary import conditional
+from seakeep.report.sections.summary import conditional, overview_table
 from seakeep.report.tables import Table, number, signed
 from seakeep.study import StudyResult
 from seakeep.study.judge import verdict
@@ -43,9 +43,9 @@ def errors(result: StudyResult) -> Section:
         )
         for test in tests
     ]
-    tables = [error_table(result, test) for test in tests]
+    tables = [overview_table(result), *(error_table(result, test) for test in tests)]
     if any(f"statistics/skill/{test}" in result.groups for test in tests):
-        tables.insert(0, _skill_table(result))
+        tables.insert(1, _skill_table(result))
     return Section("errors", "Errors", figures=(*averages, *channels), tables=tuple(tables))
 
 
@@ -74,6 +74,7 @@ def _skill_table(result: StudyResult) -> Table:
         "intervals by a two-way block bootstrap over training sets and windows. "
         "Best linear: the linear baseline of least median ANRMSE in the test set.",
         (3, 4),
+        folded=True,
     )
 
 
@@ -122,4 +123,5 @@ def error_table(result: StudyResult, test: str) -> Table:
         note + conditional(result),
         tuple(range(1, len(columns))),
         averages=(len(rows) - 1,),
+        folded=test != next(iter(result.tests)),
     )

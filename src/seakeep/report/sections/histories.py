@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 import base64
+import json
 from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import xarray as xr
 
 from seakeep.conventions import displayed
-from seakeep.report.figures.common import line_of, model_colour, model_words
+from seakeep.files import replacing
+from seakeep.report.figures.common import judged_models, line_of, model_words
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.section import Drawing, Section
 from seakeep.report.style import shown_unit
 from seakeep.study import StudyResult
 
-__all__ = ["explorer", "histories", "history_data", "pack"]
+__all__ = ["explorer", "histories", "history_data", "pack", "write_histories"]
 
+FOLDER = "histories"
 MOST_MEMBERS = 40
-"""Members of a cell that are embedded; more cannot be told apart on a screen."""
+"""Members of a cell that are kept; more cannot be told apart on a screen."""
 MISSING = 65535
 
 
 def explorer(result: StudyResult) -> Section | None:
-    """Return the interactive plot of the cells that are shown."""
+    """Return the interactive plot: all windows and training sets."""
     data = history_data(result)
     return Section("explore", "Time histories, interactive", histories=data) if data else None
 
@@ -64,55 +68,121 @@ def pack(values: npt.ArrayLike) -> dict[str, Any]:
     return {"low": low, "high": high, "data": base64.b64encode(codes.tobytes()).decode()}
 
 
-def history_data(result: StudyResult) -> list[dict[str, Any]]:
-    """Cells that are shown: labels, time step, and per channel measurement and forecasts."""
-    return [_cell(result, *place) for place in shown_cells(result)]
+def history_data(result: StudyResult) -> dict[str, Any] | None:
+    """What there is to choose from, and the cell that the plot opens with; None of none.
+
+    All other cells lie in files of :func:`write_histories`, which the page loads when they are
+    chosen.
+    """
+    shown = shown_cells(result)
+    if not shown:
+        return None
+    test, training, window = shown[0]
+    names = list(result.tests)
+    channels, inputs = (
+        [_words(result, name) for name in group] for group in (result.channels, _elevations(result))
+    )
+    return {
+        "step": float(result.attrs["dt"]),
+        "channels": channels,
+        "waves": inputs,
+        "models": [_model(result, model) for model in judged_models(result)],
+        "tests": [_test(result, name) for name in names],
+        "open": {
+            "test": names.index(test),
+            "training": training,
+            "window": window,
+            "channel": result.channels.index("heave") if "heave" in result.channels else 0,
+            "cell": _cell(result, test, training, window),
+        },
+    }
+
+
+def write_histories(result: StudyResult) -> None:
+    """Write every cell for the interactive plot, a script per test set and training set."""
+    folder = result.folder / FOLDER
+    folder.mkdir(exist_ok=True)
+    for test, data in result.tests.items():
+        for training, judged in enumerate(data["judged"].values):
+            windows = np.flatnonzero(judged).tolist()
+            cells = {window: _cell(result, test, training, window) for window in windows}
+            text = json.dumps(cells, separators=(",", ":"))
+            with replacing(folder / f"{test}-{training}.js") as temporary:
+                temporary.write_text(f'seakeepCells["{test}-{training}"]={text};\n', "utf-8")
+
+
+def _elevations(result: StudyResult) -> list[str]:
+    """Inputs that are wave elevations."""
+    channels = result.groups["channels"]
+    names = [str(name) for name in channels["name"].values]
+    return [name for name in names if name.startswith("eta_")]
+
+
+def _words(result: StudyResult, name: str) -> dict[str, str]:
+    target = displayed(str(result.groups["channels"]["units"].sel(name=name).values))[1]
+    return {"name": name, "label": result.words_of(name), "unit": shown_unit(target)}
+
+
+def _model(result: StudyResult, model: str) -> dict[str, Any]:
+    line = line_of(result, model)
+    dash = line["linestyle"]
+    return {
+        "name": model,
+        "label": model_words(model),
+        "mean": f"{model_words(model)} mean" if result.is_ensemble(model) else model_words(model),
+        "colour": line["color"],
+        "dash": [] if isinstance(dash, str) else list(dash[1]),
+    }
+
+
+def _test(result: StudyResult, name: str) -> dict[str, Any]:
+    data = result.tests[name]
+    places = zip(data["run"].values, data["start"].values, strict=True)
+    return {
+        "name": name,
+        "label": result.label_of(name),
+        "steps": int(data.sizes["time"]),
+        "training": [str(each) for each in data["training"].values],
+        "windows": [f"{run} from {start:.1f} s" for run, start in places],
+        "judged": data["judged"].values.astype(int).tolist(),
+    }
 
 
 def _cell(result: StudyResult, test: str, training: int, window: int) -> dict[str, Any]:
+    """Waves, measurement, forecasts and errors of a cell, packed."""
     data = result.tests[test]
     cell = data.isel(training=training, window=window)
     shown = data["shown"].values.tolist() if "shown" in data else []
-    row = shown.index(window) if window in shown else None
-    run, start = str(cell["run"].values), float(cell["start"])
-    return {
-        "label": f"{result.label_of(test)}: {run} from {start:.1f} s",
-        "note": f"Trained on {cell['training'].values}. Move over the plot for values.",
-        "step": float(result.attrs["dt"]),
-        "steps": int(cell.sizes["time"]),
-        "channels": [
-            _channel(result, cell, data, row, column, name)
-            for column, name in enumerate(result.channels)
-        ],
-    }
-
-
-def _channel(
-    result: StudyResult, cell: Any, data: Any, row: int | None, column: int, name: str
-) -> dict[str, Any]:
-    channels = result.groups["channels"].sel(name=name)
-    factor, target = displayed(str(channels["units"].values))
-    models = []
-    for model in result.models:
-        ensemble = result.is_ensemble(model)
-        style = line_of(result, model)["linestyle"]
+    first = int(np.argmax(data["judged"].values[:, window]))
+    row = shown.index(window) if window in shown and training == first else None
+    models = {}
+    for model in judged_models(result):
+        keys = ("mean", "lower", "upper") if result.is_ensemble(model) else ("mean",)
         entry: dict[str, Any] = {
-            "label": f"{model_words(model)} mean" if ensemble else model_words(model),
-            "colour": model_colour(result, model),
-            "dash": [] if isinstance(style, str) else list(style[1]),
-            "mean": pack(factor * cell[f"{model}_mean"].values[:, column]),
+            key: _packed(result, cell[f"{model}_{key}"].values) for key in keys
         }
-        if ensemble:
-            for bound in ("lower", "upper"):
-                entry[bound] = pack(factor * cell[f"{model}_{bound}"].values[:, column])
-            if row is not None and f"{model}_members" in data:
-                members = data[f"{model}_members"].values[row, :MOST_MEMBERS, :, column]
-                entry["members"] = pack(factor * members.astype(float))
-        models.append(entry)
+        if row is not None and f"{model}_members" in data:
+            members = data[f"{model}_members"].values[row, :MOST_MEMBERS]
+            entry["members"] = _packed(result, members.astype(float))
+        errors = cell[f"{model}_nrmse"].values
+        models[model] = entry | {"nrmse": [round(float(e), 3) if e == e else None for e in errors]}
     return {
-        "name": name,
-        "label": result.words_of(name),
-        "unit": shown_unit(target),
-        "measured": pack(factor * cell["measured"].values[:, column]),
+        "measured": _packed(result, cell["measured"].values),
+        "waves": _waves(result, cell),
         "models": models,
     }
+
+
+def _packed(result: StudyResult, values: npt.NDArray[Any]) -> list[dict[str, Any]]:
+    """Values (…, channel) in the units that are shown, packed channel by channel."""
+    units = result.groups["channels"]["units"].sel(name=result.channels).values
+    factors = [displayed(str(unit))[0] for unit in units]
+    return [pack(factor * values[..., k]) for k, factor in enumerate(factors)]
+
+
+def _waves(result: StudyResult, cell: xr.Dataset) -> list[dict[str, Any]]:
+    """Measured elevations at the instants of a cell."""
+    run = result.prepared[str(cell["run"].values)]
+    at = int(np.argmin(np.abs(run["time"].values - float(cell["start"])))) + 1
+    part = slice(at, at + int(cell.sizes["time"]))
+    return [pack(run[name].values[part]) for name in _elevations(result)]

@@ -48,4 +48,5 @@ def _table(result: StudyResult, test: str) -> Table:
         "judged in the first, and counts in the second." + conditional(result),
         tuple(range(1, 2 + len(result.models))),
         averages=(len(rows) - 1,),
+        folded=test != next(iter(result.tests)),
     )

@@ -63,6 +63,7 @@ def _model_table(result: StudyResult) -> Table:
         tuple(rows),
         "Stated: in the study file. Preset: filled in by the model's preset, or the study's. "
         "Study: the study's seed. Default: none of them says anything.",
+        folded=True,
     )
 
 
@@ -76,6 +77,7 @@ def _settings_table(result: StudyResult) -> Table:
         "Settings of the study, defaults included",
         ("setting", "value"),
         (*_of_the_data(result), *rows),
+        folded=True,
     )
 
 
@@ -179,6 +181,7 @@ def _windows_table(result: StudyResult) -> Table:
         "Of a training set: from the start of its span to its stop. A draw reads the last part, "
         f"{reads:.2f} s at most, delay history included{whole}. The delay history of a forecast is "
         "measured data just before the start; it may reach into a training span.",
+        folded=True,
     )
 
 

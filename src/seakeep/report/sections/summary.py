@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 
 import numpy as np
 
 from seakeep.conventions import canonical_channel
 from seakeep.report.figures.boxes import FEWEST
-from seakeep.report.figures.common import HEADING, model_words
-from seakeep.report.section import Section
+from seakeep.report.figures.common import HEADING, judged_models, model_words
+from seakeep.report.figures.histories import history_figure, shown_cells
+from seakeep.report.section import Drawing, Section
 from seakeep.report.sections.settings import test_overlap, training_overlap, unequal_training
 from seakeep.report.tables import Table, number
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
 from seakeep.study.judge import verdict, words_of_lost
 
-__all__ = ["findings", "overview_table", "summary"]
+__all__ = [
+    "conditional",
+    "findings",
+    "glossary",
+    "heat_table",
+    "overview_table",
+    "summary",
+]
 
 
 def summary(result: StudyResult) -> Section:
-    """Return the summary of a study."""
+    """Return what was tested and what came out, on one screen."""
     shares, words = training_overlap(result)
-    condition = str(result.attrs.get("conditional_on", ""))
     lost, repeats = (result.groups.get(key) for key in ("statistics/lost", "repeats"))
     notices = [
         str(result.attrs.get("preparation_note", "")),
@@ -31,19 +39,83 @@ def summary(result: StudyResult) -> Section:
         _few_cells(result),
         words if shares else "",
         test_overlap(result),
-        f"Every number here is conditional on measured {condition}: the alignment of the waves "
-        "reads it after the start of a forecast. It is no forecast in the strict sense."
-        if condition
-        else "",
     ]
     return Section(
         "summary",
         "What came out",
+        words=(_tested(result),),
         points=tuple(findings(result)),
         notices=tuple(filter(None, notices)),
-        terms=tuple(_glossary(result)),
-        tables=(overview_table(result),),
+        figures=tuple(_first_history(result)),
+        tables=(heat_table(result),),
     )
+
+
+def _tested(result: StudyResult) -> str:
+    """What was tested, in one sentence or two."""
+    period = float(result.attrs["encounter_period"])
+    sets = result.groups["training"].sizes["training"]
+    seas = [
+        f"{result.label_of(test)} ({data.sizes['window']} windows of "
+        f"{float(data['time'].values[-1]) / period:.3g} T̂)"
+        for test, data in result.tests.items()
+    ]
+    condition = str(result.attrs.get("conditional_on", "")).replace("_", " ")
+    told = (
+        f"Tested: {', '.join(map(model_words, result.models))}, each learnt from {sets} training "
+        f"set{'s' * (sets > 1)} and run freely through {', '.join(seas)}; {len(result.channels)} "
+        "channels. Errors are in measured SDs of the window: 0 is perfect, 1 is no better than its "
+        "mean."
+    )
+    if condition:
+        told += (
+            f" Every number is conditional on measured {condition}: the alignment of the waves "
+            "reads it after the start of a forecast. It is no forecast in the strict sense."
+        )
+    return told
+
+
+def heat_table(result: StudyResult) -> Table:
+    """Median error of each channel in each test set, of the models that are no baselines."""
+    models = judged_models(result)
+    places = [(test, model) for test in result.tests for model in models]
+    rows = []
+    for name in [*result.channels, "average"]:
+        cells = [
+            float(
+                result.groups[f"statistics/boxes/{test}"]["median"].sel(
+                    model=model, measure="nrmse", channel=name
+                )
+            )
+            for test, model in places
+        ]
+        words = name if name == "average" else result.words_of(name)
+        rows.append((words, *(number(value, 2) for value in cells)))
+    heads = [f"{result.label_of(test)}: {model_words(model)}" for test, model in places]
+    return Table(
+        "heat",
+        "Median NRMSE, channel by channel",
+        ("channel", *heads),
+        tuple(rows),
+        "The darker, the worse; average: the paper's ANRMSE." + conditional(result),
+        tuple(range(1, len(heads) + 1)),
+        averages=(len(rows) - 1,),
+        heat=tuple(range(1, len(heads) + 1)),
+    )
+
+
+def _first_history(result: StudyResult) -> list[Drawing]:
+    """One channel of the first cell that is shown: heave, or the first."""
+    name = "heave" if "heave" in result.channels else result.channels[0]
+    return [
+        Drawing(
+            "first_history",
+            f"{result.words_of(name).capitalize()} in {result.label_of(place[0])}, the first of "
+            "the windows shown below: measured and forecast.",
+            partial(history_figure, result, *place, names=(name,)),
+        )
+        for place in shown_cells(result)[:1]
+    ]
 
 
 def overview_table(result: StudyResult) -> Table:
@@ -57,24 +129,25 @@ def overview_table(result: StudyResult) -> Table:
                 at = boxes.sel(model=model, measure=measure)
                 spread = float(at["upper_quartile"] - at["lower_quartile"])
                 row += [number(float(at["median"])), number(spread)]
+            scaled = boxes["median"].sel(model=model, measure="training_nrmse")
             count = boxes.sel(model=model, measure="nrmse")["count"]
-            rows.append((*row, str(int(count))))
+            rows.append((*row, number(float(scaled)), str(int(count))))
     heads = [f"{words} {k}" for words in HEADING.values() for k in ("median", "IQR")]
     return Table(
         "overview",
         "ANRMSE and NAMMAE",
-        ("test set", "model", *heads, "cells"),
+        ("test set", "model", *heads, "in training SD", "cells"),
         tuple(rows),
         "Medians and inter-quartile ranges over all cells (training set × test window) of the "
-        "average over the channels that are judged; in measured standard deviations."
-        + conditional(result),
-        (2, 3, 4, 5, 6),
+        "average over the channels that are judged; in measured standard deviations, and ANRMSE "
+        "in those of the training set too." + conditional(result),
+        tuple(range(2, 8)),
     )
 
 
 def conditional(result: StudyResult) -> str:
     """Sentence for tables whose forecasts read a measured output after the start."""
-    words = str(result.attrs.get("conditional_on", ""))
+    words = str(result.attrs.get("conditional_on", "")).replace("_", " ")
     return f" Conditional on measured {words}." if words else ""
 
 
@@ -200,8 +273,12 @@ def _explained(result: StudyResult, channel: str) -> str:
     return words if symbol == words else f"{symbol} {words}"
 
 
-def _glossary(result: StudyResult) -> list[tuple[str, str]]:
-    """Terms and symbols with what they mean."""
+def glossary(result: StudyResult) -> Section:
+    """Return terms and symbols with what they mean."""
+    return Section("words", "Words and symbols", terms=tuple(_terms(result)))
+
+
+def _terms(result: StudyResult) -> list[tuple[str, str]]:
     period = float(result.attrs["encounter_period"])
     symbols = "; ".join(_explained(result, name) for name in result.channels)
     loads = any(name.startswith("mooring_") for name in result.channels)

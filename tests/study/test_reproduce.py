@@ -1,0 +1,157 @@
+"""The three acts of ``seakeep reproduce``: one tank, the same windows, and a page over them."""
+
+import warnings
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep.errors import SeakeepWarning
+from seakeep.report.tables import MISSING
+from seakeep.study import read_study
+from seakeep.study.plan import make_plan
+from seakeep.study.reproduce import ACTS, SLOW, Size, read_reproduction, reproduce, study_text
+
+pytest.importorskip("seakeep.tank.play", reason="the virtual tank needs its libraries")
+from seakeep.tank.delivery import campaign_text, write_record
+from seakeep.tank.instruments import Column, Record
+
+SMALL = Size(training=2, tests=2, members=2, series=4)
+RATE = 50.0
+
+
+def record(name, seconds, rng):
+    """A made-up run on one logger at 50 Hz: linear waves, and a drift in surge and loads."""
+    t = np.arange(round(seconds * RATE) + 1) / RATE
+    regular = {"regular_1_5": [0.86], "regular_2": [0.75], "regular_3": [0.61]}
+    omega = 2 * np.pi * np.array(regular.get(name, [0.4, 0.5, 0.57, 0.66, 0.75, 0.9]))
+    turn = omega * t[:, None] + rng.uniform(0, 2 * np.pi, omega.size)
+
+    def waves(lag, power=0, amplitude=1.0):
+        return amplitude * (omega**power * np.cos(turn - lag + 0.5 * np.pi * power)).sum(axis=1)
+
+    drift = np.sin(2 * np.pi * t / 29.9) + 0.3 * np.sin(2 * np.pi * t / 47.0)
+    values = {
+        "kn_fwd": ("mm", waves(0.0, amplitude=20.0)),
+        "kn_cog": ("mm", waves(omega**2 * 3.67 / 9.81, amplitude=20.0)),
+        "heave": ("m", waves(2.0, amplitude=0.01)),
+        "pitch": ("deg", waves(1.0)),
+        "rate_y": ("deg/s", waves(1.0, 1)),
+        "acceleration_x": ("m/s^2", waves(2.5, 2, 0.008)),
+        "acceleration_z": ("m/s^2", waves(2.0, 2, 0.01)),
+        "surge": ("m", waves(2.5, amplitude=0.008) + 0.25 * drift),
+        "mooring_bow": ("N", 2 + waves(2.5, amplitude=0.1) + 0.4 * drift),
+        "mooring_stern": ("N", 2 - waves(2.5, amplitude=0.1) - 0.4 * drift),
+    }
+    noisy = {
+        key: Column(unit, x + 0.01 * x.std() * rng.standard_normal(x.size), 6)
+        for key, (unit, x) in values.items()
+    }
+    return Record(name, t, noisy)
+
+
+def play_small(settings, out, progress=None):
+    """Stands in for the tank: six small runs, and the campaign file that the tank would write."""
+    for each in ("raw", "truth"):
+        (out / each).mkdir(parents=True)
+    rng = np.random.default_rng(0)
+    files = {}
+    for name, run in settings.runs.items():
+        made = record(name, run.length, rng)
+        files[name] = {name: f"raw/{write_record(made, out / 'raw', 'nc').name}"}
+        true = xr.Dataset({"heave": ("time", made.columns["heave"].values)}, {"time": made.time})
+        true.to_netcdf(out / "truth" / f"{name}.nc", engine="h5netcdf")
+    (out / "campaign.toml").write_text(campaign_text(settings, files, "nc", True), "utf-8")
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory):
+    """The acts of the paper with the smallest counts, and the study file of the third."""
+    folder = tmp_path_factory.mktemp("reproduction")
+    with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeakeepWarning)  # of windows that hold one drift cycle
+        patch.setattr("seakeep.tank.play.play", play_small)
+        reproduce(folder, "paper", size=SMALL)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def results(played):
+    return read_reproduction(played)
+
+
+def test_the_acts_of_the_paper_have_the_same_windows(results):
+    assert list(results) == ["paper", "raw"]
+    paper, raw = results.values()
+    for name, data in raw.tests.items():
+        assert paper.tests[name]["run"].values.tolist() == data["run"].values.tolist()
+        np.testing.assert_array_equal(paper.tests[name]["start"], data["start"])
+    stops = [result.groups["training"]["stop"].values for result in (paper, raw)]
+    np.testing.assert_array_equal(*stops)
+
+
+def test_the_recommended_model_is_tested_in_the_same_windows_and_learns_from_other_runs(
+    played, results, tmp_path
+):
+    text = study_text(ACTS[2], SMALL, 0).replace("../campaign", str(played / "campaign"))
+    (tmp_path / "study.toml").write_text(text, "utf-8")
+    plan, _ = make_plan(read_study(tmp_path / "study.toml"))
+    for name, data in results["raw"].tests.items():
+        windows = [(each.run, each.start) for each in plan.tests[name]]
+        assert windows == list(zip(data["run"].values, data["start"].values, strict=True))
+    for each in plan.training:
+        assert not set(each.left_out) & set(each.runs)
+
+
+def test_the_first_act_alone_has_lost_the_drift_and_keeps_the_waves(results):
+    for name in SLOW:
+        slow, fast = {}, {}
+        for act, result in results.items():
+            run = result.prepared["irregular_1"][name].values.astype(float)
+            spectrum = np.abs(np.fft.rfft((run - run.mean()) * np.hanning(run.size))) ** 2
+            frequency = np.fft.rfftfreq(run.size, result.attrs["dt"])
+            slow[act] = spectrum[frequency < 0.08].sum()
+            fast[act] = spectrum[frequency > 0.3].sum()  # the waves begin at 0.4 Hz
+        assert slow["paper"] < 1e-3 * slow["raw"]
+        # What differs is noise above the band's upper edge, 9 Hz.
+        assert fast["paper"] == pytest.approx(fast["raw"], rel=0.01)
+
+
+def test_the_waves_are_carried_to_where_the_vessel_is(results):
+    read = {name: result.attrs["conditional_on"] for name, result in results.items()}
+    assert read == {"paper": "surge_with_drift", "raw": "surge"}
+
+
+def test_the_table_of_the_acts_is_made_of_their_cells(results):
+    from seakeep.report.acts import acts_table
+
+    table = acts_table(results)
+    assert len(table.rows) == sum(len(result.models) for result in results.values())
+    assert table.columns[2:6] == (
+        "irregular: waves", "irregular: slow", "λ/L 1.5: waves", "λ/L 1.5: slow"
+    )  # fmt: skip
+    data = results["raw"].tests["regular_2"]
+    slow = data["fir_nrmse"].sel(channel=list(SLOW)).mean("channel").median()
+    (row,) = (row for row in table.rows if row[:2] == ("(b)", "FIR"))
+    assert row[table.columns.index("λ/L 2: slow")] == f"{float(slow):.2f}"
+
+
+def test_every_claim_has_a_figure_and_a_verdict(results):
+    from seakeep.report.claims import CLAIMS, claims_table
+
+    table = claims_table(results)
+    assert [row[0] for row in table.rows] == [claim for claim, _ in CLAIMS]
+    assert {row[2] for row in table.rows} <= {"holds", "does not", "cannot tell"}
+    assert not [row for row in table.rows if "nan" in row[1] or MISSING in row[1]]
+
+
+def test_the_page_over_the_acts_links_to_theirs(played, results):
+    pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+    from seakeep.report.acts import write_reproduction
+
+    page = write_reproduction(played, results).read_text("utf-8")
+    for act in ACTS[:2]:
+        assert f'href="{act.name}/report.html"' in page
+        assert act.title in page
+    for name in ("acts", "claims", "channels_irregular", "waves", "positions"):
+        assert f'id="table-{name}"' in page
