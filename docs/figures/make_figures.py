@@ -231,13 +231,15 @@ def ntnu():
     file, figures = folder / "campaign.toml", folder / "figures"
     overlays(file, None, ["3041_2", "3061_2", "3102_3"], figures, "motions_")
     overlays(file, "sway", ["3061_2", "3102_3"], figures, "sway_")
-    overlays(file, "tensions", ["3102_3"], figures, "tensions_")
+    overlays(file, "tensions", ["3041_2", "3102_3"], figures, "tensions_")
+    overlays(file, "tensions_paper", ["3102_3"], figures, "tensions_paper_")
 
 
 def sjtu():
     """Heave of the semi-submersible."""
-    folder = EXAMPLES / "sjtu_semisub"
-    overlays(folder / "campaign.toml", None, ["Data01"], folder / "figures")
+    file, figures = (EXAMPLES / "sjtu_semisub" / name for name in ("campaign.toml", "figures"))
+    overlays(file, None, ["Data01"], figures)
+    overlays(file, "paper", ["Data01"], figures, "paper_")
 
 
 def tank():

@@ -14,6 +14,7 @@ import numpy as np
 import seakeep
 from seakeep import metrics, signals
 from seakeep.campaign import read_table
+from seakeep.study import fit_campaign
 
 HERE = Path(__file__).parent
 GRAVITY, ARM, BAND = 9.81, 0.0502, (0.4, 5.0)
@@ -129,18 +130,17 @@ def ends(campaign, runs):
 
 def periods(campaign, runs):
     """Each training run forecast by the other nine: NRMSE of the motions."""
-    settings = campaign.model()
-    stated = settings.arguments()
-    spec = seakeep.HankelDMDc(**stated)
-    print("left out   " + "  ".join(f"{name:>10s}" for name in settings.states))
+    model = fit_campaign(campaign)
+    spec, states = model.settings, model.states  # as chosen on all ten
+    print("left out   " + "  ".join(f"{name:>10s}" for name in states))
     train = campaign.training_runs
     for name in train:
         others = {each: runs[each] for each in train if each != name}
-        model = spec.fit(others, list(settings.states), list(settings.inputs))
-        first = float(runs[name].time[model.history_samples - 1])
-        forecast = model.forecast(runs[name], start=first)
+        alone = spec.fit(others, states, model.inputs)
+        first = float(runs[name].time[alone.history_samples - 1])
+        forecast = alone.forecast(runs[name], start=first)
         judged = metrics.nrmse(predicted=forecast, measured=runs[name])
-        print(f"{name:10s} " + "  ".join(f"{float(judged[s]):10.3f}" for s in settings.states))
+        print(f"{name:10s} " + "  ".join(f"{float(judged[s]):10.3f}" for s in states))
 
 
 CHECKS = {each.__name__: each for each in (sway, springs, camera, means, ends, periods)}

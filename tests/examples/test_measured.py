@@ -13,6 +13,8 @@ from seakeep.study import compare, comparison_table, fit_campaign
 
 pytestmark = [
     pytest.mark.data,
+    # Models that look ahead say so, of other wave periods too: the pages say it of these.
+    pytest.mark.filterwarnings("ignore::seakeep.errors.SeakeepWarning"),
     pytest.mark.skipif(
         not os.environ.get("SEAKEEP_DATA_DIR"),
         reason="SEAKEEP_DATA_DIR is not set: it names the folder of the measured data",
@@ -62,13 +64,15 @@ def test_motions_of_unseen_runs_are_forecast_to_the_end_of_the_record(section, s
     judged = compare(model, section)
     assert [each.run for each in judged] == ["3041_2", "3061_2", "3102_3"]
     for each in judged:
-        end = float(section_runs[each.run]["time"][-1])
+        # The last step reads the waves `lead_samples` after the instant that it starts from.
+        end = float(section_runs[each.run]["time"][-model.lead_samples])
         assert float(each.forecast["time"][-1]) == end
         assert each.start == pytest.approx((model.history_samples - 1) * model.dt)
     table = comparison_table(judged)
-    # Asked for: 0.16. Found: at most 0.071; half as much again leaves room for other libraries'
-    # rounding and none for a wrong sign or lag.
-    assert float(table["nrmse"].max()) <= 0.11
+    # Asked for: 0.05 in the mean. Found: 0.037, and at most 0.060; half as much again leaves room
+    # for other libraries' rounding and none for a wrong sign or lag.
+    assert float(table["nrmse"].mean()) <= 0.05
+    assert float(table["nrmse"].max()) <= 0.09
 
 
 def test_sway_needs_the_tilt_and_the_arm_with_their_signs(section_runs):
@@ -85,16 +89,20 @@ def test_sway_needs_the_tilt_and_the_arm_with_their_signs(section_runs):
 def test_sway_is_forecast_where_its_target_is_sound(section):
     model = fit_campaign(section, "sway")
     table = comparison_table(compare(model, section))
-    # Asked for: 0.17 for 3102_3 (found 0.049). The other two stand near the resonance of roll,
+    # Asked for: 0.17 for 3102_3 (found 0.044). The other two stand near the resonance of roll,
     # where the tilt's part is ten times the sway; they are reported, not judged.
     assert float(table["nrmse"].sel(run="3102_3", channel="sway")) <= 0.08
     assert np.all(np.isfinite(table["nrmse"]))
 
 
-def test_tensions_are_reported_and_known_to_be_poor(section):
-    table = comparison_table(compare(fit_campaign(section, "tensions"), section))
-    # Slow second-order drift carries half of their variance and no linear model makes it.
-    assert 0.5 < float(table["nrmse"].mean()) < 1.2
+def test_tensions_are_forecast_in_a_sea_that_was_trained(section):
+    recommended, paper = (
+        comparison_table(compare(fit_campaign(section, name), section))
+        for name in ("tensions", "tensions_paper")
+    )
+    # Asked for: 0.25 (found 0.22) where training holds the sea; in the others drift stays poor.
+    assert float(recommended["anrmse"].sel(run="3102_3")) <= 0.25
+    assert float(recommended["anrmse"].mean()) < 0.75 * float(paper["anrmse"].mean())
 
 
 def test_integrals_hold_to_the_end_of_a_record_that_stops_in_mid_wave(section_runs):
@@ -124,9 +132,10 @@ def semisubmersible():
 def test_semisubmersible_heave_runs_freely_over_the_last_30_percent(semisubmersible):
     campaign, model = semisubmersible
     (judged,) = compare(model, campaign, ["Data01"])
-    share = model.training.stop[0] / float(judged.forecast["time"][-1])
+    # The forecast ends where the waves do that the model looks ahead to, 27 s before the record.
+    share = model.training.stop[0] / float(judged.forecast["time"][-1] + 27.1)
     assert share == pytest.approx(0.7, abs=0.001)
-    assert judged.anrmse <= 0.38  # found: 0.350; coherence allows about 0.31
+    assert judged.anrmse <= 0.28  # found: 0.251; coherence allows a linear model about 0.31
 
 
 def test_the_offset_of_a_probe_that_stood_elsewhere_is_estimated(semisubmersible):
@@ -142,8 +151,8 @@ def test_the_offset_of_a_probe_that_stood_elsewhere_is_estimated(semisubmersible
     assert judged.start == pytest.approx(run.attrs["test_span"][0])
     uncorrected = model.forecast(run.assign_attrs(probe_offset=0.0), start=judged.start)
     wrong = float(seakeep.metrics.anrmse(predicted=uncorrected, measured=judged.measured))
-    # Asked for: at most 0.6 of the uncorrected. Found: 0.337 of 0.681, that is 0.49.
-    assert wrong > 0.6
+    # Asked for: at most 0.6 of the uncorrected. Found: 0.291 of 0.596, that is 0.49.
+    assert wrong > 0.5
     assert judged.anrmse <= 0.6 * wrong
 
 
@@ -158,11 +167,11 @@ def test_a_constant_time_lag_stands_beside_the_offset(semisubmersible):
     spec = replace(model.settings, alignment=one)
     lagging = spec.fit(train, model.states, model.inputs)
     found = seakeep.estimate_probe_offset(lagging, run, SPAN)
-    assert found.offset / celerity == pytest.approx(1.57, abs=0.12)  # s; twice its spread of 0.06
+    assert found.offset / celerity == pytest.approx(1.31, abs=0.10)  # s; twice its spread of 0.05
     assert 0.02 < found.spread / celerity < 0.12
     start = run.attrs["test_span"][0]
     forecast = lagging.forecast(run.assign_attrs(probe_offset=found.offset), start=start)
     measured = run.sel(time=forecast["time"])
     lagged = float(seakeep.metrics.nrmse(predicted=forecast, measured=measured)["heave"])
-    # It does as well as dispersion here (0.330 against 0.337): the sea is narrow.
-    assert lagged == pytest.approx(0.330, abs=0.01)
+    # It does almost as well as dispersion here (0.310 against 0.291): the sea is narrow.
+    assert lagged == pytest.approx(0.310, abs=0.01)

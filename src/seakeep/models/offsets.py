@@ -138,12 +138,12 @@ def _part(model: HankelDMDcModel, run: xr.Dataset, span: tuple[float, float]) ->
     labelled.check_run(run, name)
     slack = 1e-3 * model.dt
     part = run.sel(time=slice(span[0] - slack, span[1] + slack))
-    needed = model.history_samples + BLOCKS
+    needed = model.history_samples + BLOCKS + max(model.lead_samples - 1, 0)
     if part.sizes["time"] < needed:
         raise RequestError(
             f"the span [{span[0]:g}, {span[1]:g}] s holds {part.sizes['time']} samples of {name}; "
-            f"an offset takes at least {needed} (the model's history and {BLOCKS} more). Lengthen "
-            "the span."
+            f"an offset takes at least {needed} (the model's history, its look-ahead and {BLOCKS} "
+            "more). Lengthen the span."
         )
     return part
 
@@ -165,9 +165,10 @@ def _errors(model: HankelDMDcModel, part: xr.Dataset, distance: float) -> FloatA
     time = part["time"].values
     start = float(time[model.history_samples - 1])
     run = part.assign_attrs(probe_offset=float(distance))
-    steps = time.size - model.history_samples
+    # The last step reads the input `lead_samples` after the instant that it starts from.
+    steps = time.size - model.history_samples - max(model.lead_samples - 1, 0)
     forecast = model.forecast(run, start=start, steps=steps)
-    measured = part.isel(time=slice(-steps, None))
+    measured = part.isel(time=slice(model.history_samples, model.history_samples + steps))
     squares = [
         (forecast[name].values - measured[name].values) ** 2 / np.var(measured[name].values)
         for name in model.states
