@@ -151,21 +151,9 @@ def model_blocks(
 ) -> Iterator[Table]:
     """Several models beside each other, a table of averages and one of channels per run."""
     first = next(iter(tables.values()))
-    heads = (
-        "model",
-        "ANRMSE",
-        "95 %",
-        "in training SD",
-        "NAMMAE",
-        *(f"below {each}" for each in references),
-    )
+    heads = ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
     for run in first["run"].values:
         of_run = {name: table.sel(run=run) for name, table in tables.items()}
-        errors = {name: float(at["anrmse"]) for name, at in of_run.items()}
-        best = {
-            head: min((errors[name] for name in names), default=np.nan)
-            for head, names in references.items()
-        }
         rows = [
             (
                 name,
@@ -173,15 +161,15 @@ def model_blocks(
                 _bounds(at, "anrmse"),
                 _text(at["training_anrmse"], "{:.3f}"),
                 _text(at["mean_nammae"], "{:.3f}"),
-                *(_text(100 * (1 - errors[name] / each), "{:+z.0f} %") for each in best.values()),
             )
             for name, at in of_run.items()
         ]
         title = f"{run}: models against measurement"
-        numeric = tuple(range(1, len(heads)))
         lost = [f"{n}: {s}" for n, at in of_run.items() if (s := str(at["status"].values)) != "ok"]
         note = "; ".join(lost)
-        yield Table(f"models_{run}", title, heads, tuple(rows), note, numeric)
+        yield Table(f"models_{run}", title, heads, tuple(rows), note, tuple(range(1, len(heads))))
+        if references:
+            yield _skill(of_run, references, str(run))
         channels = [
             (str(name), *(_text(at["nrmse"].sel(channel=name), "{:.3f}") for at in of_run.values()))
             for name in first["channel"].values
@@ -189,6 +177,21 @@ def model_blocks(
         columns = ("channel", *of_run)
         numeric = tuple(range(1, len(columns)))
         yield Table(f"channels_{run}", f"{run}: NRMSE", columns, tuple(channels), "", numeric)
+
+
+def _skill(
+    of_run: Mapping[str, xr.Dataset], references: Mapping[str, Sequence[str]], run: str
+) -> Table:
+    """By how much the ANRMSE of each model lies below the best of some references."""
+    errors = {name: float(at["anrmse"]) for name, at in of_run.items()}
+    best = [min((errors[each] for each in names), default=np.nan) for names in references.values()]
+    rows = [
+        (name, *(_text(100 * (1 - error / each), "{:+z.0f} %") for each in best))
+        for name, error in errors.items()
+    ]
+    heads = ("model", *(f"below {each}" for each in references))
+    title = f"{run}: ANRMSE against the baselines'"
+    return Table(f"skill_{run}", title, heads, tuple(rows), "", tuple(range(1, len(heads))))
 
 
 def band_findings(table: xr.Dataset) -> list[str]:
