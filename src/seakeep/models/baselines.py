@@ -207,9 +207,12 @@ class ARX(LinearSpec):
 
     @classmethod
     def recommended(cls, encounter_period: float, dt: float) -> Self:
-        """One encounter period of the states, three of the inputs, least squares."""
+        """One encounter period of the states, three of the inputs, λ = 1e-3 per snapshot pair.
+
+        Plain least squares diverges where a period is finely sampled.
+        """
         s, z = (periods_to_samples(periods, encounter_period, dt) for periods in (1, 3))
-        return cls(state_delays=s, input_delays=z)
+        return cls(state_delays=s, input_delays=z, ridge=1e-3, ridge_scale="per_snapshot")
 
     def solve(self, data: TrainingData) -> Solution:
         """Rows of the next states."""
@@ -303,9 +306,9 @@ class Subspace(HankelSettings):
 
     @classmethod
     def recommended(cls, encounter_period: float, dt: float) -> Self:
-        """One encounter period of the states, three of the inputs, 40 latent states."""
+        """One encounter period of the states, three of the inputs, 40 latent states, λ = 0.1."""
         s, z = (periods_to_samples(periods, encounter_period, dt) for periods in (1, 3))
-        return cls(state_delays=s, input_delays=z, order=40)
+        return cls(state_delays=s, input_delays=z, order=40, ridge=0.1)
 
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
