@@ -387,8 +387,8 @@ def _model(guesses: Sequence[Guess]) -> Iterator[str]:
     if gapped := [name for name in motions if mapped[name].gaps == "long"]:
         yield from _left_out(gapped, "states")
     if loads:
-        yield f"# Loads ({', '.join(loads)}) may be added to the states; but a line that goes slack"
-        yield "# or snaps is not linear, and the model is: judge their extremes."
+        yield f"# Loads ({', '.join(loads)}) may be added to the states: they are read off the"
+        yield "# motions where a line goes slack and that is better. Judge their extremes."
     yield f"inputs = {_value(inputs)} # guessed: the waves that drive it"
     probes = [name for name in mapped if name.startswith("eta_") and name not in inputs]
     if behind := [name for name in probes if mapped[name].behind]:
