@@ -587,7 +587,7 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
         (
             f"calibrate ensemble.nc {CAMPAIGN} --steps 900 --run unseen --stop 30 -o c.nc",
             2,
-            r"no window of 900 steps with 120 samples of history is free in unseen, .* most 256",
+            r"no window of 900 steps with \d+ samples of history is free in unseen, .* most \d+",
         ),
         (
             f"forecast ensemble.nc {FROM_20} --workers 2 --scheduler tcp://h:1 -o f.nc",
@@ -739,10 +739,13 @@ def test_a_diverging_forecast_is_told_and_ends_with_1(run, place):
 
 def test_members_that_diverge_are_counted_and_left_out_of_file_and_table(run, place):
     text = (place / CAMPAIGN).read_text()
-    (place / "docs/tutorial/wild.toml").write_text(
-        text + "state_delay = { uniform = [1.0, 5.0] }\ninput_delay = 0.5\n"
-        "ridge = { log_uniform = [1e-13, 1e-2] }\n"
-    )
+    for key, value in {
+        "state_delay": "{ uniform = [1.0, 5.0] }",
+        "input_delay": "0.5",
+        "ridge": "{ log_uniform = [1e-13, 1e-2] }",
+    }.items():
+        text = re.sub(rf"^{key} = .*uniform.*$", f"{key} = {value}", text, flags=re.MULTILINE)
+    (place / "docs/tutorial/wild.toml").write_text(text)
     status, out, err = run("fit docs/tutorial/wild.toml --model ensemble -o wild.nc")
     assert status == 0
     unstable = re.search(r"\((\d) of 8 UNSTABLE: their long forecasts diverge\)", out)

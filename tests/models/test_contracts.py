@@ -173,7 +173,7 @@ class TestObservableOfAnother:
         summary = many.forecast_summary(run, start=20.0, steps=40)
         again = load_model(many.save(tmp_path / "e.nc"))
         xr.testing.assert_identical(again.forecast_summary(run, start=20.0, steps=40), summary)
-        with pytest.raises(RequestError, match=r"delays of their own \(half\)"):
+        with pytest.raises(RequestError, match=r"driven by observables too \(half\)"):
             model.to_state_space()
 
     def test_a_file_with_an_observable_that_is_not_known_is_refused(self, monkeypatch, tmp_path):

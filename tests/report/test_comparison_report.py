@@ -255,12 +255,11 @@ def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path)
         for name, factor in {"ours": 0.9, "hold_last": 0.8, "arx": 0.95, "fir": 0.7}.items()
     }
     references = {"hold last": ["hold_last"], "best linear": ["arx", "fir"]}
-    averages, channels = model_blocks(tables, references)
-    heads = ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
-    assert averages.columns == (*heads, "below hold last", "below best linear")
-    ours = averages.rows[0]
-    assert ours[:2] == ("ours", "0.100")
-    assert ours[-2:] == ("+50 %", "-100 %")  # errors of 0.1 against 0.2 and 0.05
+    averages, skill, channels = model_blocks(tables, references)
+    assert averages.columns == ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
+    assert averages.rows[0][:2] == ("ours", "0.100")
+    assert skill.columns == ("model", "below hold last", "below best linear")
+    assert skill.rows[0][1:] == ("+50 %", "-100 %")  # errors of 0.1 against 0.2 and 0.05
     assert channels.rows[0] == ("heave", "0.100", "0.200", "0.050", "0.300")
     path = write_comparison(tables, tmp_path / "t.csv")
     rows = list(csv.DictReader(path.read_text().splitlines()))

@@ -469,7 +469,7 @@ def _divergences(
     curves = np.full((7, len(channels), 512), np.nan)
     for c, channel in enumerate(channels):
         p, m = predicted[:, :, c], measured[:, c]
-        inside = p.reshape(len(p), -1, test.sizes["time"])
+        inside = p.reshape(len(p), test.sizes["window"], test.sizes["time"])
         if not len(p) or np.ptp(m) == 0 or np.any(np.ptp(inside, axis=2).max(axis=1) == 0):
             continue  # what stands still has no density
         try:
