@@ -18,6 +18,7 @@ from seakeep.report.sections.judgements import divergence_table
 from seakeep.report.sections.settings import finished
 from seakeep.report.tables import Table, number
 from seakeep.study import StudyResult
+from seakeep.study.describe import words_of_repeats
 from seakeep.study.judge import average_of
 from seakeep.study.reproduce import ACTS, NOTE, SLOW, Act
 
@@ -97,7 +98,14 @@ def _summary(results: Results) -> Section:
             ),
         ),
         tables=(acts_table(results),),
+        notices=tuple(_warnings(results)),
     )
+
+
+def _warnings(results: Results) -> list[str]:
+    """What a study of the acts warns of: once where several do."""
+    repeats = [result.groups.get("repeats") for result in results.values()]
+    return list(dict.fromkeys(words_of_repeats(each) for each in repeats if each is not None))
 
 
 def acts_table(results: Results) -> Table:

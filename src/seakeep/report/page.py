@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["write_page", "write_report"]
 
-SHORT = re.compile(r"(\.\d\d)\d+")
+SHORT = re.compile(r"(\.\d)\d+")
 RASTER_DPI = 80
 """Of pictures without vectors: as wide as the page."""
 
@@ -155,5 +155,5 @@ def _svg_text(figure: Figure, name: str) -> str:
     buffer = io.StringIO()
     with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": name}):
         figure.savefig(buffer, format="svg", metadata={"Date": None})
-    # A hundredth of a point is all that can be seen, and half of the file.
+    # A tenth of a point is all that can be seen, and half of the file.
     return re.sub(r' d="[^"]*"', lambda path: SHORT.sub(r"\1", path[0]), buffer.getvalue())

@@ -309,7 +309,7 @@ def study_text(act: Act, size: Size, seed: int) -> str:
         "",
         "[models.bayesian]",
         'kind = "bayesian_hankel_dmdc"',
-        f"n_members = {size.members}",
+        f"n_members = {size.members if paper else min(size.members, CALIBRATED)}",
         *alignment,
         "",
         "[models.mean]",
@@ -349,5 +349,7 @@ def study_text(act: Act, size: Size, seed: int) -> str:
 
 REGULAR = {"regular_1_5": "1.5", "regular_2": "2", "regular_3": "3"}
 """Runs in regular waves, and their λ/L."""
+CALIBRATED = 20
+"""Members at most of the third act: its band is as wide as calibration says, not as they spread."""
 STARTUP = 20
 """s of a run in regular waves before the first window: longer than any model's history."""

@@ -7,7 +7,7 @@ from functools import partial
 import xarray as xr
 
 from seakeep.report.figures.boxes import FEWEST, average_boxes, channel_boxes
-from seakeep.report.figures.common import HEADING, model_words
+from seakeep.report.figures.common import HEADING, judged_models, model_words
 from seakeep.report.section import Drawing, Section
 from seakeep.report.sections.summary import conditional, overview_table
 from seakeep.report.tables import Table, number, signed
@@ -89,15 +89,16 @@ def _with_interval(at: xr.Dataset) -> str:
 def error_table(result: StudyResult, test: str) -> Table:
     """Medians and inter-quartile ranges of both measures, average and per channel."""
     boxes = result.groups[f"statistics/boxes/{test}"]
+    models = judged_models(result)
     columns = ["channel"]
     for measure in HEADING:
-        columns += [f"{measure.upper()} {model_words(m)}: median [IQR]" for m in result.models]
+        columns += [f"{measure.upper()} {model_words(m)}: median [IQR]" for m in models]
     rows, left_out = [], 0
     names = [str(name) for name in boxes["channel"].values]
     for name in [*names[1:], names[0]]:
         row = ["average" if name == "average" else result.words_of(name)]
         for measure in HEADING:
-            for model in result.models:
+            for model in models:
                 at = boxes.sel(model=model, measure=measure, channel=name)
                 spread = float(at["upper_quartile"] - at["lower_quartile"])
                 row.append(f"{number(float(at['median']))} [{number(spread)}]")

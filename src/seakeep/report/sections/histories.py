@@ -22,7 +22,7 @@ from seakeep.study import StudyResult
 __all__ = ["explorer", "histories", "history_data", "pack", "write_histories"]
 
 FOLDER = "histories"
-MOST_MEMBERS = 40
+MOST_MEMBERS = 20
 """Members of a cell that are kept; more cannot be told apart on a screen."""
 MISSING = 65535
 
