@@ -123,8 +123,10 @@ def test_output_in_a_code_page_without_greek_letters_is_no_error(monkeypatch):
 
 
 def test_reproduce_replaces_no_study_file_of_the_user(tmp_path, capfd):
-    (tmp_path / "study.toml").write_text("mine")
+    own = tmp_path / "raw" / "study.toml"
+    own.parent.mkdir()
+    own.write_text("mine")
     assert cli.main(["reproduce", "--quick", "-o", str(tmp_path)]) == 2
     assert "exists and is no reproduction's study file" in capfd.readouterr().err
-    assert (tmp_path / "study.toml").read_text() == "mine"
+    assert own.read_text() == "mine"
     assert not (tmp_path / "campaign").exists()

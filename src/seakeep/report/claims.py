@@ -218,7 +218,7 @@ def _share(result: StudyResult, measure: str, channels: tuple[str, ...]) -> Inte
     picked = _columns(result, channels)
 
     def statistic(drawn: FloatArray) -> FloatArray:
-        means = np.nanmean(drawn, axis=(1, 2))
+        means = average_of(drawn.reshape(len(drawn), -1, drawn.shape[-1]).swapaxes(1, 2))
         out: FloatArray = means[:, picked].sum(axis=1) / np.nansum(means, axis=1)
         return out
 
@@ -288,7 +288,8 @@ def _better(results: Results) -> Finding:
 
 def _dispersion(results: Results) -> Finding:
     def statistic(drawn: FloatArray, other: FloatArray) -> FloatArray:
-        return _spread(drawn) / _spread(other) - 1.0
+        with np.errstate(invalid="ignore", divide="ignore"):  # a redraw may hold one cell alone
+            return _spread(drawn) / _spread(other) - 1.0
 
     found = _against_single(results["paper"], ("irregular",), statistic)
     return Finding(
