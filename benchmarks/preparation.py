@@ -4,8 +4,8 @@
 
 The virtual tank plays the six runs of the paper: wave probes and load cells at 500 Hz, motion
 reference unit at 50 Hz, video at 30 Hz. Each command runs in a process of its own, whose times
-and peak memory the system tells. The second case is interrupted (as by Ctrl-C) once two runs are
-written, and started again.
+and peak memory that the system reports. The second case is interrupted (as by Ctrl-C) once two runs
+are written, and started again.
 """
 
 from __future__ import annotations

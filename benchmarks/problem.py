@@ -17,8 +17,8 @@ NOISE = 0.05
 INPUT_NOISE = 0.01
 """The same on the measured inputs, as a wave probe has it.
 
-Without any, a narrow-banded sea tells its own future from its past, and subspace methods (N4SID),
-which take the future input out of the future output, are left with nothing to identify."""
+Without any, a narrow-banded sea determines its own future from its past, and subspace methods
+(N4SID), which take the future input out of the future output, are left with nothing to identify."""
 
 
 @dataclass(frozen=True)

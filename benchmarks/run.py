@@ -100,7 +100,7 @@ def plain_cells(draws, deterministic: bool, problem, stops, starts):
 
 
 def forecast_cells(ensemble, model, run, stops, starts) -> None:
-    """The same with the package: an ensemble, and perhaps a model, a training window."""
+    """The same with the package: an ensemble, and perhaps a model, per training window."""
     for stop in stops:
         fitted = ensemble.fit(run, *names(), stop=stop)
         fitted.summarize_windows(run, starts, STEPS)
@@ -118,7 +118,7 @@ def members(
     """Contenders of ensembles: the same draws, forecast from one or several starts.
 
     With several training windows and the deterministic model beside the draws these are the cells
-    of the paper's study; plain NumPy identifies once a training window and draw too.
+    of the paper's study; plain NumPy also identifies once per training window and draw.
     """
     spacing = SNAPSHOTS // 4
     problem = linear_system(samples=4608 + 2 * (trainings - 1) * spacing)

@@ -79,7 +79,9 @@ def test_a_reader(add, tmp_path, name):
     run = seakeep.read_campaign(tmp_path / "campaign.toml").prepare()["a"]
     np.testing.assert_allclose(run["heave"], 1e-3 * np.sin(t), rtol=1e-15)
     (tmp_path / "text.raw").write_text("time,heave\n0,1\n1,2\n")
-    with pytest.raises(DataError, match=r"text\.raw is no RAW file: it holds text and starts with"):
+    with pytest.raises(
+        DataError, match=r"text\.raw is not a valid RAW file: it holds text and starts with"
+    ):
         formats.read_columns(tmp_path / "text.raw")
 
 

@@ -186,7 +186,7 @@ def test_whatever_is_written_as_netcdf_survives_a_disk_that_is_full(tmp_path):
     for kind, words in (told.pop("study"), told.pop("other words")):
         assert kind == "StorageError"
         assert "File too large" in words
-        assert "Free space on the disk; the same command then goes on" in words
+        assert "Free space on the disk; the same command then continues" in words
     assert len(told) == 5
     for kind, words in told.values():
         assert kind == "RequestError"
@@ -212,13 +212,13 @@ class TestOutputs:
         path = tmp_path / "a.nc"
         write_netcdf(path, xr.Dataset(attrs={MARK: "model"}))
         check_output(path, "model")
-        with pytest.raises(RequestError, match="exists and is no forecast that seakeep wrote"):
+        with pytest.raises(RequestError, match="exists and is not a forecast that seakeep wrote"):
             check_output(path, "forecast")
         write_netcdf(path, xr.Dataset({"heave": ("time", [1.0])}))
         with pytest.raises(RequestError, match=r"may be a measurement\. Choose another name"):
             check_output(path, "model")
         path.write_bytes(b"CDF\x01")
-        with pytest.raises(RequestError, match="exists and is no model"):
+        with pytest.raises(RequestError, match="exists and is not a model"):
             check_output(path, "model")
 
     def test_text_states_what_it_is_and_csv_by_its_header(self, tmp_path):
@@ -226,10 +226,10 @@ class TestOutputs:
         path.write_text("# seakeep_file: campaign\n")
         check_output(path, "campaign")
         path.write_text("[campaign]\n")
-        with pytest.raises(RequestError, match="exists and is no campaign"):
+        with pytest.raises(RequestError, match="exists and is not a campaign"):
             check_output(path, "campaign")
         table = tmp_path / "a.csv"
         table.write_text("run,channel\n1,2\n")
         check_output(table, "table", header="run,channel")
-        with pytest.raises(RequestError, match="exists and is no table"):
+        with pytest.raises(RequestError, match="exists and is not a table"):
             check_output(table, "table", header="time,.*")

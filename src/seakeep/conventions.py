@@ -224,7 +224,7 @@ _SPELLINGS = (
 )
 
 
-# A header is foreign text: powers of powers in it would keep the parser busy for ever.
+# A header is foreign text: powers of powers in it would keep the parser busy forever.
 _PLAIN = re.compile(r"[\w°%.*/() +-]*\Z")
 _POWER = re.compile(r"\*\*(?!\s*\(?-?\d\)?(?!\s*\*\*|\d))")
 

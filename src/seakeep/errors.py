@@ -1,6 +1,6 @@
 """Errors and warnings of seakeep.
 
-Every message says the symptom, what was received, and how to mend it. The command line prints
+Every message says the symptom, what was received, and how to fix it. The command line prints
 the message alone; ``exit_status`` is what it returns to the shell.
 """
 
@@ -42,7 +42,7 @@ class DataError(SeakeepError, ValueError):
 
 
 class SeakeepWarning(UserWarning):
-    """A result was produced, and something about it deserves a look."""
+    """A result was produced, but something about it needs attention."""
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -38,7 +38,7 @@ __all__ = [
 MARK = "seakeep_file"
 """Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""
 SEAL = b"seakeep SHA-256 "
-"""Stands behind the content of a NetCDF file, before its checksum; HDF5 reads no further."""
+"""Marker between the content of a NetCDF file and its checksum; HDF5 reads no further."""
 
 SHOWN = 5
 """Names of a folder that a message lists at most."""
@@ -197,7 +197,7 @@ def _missing(path: Path) -> MissingFileError:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary name beside `path`, renamed onto it when all went well.
+    """Yield a temporary name next to `path`, renamed to `path` on success.
 
     Parameters
     ----------
@@ -265,7 +265,7 @@ def write_netcdf(
     packing : callable, optional
         Gives the encoding of the variables of a Dataset, such as their compression.
     onto : Path, optional
-        A NetCDF file whose content is taken over, and added to.
+        A NetCDF file whose content is copied first.
 
     Raises
     ------
@@ -315,7 +315,7 @@ def _content(file: bytes) -> tuple[bytes, str]:
 
 
 def check_place(path: Path, suffix: str | None = None) -> None:
-    """Refuse a path at which no file can be written, before the work and not after it.
+    """Refuse a path that cannot be written, before the work starts.
 
     Parameters
     ----------
@@ -394,8 +394,8 @@ def check_output(
             ours = f"{MARK}: {kind}" in start + end
     if not ours:
         raise RequestError(
-            f"{path} exists and is no {kind} that seakeep wrote; it may be a measurement. Choose "
-            "another name, or remove it first."
+            f"{path} exists and is not a {kind} that seakeep wrote; it may be a measurement. "
+            "Choose another name, or remove it first."
         )
 
 
@@ -403,7 +403,7 @@ HEAD = 8192
 """Bytes of a file in which its mark is looked for."""
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
-"""First bytes of a NetCDF file, whatever its name ends on."""
+"""First bytes of a NetCDF file, for any suffix."""
 
 
 def _mark_of_netcdf(path: Path) -> str | None:

@@ -38,7 +38,7 @@ class Paired:
 
 
 def channel_names(data: xr.Dataset, name: str) -> list[str]:
-    """Variables that hold numbers; words, such as the status of a forecast, are no channels."""
+    """Variables that hold numbers; words, such as the status of a forecast, are not channels."""
     names = [str(key) for key, each in data.data_vars.items() if each.dtype.kind not in "OUST"]
     if not names:
         raise RequestError(f"{name} holds no channel; there is nothing to judge.")

@@ -63,7 +63,7 @@ KNOWN_BY = {
     "study": ("study", "tests", "training"),
     "tank": ("facility", "vessel", "hull", "moorings", "simulation"),
 }
-"""Tables by which each kind of file is recognised when it stands in the place of another kind."""
+"""Tables that identify each kind of file when another kind is expected."""
 
 _WRITTEN = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf)\s*(/?)\s*T\u0302?\s*"
@@ -307,7 +307,7 @@ def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
     Raises
     ------
     RequestError
-        If the file is missing, cannot be read, is no TOML, or is one of our files of another kind.
+        If the file is missing, cannot be read, is not TOML, or is one of our files of another kind.
     """
     text = _text_of(path, what, mend)
     try:

@@ -31,7 +31,7 @@ Progress = Callable[[int, int, str], None]
 
 @dataclass(frozen=True, eq=False)
 class TuneResult:
-    """What :func:`tune` found.
+    """Result of :func:`tune`.
 
     Parameters
     ----------
@@ -102,8 +102,8 @@ def tune(
         Channels of the model.
     vary : sequence of str, optional
         Out of "ridge" (always chosen), "observables" (none, slow squares, powers, both; or those of
-        the spec), "lead", "input_delays", "state_delays", "rank" (truncated singular values in the
-        place of the ridge), "alignment" (none, dispersion or one celerity, to the surge that is
+        the spec), "lead", "input_delays", "state_delays", "rank" (truncated singular values instead
+        of the ridge), "alignment" (none, dispersion or one celerity, to the surge that is
         predicted or to the place at rest: what the runs allow) and "readouts" (none, hinge or
         stacked, for those of the spec or for every load).
     horizon : sequence of float, optional
@@ -120,7 +120,7 @@ def tune(
     progress : callable, optional
         Called as ``progress(done, total, what)``.
     resume : str or Path, optional
-        File that keeps what was found, so that a search that was interrupted goes on.
+        File that keeps what was found, so that an interrupted search continues.
 
     Returns
     -------

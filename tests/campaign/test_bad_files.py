@@ -1,4 +1,4 @@
-"""Every reader fed what is no run: one error that says what it is and how to mend it."""
+"""Every reader fed what is no run: one error that says what it is and how to fix it."""
 
 import re
 import shutil
@@ -151,15 +151,15 @@ def test_a_text_cut_off_within_its_last_line(tmp_path, left):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (png(), r"is a PNG picture, and no table\. Name the file that holds the run's samples"),
-        (b"\xff\xd8\xff\xe0" + bytes(99), r"is a JPEG picture, and no table"),
-        (b"%PDF-1.7\n%\xe2\xe3\n" + bytes(99), r"is a PDF document, and no table"),
+        (png(), r"is a PNG picture, not a table\. Name the file that holds the run's samples"),
+        (b"\xff\xd8\xff\xe0" + bytes(99), r"is a JPEG picture, not a table"),
+        (b"%PDF-1.7\n%\xe2\xe3\n" + bytes(99), r"is a PDF document, not a table"),
         (
             b"PK\x03\x04" + bytes(99),
             r"is an Excel workbook .*\. Save its sheet as CSV and name",
         ),
         (b"\xd0\xcf\x11\xe0" + bytes(99), r"is an Excel workbook of the old kind .* as CSV"),
-        (bytes(4) + b"ftypisom" + bytes(99), r"is a video in MP4, .* first, with `seakeep track`"),
+        (bytes(4) + b"ftypisom" + bytes(99), r"is an MP4 video, .* first, with `seakeep track`"),
         (b"RIFF" + bytes(99), r"is a recording in AVI or WAV, .* with `seakeep track`"),
         (
             bytes(range(256)) * 4,
@@ -184,8 +184,8 @@ def test_text_under_the_name_of_a_binary_format(path, encoding):
         return
     with pytest.raises(
         DataError,
-        match=r"run\..* is no (MATLAB|NetCDF|HDF5|TDMS|MCAP) file: it holds text and starts with "
-        r"'tid \[s\],vinkel .*If it is a table, name it \.csv or \.txt; else copy or export it",
+        match=r"run\..* is not a valid (MATLAB|NetCDF|HDF5|TDMS|MCAP) file: it holds text and "
+        r"starts with 'tid \[s\],vinkel .*If it is a table, name it \.csv or \.txt; else copy or",
     ):
         read_table(path)
 
@@ -312,7 +312,7 @@ class TestUnits:
             with pytest.raises(
                 RequestError,
                 match=rf"channels\.heave: the unit 'mm' is stated, and run 'second' \(.*\.csv\) "
-                rf"says '{header}' of the column 'Heave'\. Leave unit out where the files say it; "
+                rf"says '{header}' for the column 'Heave'\. Leave unit out where the files say it; "
                 r"or, if this file is wrong, state the unit in \[runs\.second\.channels\.heave\]",
             ):
                 self.prepared(tank, header, text)

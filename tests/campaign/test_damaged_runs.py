@@ -16,7 +16,7 @@ POOLED = ("sampling_rate = 10", "steps_per_period = 12")
 CUT = "Time [s],WP fwd [mm],Heave [mm],Pitch (deg),acc [g]\n0.0,1.0,2.0\n"
 NOTE = (
     r"run 'second' is left out of the encounter period: .*second\.csv.*"
-    r"Once it is mended, prepare again; or state role = 'unused' in \[runs\.second\]"
+    r"Once it is repaired, prepare again; or state role = 'unused' in \[runs\.second\]"
 )
 
 

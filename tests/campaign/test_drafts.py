@@ -455,7 +455,9 @@ def test_probes_behind_the_vessel_are_no_inputs(tmp_path):
     assert campaign.model().inputs == ("eta_fwd",)
     assert "# eta_aft, eta_1 left out: behind the vessel, by name, where its own waves are" in text
     text, _ = drafted(tmp_path, [write_csv(tmp_path / "run.csv", tank_columns())])
-    assert "# Take probes out that stand behind the vessel: what it makes is no input." in text
+    assert (
+        "# Remove probes that stand behind the vessel: the waves it makes are not an input." in text
+    )
 
 
 def test_no_depth_is_made_up(tmp_path):

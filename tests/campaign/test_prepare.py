@@ -539,7 +539,7 @@ class TestFiles:
             write_prepared(campaign, tank, ["first"])
         (tank / "other").mkdir()
         (tank / "other" / "first.nc").write_bytes(before)
-        with pytest.raises(RequestError, match=r"first\.nc exists and is no prepared run that"):
+        with pytest.raises(RequestError, match=r"first\.nc exists and is not a prepared run that"):
             write_prepared(campaign, tank / "other", ["first"])
         assert (tank / "first.nc").read_bytes() == before
         assert (tank / "other" / "first.nc").read_bytes() == before

@@ -169,7 +169,7 @@ def test_fit_says_what_an_ensemble_is_made_of(run, place):
     for words in (
         "Ensemble of 8 Hankel DMD models with control: 5 states, 2 inputs, dt 0.08 s",
         "Monte Carlo, seed 0; none infeasible",
-        "2 runs, a window of one of them a member, drawn",
+        "2 runs, a window of one of them per member, drawn",
         "(stable)",
     ):
         assert words in out
@@ -279,7 +279,7 @@ def test_calibrate_takes_an_unread_part_of_a_run_that_trains(run, place):
         status, _, err = run(f"{calibrate} {options}")
         assert status == 0, err
         spans[options] = seakeep.load_model(place / "half.nc").calibration.spans["unseen"]
-        assert re.search(r"Note: errors that last .* \d+ windows? would warrant \d\d %", err)
+        assert re.search(r"Note: errors that last .* \d+ windows? would support \d\d %", err)
     assert spans[""][1] <= 40 < spans["--stop 100"][1] <= 100
     # 200 steps of 0.08 s end to end: less than one window is left before the end of 120 s.
     assert 50 <= spans["--start 50 --stop inf"][0] < 60
@@ -710,7 +710,7 @@ def test_ctrl_c_ends_with_130_and_says_what_is_kept(run, monkeypatch):
     monkeypatch.setattr("seakeep.study.fit_campaign", interrupt)
     status, _, err = run(f"fit {CAMPAIGN} -o m.nc")
     assert status == 130
-    assert "Interrupted. Files that were finished are kept: the command takes them over" in err
+    assert "Interrupted. Finished files are kept: run the same command again" in err
 
 
 def test_an_unforeseen_error_asks_for_a_report(run, monkeypatch):

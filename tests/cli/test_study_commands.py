@@ -106,7 +106,7 @@ def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(folder, ctrl_c):
         process.send_signal(signal.SIGINT)
         told = process.communicate()[1]
     assert process.returncode == 130, told
-    assert "the same command goes on where it stopped" in told
+    assert "the same command continues where it stopped" in told
     assert told.count("kept") == 1
     assert f"Interrupted. What was finished is kept in {out}" in told
     assert "Traceback" not in told
@@ -127,6 +127,6 @@ def test_reproduce_replaces_no_study_file_of_the_user(tmp_path, capfd):
     own.parent.mkdir()
     own.write_text("mine")
     assert cli.main(["reproduce", "--quick", "-o", str(tmp_path)]) == 2
-    assert "exists and is no reproduction's study file" in capfd.readouterr().err
+    assert "exists and is not a reproduction's study file" in capfd.readouterr().err
     assert own.read_text() == "mine"
     assert not (tmp_path / "campaign").exists()

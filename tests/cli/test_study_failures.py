@@ -153,7 +153,7 @@ def test_a_disk_that_fills_up_loses_no_finished_unit(folder, room, undisturbed, 
         assert study(folder) == 1
     told = " ".join(capfd.readouterr().err.split())
     assert "No space left on device. What was finished is kept." in told
-    assert "the same command then goes on where it stopped" in told
+    assert "the same command then continues where it stopped" in told
     before = {path.name: path.stat().st_mtime_ns for path in units_in(folder)}
     assert len(before) == room
     # Then there is room for the units, and none for the result.

@@ -229,7 +229,9 @@ def test_netcdf_cut_off(tmp_path, engine, part):
 def test_netcdf_that_is_none(tmp_path):
     path = tmp_path / "run.nc"
     path.write_text("not a NetCDF file")
-    with pytest.raises(DataError, match=r"is no NetCDF file: it holds text and starts with 'not a"):
+    with pytest.raises(
+        DataError, match=r"is not a valid NetCDF file: it holds text and starts with 'not a"
+    ):
         read_table(path)
 
 

@@ -156,7 +156,7 @@ def test_a_second_segment_cut_off(tmp_path, more):
 def test_foreign_and_empty(tmp_path):
     path = tmp_path / "run.tdms"
     path.write_bytes("temps;pilonnement é\n".encode("latin-1") * 40)
-    with pytest.raises(DataError, match=r"is no TDMS file: it holds text and starts"):
+    with pytest.raises(DataError, match=r"is not a valid TDMS file: it holds text and starts"):
         read_table(path)
     path.write_bytes(b"")
     with pytest.raises(DataError, match=r"run\.tdms is empty \(0 bytes\)"):

@@ -124,7 +124,7 @@ def test_a_unit_of_time_stated_against_the_header(tmp_path):
         assert read_table(path, FileSettings(time_unit=unit))["time"][1] == 0.02
     with pytest.raises(
         RequestError,
-        match=r"time_unit: 'ms' is stated, and .*run\.csv says 's' of its time column 'Zeit'\. "
+        match=r"time_unit: 'ms' is stated, and .*run\.csv says 's' for its time column 'Zeit'\. "
         "Leave time_unit out where the files say it; or, if the file is wrong, correct its header",
     ):
         read_table(path, FileSettings(time="Zeit", time_unit="ms"))
@@ -260,7 +260,7 @@ def test_round_trip(tmp_path, values, delimiter, comma, units, compressed, newli
             "t,heave\n0,1\n1\n2,3\n3\n4,5\n",
             DataError,
             r"line 3: 1 cells where the header has 2 \(2 such line\(s\), columns divided by ','\)\."
-            r" Mend the lines, or state in \[files\]: delimiter, decimal, or skip_rows where words",
+            r" Correct the lines, or state in \[files\]: delimiter, decimal, or skip_rows where",
         ),
         (
             "Basin 2\nBy: us\ntime,heave\n0,1\n1,2\n",

@@ -411,7 +411,7 @@ def test_the_summary_says_what_the_members_are(run):
         [run, wave_run(1)], STATES, INPUTS
     )
     assert "Sobol, seed 3" in windows.summary()
-    assert "2 runs, a window of one of them a member, drawn" in windows.summary()
+    assert "2 runs, a window of one of them per member, drawn" in windows.summary()
     whole = small(train_length=None, ridge=STABLE).fit(run, STATES, INPUTS)
     assert "window        all of a run" in whole.summary()
     single = small(state_delay=Fixed(1.0), ridge=STABLE).fit(run, STATES, INPUTS)

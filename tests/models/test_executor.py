@@ -257,7 +257,9 @@ class TestCluster:
     )
     def test_what_is_no_address_is_refused_at_once(self, address):
         with (
-            pytest.raises(RequestError, match=rf"'{address}' is no address of a Dask scheduler"),
+            pytest.raises(
+                RequestError, match=rf"'{address}' is not the address of a Dask scheduler"
+            ),
             make_executor(scheduler=address),
         ):
             pass

@@ -283,7 +283,7 @@ def test_a_mat_file_replaces_another_system_and_no_other_file(model, tmp_path):
     model.to_mat(model.to_mat(tmp_path / "rom.mat"))
     measured = tmp_path / "run.mat"
     io.savemat(measured, {"heave": np.zeros(3)})
-    with pytest.raises(RequestError, match=r"run.mat exists and is no state-space system that"):
+    with pytest.raises(RequestError, match=r"run.mat exists and is not a state-space system that"):
         model.to_mat(measured)
     assert list(io.loadmat(measured)["heave"][0]) == [0.0, 0.0, 0.0]
 
@@ -317,7 +317,7 @@ def test_a_measurement_is_never_overwritten(tmp_path, run, channels):
     model = HankelDMDc(4, 2, 1.0).fit(run, **channels)
     for name in ("raw.nc", "raw.csv", "raw.mat"):
         (tmp_path / name).write_text("time,heave")
-        with pytest.raises(RequestError, match=rf"{name} exists and is no model that seakeep"):
+        with pytest.raises(RequestError, match=rf"{name} exists and is not a model that seakeep"):
             model.save(tmp_path / name)
         assert (tmp_path / name).read_text() == "time,heave"
     model.save(tmp_path / "model.bin")

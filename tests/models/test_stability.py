@@ -96,7 +96,7 @@ def test_a_stable_model_warns_of_nothing_and_says_so(identified):
 def test_an_unstable_model_warns_and_says_what_to_do(make_dataset):
     model, _ = fit_growing(make_dataset)
     message = (
-        r"the spectral radius of the model is 1\.4979\d*: a free run grows by 50 % a step .* "
+        r"the spectral radius of the model is 1\.4979\d*: a free run grows by 50 % per step .* "
         r"Raise ridge, train on more data, use fewer state delays"
     )
     with pytest.warns(SeakeepWarning, match=message):

@@ -205,5 +205,7 @@ def test_prepare_writes_a_page_that_needs_nothing_else(tmp_path, capsys):
     first.write_bytes(b"a photo of mine")
     for command in ("prepare", "prepare --anew"):
         assert cli.main([*command.split(), str(tmp_path / "campaign.toml")]) == 2
-    assert "quality_first.png exists and is no data-quality sheet that" in capsys.readouterr().err
+    assert (
+        "quality_first.png exists and is not a data-quality sheet that" in capsys.readouterr().err
+    )
     assert first.read_bytes() == b"a photo of mine"

@@ -58,7 +58,7 @@ def test_as_python_would_reckon(x, y, z):
 @pytest.mark.parametrize(
     ("text", "position", "what"),
     [
-        ("a + __import__('os')", 5, "'__import__' is no function known here"),
+        ("a + __import__('os')", 5, "'__import__' is not a known function"),
         ("a.real", 1, "'a.real' is none of the allowed forms"),
         ("a + b[0]", 5, "'b[0]' is none of the allowed forms"),
         ("a if b else a", 1, "'a if b else a' is none of the allowed forms"),
@@ -70,7 +70,7 @@ def test_as_python_would_reckon(x, y, z):
         ("a // 2", 1, "'a // 2' is none of the allowed forms"),
         ("a < b", 1, "'a < b' is none of the allowed forms"),
         ("not a", 1, "'not a' is none of the allowed forms"),
-        ("a + sqare(b)", 5, "'sqare' is no function known here. Did you mean 'square'?"),
+        ("a + sqare(b)", 5, "'sqare' is not a known function. Did you mean 'square'?"),
         ("`wave 1` + sqrt(a, b)", 12, "'sqrt' takes one argument(s), not 2"),
         ("a + average()", 5, "'average' takes one or more argument(s), not 0"),
         ("a + mean()", 5, "'mean' takes one argument(s), not 0"),

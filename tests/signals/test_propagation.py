@@ -45,7 +45,7 @@ def test_a_sine_is_moved_exactly(frequency, phase, distance):
         np.cos(omega * TIME + phase), DT, distance, DEPTH, highest_frequency=1.2
     )
     exact = np.cos(omega * TIME - k * distance + phase)
-    # The record is no whole number of waves; its ends are continued by linear prediction, whose
+    # The record is not a whole number of waves; its ends are continued by linear prediction, whose
     # error inside is what is left of the fade.
     np.testing.assert_allclose(carried[INNER], exact[INNER], atol=1e-3)
 

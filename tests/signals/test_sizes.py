@@ -24,7 +24,7 @@ RNG = np.random.default_rng
         ),
         (
             lambda: signals.resample(X, np.arange(1200), np.arange(9, 90, 1.5), passband=2),
-            "part of",
+            "fraction of",
         ),
         (lambda: signals.integrate(X, 0.05, (1e-9, 1.0)), r"lower edge .*1e-09 Hz.* period of"),
         (lambda: signals.complementary_filter(X, X, 0.05, 1e-9), r"the crossover \(1e-09 Hz\)"),

@@ -374,7 +374,7 @@ def test_tuples_of_the_command_say_that_blanks_divide_them(capsys):
     assert cli.main(["track", "--help"]) == 0
     words = " ".join(capsys.readouterr().out.split())
     assert "--lamp X Y RADIUS" in words
-    assert "three numbers divided by blanks, such as 40 40 12" in words
+    assert "three numbers separated by spaces, such as 40 40 12" in words
 
 
 def test_a_video_of_zero_frames(tmp_path):

@@ -59,7 +59,7 @@ def groups(shift=0.9, offset=0.3, ratio=0.8, lead=40.0):
 
 def test_the_parts_are_what_the_forecast_was_made_of():
     found = regular_response(groups(), "t", ["m"]).sel(model="m", channel="surge")
-    # The record is no whole number of periods, so that its own SD differs from 0.1/√2.
+    # The record is not a whole number of periods, so that its own SD differs from 0.1/√2.
     own = groups()["tests/t"]["measured"].std("time", ddof=1).values[:, 0]
     offset = np.sqrt(np.mean((0.3 / own) ** 2))
     # The offset and the wave are not quite orthogonal over 6.9 periods: 1 % of the offset.

@@ -278,7 +278,7 @@ def test_the_smallest_study_tests_runs_that_do_not_state_their_waves(study_folde
         (errno.ENOENT, RequestError, 2, "Choose another place"),
         (errno.ENOTDIR, RequestError, 2, "Choose another place"),
         (errno.ENOSPC, StorageError, 1, "Free space on the disk"),
-        (errno.EIO, StorageError, 1, "Look after the disk"),
+        (errno.EIO, StorageError, 1, "Check the disk"),
     ],
 )
 def test_a_write_that_fails_names_the_mend_of_its_cause(number, kind, status, mend, tmp_path):

@@ -50,7 +50,7 @@ def test_a_key_of_another_scheme_is_refused():
 
 
 def test_densities_of_an_unknown_test_set_are_refused():
-    assert "statistics.densities_of = 'regular' is no table of [tests]" in refused(
+    assert "statistics.densities_of = 'regular' is not a table of [tests]" in refused(
         statistics={"densities_of": "regular"}
     )
 

@@ -181,7 +181,7 @@ def test_incomplete_and_damaged_files_are_refused(tmp_path):
         load_hydrodynamics(tmp_path / "none.nc")
     other = tmp_path / "text.nc"
     shutil.copy(__file__, other)
-    with pytest.raises(RequestError, match="is no NetCDF file"):
+    with pytest.raises(RequestError, match="is not a readable NetCDF file"):
         load_hydrodynamics(other)
 
 

@@ -167,12 +167,12 @@ def test_nothing_that_the_tank_has_not_written_is_replaced(short, tmp_path):
     record = tmp_path / "raw" / "regular_2" / "mru.csv"
     kept = record.read_text(encoding="utf-8")
     record.write_text("time [s],heave [m]\n0.0,0.1\n", encoding="utf-8")
-    with pytest.raises(RequestError, match=r"mru\.csv exists and is no raw file that"):
+    with pytest.raises(RequestError, match=r"mru\.csv exists and is not a raw file that"):
         play(short, tmp_path, names=["regular_2"])
     record.write_text(kept, encoding="utf-8")
     (tmp_path / "campaign.toml").write_text("[campaign]\nname = 'mine'\n", encoding="utf-8")
     before = digests(tmp_path)
-    with pytest.raises(RequestError, match=r"campaign\.toml exists and is no campaign"):
+    with pytest.raises(RequestError, match=r"campaign\.toml exists and is not a campaign"):
         play(short, tmp_path, names=["regular_2"])
     assert digests(tmp_path) == before
 

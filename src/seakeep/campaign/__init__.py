@@ -1,4 +1,4 @@
-"""The campaign room: a TOML file and raw recordings in, analysis-ready runs out."""
+"""Campaigns: from a TOML file and raw recordings to analysis-ready runs."""
 
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.prepare import Campaign, read_campaign

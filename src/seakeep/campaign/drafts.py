@@ -1,4 +1,4 @@
-"""A first campaign file, guessed from the files of its runs: what ``seakeep init`` writes."""
+"""A draft campaign file, guessed from the files of its runs, as ``seakeep init`` writes it."""
 
 from __future__ import annotations
 
@@ -274,7 +274,7 @@ def _runs(
 
 
 def _kind(run: str, seas: Mapping[str, Sea]) -> str | None:
-    """Kind of a run's waves, by its name or else by their spectrum; None if nothing tells."""
+    """Kind of a run's waves, by its name or else by their spectrum; None if neither says."""
     if (named := waves_of_name(run)) or run not in seas:
         return named
     return "regular" if seas[run].regular else "irregular"
@@ -394,7 +394,7 @@ def _model(guesses: Sequence[Guess]) -> Iterator[str]:
     if behind := [name for name in probes if mapped[name].behind]:
         yield f"# {', '.join(behind)} left out: behind the vessel, by name, where its own waves are"
     else:
-        yield "# Take probes out that stand behind the vessel: what it makes is no input."
+        yield "# Remove probes that stand behind the vessel: the waves it makes are not an input."
     if gapped := [n for n in probes if mapped[n].gaps and n not in behind]:
         yield from _left_out(gapped, "inputs")
 
@@ -403,7 +403,7 @@ def _left_out(names: Sequence[str], key: str) -> Iterator[str]:
     has = "it has" if len(names) == 1 else "they have"
     yield (
         f"# {', '.join(names)} left out: {has} gaps, and a model takes none. To be among the "
-        f"{key}, mend them in the files, or bridge them (gaps, longest_gap in [preparation])."
+        f"{key}, repair them in the files, or bridge them (gaps, longest_gap in [preparation])."
     )
 
 

@@ -1,4 +1,4 @@
-"""What columns, files and runs of a campaign may be, guessed from names, units and waves."""
+"""Guesses about columns, files and runs of a campaign, from names, units and waves."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class File:
 
 @dataclass(frozen=True)
 class Guess:
-    """What a column may be; `channel` is None where nothing fits, and `why` says so.
+    """A guess for a column; `channel` is None where nothing fits, and `why` says so.
 
     `named_unit` says that the unit is what the column's name ends on, `at_rest` that the motion is
     restrained or does not show, `behind` that a probe's name places it behind the vessel.
@@ -294,7 +294,7 @@ def _guess(column: str, files: Sequence[File]) -> Guess:
     why, gaps = _fault(column, files)
     if unit is not None and not is_unit(unit):
         why = why or f"its unit '{unit}' is not known; state unit = '…'"
-    # One file per run may be that of one logger, whose name tells what it measured.
+    # One file per run may be that of one logger, whose name says what it measured.
     channel = None if why else suggest_channel(name, unit, logger or _stem(files[0].path))
     canonical = canonical_channel(channel) if channel else None
     return Guess(

@@ -236,7 +236,7 @@ def _clock(
 
 
 def channels_of(settings: CampaignSettings, run: RunSettings) -> dict[str, ChannelSettings]:
-    """Channel map of a run: the campaign's, with the keys that the run states in their place."""
+    """Channel map of a run: the campaign's, with the keys that the run replaces."""
     chosen = dict(settings.channels)
     for name, own in run.channels.items():
         stated = {key: getattr(own, key) for key in own.model_fields_set}
@@ -357,7 +357,7 @@ def _refuse_other_unit(
         return
     raise RequestError(
         f"channels.{name}: the unit '{stated}' is stated, and run '{run}' ({path}) says "
-        f"'{said}' of the column '{settings.column or name}'. Leave unit out where the files say "
+        f"'{said}' for the column '{settings.column or name}'. Leave unit out where the files say "
         f"it; or, if this file is wrong, state the unit in [runs.{run}.channels.{name}]."
     )
 
@@ -394,7 +394,7 @@ def cleaned(run: Run) -> Run:
         if logger.options.sampling_rate is not None and logger.options.time is None:
             aside = time_column(logger.columns)
             step = None if aside is None else time_step_of(logger.columns, aside)
-            if step is not None:  # what the file's times tell, where a stated rate counts
+            if step is not None:  # the step of the file's times, where a stated rate is used
                 data.attrs["time_column_step"] = step
         groups[key] = data
     return replace(run, groups=groups)
@@ -666,7 +666,7 @@ def checked(
     period : (float, float), optional
         Counted period and energy period of its waves, s, where they disagree.
     left_out : mapping of str to str, optional
-        Runs that are no part of what is pooled, and why.
+        Runs left out of what is pooled, and why.
     """
     assert run.data is not None
     settings, preparation = run.settings, run.settings.preparation

@@ -368,7 +368,7 @@ class Campaign:
         Raises
         ------
         RequestError
-            If the text is no length, or the campaign has no encounter period.
+            If the text is not a length, or the campaign has no encounter period.
         """
         if not isinstance(stated, str):
             return float(stated)
@@ -554,7 +554,7 @@ def read_campaign(path: Path | str, preset: str | None = None) -> Campaign:
     Raises
     ------
     RequestError
-        If the file is missing, is no TOML, or does not describe a campaign: one message names
+        If the file is missing, is not TOML, or does not describe a campaign: one message names
         every key at fault, the value received, and the remedy.
     """
     path = Path(path).expanduser()

@@ -98,7 +98,7 @@ def read_table(
     RequestError
         If the file, the time column or a wanted column does not exist.
     DataError
-        If the file is damaged, a cell is no number, or times are missing, repeated or unsorted.
+        If the file is damaged, a cell is not a number, or times are missing, repeated or unsorted.
     """
     path, options = Path(path), options or FileSettings()
     return labelled_table(path, read_columns(path, options.known()), options, columns)
@@ -216,7 +216,7 @@ def _refuse_other_unit(path: Path, table: Columns, name: str, stated: str | None
     if conversion(said, "s") == conversion(stated, "s"):
         return
     raise RequestError(
-        f"time_unit: '{stated}' is stated, and {path} says '{said}' of its time column '{name}'. "
+        f"time_unit: '{stated}' is stated, and {path} says '{said}' for its time column '{name}'. "
         "Leave time_unit out where the files say it; or, if the file is wrong, correct its header, "
         "or leave time and time_unit out and state sampling_rate (Hz) in [files]."
     )

@@ -1,4 +1,4 @@
-"""What a campaign file may say: one frozen table a section, validated by pydantic.
+"""Tables of a campaign file: one frozen table per section, validated by pydantic.
 
 Nothing is read from disk here; :mod:`seakeep.campaign.validation` fills these tables from TOML and
 turns what does not fit into messages. A field's description is the remedy that a message proposes.
@@ -76,7 +76,8 @@ class GeneralSettings(Table):
     )
     period_hysteresis: Annotated[float, Field(ge=0, lt=1)] = Field(
         default=0.0,
-        description="part of its standard deviation by which a wave must pass its mean either way "
+        description="fraction of its standard deviation by which a wave must pass its mean "
+        "either way "
         "to count; 0, the paper's, counts all. Still water around the waves never counts",
     )
 
@@ -264,7 +265,7 @@ class InstrumentsSettings(Table):
         default=None, description="the logger whose clock is the time of all; the first by default"
     )
     pool_drift: bool = Field(
-        default=True, description="true: one drift a logger for all runs that agree"
+        default=True, description="true: one drift per logger for all runs that agree"
     )
 
     @property
@@ -524,7 +525,7 @@ class SelectSettings(Table):
 
 
 class RunSettings(Table):
-    """``[runs.NAME]``: one run, its file or files, and what it serves for.
+    """``[runs.NAME]``: one run, its file or files, and its role.
 
     `file` where one file holds all channels, else `files`, one per instrument. Either `role` (with
     an optional `span`, the part that is used), or `train` and `test`, spans of one run that is
@@ -564,7 +565,7 @@ class RunSettings(Table):
 
     @property
     def serves(self) -> str:
-        """What the run serves for: "train", "test", "train and test" or "unused"."""
+        """Role of the run: "train", "test", "train and test" or "unused"."""
         if self.train and self.test:
             return "train and test"
         if self.train or self.test:

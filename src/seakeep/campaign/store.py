@@ -86,7 +86,7 @@ def write_prepared(
     for name, run in campaign.each_prepared(missing, told, failed):
         _write(run, files[name])
         steps.add(float(run.attrs["dt"]))
-    if len(steps) > 1:  # runs that were fresh by themselves had another step: only the whole tells
+    if len(steps) > 1:  # fresh runs had another step, which only the whole campaign shows
         for name, run in campaign.each_prepared(wanted, progress, failed):
             _write(run, files[name])
     if failed and failures is None:
@@ -140,7 +140,7 @@ def load_prepared(
     missing = [name for name, run in fresh.items() if run is None]
     made = campaign.prepare(missing, progress) if missing else {}
     steps = {run.attrs["dt"] for run in (*made.values(), *fresh.values()) if run is not None}
-    if len(steps) > 1:  # files of one rate beside runs of another: only the whole tells
+    if len(steps) > 1:  # files of one rate beside runs of another
         made = campaign.prepare(wanted, progress)
     found = {name: run for name, run in fresh.items() if run is not None}
     return {name: made[name] if name in made else found[name] for name in wanted}

@@ -32,10 +32,10 @@ from seakeep.signals.waves import energy_period
 __all__ = ["Failures", "Survey", "as_one", "spare", "survey"]
 
 Failures = dict[str, SeakeepError]
-"""Errors by run, where runs that cannot be read shall not stop the others."""
+"""Errors by run: a run that cannot be read must not stop the others."""
 
 LED = 2.0
-"""Factor between counted and energy period beyond which one of them is no period of the waves.
+"""Factor between counted and energy period beyond which one of them is not a period of the waves.
 
 The energy period is 1.20 times the crossing period in a Pierson-Moskowitz spectrum, and less in
 narrower ones; two seas of one height that are two octaves apart make 1.82. White noise of a third
@@ -56,7 +56,7 @@ class Survey:
     periods : dict of str to float
         Zero-up-crossing period of the wave channel by run, s.
     left_out : dict of str to str
-        By run, of what it is no part because it cannot be read, and why.
+        By run, what it is left out of because it cannot be read, and why.
     doubts : dict of str to (float, float)
         By run, its counted period and the energy period of its waves, s, where they disagree.
     """
@@ -155,7 +155,7 @@ def _left_out(run: str, error: SeakeepError, period: bool, drift: bool) -> str:
     pooled = ["the encounter period"] * period + ["the pooled clock drifts"] * drift
     return (
         f"run '{run}' is left out of {' and of '.join(pooled) or 'the clocks'}: {error} "
-        f"Once it is mended, prepare again; or state role = 'unused' in [runs.{run}]."
+        f"Once it is repaired, prepare again; or state role = 'unused' in [runs.{run}]."
     )
 
 

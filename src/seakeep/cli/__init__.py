@@ -47,7 +47,7 @@ def _options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Read the options that stand before the verb; ``main`` looks for --debug itself."""
+    """Read the options before the verb; ``main`` looks for --debug itself."""
 
 
 app.command("tank")(tank.tank)
@@ -67,13 +67,13 @@ app.command("info")(information.info)
 
 
 def _kept(leaving: BaseException) -> str:
-    """What a command noted on Ctrl-C about what is kept, or what holds of all commands."""
+    """Message after Ctrl-C about what is kept."""
     error: BaseException | None = leaving
     while error is not None:
         if isinstance(error, KeyboardInterrupt) and (notes := getattr(error, "__notes__", [])):
             return " ".join(notes)
         error = error.__context__
-    return "Files that were finished are kept: the command takes them over when it is repeated."
+    return "Finished files are kept: run the same command again to continue."
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -82,7 +82,7 @@ def main(arguments: list[str] | None = None) -> int:
     Parameters
     ----------
     arguments : list of str, optional
-        What stands after ``seakeep``; by default the program's own arguments.
+        Arguments after ``seakeep``; by default those of the program.
 
     Returns
     -------

@@ -91,7 +91,7 @@ def calibrate(
 ) -> None:
     """Calibrate the band of an ensemble on measured windows.
 
-    Makes a band that holds the part of the measurement that it claims, in the sea of these runs.
+    Makes a band that holds the stated share of the measurement, in the sea of these runs.
     The ensemble forecasts windows, end to end, that no member has read; a quantile of its errors
     there makes the band (split-conformal prediction). Leave out what the ensemble is to be judged
     on.
@@ -152,7 +152,7 @@ def calibrate(
     if whole / (whole + 1) < calibrated.calibration.found.level:
         messages().print(
             "Note: errors that last for a whole window are seen only once in each. Counted as "
-            f"such, {counted(whole, 'window')} would warrant {100 * whole / (whole + 1):.0f} %; "
+            f"such, {counted(whole, 'window')} would support {100 * whole / (whole + 1):.0f} %; "
             "more windows make the margin surer.",
             soft_wrap=True,
         )

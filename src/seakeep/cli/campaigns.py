@@ -31,13 +31,13 @@ def init(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier draft.")] = False,
     skip_rows: Annotated[
-        int | None, typer.Option("--skip-rows", min=0, help="Lines above the header to leave out.")
+        int | None, typer.Option("--skip-rows", min=0, help="Lines to skip above the header.")
     ] = None,
     delimiter: Annotated[
         str | None, typer.Option("--delimiter", help="',' or ';' or 'tab' or 'blank'.")
     ] = None,
     decimal: Annotated[
-        str | None, typer.Option("--decimal", help="Mark of decimals, '.' or ','.")
+        str | None, typer.Option("--decimal", help="Decimal mark, '.' or ','.")
     ] = None,
     group: Annotated[
         str | None, typer.Option("--group", help="Group of HDF5 or TDMS, topic of ROS.")
@@ -91,7 +91,7 @@ def prepare(
         ),
     ] = None,
     anew: Annotated[
-        bool, typer.Option("--anew", help="Prepare all runs again, fresh ones too.")
+        bool, typer.Option("--anew", help="Prepare all runs again, up-to-date ones too.")
     ] = False,
     sheet: Annotated[
         bool, typer.Option("--sheet/--no-sheet", help="Write the data-quality sheet.")
@@ -165,7 +165,7 @@ def _report_runs(
     except RequestError as error:
         messages().print(f"Note: no data-quality sheet: {error}", style="yellow")
         return
-    messages().print(f"Wrote {page}: look at it before you use the runs.")
+    messages().print(f"Wrote {page}: check it before you use the runs.")
 
 
 def _print_findings(runs: Mapping[str, xr.Dataset]) -> None:

@@ -1,4 +1,4 @@
-"""What all commands share: streams, progress, and how mistakes are reported."""
+"""Shared by all commands: streams, progress, and error messages."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def worker_count(workers: int | None) -> int:
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Report]:
-    """Show progress: a bar on a terminal, a line a step elsewhere, on standard error."""
+    """Show progress: a bar on a terminal, one line per step elsewhere, on standard error."""
     console = messages()
     if not console.is_terminal:
 
@@ -130,7 +130,7 @@ def tell_warnings() -> Iterator[None]:
 
 
 def quietly(progress: Report) -> Report:
-    """Tell every few seconds where each step would be a line of its own."""
+    """Print progress every few seconds instead of a line for every step."""
     if sys.stderr.isatty():
         return progress
     told = time.monotonic()

@@ -94,7 +94,7 @@ def forecast(
     band: BandKind = None,
     members: Annotated[
         bool,
-        typer.Option("--members", help="Of an ensemble: write each member, and no statistics."),
+        typer.Option("--members", help="For an ensemble: write each member, and no statistics."),
     ] = False,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -106,15 +106,15 @@ def forecast(
         str,
         typer.Option(
             "--ahead",
-            help="Where the waves end before the model's look-ahead does: 'refuse', or 'predict' "
-            "them from their record.",
+            help="If the waves end before the model's look-ahead: 'refuse', or 'predict' them "
+            "from their record.",
         ),
     ] = "refuse",
 ) -> None:
     """Forecast a run from START, driven by measured waves.
 
     The model runs freely after START; no measured state is read there.
-    Of an ensemble, mean, standard deviation and band of its members are written.
+    For an ensemble, mean, standard deviation and band of its members are written.
 
     Example: seakeep forecast model.nc docs/tutorial/campaign.toml --run unseen --start 20
     --steps 400 -o forecast.csv
@@ -231,7 +231,7 @@ def compare(
 ) -> None:
     """Judge forecasts of test runs against the measurement.
 
-    Prints a table per run and writes it as CSV, with an overlay figure per run. Of an ensemble the
+    Prints a table per run and writes it as CSV, with an overlay figure per run. For an ensemble the
     members' mean is judged, and how much of the measurement their band holds. Several models are
     judged over the same instants.
 

@@ -46,8 +46,8 @@ Level = Annotated[
     float | None,
     typer.Option(
         "--level",
-        help="Of an ensemble: probability between the bounds of the band; by default 0.95, or what "
-        "a calibrated band was made for.",
+        help="For an ensemble: probability between the bounds of the band; by default 0.95, or "
+        "what a calibrated band was made for.",
     ),
 ]
 Steps = Annotated[
@@ -80,7 +80,7 @@ BandKind = Annotated[
     str | None,
     typer.Option(
         "--band",
-        help="Of an ensemble: 'members', the quantiles of its members, or 'calibrated', which "
+        help="For an ensemble: 'members', the quantiles of its members, or 'calibrated', which "
         "seakeep calibrate made; by default members.",
     ),
 ]

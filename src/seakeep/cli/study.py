@@ -47,7 +47,7 @@ def study(
 
     Each model is fitted on each training set and judged in each test window.
 
-    A study that was stopped goes on where it stopped: run the same command again.
+    A study that was stopped continues where it stopped: run the same command again.
 
     Example: seakeep study examples/ntnu_ship_section/study.toml -o ship-study
     """
@@ -77,9 +77,7 @@ def _write_study(_: Path, found: StudyResult) -> Path:
 
 
 def reproduce(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for everything.")] = Path(
-        "reproduction"
-    ),
+    out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("reproduction"),
     quick: Annotated[
         bool, typer.Option("--quick", help="All stages with small counts, in a minute.")
     ] = False,
@@ -196,7 +194,7 @@ def _run(
     work: Callable[[Executor | None, Report], Found],
     write: Callable[[Path, Found], Path],
 ) -> tuple[Found, Path]:
-    """Do the work and write its report; what was stopped is kept."""
+    """Do the work and write its report; interrupted work is kept."""
     from seakeep.models.executor import make_executor
 
     try:
@@ -205,6 +203,6 @@ def _run(
         return found, write(folder, found)
     except KeyboardInterrupt as stop:
         stop.add_note(
-            f"What was finished is kept in {folder}; the same command goes on where it stopped."
+            f"What was finished is kept in {folder}; the same command continues where it stopped."
         )
         raise

@@ -44,7 +44,7 @@ def track(
         tuple[float, float],
         typer.Option(
             metavar="LENGTH HEIGHT",
-            help="Length and height of the panel, m: two numbers divided by a blank.",
+            help="Length and height of the panel, m: two numbers separated by a space.",
         ),
     ] = (0.30, 0.10),
     panel_place: Annotated[
@@ -52,7 +52,7 @@ def track(
         typer.Option(
             metavar="X Z",
             help="Panel's centre from the centre of gravity, downstream and up, m: two numbers "
-            "divided by a blank.",
+            "separated by a space.",
         ),
     ] = (0.0, 0.25),
     downstream: Annotated[
@@ -65,23 +65,23 @@ def track(
         tuple[float, float] | None,
         typer.Option(
             metavar="X Y",
-            help="Pixel of the panel's centre at rest, two numbers divided by a blank; by default "
-            "from the first second.",
+            help="Pixel of the panel's centre at rest, two numbers separated by a space; by "
+            "default from the first second.",
         ),
     ] = None,
     threshold: Annotated[
         tuple[int, int, int],
         typer.Option(
             metavar="RED GREEN BLUE",
-            help="Least red, green and blue of the panel, each 0 to 255: three numbers divided by "
-            "blanks.",
+            help="Smallest red, green and blue of the panel, each 0 to 255: three numbers "
+            "separated by spaces.",
         ),
     ] = (150, 150, 150),
     region: Annotated[
         tuple[int, int, int, int] | None,
         typer.Option(
             metavar="LEFT TOP WIDTH HEIGHT",
-            help="Part of the picture searched, pixels: four numbers divided by blanks.",
+            help="Part of the picture searched, pixels: four numbers separated by spaces.",
         ),
     ] = None,
     lamp: Annotated[
@@ -89,11 +89,11 @@ def track(
         typer.Option(
             metavar="X Y RADIUS",
             help="Lamp that shows the trigger, pixels from the upper left corner: three numbers "
-            "divided by blanks, such as 40 40 12.",
+            "separated by spaces, such as 40 40 12.",
         ),
     ] = None,
     tolerance: Annotated[
-        float, typer.Option(help="Part of its length by which the panel seen may differ.")
+        float, typer.Option(help="Fraction by which the panel's length may differ.")
     ] = 0.02,
     bridge: Annotated[
         float, typer.Option(help="Bridge gaps up to this long, s; by default none.")
@@ -250,7 +250,7 @@ def _compare(track: Track, reference: xr.Dataset, max_lag: float | None) -> None
 
 
 def _doubt(found: MotionAgreement) -> str:
-    """Why the lag may be another one; empty where there is no reason."""
+    """Why the lag may be wrong; empty if there is no reason."""
     searched = f"the lags searched (within {found.max_lag:g} s)"
     if found.at_limit:
         return f"the lag is at the end of {searched}; the true one may be longer. Raise --max-lag."

@@ -51,7 +51,7 @@ FEWEST_SAMPLES = 8
 
 @dataclass(frozen=True)
 class BlockChoice:
-    """A block length and how it came about.
+    """A block length and the rule that chose it.
 
     Attributes
     ----------
@@ -389,8 +389,8 @@ def moving_block_bootstrap(
     Notes
     -----
     The paper draws :math:`C' = \mathcal T / r` of the :math:`\mathcal T - r + 1` blocks, which is
-    no whole number; its ceiling is drawn and the last block cut. Samples within a block of either
-    end lie in fewer blocks than the others and are drawn less often.
+    not a whole number; its ceiling is drawn and the last block cut. Samples within a block of
+    either end lie in fewer blocks than the others and are drawn less often.
 
     Examples
     --------

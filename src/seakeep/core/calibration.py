@@ -1,4 +1,4 @@
-"""How wide the band of an ensemble must be to hold what it is meant to hold.
+"""Calibration of the band of an ensemble, so that it holds what it claims.
 
 Split-conformal prediction: the ensemble forecasts windows that its members never saw, and a
 quantile of its errors there makes the band. Either the band of the members is moved outwards by a
@@ -48,7 +48,7 @@ class ConformalMargin:
     blocks : ndarray, shape (channel,)
         Blocks that the scores are worth.
     warranted : ndarray, shape (channel,)
-        Probability that so many blocks can warrant, at most `level`.
+        Probability that so many blocks can guarantee, at most `level`.
     level : float
         Probability that the band is to have.
     """
@@ -302,7 +302,7 @@ def conformal_margin(
     Patterson and Candès, 2019), and the coverage of a new score is at least `level`, whatever their
     distribution. In time series it is so for exchangeable blocks, and about so for stationary
     forecast errors whose dependence is short against the record. It does not hold in another sea
-    than that of the scores. Where K blocks cannot warrant `level` (K / (K + 1) is less), the
+    than that of the scores. Where K blocks cannot guarantee `level` (K / (K + 1) is less), the
     margin is the largest score, and ``warranted`` says what remains.
 
     Examples

@@ -1,4 +1,4 @@
-"""How often a band holds the measurement, how wide and how good it is; numbers of a box plot."""
+"""Coverage, width and scores of a band; numbers of a box plot."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class BandCoverage:
     Attributes
     ----------
     inside, below, above : ndarray, shape (…, channel)
-        Part of the instants at which the measurement lies in the band (bounds included), below
+        Fraction of the instants at which the measurement lies in the band (bounds included), below
         it, and above it; they add up to 1.
     width : ndarray, shape (…, channel)
         Mean width, in the unit of the channel.
@@ -51,7 +51,7 @@ class BandCoverage:
 
 
 def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike) -> BandCoverage:
-    """Part of the instants at which a band holds the measurement, and the mean width of the band.
+    """Fraction of the instants at which a band holds the measurement, and its mean width.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
 
 @dataclass(frozen=True)
 class CoverageTable:
-    """How a band does in parts of the instants that it was judged at.
+    """Coverage, width and scores of a band in parts of the instants.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ class CoverageTable:
     instants : ndarray of int, shape (part,)
         Instants of all windows in each part.
     inside : ndarray, shape (part, channel)
-        Part of the instants at which the measurement lies in the band, bounds included.
+        Fraction of the instants at which the measurement lies in the band, bounds included.
     width, relative_width : ndarray, shape (part, channel)
         Mean width in the unit of the channel, and in standard deviations (ddof = 1) of the
         measurement over all windows; NaN where it is constant.
@@ -154,7 +154,7 @@ class CoverageTable:
 def winkler_score(
     lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike, level: float = 0.95
 ) -> FloatArray:
-    r"""Width of a band, and a fine for each measurement outside of it.
+    r"""Width of a band plus a penalty for each measurement outside of it.
 
     Parameters
     ----------
@@ -340,7 +340,7 @@ def _parts(shape: tuple[int, ...], heights: FloatArray | None) -> dict[str, Bool
     thirds = [(WAVE_PARTS, heights)] if heights is not None else []
     horizon = np.broadcast_to(np.arange(shape[1], dtype=float), shape)
     for names, values in (*thirds, (HORIZON_PARTS, horizon)):
-        # Ranks, so that thirds are of one size whatever values are equal.
+        # Ranks, so that thirds are of one size where values are equal.
         order = np.argsort(values, axis=None, kind="stable")
         third = np.empty(order.size, dtype=int)
         third[order] = 3 * np.arange(order.size) // order.size

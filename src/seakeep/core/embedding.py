@@ -106,7 +106,7 @@ def embed(series: FloatArray, delays: int, first: int, count: int) -> FloatArray
     Raises
     ------
     RequestError
-        If the series is no array (time, channel) of real numbers, or a column lies outside it.
+        If the series is not an array (time, channel) of real numbers, or a column lies outside it.
 
     Examples
     --------

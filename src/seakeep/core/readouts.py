@@ -1,6 +1,6 @@
 r"""Read-outs: a channel as a function of what a model forecasts, with hinges.
 
-A line that falls slack is no linear function of the motion: its load stops at a floor. A hinge
+A line that falls slack is not a linear function of the motion: its load stops at a floor. A hinge
 :math:`\max(0, x - q)` bends at a knot q, and a ridge regression on states and hinges makes any
 function that is linear between the knots.
 """
@@ -77,7 +77,8 @@ class LinearHinges:
 
     def __call__(self, states: FloatArray) -> FloatArray:
         """The channel, shape (…), of states, shape (…, N)."""
-        # Term by term: the same bits whatever else is in the array, and no table of all hinges.
+        # Term by term: the same bits for any other content of the array, and no table of all
+        # hinges.
         terms = [(column, None) for column in self.linear]
         terms += [(c, q) for c, knots in zip(self.columns, self.knots, strict=True) for q in knots]
         value = np.full(states.shape[:-1], self.weights[0])

@@ -23,7 +23,7 @@ first by :math:`(I-\tau Z)^{-1}` and its transpose, then by H, then by :math:`(I
 .. math:: H - Z^T H Z = G \Sigma G^T , \qquad G = (I-\tau Z)^T H (I-\tau Z)^{-1} B ,
 
 which determines H by running sums from the oldest lag. So H costs 2(channels + R) solutions (R
-runs), a product of that rank and one addition an entry, in the place of inverting.
+runs), a product of that rank and one addition per entry, instead of an inversion.
 :math:`(I-\tau Z)^{-1}` sums a series over its lags; τ = −1 sums it with turning signs, which keeps
 a smooth series small, and τ = 1 one that turns its sign at every sample.
 """
@@ -355,7 +355,7 @@ def _solve_beside(padded: FloatArray, right: FloatArray, ridge: float) -> FloatA
 
     The Gram matrix M − λI stands at the head of `padded`, and the right-hand sides R are put
     beside it, so that Cholesky does the forward half of the solution on its way: the factor of
-    [M Rᵀ; R κI] begins with that of M, and R L⁻ᵀ stands below. κ is so large that what it is
+    [M Rᵀ; R κI] starts with that of M, and R L⁻ᵀ stands below. κ is so large that what it is
     reduced by does not count.
     """
     count, size = right.shape
@@ -396,7 +396,7 @@ def solve(regressors: FloatArray, targets: FloatArray, ridge: float) -> Solution
 def _by_singular_values(
     regressors: FloatArray, targets: FloatArray, ridge: float, rank: int | None
 ) -> Solution:
-    # A rank stands in the place of λ.
+    # A rank replaces λ.
     ridge = ridge if rank is None else 0.0
     left, values, right = linalg.svd(regressors, full_matrices=False, check_finite=False)
     # Below this, a singular value is rounding (the rule of numpy.linalg.matrix_rank).

@@ -1,4 +1,4 @@
-r"""Does the error grow with the forecast's age? A test of trend for dependent series, ε(t)."""
+r"""Trend test for dependent series: whether the error ε(t) grows with the age of a forecast."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class TrendTest:
     kendall_tau : float
         Rank correlation with time, in [−1, 1].
     p_value : float
-        Part of the redrawn series whose tau is as large as the series', two-sided.
+        Fraction of the redrawn series whose tau is as large as the series', two-sided.
     level : float
         Probability between `lower` and `upper`.
     block_length : int

@@ -1,4 +1,4 @@
-"""What a reader hands on: named columns of numbers, with the units the file states."""
+"""Output of a reader: named columns of numbers, with the units the file states."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Columns:
     headers : dict of str to str
         The full header of a column where it differs from its name.
     sampling_rate : float or None
-        Samples a second, where the file holds it apart from a time column.
+        Samples per second, where the file holds it apart from a time column.
     """
 
     values: dict[str, FloatArray]

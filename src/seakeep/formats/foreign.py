@@ -1,4 +1,4 @@
-"""Files that are no tables, recognised by their first bytes, and what to do about them."""
+"""Files that are not tables, recognised by their first bytes, and what to do about them."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def refuse_foreign(path: Path, head: bytes) -> None:
     """Refuse pictures, workbooks, videos and the like by their first bytes."""
     for start, what, mend in _FOREIGN:
         if head.startswith(start):
-            raise DataError(f"{path} is {what}, and no table. {mend}")
+            raise DataError(f"{path} is {what}, not a table. {mend}")
     if head[4:8] == b"ftyp":
-        raise DataError(f"{path} is a video in MP4, and no table. {_TRACK}")
+        raise DataError(f"{path} is an MP4 video, not a table. {_TRACK}")
 
 
 def refuse_text(path: Path, head: bytes, kind: str) -> None:
@@ -37,8 +37,8 @@ def refuse_text(path: Path, head: bytes, kind: str) -> None:
     if _is_text(head):
         shown = head[:24].decode("latin-1").splitlines()[0] if head.strip() else ""
         raise DataError(
-            f"{path} is no {kind} file: it holds text and starts with {shown!r}. If it is a table, "
-            "name it .csv or .txt; else copy or export it again."
+            f"{path} is not a valid {kind} file: it holds text and starts with {shown!r}. If it is "
+            "a table, name it .csv or .txt; else copy or export it again."
         )
 
 

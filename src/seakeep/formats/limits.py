@@ -11,7 +11,7 @@ from seakeep.errors import DataError
 __all__ = ["check_declared", "most_bytes"]
 
 FREE = 2**28
-"""Bytes that a file may unpack to, whatever its own size."""
+"""Bytes that a file may unpack to, for any size of the file."""
 
 EXPANSION = 100
 """Times its own size that a larger one may unpack to; tables of numbers reach 10, constants 50."""

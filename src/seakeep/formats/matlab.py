@@ -57,11 +57,11 @@ def _loaded(path: Path) -> dict[str, Any]:
     try:
         opaque = _opaque(path) if hdf5 else {}
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of classes: they are no channels
+            warnings.simplefilter("ignore")  # of classes: they are not channels
             content = read_mat(path, ignore_fields=[name.rpartition("/")[2] for name in opaque])
     except DataError:
         raise
-    # On a damaged file scipy, h5py and pymatreader raise whatever their parts do.
+    # On a damaged file scipy, h5py and pymatreader raise the errors of their dependencies.
     except Exception as error:
         said = str(error).splitlines()[0] if str(error) else type(error).__name__
         said = "structs and cells nest without end" if isinstance(error, RecursionError) else said

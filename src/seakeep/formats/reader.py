@@ -1,4 +1,4 @@
-"""What a reader is, and what may be known about a file before it is read."""
+"""Readers, and what may be known about a file before it is read."""
 
 from __future__ import annotations
 

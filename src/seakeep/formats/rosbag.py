@@ -39,8 +39,8 @@ def read_recording(path: Path, options: Options) -> Columns:
     A column per number, named by its place in the message: ``angular_velocity.y``, ``data[0]``.
     Units where the message is a standard one, whose units are fixed. ``time``: the header's stamps
     where the message has a header that is stamped, else the times of reception; ``receive_time``
-    beside it in the first case. Both count seconds from the recording's first message, whatever
-    its topic. `group` is the topic; it may be left out where only one holds numbers.
+    beside it in the first case. Both count seconds from the recording's first message, of
+    any topic. `group` is the topic; it may be left out where only one holds numbers.
     """
     try:
         from rosbags import highlevel, typesys
@@ -58,12 +58,13 @@ def read_recording(path: Path, options: Options) -> Columns:
             rows = _read_topic(path, reader, options.group)
     except (RequestError, DataError):
         raise
-    # On a damaged file rosbags raises whatever its parts do: SQLite, YAML, decompression, assert.
+    # On a damaged file rosbags raises the errors of its dependencies: SQLite, YAML, decompression,
+    # assert.
     except Exception as error:
         said = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise DataError(
             f"{path} cannot be read as a recording of ROS 2: cut off, damaged or of another kind "
-            f"({said}). Copy it again; `ros2 bag reindex` mends a bag that was not closed."
+            f"({said}). Copy it again; `ros2 bag reindex` repairs a bag that was not closed."
         ) from None
     return _columns(path, rows, begin)
 
@@ -100,8 +101,8 @@ def _read_topic(path: Path, reader: Any, wanted: str | None) -> _Rows:
     if len(received) < announced:
         raise DataError(
             f"{path} announces {announced} messages of the topic '{wanted}' and holds "
-            f"{len(received)}: it was cut off. Copy it again; `ros2 bag reindex` mends a bag that "
-            "was not closed."
+            f"{len(received)}: it was cut off. Copy it again; `ros2 bag reindex` repairs a bag "
+            "that was not closed."
         )
     if not any(numbers):
         raise DataError(
@@ -177,7 +178,7 @@ def _columns(path: Path, rows: _Rows, begin: int) -> Columns:
     elif stamps:
         raise DataError(
             f"{path}: {len(rows.stamps) - len(stamps)} of {len(rows.stamps)} messages of the topic "
-            f"'{rows.topic}' have no stamp in their header. Mend the node that publishes them."
+            f"'{rows.topic}' have no stamp in their header. Correct the node that publishes them."
         )
     elif rows.kind.endswith("Stamped") or rows.kind.startswith("sensor_msgs/"):
         warnings.warn(

@@ -127,7 +127,7 @@ def _unpacked(path: Path) -> bytes:
 
 
 def _utf8(path: Path, raw: bytes, encoding: str | None) -> bytes:
-    """Text in UTF-8 with plain ends of lines, whatever its own encoding."""
+    """Text in UTF-8 with plain ends of lines, from any encoding."""
     if not raw or raw.isspace():
         raise DataError(f"{path} is empty. Export the run again.")
     if encoding is None and raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
@@ -183,12 +183,12 @@ def _western(path: Path, raw: bytes) -> str:
             SeakeepWarning,
             stacklevel=2,
         )
-    # Five bytes are no letter of Windows-1252; Latin-1 has control characters in their place.
+    # Five bytes are not letters of Windows-1252; Latin-1 has control characters there.
     return raw.decode("latin-1" if _UNUSED & letters else "cp1252")
 
 
 def _rows(raw: bytes, at: int, marks: tuple[str, ...]) -> Iterator[tuple[int, str]]:
-    """Offset and content of each line that is no comment and not blank."""
+    """Offset and content of each line that is neither a comment nor blank."""
     # Not splitlines: it would break lines at form feeds and other marks inside a cell.
     while at < len(raw):
         end = raw.find(b"\n", at)
@@ -421,11 +421,11 @@ def _check_widths(path: Path, raw: bytes, body: bytes, layout: _Layout) -> None:
 
 
 def _widths_mend(wanted: int, counts: npt.NDArray[np.intp], mark: str, raw: bytes) -> str:
-    """What to do about lines of another width, with what the file itself tells."""
+    """What to do about lines of another width, as far as the file itself shows."""
     if mark == "," and np.isin(counts, (2 * wanted, 2 * wanted - 1)).all():
         return (
-            "This looks like decimal commas in a file divided by commas, which cannot be told "
-            "apart: export it with decimal points, or divided by semicolons or tabs."
+            "This looks like decimal commas in a file divided by commas; they cannot be "
+            "distinguished: export it with decimal points, or divided by semicolons or tabs."
         )
     lines = raw.decode("utf-8", "replace").split("\n")
     rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
@@ -440,8 +440,8 @@ def _widths_mend(wanted: int, counts: npt.NDArray[np.intp], mark: str, raw: byte
                 f"{above} to seakeep init."
             )
     return (
-        "Mend the lines, or state in [files]: delimiter, decimal, or skip_rows where words stand "
-        "above the header; seakeep init takes them as --delimiter, --decimal and --skip-rows."
+        "Correct the lines, or state in [files]: delimiter, decimal, or skip_rows where words "
+        "stand above the header; seakeep init takes them as --delimiter, --decimal and --skip-rows."
     )
 
 
@@ -476,7 +476,7 @@ def _numbers(
 
 
 def _number(cell: str, decimal: str) -> float | None:
-    """Value of a cell; None if it is no number."""
+    """Value of a cell; None if it is not a number."""
     if cell.lower() in _MISSING:
         return float(cell)
     # The other mark would divide thousands, or the file mixes both: neither is guessed at.

@@ -1,4 +1,4 @@
-"""Models to compare with: what stands still, and classic linear identification.
+"""Models to compare with: constant forecasts, and classic linear identification.
 
 They fit, forecast, save and load as :class:`seakeep.HankelDMDc` does, take the same runs, and go
 through studies and reports by their ``kind``. :mod:`seakeep.baselines` is the public name.
@@ -46,36 +46,36 @@ class LinearModel(HankelDMDcModel):
     title: ClassVar[str]
 
     def summary(self) -> str:
-        """Text that says what the model is and what it was fitted to."""
+        """Text that describes the model and its training data."""
         return "\n".join([f"{self.title}, dt {self.dt:g} s", *self.lines()])
 
 
 class ARXModel(LinearModel):
-    """What :class:`ARX` fits."""
+    """Model fitted by :class:`ARX`."""
 
     kind: ClassVar[str] = "arx"
     title: ClassVar[str] = "ARX: least squares on past states and inputs"
 
 
 class FIRModel(LinearModel):
-    """What :class:`FIR` fits: a filter of the inputs."""
+    """Model fitted by :class:`FIR`: a filter of the inputs."""
 
     kind: ClassVar[str] = "fir"
     title: ClassVar[str] = "FIR: a filter of the inputs, without states"
 
 
 class MeanModel(LinearModel):
-    """What :class:`Mean` fits: the means of the states."""
+    """Model fitted by :class:`Mean`: the means of the states."""
 
     kind: ClassVar[str] = "mean"
     title: ClassVar[str] = "Mean of the training windows"
 
 
 class HoldLastModel(LinearModel):
-    """What :class:`HoldLast` fits: nothing but the spread of the states."""
+    """Model fitted by :class:`HoldLast`: only the spread of the states."""
 
     kind: ClassVar[str] = "hold_last"
-    title: ClassVar[str] = "Hold last: the state at the start, for ever"
+    title: ClassVar[str] = "Hold last: the state at the start, kept constant"
 
 
 @dataclass(frozen=True)
@@ -354,7 +354,7 @@ class Subspace(HankelSettings):
 
 @dataclass(frozen=True, eq=False)
 class SubspaceModel(SingleModel, store.Saved):
-    """What :class:`Subspace` fits.
+    """Model fitted by :class:`Subspace`.
 
     Parameters
     ----------
@@ -403,7 +403,7 @@ class SubspaceModel(SingleModel, store.Saved):
         yield self.space.A
 
     def summary(self) -> str:
-        """Text that says what the model is and how it was identified."""
+        """Text that describes the model and its identification."""
         radius = float(np.abs(np.linalg.eigvals(self.space.A)).max())
         verdict = "stable" if radius < 1 else "UNSTABLE: long forecasts diverge"
         return "\n".join(

@@ -72,7 +72,7 @@ class Judged(NamedTuple):
 
 
 class Ensemble(FreeRuns, Protocol):
-    """What a calibration must know of an ensemble."""
+    """Members of an ensemble that a calibration uses."""
 
     @property
     def arrays(self) -> TrainingArrays: ...
@@ -85,7 +85,7 @@ class Ensemble(FreeRuns, Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What makes the calibrated band, and on what that was found.
+    """Numbers that make the calibrated band, and the windows they come from.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ class Calibration:
 
     @classmethod
     def from_json(cls, text: str, channels: int) -> Calibration | None:
-        """Rebuild from :meth:`to_json`, for so many states; None of ``null``."""
+        """Rebuild from :meth:`to_json`, for so many states; None for ``null``."""
         kept: Json | None = json.loads(text)
         if kept is None:
             return None
@@ -166,7 +166,9 @@ class Calibration:
         windows = {name: int(count) for name, count in kept["windows"].items()}
         law = None if kept["law"] is None else np.array(kept["law"], dtype=float)
         if law is not None and (law.shape != (4, channels) or not np.all(np.isfinite(law))):
-            raise ValueError(f"law of the calibration is no table of 4 rows of {channels} numbers")
+            raise ValueError(
+                f"law of the calibration is not a table of 4 rows of {channels} numbers"
+            )
         return cls(found, floor, law, windows, int(kept["steps"]), spans, kept["folds"])
 
 
@@ -174,7 +176,9 @@ def _positive(kept: Json, key: str, channels: int) -> FloatArray:
     """Numbers of a calibration, one per state, none negative."""
     values = np.array(kept[key], dtype=float)
     if values.shape != (channels,) or not np.all(values >= 0):
-        raise ValueError(f"{key} of the calibration is no list of {channels} numbers from zero on")
+        raise ValueError(
+            f"{key} of the calibration is not a list of {channels} numbers from zero on"
+        )
     return values
 
 
@@ -456,7 +460,7 @@ def warn_of_horizon(
     if calibration is not None and steps > calibration.steps:
         warnings.warn(
             f"the forecast of {name} is longer than the {calibration.steps} instants that "
-            "the band was calibrated for: its coverage is not warranted there. Calibrate with "
+            "the band was calibrated for: its coverage is not guaranteed there. Calibrate with "
             "longer windows.",
             SeakeepWarning,
             stacklevel=stacklevel,

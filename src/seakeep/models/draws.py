@@ -2,7 +2,7 @@ r"""Draws of the settings of an ensemble's members.
 
 Every member has a generator of its own, the k-th child of the seed, and reads its numbers from it
 alone, or from the k-th point of a Sobol net that the seed itself scrambles: a member is the same
-whatever the number of members, of workers, or the order of work.
+for any number of members or workers, in any order of work.
 
 Lengths are drawn in encounter periods and become samples by rounding to the nearest integer, halves
 upwards (:func:`~seakeep.models.settings.periods_to_samples`). A draw is infeasible where a run that
@@ -204,7 +204,7 @@ def _quantiles_of(spec: Drawn, quantiles: FloatArray) -> dict[str, float]:
 
 
 def _not_finite(drawn: dict[str, float]) -> str:
-    """What is wrong with quantiles that are no numbers to round; empty where nothing is."""
+    """What is wrong with quantiles that cannot be rounded; empty where nothing is."""
     wrong = [f"{name} = {value}" for name, value in drawn.items() if not np.isfinite(value)]
     if not wrong:
         return ""
@@ -212,7 +212,7 @@ def _not_finite(drawn: dict[str, float]) -> str:
 
 
 def _out_of_range(draw: Draw, inside: bool) -> str:
-    """What is wrong with a draw whatever the runs; empty where nothing is."""
+    """What is wrong with a draw for any runs; empty where nothing is."""
     for name in ("state_delays", "input_delays", "ridge"):
         if (value := getattr(draw, name)) < 0:
             return (

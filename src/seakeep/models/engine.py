@@ -52,7 +52,7 @@ or the history of the forecast, ever was, in waves as high as those of training.
 
 A linear model answers waves twice as high by twice the motion, so the limit grows with the ratio of
 the highest deviation of the input to that in training. What is left for the factor are transients
-and resonances that training did not show: a tenfold answer is no forecast of a vessel any more, and
+and resonances that training did not show: a tenfold answer is no longer a forecast of a vessel, and
 members that go on from there would make up the mean of an ensemble."""
 PIECE = 2**18
 """Numbers that are looked at together, so that a long run takes little beside its result."""
@@ -111,7 +111,7 @@ class Windows:
 
 @dataclass(frozen=True, eq=False)
 class Dynamics:
-    """What a free run needs of a linear model, or of a member.
+    """What a free run needs from a linear model or a member.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class Dynamics:
 
 
 class Runs(Protocol):
-    """What makes free runs: a model, an ensemble, or members that are held."""
+    """An object that makes free runs: a model, an ensemble, or members that are held."""
 
     @property
     def signature(self) -> Signature: ...
@@ -302,7 +302,7 @@ class _Opened:
         names = signature.inputs
         values = labelled.channel_matrix(self.run, names, self.name, slice(0, stop))
         ends = [min(_end(column), stop) for column in values.T]
-        # What is missing before a start is no future, and is refused as ever.
+        # Only the future is predicted: missing samples before a start are refused.
         missing = [end if start < end < stop else None for end in ends]
         if all(end is None for end in missing):
             return self
@@ -494,7 +494,7 @@ def cut_lost(values: FloatArray, scales: Dynamics | Signature, windows: Windows)
         with np.errstate(invalid="ignore", over="ignore"):
             distance = np.abs(piece - scale.centre)
         if np.all(distance <= GROWTH * reach) and not before.any():
-            continue  # whatever the input
+            continue  # for any input
         if limit is None:
             limit = GROWTH * reach * _excess(scales, windows)[:, None, None]
         lost = ~np.all(distance <= limit, axis=-1)

@@ -81,13 +81,13 @@ OPTIONAL = ("window", "run", "last")
 SAMPLING = {"monte_carlo": "Monte Carlo", "sobol": "Sobol"}
 TRAIN_ON = {
     "all": "together",
-    "runs": "one of them a member, drawn",
-    "windows": "a window of one of them a member, drawn",
+    "runs": "one of them per member, drawn",
+    "windows": "a window of one of them per member, drawn",
 }
 
 
 class _Forecasts(Forecaster):
-    """Forecasts of several members: what an ensemble and members that are held have in common."""
+    """Forecasts of several members, shared by ensembles and held ensembles."""
 
     origin: Json
     calibration: Calibration | None
@@ -123,8 +123,9 @@ class _Forecasts(Forecaster):
         run, start, steps, ahead
             As in :meth:`HankelDMDcModel.forecast`.
         executor : concurrent.futures.Executor, optional
-            Who identifies and runs the members: :func:`seakeep.models.processes`, or Dask's
-            ``client.get_executor()``; by default this process. The result does not depend on it.
+            Executor that identifies and runs the members: :func:`seakeep.models.processes`, or
+            Dask's ``client.get_executor()``; by default this process. The result does not depend on
+            it.
         progress : callable, optional
             Called as ``progress(done, total, what)`` after each member.
 
@@ -163,7 +164,7 @@ class _Forecasts(Forecaster):
         executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> xr.Dataset:
-        """Mean, standard deviation and band of the members, never all of them at once.
+        """Mean, standard deviation and band of the members, reduced piece by piece.
 
         Parameters
         ----------
@@ -255,7 +256,7 @@ class _Forecasts(Forecaster):
         executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> xr.Dataset:
-        """Mean, standard deviation and band from several starts, never all members at once.
+        """Mean, standard deviation and band from several starts, reduced piece by piece.
 
         Parameters
         ----------
@@ -326,27 +327,27 @@ class _Forecasts(Forecaster):
 
 @dataclass(frozen=True, eq=False)
 class HankelEnsemble(_Forecasts, store.Saved):
-    """Members that differ in their settings, or in what they learned from.
+    """Ensemble of models that differ in their settings or their training data.
 
     Made by :meth:`BayesianHankelDMDc.fit` or :func:`seakeep.load_model`. It holds draws and
-    training arrays; a member's matrices exist while it is at work, and no longer.
+    training arrays; a member's matrices exist only while they are used.
 
     Parameters
     ----------
     settings : HankelSettings
-        What all members share.
+        Settings that all members share.
     origin : dict
         Priors, seed and rules that made the draws, as JSON values.
     members : tuple of Draw
         Settings of each member.
     arrays : TrainingArrays
-        What they learn from.
+        Training data of the members.
     signature : Signature
         Time step, names and units, longest delays, and how inputs drive the members.
     coverage : Coverage
         Waves that they were trained in.
     calibration : Calibration, optional
-        What makes the calibrated band; see :meth:`calibrate`.
+        Numbers that make the calibrated band; see :meth:`calibrate`.
     selection : str
         How free runs chose what the settings left open; empty where they stated all.
     """
@@ -374,7 +375,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
 
     @cached_property
     def draws(self) -> xr.Dataset:
-        """What was drawn, over ``member``.
+        """Drawn settings, over ``member``.
 
         ``train_length``, ``state_delay`` and ``input_delay`` in encounter periods (NaN where all
         of a run trains), the integers ``…_samples`` they became (−1 for all of a run), ``ridge``,
@@ -433,7 +434,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
         Parameters
         ----------
         number : int
-            Which, from zero.
+            Number of the member, from zero.
 
         Returns
         -------
@@ -518,7 +519,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
         return []
 
     def summary(self) -> str:
-        """Text that says what the ensemble is made of, and how stable its members are.
+        """Text that describes the ensemble and the stability of its members.
 
         Returns
         -------
@@ -618,11 +619,12 @@ class HankelEnsemble(_Forecasts, store.Saved):
         executor: Executor | None = None,
         progress: Progress | None = None,
     ) -> Self:
-        r"""Make a band that holds unseen measurements as often as it says.
+        r"""Make a band that holds unseen measurements as often as it states.
 
         The ensemble forecasts windows end to end in `runs` that no member has read, and a quantile
         of its errors there makes the band, channel by channel
-        (:func:`seakeep.statistics.conformal_margin`, which says what that warrants and what not).
+        (:func:`seakeep.statistics.conformal_margin`, which says what that guarantees and what it
+        does not).
 
         Parameters
         ----------
@@ -949,7 +951,7 @@ def _warn_of_unstable(radii: FloatArray) -> None:
             "left out of mean and band. Raise the ridge, train on more data, use shorter state "
             "delays, or look for transients at the ends of the training runs.",
             SeakeepWarning,
-            stacklevel=4,  # past spectral_radii, to who asked for them
+            stacklevel=4,  # past spectral_radii, to its caller
         )
 
 

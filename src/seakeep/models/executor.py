@@ -1,7 +1,7 @@
-"""Work side by side on any :class:`concurrent.futures.Executor`, or in this process without one.
+"""Parallel work on any :class:`concurrent.futures.Executor`, or serial work without one.
 
-An executor is a pool of processes (:func:`processes`), Dask's ``client.get_executor()``, or what
-else offers ``submit``. Results do not depend on it: BLAS has one thread wherever work is done.
+An executor is a pool of processes (:func:`processes`), Dask's ``client.get_executor()``, or any
+object with ``submit``. Results do not depend on it: BLAS has one thread wherever work is done.
 """
 
 from __future__ import annotations
@@ -233,8 +233,8 @@ def _dask(scheduler: str) -> Iterator[Executor]:
         ) from error
     if re.fullmatch(r"(tcp|tls|ucx|wss?)://\S+:\d+/?|inproc://\S+", scheduler) is None:
         raise RequestError(
-            f"'{scheduler}' is no address of a Dask scheduler. Give protocol, host and port, as "
-            "`dask scheduler` prints them: tcp://HOST:8786."
+            f"'{scheduler}' is not the address of a Dask scheduler. Give protocol, host and port, "
+            "as `dask scheduler` prints them: tcp://HOST:8786."
         )
     try:
         client = Client(scheduler, timeout=PATIENCE, set_as_default=False, name="seakeep")
@@ -309,7 +309,7 @@ def _wait_for_any(pending: Iterable[Future[Result]], executor: Executor) -> set[
 
 
 def _check_alive(executor: Executor) -> None:
-    """Refuse Dask's executor where no scheduler or no worker answers: it would wait for ever."""
+    """Refuse Dask's executor where no scheduler or no worker answers: it would never return."""
     client = getattr(executor, "_client", None)  # it has no public way to ask
     if client is None:
         return

@@ -40,7 +40,7 @@ __all__ = [
 
 
 class Forecaster:
-    """What models, ensembles and held members say of themselves, from their signature."""
+    """What models, ensembles and held members report about themselves, from their signature."""
 
     signature: Signature
 
@@ -106,7 +106,7 @@ class Forecaster:
 
 
 class SingleModel(Forecaster):
-    """What every model of one member offers; it brings a signature and ``free_runs``."""
+    """Methods of every model with one member; it adds a signature and ``free_runs``."""
 
     kind: ClassVar[str]
     n_members: ClassVar[int] = 1
@@ -164,17 +164,17 @@ class SingleModel(Forecaster):
         Parameters
         ----------
         run : Dataset
-            Channels of the model over ``time``; the order does not matter, further ones neither.
+            Channels of the model over ``time``, in any order; other channels are ignored.
         start : float
             Instant of the last measured state, s; the nearest sample is taken. The
             ``history_samples`` samples up to it are needed.
         steps : int, optional
             Number of instants forecast; by default to the end of the run.
         ahead : {"refuse", "predict"}, optional
-            What to do where the input ends before the look-ahead does: refuse, or continue each
+            What to do if the input ends before the look-ahead: refuse, or continue each
             input from its own record by linear prediction
-            (:func:`seakeep.signals.predict_waves`). Samples that are missing up to the end count
-            as not there.
+            (:func:`seakeep.signals.predict_waves`). Samples missing at the end count as not
+            recorded.
 
         Returns
         -------
@@ -316,7 +316,7 @@ def window_coords(windows: Windows, dt: float) -> dict[str, xr.Variable]:
 
 
 def status_text(lost: int, time: FloatArray, dt: float, predicted: int = -1) -> str:
-    """What ``status`` says of a free run.
+    """Text of ``status`` for a free run.
 
     `lost` is its first lost instant and `predicted` the first that depends on predicted input, −1
     for none.
@@ -338,7 +338,7 @@ def status_at_clock(status: str, clock: float) -> str:
 
 
 def is_usable(status: str) -> bool:
-    """Whether a status tells of a forecast at all instants."""
+    """Whether a status says that there is a forecast at all instants."""
     return status.startswith("ok")
 
 

@@ -1,7 +1,7 @@
 """Input maps: how measured inputs become what drives a model.
 
 A :class:`Chain` of maps is fitted with a model, and opened once per run: its :class:`Drive` then
-serves all members, windows and steps. Three maps are here: none at all (a chain without maps),
+serves all members, windows and steps. There are three maps: the identity (an empty chain),
 :class:`Lead`, by which waves that have not yet arrived drive a step, and :class:`ProbeAlignment`,
 which carries the elevation to a vessel that moves:
 
@@ -398,7 +398,7 @@ class ProbeAlignment:
 
 @dataclass(frozen=True)
 class FittedAlignment:
-    """What a model keeps of its alignment.
+    """A fitted alignment.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The contracts of this room: what is fitted, what forecasts, and what drives a forecast.
+"""Interfaces of specs, models, and input maps.
 
 Helpers take a :class:`Signature`, never a whole model. A new model is a ``Spec``, a
 ``Model`` and one line in :data:`seakeep.models.registry.KINDS`; a new input map is an ``InputMap``
@@ -227,12 +227,12 @@ class Signature:
     state_labels, input_labels : tuple of ChannelLabel
         Names, units and long names of the states and of the measured inputs.
     state_delays, input_delays : int
-        s and z; of an ensemble the longest of a member.
+        s and z; for an ensemble the longest of a member.
     input_map : InputMap
         How measured inputs become regressors, as fitted.
     state_scale, input_scale, direct_scale : Scale
         Moments of the states, of the delayed and of the direct regressors over the training
-        windows; of an ensemble over all that its members learn from.
+        windows; for an ensemble over all that its members learn from.
     readouts : tuple of FittedReadOut
         Channels that are read off the free runs.
     """
@@ -299,7 +299,7 @@ class Needs:
 
 
 class Model(Protocol):
-    """What compare, study and report know about a fitted model."""
+    """A fitted model, as compare, study and report use it."""
 
     kind: ClassVar[str]
 
@@ -357,7 +357,7 @@ class Model(Protocol):
         ...
 
     def summary(self) -> str:
-        """Text that says what the model is."""
+        """Text that describes the model."""
         ...
 
     def save(self, path: str | Path) -> Path:

@@ -108,7 +108,7 @@ def run_step(run: xr.Dataset, name: str) -> float:
     Raises
     ------
     DataError
-        If the times are no numbers, unsorted, repeated or not uniform.
+        If the times are not numbers, unsorted, repeated or not uniform.
     """
     return uniform_step(run.variables["time"].values, name)
 
@@ -146,7 +146,7 @@ def channel_matrix(
     Returns
     -------
     ndarray, shape (samples, channels)
-        Double precision, whatever the run holds.
+        Double precision, for any type in the run.
 
     Raises
     ------

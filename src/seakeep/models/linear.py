@@ -142,8 +142,8 @@ class HankelDMDcModel(SingleModel, store.Saved):
         if abs(values[0]) >= 1.0:
             warnings.warn(
                 f"the spectral radius of the model is {abs(values[0]):.6f}: a free run grows by "
-                f"{100 * (abs(values[0]) - 1):.2g} % a step in its worst mode and will diverge if "
-                "it is long. Raise ridge, train on more data, use fewer state delays, look for "
+                f"{100 * (abs(values[0]) - 1):.2g} % per step in its worst mode and will diverge "
+                "if it is long. Raise ridge, train on more data, use fewer state delays, look for "
                 "transients at the ends of the training runs, or set stable = True.",
                 SeakeepWarning,
                 stacklevel=3,  # past the cached property
@@ -249,7 +249,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
         steps : int
             Number of instants.
         ahead : {"refuse", "predict"}, optional
-            What to do where `u_future` ends before the look-ahead does: refuse, or continue it by
+            What to do if `u_future` ends before the look-ahead: refuse, or continue it by
             linear prediction (:func:`seakeep.signals.predict_waves`) from all rows of `u_history`
             and `u_future`; tens of wave periods of history are best.
 
@@ -381,7 +381,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
         return export.matrices(self.A, self.B, self.signature)
 
     def summary(self) -> str:
-        """Text that says what the model is and how it was identified.
+        """Text that describes the model and its identification.
 
         Returns
         -------

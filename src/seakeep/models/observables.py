@@ -310,7 +310,7 @@ class Expression:
     Raises
     ------
     RequestError
-        If it is no expression.
+        If it is not an expression.
     """
 
     name: str

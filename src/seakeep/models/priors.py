@@ -20,7 +20,7 @@ __all__ = ["Fixed", "LogUniform", "Prior", "Uniform", "check_prior", "describe",
 
 @runtime_checkable
 class Prior(Protocol):
-    """What a prior must offer."""
+    """Interface of a prior."""
 
     def ppf(self, q: float) -> Any:
         """Quantile function: the value below which lies the probability `q`."""
@@ -126,7 +126,7 @@ class Fixed:
             raise RequestError(f"Fixed needs a finite number; received {self.value!r}.")
 
     def ppf(self, q: float) -> float:
-        """Quantile function: the value, whatever the probability."""
+        """Quantile function: the value, for any probability."""
         return float(self.value)
 
 

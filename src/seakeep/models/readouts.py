@@ -234,7 +234,7 @@ def _of_table(table: Mapping[str, Any]) -> ReadOut:
 
 
 def readouts_json(readouts: ReadOuts) -> Any:
-    """What :func:`readouts_of` takes, as JSON values."""
+    """Argument of :func:`readouts_of` as JSON values."""
     return readouts if readouts == "auto" else [asdict(each) for each in readouts]
 
 

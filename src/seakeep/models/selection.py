@@ -115,7 +115,7 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """What a candidate scored.
+    """Scores of a candidate.
 
     Parameters
     ----------
@@ -417,7 +417,7 @@ def split(
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """What a search found.
+    """Result of a search.
 
     Parameters
     ----------
@@ -538,7 +538,7 @@ def _unit(
 
 @dataclass(frozen=True, eq=False)
 class Selected(Generic[Chosen]):
-    """What free runs chose, and on what evidence.
+    """Settings that free runs chose, and the evidence.
 
     Parameters
     ----------

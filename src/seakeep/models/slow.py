@@ -35,7 +35,7 @@ class SlowMotion:
     period : float
         Mean period between crossings of its mean, s; infinite where it crosses at most once.
     share : float
-        Part of the channel's variance that is slow, 0 to 1.
+        Fraction of the channel's variance that is slow, 0 to 1.
     cycles : float
         Periods that the training windows hold in all.
     """
@@ -67,7 +67,7 @@ def slow_motions(
     -------
     list of SlowMotion
         States more than half of whose variance is slow, the one with the fewest cycles first.
-        Runs with gaps in a state, and such as are shorter than six encounter periods, are left
+        Runs with gaps in a state, and runs shorter than six encounter periods, are left
         out.
     """
     shortest = 2 * SPLIT * encounter_period
@@ -125,8 +125,8 @@ def warn_of_slow_motions(
     warnings.warn(
         f"{what}, {trained:.4g} s in all, hold {worst.cycles:.1f} periods of the slow motion of "
         f"{worst.channel} (period {length}, {100 * worst.share:.0f} % of its variance), fewer than "
-        f"{FEWEST}{f'; so too for {others}' if others else ''}. Means and standard deviations are "
-        "then those of single cycles. Lengthen the window, or train on more runs.",
+        f"{FEWEST}{f'; the same holds for {others}' if others else ''}. Means and standard "
+        "deviations are then those of single cycles. Lengthen the window, or train on more runs.",
         SeakeepWarning,
         stacklevel=3,
     )

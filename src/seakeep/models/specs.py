@@ -1,4 +1,4 @@
-"""What a user sets: the Hankel model and the ensemble of them, and how each is fitted."""
+"""Settings of the Hankel model and of its ensemble, and how each is fitted."""
 
 from __future__ import annotations
 
@@ -127,8 +127,8 @@ class HankelDMDc(HankelSettings):
 
     Whether a model is stable is found when its eigenvalues are asked for (``summary()``,
     ``spectral_radius``, ``modes()``), and an unstable one warns then: no bound that is cheaper
-    than the eigenvalues tells a slowly decaying mode from a slowly growing one. A forecast that
-    is lost says so in its ``status`` either way.
+    than the eigenvalues distinguishes a slowly decaying mode from a slowly growing one. A forecast
+    that is lost says so in its ``status`` either way.
 
     Examples
     --------
@@ -270,13 +270,13 @@ class HankelDMDc(HankelSettings):
         ----------
         runs : Dataset, sequence of Dataset, or mapping of names to Datasets
             Runs with the dimension ``time`` (s, uniform, the same step in all) and one variable
-            a channel. Several are pooled.
+            per channel. Several are pooled.
         states : sequence of str
             Channels to forecast.
         inputs : sequence of str
             Channels that drive them; may be empty (autonomous Hankel DMD).
         stop : float, sequence or mapping of float, optional
-            Last instant of the training window, s; one for all runs, or one a run. By default
+            Last instant of the training window, s; one for all runs, or one per run. By default
             each run's end.
         executor, progress
             As in :meth:`settled`, where something is to be chosen.
@@ -453,7 +453,7 @@ class BayesianHankelDMDc:
         object.__setattr__(self, "seed_sequence", _seed_sequence(self.seed))
 
     def shared(self, dt: float) -> HankelSettings:
-        """What all members share; delays, window and λ in it stand for nothing."""
+        """What all members share; its delays, window and λ are not used."""
         lead = self.lead
         if not isinstance(lead, int):
             lead = periods_to_samples(lead, self.encounter_period, dt) if lead else 0
@@ -489,7 +489,7 @@ class BayesianHankelDMDc:
         return HankelDMDc(**values, select=self.select)
 
     def needs(self, dt: float) -> Needs:
-        """Samples that its greediest draw asks of its runs: the upper ends of the priors count."""
+        """Samples that its largest draw asks of its runs: the upper ends of the priors count."""
         shared = self.shared(dt)
 
         def samples(prior: Prior) -> int:

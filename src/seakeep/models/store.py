@@ -46,7 +46,7 @@ Value = TypeVar("Value")
 
 
 class Saved:
-    """What a NetCDF file keeps; it brings its ``kind`` and ``to_dataset``."""
+    """A model that a NetCDF file can hold; it has a ``kind`` and ``to_dataset``."""
 
     kind: ClassVar[str]
 
@@ -172,7 +172,7 @@ def _plain(value: object) -> object:
 
 
 def rebuilt(source: str | Path, build: Callable[[], Value]) -> Value:
-    """What `build` makes of a file's content; whatever does not fit becomes one DataError."""
+    """What `build` makes of a file's content; anything that does not fit raises one DataError."""
     try:
         return build()
     except DataError:
@@ -269,8 +269,8 @@ def read(path: str | Path) -> xr.Dataset:
         version = int(dataset.attrs.get("seakeep_format", 0))
     except (TypeError, ValueError):
         raise DataError(
-            f"{source} states the layout {dataset.attrs['seakeep_format']!r}, which is no number: "
-            "the file was altered. Save the model again."
+            f"{source} states the layout {dataset.attrs['seakeep_format']!r}, which is not a "
+            "number: the file was altered. Save the model again."
         ) from None
     if version > FORMAT_VERSION:
         raise DataError(

@@ -122,7 +122,7 @@ def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
     Returns
     -------
     Dataset
-        The variables of `forecast` with ``statistic`` (mean, std, lower, upper) in the place of
+        The variables of `forecast` with ``statistic`` (mean, std, lower, upper) instead of
         ``member``. Members that diverged are left out of all instants; ``attrs["members"]`` and
         ``attrs["diverged"]`` count them.
 

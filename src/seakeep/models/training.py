@@ -39,7 +39,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Training:
-    """What a model was identified from, and how.
+    """Training of a model: its data, and the regression.
 
     Parameters
     ----------

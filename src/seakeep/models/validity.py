@@ -34,7 +34,7 @@ class Waves:
     trained : (float, float)
         Shortest and longest period of the bands that were trained, s.
     outside : float
-        Part of its energy in bands that were not trained, 0 to 1.
+        Fraction of its energy in bands that were not trained, 0 to 1.
     is_gap : bool
         Whether `period` lies between trained periods without being one of them.
     """
@@ -75,7 +75,7 @@ class Coverage:
     first : int
         Number of the first band.
     shares : ndarray, shape (channel, band)
-        Part of the energy in each band.
+        Fraction of the energy in each band.
     """
 
     channels: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""The quality room: checks look at a run and report findings; none of them changes a value."""
+"""Checks of runs: they report findings and change no value."""
 
 from collections.abc import Callable, Collection, Iterable
 

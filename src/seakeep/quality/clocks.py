@@ -45,7 +45,7 @@ _FILE = (
 
 
 class ClocksKind(Kind):
-    """What is wrong with time."""
+    """Findings about time."""
 
     TIME_GAPS = "time has {gaps} gap(s): {missing} samples are missing"
     JITTER = "time has a jitter of {jitter:.3g} ms RMS; interpolated onto a uniform step"
@@ -189,14 +189,14 @@ def is_noise(series: FloatArray) -> bool:
 
 
 def periods(record: Record) -> Iterator[Finding]:
-    """A counted period that is no period of the waves."""
+    """A counted period that is not a period of the waves."""
     if record.period is not None and record.wave_channel is not None:
         counted, energy = record.period
         yield Finding(ClocksKind.PERIOD, record.run, record.wave_channel, counted, energy, "s")
 
 
 def others(record: Record) -> Iterator[Finding]:
-    """Runs that are no part of the period and the clocks of all."""
+    """Runs left out of the pooled period and clocks."""
     for run, words in record.left_out.items():
         details = {"words": words}
         yield Finding(ClocksKind.LEFT_OUT, record.run, f"run {run}", details=details)

@@ -1,4 +1,4 @@
-"""What a check found, as data; its sentence is rendered from it."""
+"""Findings as data; their sentences are rendered from them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a check looks at: the channels of a run, and what the campaign says of them."""
+"""Input of the checks: the channels of a run, and what the campaign says about them."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Record:
     anti_alias : bool, optional
         Whether a filter damps what lies near the new Nyquist frequency.
     left_out : mapping of str to str, optional
-        Runs that are no part of what is pooled, and why.
+        Runs left out of what is pooled, and why.
     """
 
     run: str

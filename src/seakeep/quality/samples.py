@@ -35,7 +35,7 @@ _UNIT = "Check unit and column in [channels.{channel}]."
 
 
 class SamplesKind(Kind):
-    """What is wrong with the samples of a channel."""
+    """Findings about the samples of a channel."""
 
     MISSING = "missing" + _COUNTED
     BRIDGED = "bridged" + _COUNTED

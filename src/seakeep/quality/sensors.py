@@ -27,7 +27,7 @@ __all__ = ["SensorsKind", "compared", "held", "positions", "redundant"]
 
 
 class SensorsKind(Kind):
-    """What two sensors say about each other."""
+    """Findings from the comparison of two sensors."""
 
     STILL = "against {other}: constant while the other sensor moves"
     UNSEEN = "against {other}: no motion seen"

@@ -1,4 +1,4 @@
-"""What the paper says in its results and conclusions, held against the acts of the reproduction."""
+"""Claims of the paper's results and conclusions, checked against the acts of the reproduction."""
 
 from __future__ import annotations
 
@@ -214,7 +214,7 @@ def _any_length(results: Results) -> Finding:
 
 
 def _share(result: StudyResult, measure: str, channels: tuple[str, ...]) -> Interval:
-    """Part of the average error that some channels make."""
+    """Fraction of the average error that some channels make."""
     picked = _columns(result, channels)
 
     def statistic(drawn: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Forecast over measurement: the figure everybody asks for first."""
+"""Figure of forecast over measurement."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ SHADES: tuple[tuple[str, Any], ...] = (
     ("#D55E00", (0, (1, 2.5))),
     ("#0072B2", (0, (2, 2, 6, 2))),
 )
-"""Colour and dash of each of several inputs: dashes tell them apart in grey print."""
+"""Colour and dash of each of several inputs: dashes distinguish them in grey print."""
 ACROSS = 84
 """Letters of a legend that stand beside each other over a panel."""
 BAND: dict[str, Any] = {"color": COLOURS["ensemble"], "alpha": 0.35, "linewidth": 0.6}
@@ -94,7 +94,7 @@ def _draw(comparison: Comparison) -> Figure:
         axes[0, 0].set_title("whole forecast, envelopes", loc="left")
         axes[0, 1].set_xlim(end - ENLARGED * period, end)
         axes[0, 1].set_title(f"last {ENLARGED} periods", loc="left")
-    # Of a band both panels tell; the dictionary keeps one of equal labels.
+    # Both panels label the band; the dictionary keeps one of equal labels.
     keys = {
         label: handle
         for column in range(columns)

@@ -44,7 +44,7 @@ _MARKS = {
     "stuck": ("#009E73", "s"),
     "replaced": ("#56B4E9", "d"),
 }
-"""Colour and shape of each flag: shapes tell them apart in grey print."""
+"""Colour and shape of each flag: shapes distinguish them in grey print."""
 FOUND = "#FDEEE4"
 """Ground of a panel in which something was found; the style sheet has the same for rows."""
 
@@ -217,7 +217,7 @@ def write_quality_sheet(
 
 
 def _told(name: str, run: xr.Dataset) -> dict[str, Any]:
-    """What the page says of a run."""
+    """What the page shows for a run."""
     found, rows = findings_of(run), channel_rows(run)
     known = {row.channel for row in rows}
     clocks = [

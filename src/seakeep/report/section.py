@@ -1,4 +1,4 @@
-"""What a page is made of: sections of words, figures and tables."""
+"""Sections of a page: words, figures and tables."""
 
 from __future__ import annotations
 

@@ -139,7 +139,7 @@ def axis_label(name: str, units: str, long_name: str | None = None) -> str:
 
 
 def plain_text(words: str) -> str:
-    r"""Words of a user for a figure: a dollar is a dollar, and begins no formula.
+    r"""Escape a user's words for a figure, so that a dollar sign does not start a formula.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Tables as data, and what becomes of them: CSV, LaTeX, the terminal (pages have a template)."""
+"""Tables as data, and their output as CSV, LaTeX and text (pages have a template)."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ SHADES = (0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
 
 
 def shade(text: str) -> int:
-    """Shade of a cell: how many of the steps an error is beyond; 0 of no number.
+    """Shade of a cell: how many of the steps an error is beyond; 0 for NaN.
 
     Examples
     --------

@@ -390,7 +390,7 @@ def complementary_filter(
 
 
 def _line(x: FloatArray) -> tuple[float, FloatArray]:
-    """Slope a sample and values of the straight line through a series."""
+    """Slope per sample and values of the straight line through a series."""
     at = np.arange(x.size) - 0.5 * (x.size - 1)
     slope = float(at @ x / (at @ at))
     return slope, x.mean() + slope * at

@@ -3,7 +3,7 @@
 An expression knows numbers, channel names, ``+ - * / **``, parentheses, and the functions
 ``square``, ``abs``, ``sqrt``, ``sin``, ``cos``, ``mean`` and ``average``. ``mean(a)`` is the mean
 of a channel over time, so that ``a - mean(a)`` is the deviation; ``average(a, b)`` is that of
-several values instant by instant. A name that is no identifier stands between backticks.
+several values instant by instant. A name that is not an identifier stands between backticks.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def parse(text: str) -> Expression:
     Raises
     ------
     RequestError
-        If the text is no expression, names no channel, or uses what is not allowed; the message
+        If the text is not an expression, names no channel, or uses what is not allowed; the message
         says what and where.
 
     Examples
@@ -198,7 +198,7 @@ def parse(text: str) -> Expression:
 
 
 def _unquoted(text: str) -> tuple[str, dict[str, str]]:
-    """Put identifiers of the same length in the place of names between backticks."""
+    """Put identifiers of the same length for names between backticks."""
     quoted: dict[str, str] = {}
 
     def stand_in(match: re.Match[str]) -> str:
@@ -281,7 +281,7 @@ def _check_call(name: str, count: int, text: str, position: int) -> None:
     known = [*_FUNCTIONS, "mean", "average"]
     if name not in known:
         near = did_you_mean(name, known)
-        raise _refusal(text, position, f"'{name}' is no function known here.{near}".rstrip("."))
+        raise _refusal(text, position, f"'{name}' is not a known function.{near}".rstrip("."))
     if name == "mean" and count > 1:
         raise _refusal(
             text, position, "'mean' is the mean of one channel over time; the average of several "

@@ -202,7 +202,7 @@ def resample(
     attenuation : float, optional
         Attenuation above the new Nyquist frequency, dB; less than 50 is taken as 50.
     passband : float, optional
-        Edge of the pass band as a part of the lower Nyquist frequency.
+        Edge of the pass band as a fraction of the lower Nyquist frequency.
     anti_alias : bool, optional
         False cuts at the old Nyquist frequency: samples are taken as they are, and what lies
         above the new one is folded into the result, as in the paper's chain.
@@ -237,7 +237,8 @@ def resample(
         )
     if not 0 < number(passband, "passband") < 1:
         raise RequestError(
-            f"passband is a part of the Nyquist frequency, between 0 and 1; received {passband!r}."
+            f"passband is a fraction of the Nyquist frequency, between 0 and 1; received "
+            f"{passband!r}."
         )
     slack = 1e-6 * dt
     if wanted[0] < t[0] - slack or wanted[-1] > t[-1] + slack:
@@ -251,7 +252,7 @@ def resample(
         same: FloatArray = array[nearest.astype(int)]
         return same
 
-    # The lower one, in cycles an old sample.
+    # The lower one, in cycles per old sample.
     nyquist = 0.5 * min(1.0, dt / new_dt if anti_alias else 1.0)
     return _sinc_sums(array, position, (passband * nyquist, nyquist), attenuation)
 

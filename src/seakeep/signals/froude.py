@@ -1,4 +1,4 @@
-r"""Froude's law: what a model's value means at full scale.
+r"""Froude's law: from model to full scale.
 
 With the scale factor :math:`\lambda` (full-scale length over model length), gravity the same:
 lengths go with :math:`\lambda`, times with :math:`\lambda^{1/2}`, masses with

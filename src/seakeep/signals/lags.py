@@ -69,7 +69,7 @@ def windowed_lags(
     largest_lag : float
         Lags searched on either side, s.
     overlap : float, optional
-        Part of a window that the next one shares.
+        Fraction of a window that the next one shares.
 
     Returns
     -------
@@ -247,7 +247,7 @@ FINEST = 0.01
 
 @dataclass(frozen=True)
 class MotionAgreement:
-    """How well one record of a motion agrees with another.
+    """Agreement of one record of a motion with another.
 
     Parameters
     ----------

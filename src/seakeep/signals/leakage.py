@@ -1,4 +1,4 @@
-"""Whether a test input repeats a training input, which makes a test of no test at all."""
+"""Whether a test input repeats a training input, which makes the test meaningless."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Leakage:
     Parameters
     ----------
     share : float
-        Part of the test record that repeats, 0 to 1; still water before and after the waves does
-        not count.
+        Fraction of the test record that repeats, 0 to 1; still water before and after the waves
+        does not count.
     correlation : float
         Highest modulus of the correlation of the analytic signals.
     training : int

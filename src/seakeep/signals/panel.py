@@ -35,7 +35,7 @@ CORNERS = ("left_top", "left_bottom", "right_top", "right_bottom")
 """Fields that say how much of each corner is seen."""
 FIELDS = ("x", "y", "angle", "length", "height", "area", "fill", "cut", "saturation", "brightness",
           *CORNERS)  # fmt: skip
-"""What is measured of a frame: centroid, pixels; orientation of the long axis, rad in (−π/2, π/2],
+"""Measurements of a frame: centroid, pixels; orientation of the long axis, rad in (−π/2, π/2],
 positive clockwise as seen; sides of the rectangle of the same second moments; pixels, holes
 included; area by that of the smallest rectangle around it; one where it touches the border of the
 region; saturated pixels; mean of the colours; part seen of squares of half the rectangle's height
@@ -65,7 +65,7 @@ class TrackingSettings:
     rest : float
         s, where `origin` is None.
     lower, upper : (int, int, int)
-        Least and greatest red, green and blue of the panel, 0 to 255.
+        Smallest and largest red, green and blue of the panel, 0 to 255.
     opening, closing : int
         Sides of the squares of opening and closing, pixels; 0 leaves the step out.
     refine : bool

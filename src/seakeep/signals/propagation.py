@@ -254,8 +254,8 @@ LEAST_WAVES = 20
 LEAST_CORRELATION = 0.8
 """Below it, six tenths of the second record are not the first one carried to it."""
 BEYOND_THEORY = 0.01
-"""Part of a separation by which waves of a steepness ka of 0.14 are faster than linear theory has
-it, (ka)²/2; a current of a hundredth of the phase speed does the same."""
+"""Fraction of a separation by which waves of a steepness ka of 0.14 are faster than in linear
+theory, (ka)²/2; a current of a hundredth of the phase speed does the same."""
 MATTERS = 0.2
 """Error of a carried elevation, in its standard deviations, below which a wrong position is hidden
 by what a model of waves leaves over in any case (0.16 for heave on the virtual tank)."""
@@ -676,7 +676,7 @@ def delay_by_dispersion(
     Notes
     -----
     The record is continued by linear prediction at either end. What was at the probe before the
-    record began reaches a place downstream later: the first d/c_g seconds are a guess there, and
+    record started reaches a place downstream later: the first d/c_g seconds are a guess there, and
     the last ones upstream.
 
     Examples
@@ -752,7 +752,7 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     Raises
     ------
     RequestError
-        If `count` is no positive integer.
+        If `count` is not a positive integer.
     DataError
         If a record has gaps.
 

@@ -1,4 +1,4 @@
-"""Quality of measured series: what is missing, wrong, frozen, late, and what was done about it.
+"""Quality of measured series: missing, wrong, frozen and late samples, and their repair.
 
 The checks report; none of them changes a value. Thresholds are stated in units of the
 series' own noise, spread or period, not of any one data set.
@@ -81,7 +81,7 @@ def flag_attributes(channel: str) -> dict[str, object]:
 def find_outliers(
     series: npt.ArrayLike, half_width: int = 5, threshold: float = 6.0, least: float = 0.5
 ) -> BoolArray:
-    """Single samples far from those beside them, by Hampel's rule; steps are no outliers.
+    """Single samples far from those beside them, by Hampel's rule; steps are not outliers.
 
     Parameters
     ----------
@@ -524,7 +524,7 @@ Pierson-Moskowitz spectrum, whose tail is the highest of the usual ones, 1.5 % o
 
 
 def energy_above(series: npt.ArrayLike, dt: float, edge: float) -> tuple[float, float]:
-    """Part of the energy of waves that lies above a frequency.
+    """Fraction of the energy of waves that lies above a frequency.
 
     Noise and ringing above three times the peak's frequency do not count: to lose them does no
     harm.

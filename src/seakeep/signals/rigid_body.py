@@ -1,4 +1,4 @@
-r"""Motions of points of a rigid body, and what accelerometers on it feel.
+r"""Motions of points of a rigid body, and readings of accelerometers on it.
 
 Axes: x along the waves, y, z up; roll, pitch and yaw are right-handed about them. With
 :math:`R = R_z(\psi) R_y(\theta) R_x(\phi)` a vector r fixed in the body is :math:`R r` in space.
@@ -31,7 +31,7 @@ def _vectors(**values: npt.ArrayLike) -> list[FloatArray]:
         received = ", ".join(f"{name}: {a.shape}" for name, a in zip(values, arrays, strict=True))
         raise RequestError(
             "vectors have the shape (time, 3), one column for each of x, y and z, and the same "
-            f"length; received {received}. Put zeros in the place of what was not measured."
+            f"length; received {received}. Use zeros for what was not measured."
         )
     return arrays
 

@@ -517,7 +517,7 @@ def find_pulses(trigger: FloatArray, time: FloatArray, name: str = "the trigger"
         raise DataError(
             f"{name} has no pulses that stand out of its noise (largest value {top:g} above the "
             f"median, noise {noise:g}). Check the column that trigger names in [instruments.NAME]; "
-            "or synchronise by another signal: state in its place shared (one signal both record), "
+            "or synchronise by another signal: state instead shared (one signal both record), "
             "correlated (two that go together) or offset (s)."
         )
     half = 0.5 * top

@@ -36,7 +36,7 @@ def as_seconds(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
 
 
 def instant_text(instant: float, dt: float) -> str:
-    """Write an instant to a thousandth of a time step, whatever it is counted from.
+    """Write an instant to a thousandth of a time step, for any origin of time.
 
     Examples
     --------
@@ -110,7 +110,7 @@ def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
     Raises
     ------
     DataError
-        If the times are no numbers, unsorted, repeated, or further from a uniform grid than a
+        If the times are not numbers, unsorted, repeated, or further from a uniform grid than a
         hundredth of a step and than the decimals explain with which they were written.
 
     Examples
@@ -172,7 +172,7 @@ def _irregularity(t: FloatArray, name: str) -> str:
 
 @dataclass(frozen=True)
 class TimeReport:
-    """What a time axis looks like.
+    """Step, gaps and jitter of a time axis.
 
     Parameters
     ----------
@@ -323,7 +323,7 @@ def onto_uniform(
 def stretches(
     wanted: BoolArray, place: npt.NDArray[np.int64] | None = None
 ) -> list[tuple[int, int]]:
-    """Begin and end (not included) of each stretch of true values.
+    """Start and end (not included) of each stretch of true values.
 
     Examples
     --------

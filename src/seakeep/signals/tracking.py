@@ -58,7 +58,7 @@ LABELS = {
     "panel_height": ("pixel", "panel height as seen"),
     "panel_area": ("pixel^2", "panel area as seen"),
     "panel_fill": ("1", "panel area by that of the rectangle around it"),
-    "saturation": ("1", "saturated part of the picture"),
+    "saturation": ("1", "saturated fraction of the picture"),
     "quality": ("1", "quality of the frame"),
     "bridged": ("1", "whether the frame is bridged"),
     "picture": ("1", "count of the frame in the file"),
@@ -98,7 +98,7 @@ FLAGGED_QUALITY = 0.49
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """What was tracked, frame by frame.
+    """A track, frame by frame.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class Track:
         ``picture``, the count of the frame in the file; and what was measured, unfiltered, of each
         frame: ``centroid_x``, ``centroid_y``, ``panel_length``, ``panel_height`` (pixel),
         ``panel_angle`` (rad, positive clockwise as seen), ``panel_area`` (pixel²), ``panel_fill``
-        and ``saturation`` (saturated part of the picture).
+        and ``saturation`` (saturated fraction of the picture).
     attributes : mapping of str to object
         Calibration and settings.
     """
@@ -333,7 +333,7 @@ def _measure(
 
 
 def _on_grid(frames: list[int] | range, rows: list[list[float]]) -> dict[str, FloatArray]:
-    """What was seen, by name; dropped frames are NaN."""
+    """Measurements by name; dropped frames are NaN."""
     table = np.full((frames[-1] + 1, len(FIELDS)), np.nan)
     table[list(frames)] = rows
     return dict(zip(FIELDS, table.T, strict=True))

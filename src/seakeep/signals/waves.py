@@ -161,8 +161,8 @@ def zero_up_crossings(
     for name, value in (("hysteresis", hysteresis), ("still", still)):
         if not 0 <= value < 1:
             raise RequestError(
-                f"{name} is a part of a standard deviation, 0 or more and less than 1; received "
-                f"{value!r}."
+                f"{name} is a fraction of a standard deviation, 0 or more and less than 1; "
+                f"received {value!r}."
             )
     part = waves_part(series, dt, still)
     x = as_series(series)[part]

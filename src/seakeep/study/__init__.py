@@ -1,4 +1,4 @@
-"""From campaign to judgement: settings, plan, run (one file per unit), judge.
+"""Studies, from campaign to judgement: settings, plan, run (one file per unit), judge.
 
 The public names are listed in ``__init__.pyi``; a module is imported when a name of it is used.
 """

@@ -1,4 +1,4 @@
-"""A model against the measurement: forecasts of test runs, and the table that judges them."""
+"""Comparison of models with the measurement: forecasts of test runs, and their table."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ class Comparison:
     sea_state : str
         As the campaign states it.
     forecast : Dataset
-        As :meth:`seakeep.HankelDMDcModel.forecast` gives it; of an ensemble, the members' mean.
+        As :meth:`seakeep.HankelDMDcModel.forecast` gives it; for an ensemble, the members' mean.
     measured : Dataset
         The states at the same instants.
     inputs : Dataset
-        The inputs over the forecast, to be drawn beside it.
+        The inputs over the forecast, drawn below it.
     band : Dataset, optional
-        Of an ensemble: ``lower`` and ``upper`` over ``statistic``, at the same instants.
+        For an ensemble: ``lower`` and ``upper`` over ``statistic``, at the same instants.
     """
 
     run: str
@@ -74,7 +74,7 @@ class Comparison:
 
     @property
     def status(self) -> str:
-        """Whether the forecast went well ("ok"), from when on it diverged, or how many members."""
+        """Status: "ok", the instant of divergence, or the number of diverged members."""
         return str(self.forecast.attrs["status"])
 
     @property
@@ -105,7 +105,7 @@ def in_degrees(comparison: Comparison) -> Comparison:
     Returns
     -------
     Comparison
-        Radians, and their rates, turned into degrees; error measures do not change by it.
+        Radians, and their rates, turned into degrees; error measures do not change.
     """
     return replace(
         comparison,
@@ -129,7 +129,7 @@ def at_full_scale(comparison: Comparison, scale: float) -> Comparison:
     Returns
     -------
     Comparison
-        Times and values at full scale; error measures do not change by it.
+        Times and values at full scale; error measures do not change.
 
     Raises
     ------
@@ -213,12 +213,12 @@ def compare(
     band: Band = "members",
     executor: Executor | None = None,
 ) -> list[Comparison]:
-    """Forecast runs of a campaign and put the measurement beside.
+    """Forecast runs of a campaign and pair the forecasts with the measurement.
 
     Parameters
     ----------
     model : HankelDMDcModel or HankelEnsemble
-        The model. Of an ensemble the members' mean is judged, and their band beside it.
+        The model. For an ensemble the members' mean is judged, and their band beside it.
     campaign : Campaign
         The campaign.
     runs : sequence of str, optional
@@ -237,7 +237,7 @@ def compare(
     level : float, optional
         Probability between the bounds of an ensemble's band.
     band : {"members", "calibrated"}, optional
-        Of an ensemble: quantiles of the members, or these moved outwards as
+        For an ensemble: quantiles of the members, or these moved outwards as
         :meth:`seakeep.models.HankelEnsemble.calibrate` found.
     executor
         As in :meth:`seakeep.models.HankelEnsemble.forecast`.
@@ -287,7 +287,7 @@ def compare_models(
     band: Band = "members",
     executor: Executor | None = None,
 ) -> dict[str, list[Comparison]]:
-    """Forecast the same instants with several models and put the measurement beside.
+    """Forecast the same instants with several models and pair them with the measurement.
 
     Parameters
     ----------
@@ -312,7 +312,7 @@ def compare_models(
         As :func:`compare`.
     """
     wanted = list(runs) or campaign.test_runs
-    known = list(campaign.settings.runs)  # unused ones too: whoever names one wants it
+    known = list(campaign.settings.runs)  # unused ones too, if named
     unknown = [name for name in wanted if name not in known]
     if unknown:
         raise RequestError(
@@ -477,8 +477,8 @@ def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
         (:mod:`seakeep.metrics`); ``training_anrmse`` over all, ``slack_channels`` (how many
         cannot), ``status``, ``start``, and ``conditional_on``: the measured output that the
         forecast read after its start, or an empty text; ``probe_offset`` and
-        ``probe_offset_spread`` (m), NaN where the run has none. Of an ensemble
-        also ``coverage``, the part of the measured instants that lie in the band (%),
+        ``probe_offset_spread`` (m), NaN where the run has none. For an ensemble
+        also ``coverage``, the percentage of measured instants that lie in the band,
         ``band_width``, its mean width (in ``channel_units``), and
         ``relative_band_width`` (in measured standard deviations); over ``run``:
         ``mean_coverage`` over the channels that can be judged, ``members``, ``diverged``,

@@ -1,4 +1,4 @@
-"""What a study was made of: channels with their signs, runs with their quality, spectra."""
+"""Data of a study: channels with their signs, runs with their quality, spectra."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ PAPER_SEGMENT, PAPER_OVERLAP, PAPER_PADDED = 2**12 / 500, 2**7 / 500, 2**16 / 50
 
 
 def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset]:
-    """Say what went into a study."""
+    """Data that a study used."""
     groups = {
         "channels": _channels(study.campaign, plan, runs),
         "training": _training(plan, runs),
@@ -55,7 +55,7 @@ def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset
 
 
 def _repeats(campaign: Campaign, plan: Plan, runs: Runs) -> xr.Dataset | None:
-    """Runs whose test windows repeat input of a training set that they test; None without any."""
+    """Runs whose test windows repeat input of their training set; None if there are none."""
     spans: dict[str, list[float]] = {}
     for window in (each for windows in plan.tests.values() for each in windows):
         if campaign.settings.runs[window.run].waves != "regular":

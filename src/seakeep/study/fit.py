@@ -1,4 +1,4 @@
-"""A campaign's settings become a model; what its data cannot teach is warned of."""
+"""From a campaign's settings to a model, with warnings about its training data."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def fit_campaign(
     -----
     SeakeepWarning
         If the test part of a training run repeats the model's training input, or the training
-        windows (of an ensemble the longest) hold fewer than five periods of a slow motion; of what
+        windows (for an ensemble the longest) hold fewer than five periods of a slow motion; of what
         the quality checks found in the model's channels; of test waves whose periods were not
         trained; and where the model reads waves after the instant that it forecasts.
     """
@@ -307,7 +307,7 @@ def _test_part(run: xr.Dataset, trained: xr.Dataset | None) -> xr.Dataset:
     span = run.attrs.get("test_span")
     if span is not None:
         return run.sel(time=slice(span[0] - 1e-6, span[1] + 1e-6))
-    if trained is not None:  # whoever tests on the training part knows that it repeats
+    if trained is not None:  # a test on the training part repeats by definition
         return run.sel(time=slice(float(trained["time"][-1]) + 1e-6, None))
     return run
 
@@ -332,7 +332,7 @@ class Repeat:
     run, input : str
         What is tested, and the channel that repeats.
     share : float
-        Part of the test record that repeats, 0 to 1.
+        Fraction of the test record that repeats, 0 to 1.
     start : float
         Where the best matching stretch starts, s.
     source : str

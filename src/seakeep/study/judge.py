@@ -110,7 +110,7 @@ def judge(
 def lost_forecasts(
     groups: Mapping[str, xr.Dataset], tests: Iterable[str], models: Sequence[str]
 ) -> xr.Dataset | None:
-    """Cells without a whole forecast, which are left out; of an ensemble all members were lost."""
+    """Cells without a whole forecast, which are left out; of ensembles, all members were lost."""
     rows = []
     for name in tests:
         test = groups[f"tests/{name}"]
@@ -239,7 +239,8 @@ def skill_table(
 
     ``change``, ``lower`` and ``upper`` over (model, reference, measure) are those of
     :func:`difference_table` for the average over the channels. References are ``hold_last``,
-    ``mean`` and ``best_linear``, the linear baseline of least median ANRMSE; None without any.
+    ``mean`` and ``best_linear``, the linear baseline of least median ANRMSE; None if there are
+    none.
     """
     median = boxes["median"].sel(channel="average", drop=True)
     named = {kind: model for model, kind in kinds.items() if kind in ("hold_last", "mean")}
@@ -302,7 +303,7 @@ def average_of(cells: FloatArray) -> FloatArray:
 def coverage_table(
     test: xr.Dataset, ensembles: Sequence[str], calibrations: Mapping[str, xr.Dataset] | None = None
 ) -> xr.Dataset:
-    """Part of the instants at which the band holds the measurement, and the truth where known.
+    """Fraction of the instants at which the band holds the measurement, and the truth where known.
 
     Over (model, against, channel), averages over all cells. With calibrations of a study, the same
     of the calibrated band: ``calibrated_inside`` and so on.

@@ -1,4 +1,4 @@
-"""All that is decided before the first model is fitted: models, training sets, test windows.
+"""Decisions made before the first model is fitted: models, training sets, test windows.
 
 Windows are drawn once and are the same for all models.
 """
@@ -43,7 +43,7 @@ Runs = Mapping[str, xr.Dataset]
 
 @dataclass(frozen=True)
 class TrainingSet:
-    """What one model learns from: the spans of one or several runs, each up to its stop.
+    """Training data of one model: spans of one or several runs, each up to its stop.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class TestWindow:
         Instants forecast.
     """
 
-    __test__ = False  # no class of tests, whatever pytest takes its name for
+    __test__ = False  # not a test class, although pytest would collect it by its name
 
     run: str
     start: float
@@ -277,7 +277,7 @@ def _longest_length(samples: int, steps: int, length: float) -> str:
 
 
 def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
-    """Mean part of a window that another window of the same run covers too, 0 to 1.
+    """Mean fraction of a window that other windows of the same run cover too, 0 to 1.
 
     Parameters
     ----------
@@ -307,7 +307,7 @@ def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
 
 
 def needs_of(specs: Sequence[Spec], dt: float) -> Needs:
-    """Samples of the greediest of several models: the same windows serve all."""
+    """Samples that the most demanding of several models needs: the same windows serve all."""
     each = [spec.needs(dt) for spec in specs]
     return Needs(
         max(needs.snapshots for needs in each),
@@ -324,7 +324,7 @@ def training_samples(needs: Needs) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What a study does.
+    """Plan of a study.
 
     Parameters
     ----------
@@ -339,7 +339,7 @@ class Plan:
     models : dict of str to ResolvedModel
         Specs, and where their settings come from.
     training : tuple of TrainingSet
-        What they learn from.
+        Training data of the members.
     tests : dict of str to tuple of TestWindow
         What they are judged on.
     shown : int

@@ -150,7 +150,7 @@ def reproduce(
     Returns
     -------
     dict of str to StudyResult
-        All that was found, by act; what was stopped goes on.
+        Results by act; a stopped act continues.
 
     Raises
     ------

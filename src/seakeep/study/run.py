@@ -41,7 +41,7 @@ def run_study(
     extra: Mapping[str, xr.Dataset] | None = None,
     notes: Mapping[str, str] | None = None,
 ) -> StudyResult:
-    """Run a study, or go on with one that was stopped.
+    """Run a study, or continue one that was stopped.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def run_study(
         From :func:`seakeep.study.read_study`.
     out : Path or str
         Folder of the results. Finished units (a model of a training set) are kept there, one file
-        each, and taken over when the study is run again; at the end all is in ``study.nc``.
+        each, and reused when the study is run again; at the end all is in ``study.nc``.
     executor : concurrent.futures.Executor, optional
         Does units side by side: :func:`seakeep.models.executor.processes`, or ``get_executor()``
         of a Dask client. Its workers need no disk in common. The arrays do not depend on it.
@@ -63,7 +63,7 @@ def run_study(
     Returns
     -------
     StudyResult
-        All that was found.
+        Results of the study.
 
     Raises
     ------
@@ -196,7 +196,7 @@ def _compute_all(
             report(done, total, f"{unit.model}, training set {plan.training[unit.training].name}")
     except WorkerLostError as error:
         raise WorkerLostError(
-            f"{error} What was finished is kept: the same command goes on where it stopped."
+            f"{error} What was finished is kept: the same command continues where it stopped."
         ) from None
 
 

@@ -1,6 +1,6 @@
-"""What a study file may say: models, training and test windows, statistics; frozen and validated.
+"""Tables of a study file: models, training and test windows, statistics; frozen and validated.
 
-A study is a campaign and a few choices. All that it leaves out is the paper's: ten training
+A study is a campaign and a few choices. Settings that it leaves out are the paper's: ten training
 windows drawn from the first halves, ten test windows of 15 encounter periods from the second, the
 deterministic model and the ensemble, all of them with the same windows and the same draws.
 """
@@ -105,7 +105,7 @@ class TrainingSettings(Table):
 class TestSetSettings(Table):
     """``[tests.NAME]``: windows that are forecast and judged."""
 
-    __test__ = False  # no class of tests, whatever pytest takes its name for
+    __test__ = False  # not a test class, although pytest would collect it by its name
 
     runs: Names = Field(default=(), description="list of runs; left out, the test runs")
     waves: Literal["regular", "irregular"] | None = Field(
@@ -205,7 +205,7 @@ class StudySettings(Table):
         wanted = self.statistics.densities_of
         if wanted is not None and wanted not in self.tests:
             raise ValueError(
-                f"statistics.densities_of = {wanted!r} is no table of [tests]; choose one of "
+                f"statistics.densities_of = {wanted!r} is not a table of [tests]; choose one of "
                 f"{', '.join(self.tests)}"
             )
         for group in (self.models, self.tests):
@@ -263,7 +263,7 @@ class Study:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of all on which the results depend: settings, campaign, raw files, the truth."""
+        """SHA-256 of what the results depend on: settings, campaign, raw files, the truth."""
         content = self.settings.model_dump(mode="json")
         for key in ("name", "description", "campaign", "truth", "model"):
             del content["study"][key]
@@ -304,7 +304,7 @@ def read_study(path: Path | str) -> Study:
     Raises
     ------
     RequestError
-        If a file is missing, is no TOML, or does not describe a study: one message names every key
+        If a file is missing, is not TOML, or does not describe a study: one message names every key
         at fault, the value received, and the remedy.
     """
     path = Path(path).expanduser()

@@ -1,4 +1,4 @@
-"""Results on disk: one file per finished unit, then one NetCDF file with everything."""
+"""Results on disk: one file per finished unit, then one NetCDF file for the study."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ Arrays = dict[str, npt.NDArray[Any]]
 
 
 class StorageError(SeakeepError):
-    """Results could not be written: what is finished is kept, and the same command goes on."""
+    """Results could not be written: finished work is kept, and the same command continues."""
 
 
 def versions() -> dict[str, str]:
@@ -73,15 +73,15 @@ def storing(folder: Path) -> Iterator[None]:
         if cause.errno in FORBIDDEN:
             raise RequestError(
                 f"{said} Choose a folder that you may write to, or change its permissions; the "
-                "same command goes on with what is there."
+                "same command continues with what is there."
             ) from error
         if cause.errno in NO_FOLDER:
             raise RequestError(
                 f"{said} No folder can be made or kept there. Choose another place."
             ) from error
-        mend = "Free space on the disk" if cause.errno in FULL else "Look after the disk"
+        mend = "Free space on the disk" if cause.errno in FULL else "Check the disk"
         raise StorageError(
-            f"{said} What was finished is kept. {mend}; the same command then goes on where it "
+            f"{said} What was finished is kept. {mend}; the same command then continues where it "
             "stopped."
         ) from error
 
@@ -227,7 +227,8 @@ def _read_header(path: Path) -> dict[str, Any]:
         found = None
     if not isinstance(found, dict) or "digest" not in found:
         raise RequestError(
-            f"{path} is damaged or no study's. Give another folder with -o, or remove this one."
+            f"{path} is damaged or belongs to no study. Give another folder with -o, or remove "
+            "this one."
         )
     return found
 
@@ -251,7 +252,7 @@ def _check_header(folder: Path, found: Mapping[str, Any], expected: Mapping[str,
 
 @dataclass(frozen=True, eq=False)
 class StudyResult:
-    """All that a study found; read from its folder by :func:`read_result`.
+    """Results of a study, read from its folder by :func:`read_result`.
 
     Parameters
     ----------
@@ -385,7 +386,7 @@ def read_result(folder: Path | str) -> StudyResult:
         raise RequestError(
             f"{folder} holds no finished study ({RESULT} is missing). "
             + (
-                "One was started there: run its 'seakeep study' again, it goes on where it stopped."
+                "One was started there: run its 'seakeep study' again to continue."
                 if started
                 else "Give the folder that 'seakeep study' or 'seakeep reproduce' wrote."
             )
@@ -407,8 +408,8 @@ def read_result(folder: Path | str) -> StudyResult:
         raise
     except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
         raise DataError(
-            f"{path} is damaged or no NetCDF file: {type(error).__name__} while reading it. Remove "
-            "it and run the study again."
+            f"{path} is damaged or not a NetCDF file: {type(error).__name__} while reading it. "
+            "Remove it and run the study again."
         ) from error
     return StudyResult(folder, attrs, groups)
 

@@ -1,7 +1,7 @@
 """The work of a study: one model of one training set on all windows that it may be tested on.
 
 Such a unit is computed as a whole and kept in one file, so that its arrays are the same to the last
-bit whether or not a study was interrupted, and whatever the number of workers.
+bit whether or not a study was interrupted, and for any number of workers.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Unit:
 
 
 def units_of(plan: Plan) -> list[Unit]:
-    """All that there is to do, in an order that shows something early."""
+    """All units, in an order that shows results early."""
     return [
         Unit(model, training)
         for training in range(len(plan.training))
@@ -280,7 +280,7 @@ def draws_of(plan: Plan, runs: Runs, model: str, origin: Json) -> xr.Dataset:
 
     A λ that is drawn around one that was chosen is that of the first training set.
     """
-    origin = {**origin, "readouts": []}  # no matter here, and long to fit
+    origin = {**origin, "readouts": []}  # not needed here, and slow to fit
     draws: xr.Dataset = fit_training(plan, runs, model, plan.training[0], origin).draws
     return draws
 
@@ -333,7 +333,7 @@ def _noise(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray:
 
 
 def wave_heights(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray | None:
-    """Twice the envelope of the first wave elevation in windows, (window, time); None of none."""
+    """Twice the envelope of the first elevation in windows, (window, time), or None."""
     name = next((name for name in plan.inputs if name.startswith("eta_")), None)
     if name is None:
         return None

@@ -75,9 +75,9 @@ def _wave_forces(
 ) -> float:
     """Add wave and drift forces to `force`; return the slow part of surge.
 
-    `real` and `imag` are the components' phases at `place`; `waves` holds a row each of ω, k, and
-    the surge response (re, im) times the amplitude, `excitation` the forces times the amplitude,
-    `drift` and `signs` the envelopes of the drift force. `moved` is overwritten.
+    `real` and `imag` are the components' phases at `place`; `waves` holds one row each for ω, k,
+    and the surge response (re, im) times the amplitude, `excitation` the forces times the
+    amplitude, `drift` and `signs` the envelopes of the drift force. `moved` is overwritten.
     """
     fast = fast_speed = 0.0
     for n in range(real.size):

@@ -1,4 +1,4 @@
-"""What the virtual tank delivers: raw files as loggers write them, and a campaign.toml."""
+"""Files that the virtual tank delivers: raw files as loggers write them, and a campaign.toml."""
 
 from __future__ import annotations
 

@@ -142,7 +142,7 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
             data = opened.load()
     except (OSError, ValueError) as error:
         raise RequestError(
-            f"{source} is no NetCDF file that can be read ({error}). Build the file again: "
+            f"{source} is not a readable NetCDF file ({error}). Build the file again: "
             "python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
         ) from error
     for key, expected in CONVENTIONS.items():

@@ -1,4 +1,4 @@
-"""Mooring lines that only pull: what a TOML file says of them, geometry, stiffness at rest.
+"""Mooring lines that only pull: their TOML table, geometry, stiffness at rest.
 
 A model of a line is an entry of :data:`KINDS`: it says how the tension grows with the stretch, as a
 cubic, and the time loop knows nothing else of it.

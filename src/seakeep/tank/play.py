@@ -229,7 +229,7 @@ def noisy_truth(
 
 
 def _check_outputs(folder: Path, names: list[str], kind: str, filmed: list[str]) -> None:
-    """Refuse to write over a campaign file or a record that the tank has not written."""
+    """Refuse to overwrite a campaign file or a record that the tank has not written."""
     campaign = folder / CAMPAIGN_FILE
     if campaign.exists():
         check_output(campaign, CAMPAIGN)
@@ -242,8 +242,8 @@ def _check_outputs(folder: Path, names: list[str], kind: str, filmed: list[str])
             check_output(hidden, TRUTH)
         if name in filmed and (raw / f"{SIDE_VIEW}.mp4").exists() and not campaign.exists():
             raise RequestError(
-                f"{raw / f'{SIDE_VIEW}.mp4'} exists in a folder that is no campaign of the tank; "
-                "it may be a measurement. Choose another folder."
+                f"{raw / f'{SIDE_VIEW}.mp4'} exists in a folder that is not a campaign of the "
+                "tank; it may be a measurement. Choose another folder."
             )
 
 

@@ -1,4 +1,4 @@
-"""What the waves and lines of a played campaign came out as, beside the paper's numbers."""
+"""Realised waves and line loads of a played campaign, next to the paper's numbers."""
 
 from __future__ import annotations
 

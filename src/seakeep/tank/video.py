@@ -1,7 +1,7 @@
 """Side view of a run as a video, for the tracking of the white panel on the vessel.
 
 Needs the extra ``video`` (OpenCV). Frames are 1280 × 720 at the video clock's rate; the vessel
-moves in a plane of 2.5 mm a pixel. A lamp in the upper left corner shows the trigger.
+moves in a plane of 2.5 mm per pixel. A lamp in the upper left corner shows the trigger.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ def draw_box_violin(
     colour: str,
     hatch: str = "",
 ) -> None:
-    """Draw one box-violin; the hatch tells models apart in grey print.
+    """Draw one box-violin; the hatch distinguishes models in grey print.
 
     A logarithmic axis has no place for values that are not positive.
     """

@@ -1,4 +1,4 @@
-"""What the figures of a study share: colours of models, labels of channels, small helpers."""
+"""Shared parts of a study's figures: colours of models, labels of channels, helpers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ BASELINES = ("mean", "hold_last", "fir", "arx", "subspace")
 
 
 def judged_models(result: StudyResult) -> list[str]:
-    """Models that are no baselines; all where none is left."""
+    """Models that are not baselines; all models if there is no other."""
     own = [m for m in result.models if result.model_settings[m].get("kind") not in BASELINES]
     return own or result.models
 

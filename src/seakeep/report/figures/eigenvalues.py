@@ -21,7 +21,7 @@ LOWEST = 0.8
 
 
 def eigenvalue_figure(result: StudyResult) -> Figure:
-    """Eigenvalues of each model of the first training set, of an ensemble all members'."""
+    """Eigenvalues of each model of the first training set, for an ensemble those of all members."""
     with figure_style():
         figure = new_figure(8.5, 3.0)
         plane, decay = figure.subplots(1, 2)

@@ -118,6 +118,6 @@ def _title(result: StudyResult, model: str, band: str) -> str:
 
 
 def _mean(values: FloatArray) -> float:
-    """Mean over the channels that move; NaN of none."""
+    """Mean over the channels that move; NaN if there are none."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else np.nan

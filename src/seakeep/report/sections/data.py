@@ -1,4 +1,4 @@
-"""What the study was made of: waves, channels and signs, quality of the runs, clocks."""
+"""Data of the study: waves, channels and signs, quality of the runs, clocks."""
 
 from __future__ import annotations
 
@@ -222,7 +222,7 @@ def _quality_table(result: StudyResult, name: str) -> Table:
         tuple(rows),
         "After preparation; no value that the study uses is missing, or it would have refused the "
         "run. Frozen: samples equal to both neighbours. Slack: a load below 0.1 % of its largest. "
-        "Flagged: part of the samples.",
+        "Flagged: fraction of the samples.",
         (3, 4, 5, 6, 7, 8),
         folded=True,
     )  # fmt: skip

@@ -79,7 +79,7 @@ def _skill_table(result: StudyResult) -> Table:
 
 
 def _with_interval(at: xr.Dataset) -> str:
-    """Relative change with its interval, in percent; cannot be told where that holds zero."""
+    """Relative change with its interval, in percent; undecided where the interval holds zero."""
     change, low, high = (signed(100 * float(at[k]), 0) for k in ("change", "lower", "upper"))
     if verdict(float(at["lower"]), float(at["upper"])) == "cannot tell":
         return f"{change} [{low}, {high}] cannot tell"

@@ -23,7 +23,7 @@ __all__ = ["explorer", "histories", "history_data", "pack", "write_histories"]
 
 FOLDER = "histories"
 MOST_MEMBERS = 20
-"""Members of a cell that are kept; more cannot be told apart on a screen."""
+"""Members of a cell that are kept; a screen cannot show more."""
 MISSING = 65535
 
 
@@ -69,7 +69,7 @@ def pack(values: npt.ArrayLike) -> dict[str, Any]:
 
 
 def history_data(result: StudyResult) -> dict[str, Any] | None:
-    """What there is to choose from, and the cell that the plot opens with; None of none.
+    """What there is to choose from, and the cell that the plot opens with; None if there are none.
 
     All other cells lie in files of :func:`write_histories`, which the page loads when they are
     chosen.

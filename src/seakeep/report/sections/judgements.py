@@ -131,8 +131,8 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
         rows.append(tuple(row))
     level = float(result.settings["statistics"]["level"])
     note = (
-        f"Part of the measured instants inside the band of nominally {level:g} (quantiles of the "
-        "members), and its mean width in measured SD; means over all cells."
+        f"Fraction of the measured instants inside the band of nominally {level:g} (quantiles of "
+        "the members), and its mean width in measured SD; means over all cells."
     )
     if calibrated:
         found = result.groups[f"calibration/{model}"]
@@ -148,7 +148,7 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
             "the members had not read, in windows as long as the first test set's. "
             + _other_lengths(result)
             + _calibrated_on(found, level)
-            + "The margin warrants nothing in a sea of another kind."
+            + "The margin guarantees nothing in another kind of sea."
         )
     if true:
         note += (
@@ -191,7 +191,7 @@ def _calibrated_on(found: xr.Dataset, level: float) -> str:
     )
     warranted = float(found["warranted"].min())
     if warranted < level:
-        said += f"Of some channels that is too few: {warranted:.2f} is warranted there. "
+        said += f"Of some channels that is too few: {warranted:.2f} is guaranteed there. "
     return said
 
 

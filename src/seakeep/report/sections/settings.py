@@ -208,7 +208,7 @@ def _trained_on(result: StudyResult) -> dict[str, Any]:
 
 
 def whole_readers(result: StudyResult) -> list[str]:
-    """Models that read all of a training set, whatever its length."""
+    """Models that read all of a training set, for any length."""
     return [model for model, length in _trained_on(result).items() if length is None]
 
 
@@ -279,7 +279,7 @@ def test_overlap(result: StudyResult) -> str:
     if not said:
         return ""
     return (
-        f"Test windows overlap; the mean part of one that others cover too: {', '.join(said)}. "
+        f"Test windows overlap; the mean share of one that others cover too: {', '.join(said)}. "
         "Errors over them are not independent."
     )
 

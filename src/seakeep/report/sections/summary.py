@@ -1,4 +1,4 @@
-"""What came out, in sentences, with the words and symbols of the report."""
+"""Summary of results in sentences, with the words and symbols of the report."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = [
 
 
 def summary(result: StudyResult) -> Section:
-    """Return what was tested and what came out, on one screen."""
+    """Return what was tested and the results, on one screen."""
     shares, words = training_overlap(result)
     lost, repeats = (result.groups.get(key) for key in ("statistics/lost", "repeats"))
     notices = [
@@ -42,7 +42,7 @@ def summary(result: StudyResult) -> Section:
     ]
     return Section(
         "summary",
-        "What came out",
+        "Results",
         words=(_tested(result),),
         points=tuple(findings(result)),
         notices=tuple(filter(None, notices)),
@@ -76,7 +76,7 @@ def _tested(result: StudyResult) -> str:
 
 
 def heat_table(result: StudyResult) -> Table:
-    """Median error of each channel in each test set, of the models that are no baselines."""
+    """Median error of each channel in each test set, of the models that are not baselines."""
     models = judged_models(result)
     places = [(test, model) for test in result.tests for model in models]
     rows = []
@@ -152,7 +152,7 @@ def conditional(result: StudyResult) -> str:
 
 
 def findings(result: StudyResult) -> list[str]:
-    """What came out, sentence by sentence, whichever way it came out."""
+    """Results, one sentence each."""
     said = []
     singles = [m for m in result.models if not result.is_ensemble(m)]
     ensembles = [m for m in result.models if result.is_ensemble(m)]
@@ -176,7 +176,7 @@ def findings(result: StudyResult) -> list[str]:
 
 
 def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure: str) -> str:
-    """Whether the ensemble's mean is better than the single model, as far as it can be told."""
+    """Whether the ensemble's mean is better than the single model, if the study can decide."""
     at = result.groups[f"statistics/differences/{test}"].sel(
         model=ensemble, other=single, measure=measure, channel="average"
     )
