@@ -1,6 +1,6 @@
 """Three forms of one regression, and the choice between them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seakeep.core import identify, snapshot_matrices, training_window
-from seakeep.core.solve import GRAM_LIMIT
+from seakeep.core.solve import GRAM_LIMIT, REFINED_LIMIT
 
 LONG, WIDE, SQUARE = (1, 1, 40), (9, 19, 6), (4, 9, 20)
 """Delays of two states and one input, and columns: 6, 40 and 20 regressors."""
@@ -92,15 +92,33 @@ def test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen(shape, part, al
     np.testing.assert_allclose(primal, svd, rtol=0, atol=lost * 1e-10 * largest)
 
 
-@pytest.mark.parametrize(("shape", "form"), [(LONG, "primal"), (WIDE, "dual")])
-def test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below(shape, form):
+@pytest.mark.parametrize(
+    ("shape", "form", "all_rows"), [(LONG, "primal", True), (WIDE, "dual", False)]
+)
+def test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below(shape, form, all_rows):
     made = problem(shape)
     limit = GRAM_LIMIT * largest_squared(made.matrices[0])
     assert GRAM_LIMIT == 1e-6
     # The eigenvalue that decides is computed to rounding; a millionth is beyond it.
-    assert made.solved(limit * (1 + 1e-6), all_rows=False).method == form
-    assert made.solved(limit * (1 - 1e-6), all_rows=False).method == "svd"
-    assert made.solved(0.0, all_rows=False).method == "svd"
+    assert made.solved(limit * (1 + 1e-6), all_rows=all_rows).method == form
+    assert made.solved(limit * (1 - 1e-6), all_rows=all_rows).method == "svd"
+    assert made.solved(0.0, all_rows=all_rows).method == "svd"
+
+
+@pytest.mark.parametrize("part", [1.01 * REFINED_LIMIT, 1e-9, 0.99 * GRAM_LIMIT])
+def test_corrections_give_newest_rows_the_accuracy_of_singular_values(part):
+    made = linear((3, 4, 200))
+    # Twice summed noise is smooth: singular values of its delays spread over five decades.
+    made = replace(made, inputs=made.inputs.cumsum(axis=0).cumsum(axis=0))
+    trace = np.sum(made.matrices[0] ** 2)
+    assert np.linalg.cond(made.matrices[0]) > 1e5
+    found = made.solved(part * trace, all_rows=False)
+    svd = made.solved(part * trace, all_rows=False, method="svd").coefficients
+    assert found.method == "primal"
+    # Singular values of regressors of condition 3e5 (the root of 1 / REFINED_LIMIT) leave ten
+    # digits; without corrections the least λ leaves six.
+    np.testing.assert_allclose(found.coefficients, svd, rtol=0, atol=1e-10 * np.abs(svd).max())
+    assert made.solved(0.99 * REFINED_LIMIT * trace, all_rows=False).method == "svd"
 
 
 @pytest.mark.parametrize("shape", [LONG, WIDE, SQUARE])

@@ -7,6 +7,8 @@ is chosen by shape and conditioning:
   :math:`G = X' (Y^T Y + \lambda I)^{-1} Y^T`, the same matrix, whichever is less work;
 * singular values, where forming a Gram matrix would square away the accuracy: the effective λ is
   below 1e-6 of the largest squared singular value, or λ = 0 (minimum norm), or a rank is given.
+  Where the newest rows alone are regressed, corrections by residuals of the data bring the primal
+  form back to their accuracy, down to 1e-11.
 
 All rows of the next extended state need rows of the inverse of :math:`M = C + \lambda I`. Let Z
 move the lags down by one, newest first, filling with zeros. The recursion of the Gram matrix says
@@ -60,6 +62,12 @@ GRAM_LIMIT = 1e-6
 """Least effective λ, as a part of the largest squared singular value, for a Gram matrix.
 
 Its condition number is then below 1e6, and ten digits are left of sixteen."""
+
+REFINED_LIMIT = 1e-11
+"""The same where residuals correct the coefficients.
+
+Each correction gains four digits or more, up to those of singular values."""
+CORRECTIONS = 2
 
 
 @dataclass(frozen=True)
@@ -252,10 +260,16 @@ class _Delayed:
 
     def choose(self, ridge: float) -> Method:
         """The form, or singular values where λ is too small for a Gram matrix."""
-        settled = ridge >= GRAM_LIMIT * gram_trace(self.pieces, self.delays)
-        if settled or (ridge > 0 and _gram_suffices(ridge, self.gram())):
+        if not self.is_squared_away(ridge):
             return self.form()
-        return "svd"
+        trace = gram_trace(self.pieces, self.delays)
+        if not self.all_rows and self.rows <= self.columns and ridge >= REFINED_LIMIT * trace:
+            return "primal"
+        return self.form() if ridge > 0 and _gram_suffices(ridge, self.gram()) else "svd"
+
+    def is_squared_away(self, ridge: float) -> bool:
+        """Whether λ may be too small for a Gram matrix, by its trace."""
+        return ridge < GRAM_LIMIT * gram_trace(self.pieces, self.delays)
 
     def gram(self) -> FloatArray:
         """The smaller Gram matrix, its upper triangle."""
@@ -289,9 +303,22 @@ class _Delayed:
         if self.all_rows:
             system = primal_system(self.pieces, self.delays)
             return _all_rows(system, _factor(system.gram, ridge), ridge)
+        if self.is_squared_away(ridge):
+            return self._refined(ridge)
         room = self.pieces[0].states.shape[1]
         system = primal_system(self.pieces, self.delays, room)
         return np.ascontiguousarray(_solve_beside(system.gram, system.right, ridge))
+
+    def _refined(self, ridge: float) -> FloatArray:
+        """Coefficients of the newest rows, corrected by the residuals of the data."""
+        system = primal_system(self.pieces, self.delays)
+        factor = _factor(system.gram, ridge)
+        regressors, targets = self.matrices()
+        found = np.zeros_like(system.right)
+        for _ in range(1 + CORRECTIONS):
+            right = (targets - found @ regressors) @ regressors.T - ridge * found
+            found += np.asarray(lapack.dpotrs(factor, right.T, lower=1)[0]).T
+        return found
 
     def dual(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`K = \hat Y^T \hat Y`.

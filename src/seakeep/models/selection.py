@@ -139,6 +139,15 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
+class _Regression:
+    """Models that have not seen one run: its number, their scales, and coefficients by level."""
+
+    fold: int
+    scales: Scales
+    weights: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class Problem:
     """Training runs with the columns of all candidates.
 
@@ -249,7 +258,7 @@ class Problem:
         """Free runs, end to end, on each run by the model of the others."""
         for run in range(len(self.data.names)):
             if len(self.data.names) > 1 and (starts := self._starts(run, steps)).size:
-                predicted, _ = self.forecast(candidate, [level], run, steps)
+                predicted = self._forecast(candidate, self._without(candidate, [level], run), steps)
                 yield Held(run, predicted[0], self._measured(run, starts, steps))
 
     def _starts(self, run: int, steps: int) -> IntArray:
@@ -261,17 +270,19 @@ class Problem:
         self, candidate: Candidate, levels: Sequence[float], fold: int
     ) -> Iterator[FloatArray]:
         """Scores, shape (level, window), for each horizon that fits into the held-out run."""
+        held = self._without(candidate, levels, fold)
+        spread = held.scales[0][1]
         for steps in self.horizons:
             starts = self._starts(fold, steps)
             if starts.size:
-                predicted, scale = self.forecast(candidate, levels, fold, steps)
+                predicted = self._forecast(candidate, held, steps)
                 measured = self._measured(fold, starts, steps)
                 with np.errstate(over="ignore", invalid="ignore"):
                     errors = metrics.nrmse(
-                        predicted=predicted, measured=measured, training_std=scale[1]
+                        predicted=predicted, measured=measured, training_std=spread
                     )
                 judged = ~metrics.is_slack(
-                    predicted=measured, measured=measured, training_std=scale[1]
+                    predicted=measured, measured=measured, training_std=spread
                 )
                 errors = np.where(np.isfinite(errors), np.minimum(errors, WORST), WORST)
                 moved = judged.any(axis=-1)
@@ -281,34 +292,20 @@ class Problem:
         states = self.data.states[run]
         return np.stack([states[at + 1 : at + 1 + steps] for at in starts])
 
-    def forecast(
-        self, candidate: Candidate, levels: Sequence[float], fold: int, steps: int
-    ) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
-        """Free runs of a candidate on a run that is held out.
+    def _without(self, candidate: Candidate, levels: Sequence[float], fold: int) -> _Regression:
+        """Models of all runs but one, at each level."""
+        others = [run for run in range(len(self.data.names)) if run != fold]
+        scales, gram, right, count = self._system(candidate, others)
+        return _Regression(fold, scales, self._path(candidate, levels, gram, right, count))
 
-        Parameters
-        ----------
-        candidate : Candidate
-            Columns.
-        levels : sequence of float
-            λ, or numbers of singular values of a truncated candidate.
-        fold : int
-            The run that is held out.
-        steps : int
-            Length of the windows.
+    def _forecast(self, candidate: Candidate, held: _Regression, steps: int) -> FloatArray:
+        """Free runs on the run that is held out, shape (level, window, steps, N).
 
-        Returns
-        -------
-        predicted : ndarray, shape (level, window, steps, N)
-            In the standardised deviations of `data`.
-        scale : (ndarray, ndarray), each of shape (N,)
-            Mean and standard deviation of the states that trained, likewise.
+        They are in the standardised deviations of `data`.
         """
         data, s, z = self.data, candidate.state_delays, candidate.input_delays
-        others = [run for run in range(len(data.names)) if run != fold]
-        (x, u, w), gram, right, count = self._system(candidate, others)
+        fold, (x, u, w), weights = held.fold, held.scales, held.weights
         kept, direct = self._delayed(candidate), self._direct(candidate)
-        weights = self._path(candidate, levels, gram, right, count)
         size = len(x[0]) * (s + 1)
         top, rest = weights[..., :size], weights[..., size:]
         starts = self._starts(fold, steps)
@@ -349,7 +346,7 @@ class Problem:
                 chosen = slice(None) if models == 1 else slice(model, model + 1)
                 forcing[chosen] = np.einsum("wtp,lnp->lwtn", driving, rest[chosen], optimize=True)
             predicted = free_runs(top, histories, forcing) * x[1] + x[0]
-        return predicted, x
+        return predicted
 
     def _system(
         self, candidate: Candidate, runs: Sequence[int]
