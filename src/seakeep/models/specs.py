@@ -18,7 +18,7 @@ from seakeep.models.draws import Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.executor import Progress
 from seakeep.models.inputs import Chain, ProbeAlignment
-from seakeep.models.interface import Json, Needs, Signature, Span, plain
+from seakeep.models.interface import Json, Needs, Signature, Span, Spec, plain
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.members import TrainingArrays, reach, spectral_radius
@@ -217,6 +217,15 @@ class HankelDMDc(HankelSettings):
             select=Select(observables=True, period=encounter_period),
         )
 
+    @property
+    def is_open(self) -> bool:
+        """Whether something is left to be chosen by free runs."""
+        return isinstance(self.ridge, str) or self.select is not None
+
+    def central(self, dt: float) -> HankelDMDc:
+        """Itself: the single model at the middle of what is fitted."""
+        return self
+
     def settled(
         self,
         runs: Runs,
@@ -263,6 +272,7 @@ class HankelDMDc(HankelSettings):
         *,
         executor: Executor | None = None,
         progress: Progress | None = None,
+        selected: Selected[HankelDMDc] | None = None,
     ) -> HankelDMDcModel:
         """Identify a model; the settings are not changed by it.
 
@@ -280,6 +290,8 @@ class HankelDMDc(HankelSettings):
             each run's end.
         executor, progress
             As in :meth:`settled`, where something is to be chosen.
+        selected : Selected, optional
+            What :meth:`settled` found in these runs, so that it is not looked for again.
 
         Returns
         -------
@@ -296,8 +308,10 @@ class HankelDMDc(HankelSettings):
             grows.
         """
         named = as_runs(runs)
-        if isinstance(self.ridge, str) or self.select is not None:
-            found = self.settled(named, states, inputs, stop, executor=executor, progress=progress)
+        if self.is_open:
+            found = selected or self.settled(
+                named, states, inputs, stop, executor=executor, progress=progress
+            )
             model = found.settings._fitted(named, states, inputs, stop, found.readouts)
             _check_growth(model)
             return replace(model, selection=found.describe())
@@ -472,6 +486,11 @@ class BayesianHankelDMDc:
             readouts=self.readouts,
             stable=self.stable,
         )
+
+    @property
+    def is_open(self) -> bool:
+        """Whether something is left to be chosen by free runs."""
+        return isinstance(self.ridge, str) or self.select is not None
 
     def central(self, dt: float) -> HankelDMDc:
         """The single model at the medians of the priors."""
@@ -657,7 +676,12 @@ class BayesianHankelDMDc:
             As :meth:`HankelDMDc.fit`.
         """
         central = self.central(labelled.common_step(as_runs(runs)))
-        found = central.settled(runs, states, inputs, stop, executor=executor, progress=progress)
+        return self._adopt(
+            central.settled(runs, states, inputs, stop, executor=executor, progress=progress)
+        )
+
+    def _adopt(self, found: Selected[HankelDMDc]) -> Selected[BayesianHankelDMDc]:
+        """Priors around what :meth:`central` found."""
         ridge, scale = self.ridge, self.ridge_scale
         if isinstance(ridge, str):
             best = float(found.settings.ridge)
@@ -682,6 +706,7 @@ class BayesianHankelDMDc:
         *,
         executor: Executor | None = None,
         progress: Progress | None = None,
+        selected: Selected[HankelDMDc] | None = None,
     ) -> HankelEnsemble:
         """Draw the members and gather what they learn from; their matrices are made on demand.
 
@@ -689,6 +714,9 @@ class BayesianHankelDMDc:
         ----------
         runs, states, inputs, stop, executor, progress
             As in :meth:`HankelDMDc.fit`.
+        selected : Selected, optional
+            What the settled :meth:`central` found in these runs, so that it is not looked for
+            again.
 
         Returns
         -------
@@ -703,8 +731,12 @@ class BayesianHankelDMDc:
         """
         named = as_runs(runs)
         check_names(states, inputs)
-        if isinstance(self.ridge, str) or self.select is not None:
-            found = self.settled(named, states, inputs, stop, executor=executor, progress=progress)
+        if self.is_open:
+            found = (
+                self.settled(named, states, inputs, stop, executor=executor, progress=progress)
+                if selected is None
+                else self._adopt(selected)
+            )
             ensemble = found.settings._drawn(named, states, inputs, stop, found.readouts)
             return replace(ensemble, selection=found.describe())
         readouts: tuple[FittedReadOut, ...] = ()
@@ -768,6 +800,13 @@ class BayesianHankelDMDc:
             signature=signature,
             coverage=Coverage.of(inputs, trained, dt),
         )
+
+
+def left_open(spec: Spec) -> HankelDMDc | BayesianHankelDMDc | None:
+    """The spec, where it leaves something to be chosen by free runs."""
+    if isinstance(spec, HankelDMDc | BayesianHankelDMDc) and spec.is_open:
+        return spec
+    return None
 
 
 def _described(prior: Prior | str | None) -> dict[str, Any] | str | None:

@@ -27,7 +27,7 @@ from seakeep.study.store import (
     versions,
     write_result,
 )
-from seakeep.study.units import Unit, collect, compute, units_of
+from seakeep.study.units import Unit, choice_of, choose, collect, compute, units_of
 
 __all__ = ["run_study"]
 
@@ -184,22 +184,34 @@ def _compute_all(
     report: Progress,
 ) -> None:
     left = [unit for unit in units if not folder.has(unit.name)]
-    done, total = len(units) - len(left), len(units)
+    choices = {unit: choice_of(plan, unit) for unit in left}
+    todo = [each for each in dict.fromkeys(choices.values()) if each is not None]
+    todo = [each for each in todo if not folder.has(each.name)]
+    done, total = len(units) - len(left), len(units) + len(todo)
     report(done, total, "fitting and forecasting")
-    if not left:
-        return
-    try:
-        for number, arrays in as_finished(_work, (plan, dict(runs)), left, executor):
-            unit = left[number]
-            folder.write(unit.name, arrays)
-            done += 1
-            report(done, total, f"{unit.model}, training set {plan.training[unit.training].name}")
-    except WorkerLostError as error:
-        raise WorkerLostError(
-            f"{error} What was finished is kept: the same command continues where it stopped."
-        ) from None
+    # What is chosen serves several models: it comes first, with the units that need no choice.
+    first = [*todo, *(unit for unit in left if choices[unit] is None)]
+    then = [unit for unit in left if choices[unit] is not None]
+    for batch in filter(None, (first, then)):
+        items = [
+            (unit, None if (choice := choices.get(unit)) is None else _arrays(folder, choice))
+            for unit in batch
+        ]
+        try:
+            for number, arrays in as_finished(_work, (plan, dict(runs)), items, executor):
+                unit = batch[number]
+                folder.write(unit.name, arrays)
+                done += 1
+                what = "settings chosen" if unit.chooses else unit.model
+                name = plan.training[unit.training].name
+                report(done, total, f"{what}, training set {name}")
+        except WorkerLostError as error:
+            raise WorkerLostError(
+                f"{error} What was finished is kept: the same command continues where it stopped."
+            ) from None
 
 
-def _work(data: tuple[Plan, dict[str, xr.Dataset]], unit: Unit) -> Arrays:
+def _work(data: tuple[Plan, dict[str, xr.Dataset]], item: tuple[Unit, Arrays | None]) -> Arrays:
     """Arrays of a unit, which come back to be written: a worker may have another disk."""
-    return compute(*data, unit)
+    unit, choice = item
+    return choose(*data, unit) if unit.chooses else compute(*data, unit, choice)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,13 +23,16 @@ from seakeep.errors import DataError, SeakeepError
 from seakeep.models.calibration import Judged, envelope_of, found_margin, held_out
 from seakeep.models.engine import group_series, read_groups
 from seakeep.models.interface import Json
+from seakeep.models.readouts import FittedReadOut
+from seakeep.models.selection import Selected
+from seakeep.models.specs import HankelDMDc, left_open
 from seakeep.models.summaries import STATISTICS, reduce_members
 from seakeep.signals import envelope_squared
 from seakeep.study.judge import BAND_ERRORS, MEASURES
 from seakeep.study.plan import Plan, TestWindow, TrainingSet, between
 from seakeep.study.settings import Study
 
-__all__ = ["Unit", "collect", "compute", "fit_training", "units_of"]
+__all__ = ["Unit", "choice_of", "choose", "collect", "compute", "fit_training", "units_of"]
 
 Runs = Mapping[str, xr.Dataset]
 Arrays = dict[str, npt.NDArray[Any]]
@@ -50,15 +54,19 @@ DIMS = {
 
 @dataclass(frozen=True)
 class Unit:
-    """A model and the number of a training set: what one worker does at a time."""
+    """A model and the number of a training set: what one worker does at a time.
+
+    A unit that chooses finds the settings that the model, and others like it, leave open.
+    """
 
     model: str
     training: int
+    chooses: bool = False
 
     @property
     def name(self) -> str:
         """Name of its file."""
-        return f"{self.model}.t{self.training:02d}"
+        return f"{self.model}.t{self.training:02d}" + ".choice" * self.chooses
 
 
 def units_of(plan: Plan) -> list[Unit]:
@@ -71,19 +79,67 @@ def units_of(plan: Plan) -> list[Unit]:
     ]
 
 
+def choice_of(plan: Plan, unit: Unit) -> Unit | None:
+    """The unit that chooses for another one; None where nothing is left open."""
+
+    def central(model: str) -> HankelDMDc | None:
+        spec = left_open(plan.specs[model])
+        return None if spec is None else spec.central(plan.dt)
+
+    if (wanted := central(unit.model)) is None:
+        return None
+    first = next(model for model in plan.models if central(model) == wanted)
+    return Unit(first, unit.training, chooses=True)
+
+
+def choose(plan: Plan, runs: Runs, unit: Unit) -> Arrays:
+    """Choose what the settings of a model leave open, on a training set."""
+    parts = training_parts(runs, plan.training[unit.training])
+    spec = left_open(plan.specs[unit.model])
+    assert spec is not None
+    with _named_after(plan, unit):
+        found = spec.central(plan.dt).settled(parts, list(plan.states), list(plan.inputs))
+    content = {
+        "settings": found.settings.to_json(),
+        "rows": found.rows,
+        "note": found.note,
+        "readouts": [each.to_json() for each in found.readouts],
+    }
+    return {"choice": np.array(json.dumps(content))}
+
+
+def _chosen(plan: Plan, choice: Arrays) -> Selected[HankelDMDc]:
+    """What :func:`choose` found."""
+    content = json.loads(str(choice["choice"]))
+    return Selected(
+        HankelDMDc.from_json(content["settings"]),
+        tuple(content["rows"]),
+        content["note"],
+        tuple(FittedReadOut.from_json(each, plan.states) for each in content["readouts"]),
+    )
+
+
+@contextmanager
+def _named_after(plan: Plan, unit: Unit) -> Iterator[None]:
+    """Name training set and model in errors."""
+    try:
+        yield
+    except SeakeepError as error:
+        name = plan.training[unit.training].name
+        raise DataError(f"training set '{name}', model '{unit.model}': {error}") from error
+
+
 def tested_windows(plan: Plan, training: int, test: str) -> tuple[int, ...]:
     """Windows of a test set that a training set may be tested on."""
     where = plan.training[training]
     return tuple(k for k, w in enumerate(plan.tests[test]) if where.may_test(w.run))
 
 
-def compute(plan: Plan, runs: Runs, unit: Unit) -> Arrays:
-    """Fit a model and forecast all windows."""
+def compute(plan: Plan, runs: Runs, unit: Unit, choice: Arrays | None = None) -> Arrays:
+    """Fit a model, with the settings that were chosen, and forecast all windows."""
     training = plan.training[unit.training]
-    try:
-        fitted = fit_training(plan, runs, unit.model, training)
-    except SeakeepError as error:
-        raise DataError(f"training set '{training.name}', model '{unit.model}': {error}") from error
+    with _named_after(plan, unit):
+        fitted = fit_training(plan, runs, unit.model, training, choice=choice)
     ahead = (max(fitted.signature.lead_samples, 1) - 1) * plan.dt
     out: Arrays = {
         "chosen/words": np.array(getattr(fitted, "selection", "")),
@@ -180,13 +236,28 @@ def measured_windows(
     return np.stack(out)
 
 
+def training_parts(runs: Runs, training: TrainingSet) -> dict[str, xr.Dataset]:
+    """The runs of a training set, cut to what may be read."""
+    return {name: between(runs[name], (begin, stop)) for name, begin, stop in training.spans}
+
+
 def fit_training(
-    plan: Plan, runs: Runs, model: str, training: TrainingSet, origin: Json | None = None
+    plan: Plan,
+    runs: Runs,
+    model: str,
+    training: TrainingSet,
+    origin: Json | None = None,
+    choice: Arrays | None = None,
 ) -> Any:
-    """Fit a model of the study to a training set; an ensemble may be chosen already: `origin`."""
-    parts = {name: between(runs[name], (begin, stop)) for name, begin, stop in training.spans}
+    """Fit a model of the study to a training set.
+
+    An ensemble may be chosen already, `origin`, or what its settings leave open, `choice`.
+    """
     spec = plan.specs[model] if origin is None else plan.specs[model].from_json(origin)
-    return spec.fit(parts, list(plan.states), list(plan.inputs))
+    parts, states, inputs = training_parts(runs, training), list(plan.states), list(plan.inputs)
+    if choice is not None and (open_spec := left_open(spec)) is not None:
+        return open_spec.fit(parts, states, inputs, selected=_chosen(plan, choice))
+    return spec.fit(parts, states, inputs)
 
 
 def training_moments(plan: Plan, runs: Runs, training: TrainingSet) -> FloatArray:
@@ -194,7 +265,7 @@ def training_moments(plan: Plan, runs: Runs, training: TrainingSet) -> FloatArra
 
     The same for all models, so that all are judged on the same channels.
     """
-    parts = [between(runs[name], (begin, stop)) for name, begin, stop in training.spans]
+    parts = training_parts(runs, training).values()
     pooled = np.concatenate([[part[n].values for n in plan.states] for part in parts], axis=1)
     return np.stack([pooled.mean(axis=1), pooled.std(axis=1, ddof=1)])
 

@@ -62,6 +62,9 @@ def draw_box_violin(
     x = x[np.isfinite(x) & (not logarithmic or x > 0)]
     if x.size == 0:
         return
+    # Before the violin, whose logarithms a logarithmic axis would be scaled to.
+    sideways = place + 0.16 * width * np.resize(JITTER, x.size)
+    axes.scatter(sideways, x, s=7, color=colour, alpha=0.5, linewidths=0, rasterized=True, zorder=2)
     if x.size >= FEWEST and np.ptp(x) > 0:
         spread = np.log10(x) if logarithmic else x
         violin = axes.violinplot([spread], [place], widths=width, showextrema=False, points=120)
@@ -70,8 +73,6 @@ def draw_box_violin(
                 vertices = body.get_paths()[0].vertices
                 vertices[:, 1] = 10.0 ** vertices[:, 1]
             body.set(facecolor=colour, edgecolor=colour, alpha=0.18, linewidth=0.6)
-    sideways = place + 0.16 * width * np.resize(JITTER, x.size)
-    axes.scatter(sideways, x, s=7, color=colour, alpha=0.5, linewidths=0, rasterized=True)
     box = box_statistics(x)
     half = 0.13 * width
     axes.fill_between(
