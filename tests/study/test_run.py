@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from started import started
+from tutorial_study import put_tutorial
 
 from seakeep.errors import DataError, RequestError
 from seakeep.models.executor import processes
@@ -21,6 +22,7 @@ from seakeep.study import StorageError, read_result, read_study, run, run_study,
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
 from seakeep.study.store import LOCK, UNITS, UnitFolder
+from seakeep.study.units import choice_of, choose, compute, units_of
 
 
 def change(folder, old, new):
@@ -386,3 +388,44 @@ def test_a_report_is_never_written_among_files_of_others(name, study_folder):
     with pytest.raises(RequestError, match=r"no report (that|of) seakeep"):
         run_study(read_study(study_folder / "study.toml"), study_folder / "out")
     assert mine.read_text() == "mine"
+
+
+OPEN = """
+[study]
+campaign = "campaign.toml"
+preset = "recommended"
+
+[training]
+scheme = "pooled"
+
+[models.deterministic]
+kind = "hankel_dmdc"
+
+[models.bayesian]
+kind = "bayesian_hankel_dmdc"
+n_members = 2
+
+[models.mean]
+kind = "mean"
+
+[tests.unseen]
+runs = ["unseen"]
+windows = 1
+length = 6
+"""
+
+
+def test_a_single_model_and_an_ensemble_share_what_is_chosen_on_a_training_set(tmp_path):
+    put_tutorial(tmp_path, OPEN)
+    plan, runs = make_plan(read_study(tmp_path / "study.toml"))
+    single, ensemble, mean = units_of(plan)
+    choice = choice_of(plan, single)
+    assert choice == choice_of(plan, ensemble)
+    assert choice.name == "deterministic.t00.choice"
+    assert choice_of(plan, mean) is None
+    chosen = choose(plan, runs, choice)
+    for unit in (single, ensemble):
+        found, alone = compute(plan, runs, unit, chosen), compute(plan, runs, unit)
+        assert found.keys() == alone.keys()
+        for key, values in found.items():
+            np.testing.assert_array_equal(values, alone[key])
