@@ -312,7 +312,7 @@ def test_a_full_disk_is_told_and_what_is_finished_is_kept(study_folder, monkeypa
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(np, "savez", full)
-    with pytest.raises(StorageError, match=r"No space left.*kept.*goes on") as caught:
+    with pytest.raises(StorageError, match=r"No space left.*kept.*continues") as caught:
         folder.write("second", {"mean": np.arange(3.0)})
     assert caught.value.exit_status == 1
     assert folder.has("first")
