@@ -27,7 +27,7 @@ FLOORS = (
     ("campaign",),
     ("tank",),
     ("models",),
-    ("baselines",),
+    ("baselines", "hosts"),
     ("check",),
     ("study",),
     ("report", "plot"),

@@ -19,7 +19,18 @@ REQUESTS = (
     ["info"],
 )
 VERBS = (
-    *("tank", "init", "prepare", "tune", "fit", "calibrate", "forecast", "compare", "study"),
+    *(
+        "tank",
+        "init",
+        "prepare",
+        "tune",
+        "fit",
+        "calibrate",
+        "forecast",
+        "compare",
+        "export",
+        "study",
+    ),
     *("report", "reproduce", "datasets", "track", "info"),
 )
 

@@ -20,7 +20,18 @@ from seakeep.cli import modelling
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial"
 VERBS = (
-    *("tank", "init", "prepare", "fit", "calibrate", "forecast", "compare", "datasets", "info"),
+    *(
+        "tank",
+        "init",
+        "prepare",
+        "fit",
+        "calibrate",
+        "forecast",
+        "compare",
+        "export",
+        "datasets",
+        "info",
+    ),
 )
 
 

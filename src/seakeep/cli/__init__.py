@@ -10,7 +10,16 @@ from typing import Annotated
 
 import typer
 
-from seakeep.cli import calibrating, campaigns, information, modelling, tank, tracking, tuning
+from seakeep.cli import (
+    calibrating,
+    campaigns,
+    exporting,
+    information,
+    modelling,
+    tank,
+    tracking,
+    tuning,
+)
 from seakeep.cli import study as studying
 from seakeep.cli.console import messages, tell_warnings
 from seakeep.errors import SeakeepError
@@ -58,6 +67,7 @@ app.command("fit")(modelling.fit)
 app.command("calibrate")(calibrating.calibrate)
 app.command("forecast")(modelling.forecast)
 app.command("compare")(modelling.compare)
+app.command("export")(exporting.export)
 app.command("study")(studying.study)
 app.command("report")(studying.report)
 app.command("reproduce")(studying.reproduce)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from itertools import combinations
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 import xarray as xr
@@ -29,11 +29,15 @@ __all__ = [
     "OBSERVABLES",
     "Bound",
     "Expression",
+    "Formula",
     "Observable",
     "Observed",
     "Observing",
     "Powers",
+    "Product",
+    "SlowSquare",
     "SlowSquares",
+    "Term",
 ]
 
 HALF_WIDTH = 0.5
@@ -41,6 +45,35 @@ HALF_WIDTH = 0.5
 
 With a cutoff of 1/3 per encounter period that is 1.5 encounter periods: a wave of half the
 encounter period's frequency is damped to a fifth, one at the encounter frequency to a hundredth."""
+
+
+class Product(NamedTuple):
+    """A column as the product of inputs; a power names one more than once."""
+
+    places: tuple[int, ...]
+
+
+class SlowSquare(NamedTuple):
+    """A column as the low-pass filtered square of a derivative of an input.
+
+    The middle of the filter lies `shift` samples after the instant of the row.
+    """
+
+    place: int
+    order: int
+    kernel: FloatArray
+    shift: int
+
+
+class Formula(NamedTuple):
+    """A column as an expression of inputs."""
+
+    expression: expressions.Expression
+    places: Mapping[str, int]
+
+
+Term = Product | SlowSquare | Formula
+"""A column as hosts other than Python compute it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +91,8 @@ class Bound:
     columns : callable
         From the inputs, shape (time, Q), to the columns, shape (time, len(labels)); rows are NaN
         where they need samples that are not there.
+    terms : tuple of Product, SlowSquare or Formula, optional
+        The columns for hosts other than Python; without them the model cannot be exported.
     """
 
     labels: tuple[ChannelLabel, ...]
@@ -65,6 +100,7 @@ class Bound:
     before: int
     ahead: int
     columns: Callable[[FloatArray], FloatArray]
+    terms: tuple[Term, ...] = ()
 
 
 class Observable(Protocol):
@@ -204,7 +240,14 @@ class SlowSquares:
             ]
             return np.concatenate(parts, axis=1)
 
-        return Bound(tuple(labels), False, max(0, reach + max(lags) - middle), ahead, columns)
+        terms = tuple(
+            SlowSquare(place, order, kernel, middle - lag)
+            for place in places
+            for order in self.orders
+            for lag in lags
+        )
+        before = max(0, reach + max(lags) - middle)
+        return Bound(tuple(labels), False, before, ahead, columns, terms)
 
     def reach(self, dt: float) -> tuple[int, int]:
         """Samples around an instant; see :class:`Observable`."""
@@ -288,7 +331,8 @@ class Powers:
             parts += [values[:, [a]] * values[:, [b]] for a, b in pairs]
             return np.concatenate(parts, axis=1)
 
-        return Bound(tuple(labels), True, 0, 0, columns)
+        factors = [(place,) * power for power in self.powers for place in places] + pairs
+        return Bound(tuple(labels), True, 0, 0, columns, tuple(map(Product, factors)))
 
     def reach(self, dt: float) -> tuple[int, int]:
         """0, 0: the instant itself."""
@@ -341,7 +385,7 @@ class Expression:
             return out
 
         label = ChannelLabel(self.name, self.units, self.expression)
-        return Bound((label,), True, 0, 0, columns)
+        return Bound((label,), True, 0, 0, columns, (Formula(parsed, places),))
 
     def reach(self, dt: float) -> tuple[int, int]:
         """0, 0: the instant itself."""

@@ -12,6 +12,7 @@ import ast
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,7 @@ from seakeep.errors import DataError, RequestError, did_you_mean
 
 __all__ = ["Expression", "parse"]
 
+Value = TypeVar("Value")
 
 LONGEST = 1000
 """Characters an expression may have: more is a program, and Python's parser recurses."""
@@ -35,20 +37,14 @@ GREATEST_EXPONENT = 16.0
 LONGEST_NAME = 200
 """Characters a channel's name may have."""
 
-_OPERATORS: dict[type[ast.operator], Callable[[FloatArray, FloatArray], FloatArray]] = {
-    ast.Add: np.add,
-    ast.Sub: np.subtract,
-    ast.Mult: np.multiply,
-    ast.Div: np.divide,
-    ast.Pow: np.power,
+_OPERATORS: dict[type[ast.operator], str] = {
+    ast.Add: "add",
+    ast.Sub: "subtract",
+    ast.Mult: "multiply",
+    ast.Div: "divide",
+    ast.Pow: "power",
 }
-_FUNCTIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
-    "square": np.square,
-    "abs": np.abs,
-    "sqrt": np.sqrt,
-    "sin": np.sin,
-    "cos": np.cos,
-}
+_FUNCTIONS = ("square", "abs", "sqrt", "sin", "cos")
 _ALLOWED = (
     "numbers, channel names, + - * / **, parentheses, and the functions "
     "square, abs, sqrt, sin, cos, mean, average"
@@ -112,7 +108,7 @@ class Expression:
                 f"{', '.join(f'{name}: {array.shape}' for name, array in arrays.items())}."
             )
         with np.errstate(all="ignore"):
-            out = self._value(self._tree, arrays)
+            out = self.fold(np.asarray, arrays.__getitem__, _apply)
         result: FloatArray = np.array(np.broadcast_to(out, shapes.pop()))
         if not np.all(np.isfinite(result)):
             bad = np.flatnonzero(~np.isfinite(result))
@@ -123,28 +119,56 @@ class Expression:
             )
         return result
 
-    def _value(self, node: ast.expr, values: Mapping[str, FloatArray]) -> FloatArray:
-        if isinstance(node, ast.Constant):
-            return np.asarray(node.value, dtype=float)
-        if isinstance(node, ast.Name):
-            return values[self._quoted.get(node.id, node.id)]
-        if isinstance(node, ast.BinOp):
-            operate = _OPERATORS[type(node.op)]
-            return operate(self._value(node.left, values), self._value(node.right, values))
-        if isinstance(node, ast.UnaryOp):
-            operand = self._value(node.operand, values)
-            return -operand if isinstance(node.op, ast.USub) else operand
-        assert isinstance(node, ast.Call)
-        assert isinstance(node.func, ast.Name)
-        arguments = [self._value(argument, values) for argument in node.args]
-        if node.func.id == "mean":
-            return np.asarray(np.mean(arguments[0]))
-        if node.func.id == "average":
-            total = arguments[0]
-            for argument in arguments[1:]:
-                total = total + argument
-            return total / len(arguments)
-        return _FUNCTIONS[node.func.id](arguments[0])
+    def fold(
+        self,
+        number: Callable[[float], Value],
+        channel: Callable[[str], Value],
+        apply: Callable[[str, list[Value]], Value],
+    ) -> Value:
+        """Build a value from the leaves up: numbers, text in another language, nodes of a graph.
+
+        Parameters
+        ----------
+        number, channel : callable
+            Value of a number, and of a channel by its name.
+        apply : callable
+            Value of an operation on values: ``add``, ``subtract``, ``multiply``, ``divide``,
+            ``power``, ``negative`` and the functions by their names.
+
+        Returns
+        -------
+        object
+            Value of the whole.
+        """
+
+        def value(node: ast.expr) -> Value:
+            if isinstance(node, ast.Constant):
+                return number(float(node.value))  # type: ignore[arg-type]
+            if isinstance(node, ast.Name):
+                return channel(self._quoted.get(node.id, node.id))
+            if isinstance(node, ast.BinOp):
+                return apply(_OPERATORS[type(node.op)], [value(node.left), value(node.right)])
+            if isinstance(node, ast.UnaryOp):
+                operand = value(node.operand)
+                return apply("negative", [operand]) if isinstance(node.op, ast.USub) else operand
+            assert isinstance(node, ast.Call)
+            assert isinstance(node.func, ast.Name)
+            return apply(node.func.id, [value(argument) for argument in node.args])
+
+        return value(self._tree)
+
+
+def _apply(name: str, values: list[FloatArray]) -> FloatArray:
+    """Value of an operation on arrays."""
+    if name == "mean":
+        return np.asarray(np.mean(values[0]))
+    if name == "average":
+        total = values[0]
+        for each in values[1:]:
+            total = total + each
+        return total / len(values)
+    result: FloatArray = getattr(np, name)(*values)
+    return result
 
 
 def parse(text: str) -> Expression:

@@ -1,0 +1,106 @@
+"""``seakeep export``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from seakeep.cli.console import messages
+from seakeep.cli.options import ModelFile
+from seakeep.errors import RequestError
+from seakeep.files import check_place
+
+if TYPE_CHECKING:
+    from seakeep.models import Model
+
+__all__ = ["export"]
+
+
+def export(
+    model: ModelFile,
+    c: Annotated[
+        Path | None,
+        typer.Option("--c", help="Folder for C99 sources: a library of two files.", metavar="DIR"),
+    ] = None,
+    fmu: Annotated[
+        Path | None,
+        typer.Option("--fmu", help="FMU 2.0 for co-simulation to write.", metavar="FILE.fmu"),
+    ] = None,
+    onnx: Annotated[
+        Path | None,
+        typer.Option("--onnx", help="ONNX graph to write.", metavar="FILE.onnx"),
+    ] = None,
+    mat: Annotated[
+        Path | None,
+        typer.Option("--mat", help="State-space system for MATLAB.", metavar="FILE.mat"),
+    ] = None,
+    steps: Annotated[
+        int | None,
+        typer.Option(
+            "--steps", help="Instants that the ONNX graph forecasts; by default 1.", min=1
+        ),
+    ] = None,
+    member: Annotated[
+        int | None,
+        typer.Option("--member", help="Of an ensemble: the member to export, from 0.", min=0),
+    ] = None,
+) -> None:
+    """Write a model for another host: C, FMU, ONNX, MATLAB.
+
+    All of them take waves that are aligned already, if the model aligns them, and compute what
+    forecast_arrays does. The FMU holds its C sources, and a binary for this platform where a C
+    compiler is found.
+
+    Example: seakeep export model.nc --c library --fmu model.fmu
+    """
+    if not any((c, fmu, onnx, mat)):
+        raise RequestError("nothing to write. Give --c DIR, --fmu, --onnx or --mat FILE.")
+    if steps is not None and onnx is None:
+        raise RequestError("--steps belongs to --onnx FILE. Leave it out, or write an ONNX graph.")
+    for path, suffix in ((fmu, ".fmu"), (onnx, ".onnx"), (mat, ".mat")):
+        if path is not None:
+            check_place(path, suffix)
+    from seakeep.hosts import write_c, write_fmu, write_onnx
+    from seakeep.hosts.program import program_of
+
+    program = program_of(_single(model, member))
+    written: list[Path] = []
+    if c is not None:
+        written += write_c(program.model, c, model.stem)
+    if fmu is not None:
+        written.append(write_fmu(program.model, fmu))
+    if onnx is not None:
+        written.append(write_onnx(program.model, onnx, steps or 1))
+    if mat is not None:
+        written.append(program.model.to_mat(mat))
+    messages().print(f"Wrote {', '.join(map(str, written))}.", soft_wrap=True)
+    if fmu is not None:
+        messages().print(_binary(fmu), soft_wrap=True)
+    messages().print(program.timing, soft_wrap=True)
+
+
+def _single(file: Path, member: int | None) -> Model:
+    """The model of a file, or a member of the ensemble that it holds."""
+    from seakeep.models import HankelEnsemble, load_model
+
+    loaded = load_model(file)
+    if member is None:
+        return loaded
+    if not isinstance(loaded, HankelEnsemble):
+        raise RequestError(
+            f"--member is for ensembles, and {file} holds a single model. Leave it out."
+        )
+    return loaded.member(member)
+
+
+def _binary(fmu: Path) -> str:
+    from seakeep.hosts.fmu import compiler
+
+    if compiler() is None:
+        return (
+            f"{fmu} holds sources alone: no C compiler was found (cc, gcc, clang, or CC). Export "
+            "it where there is one, or with a host that compiles the sources."
+        )
+    return f"{fmu} holds a binary for this platform, and the sources for others."

@@ -1,0 +1,7 @@
+"""Models for hosts other than Python: C99 sources, FMI 2.0 co-simulation, and ONNX graphs."""
+
+from seakeep.hosts.c import write_c
+from seakeep.hosts.fmu import write_fmu
+from seakeep.hosts.graph import write_onnx
+
+__all__ = ["write_c", "write_fmu", "write_onnx"]

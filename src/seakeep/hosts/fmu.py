@@ -1,0 +1,173 @@
+"""Functional mock-up units: the C sources of a model behind FMI 2.0 for co-simulation."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import tempfile
+import uuid
+import zipfile
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from seakeep.errors import RequestError
+from seakeep.files import MARK, check_output, replacing
+from seakeep.hosts.c import identifier, rendered, sources
+from seakeep.hosts.program import Program, program_of
+from seakeep.models import Model
+
+__all__ = ["compiler", "write_fmu"]
+
+KIND = "functional mock-up unit"
+PLATFORMS = {
+    ("Linux", "x86_64"): ("linux64", ".so"),
+    ("Darwin", "x86_64"): ("darwin64", ".dylib"),
+    ("Darwin", "arm64"): ("darwin64", ".dylib"),
+    ("Windows", "AMD64"): ("win64", ".dll"),
+}
+"""Folder of a binary in an FMU and its suffix, by system and processor."""
+
+
+def write_fmu(model: Model, path: str | Path) -> Path:
+    """Write a model as an FMU 2.0 for co-simulation.
+
+    It holds the sources of :func:`seakeep.hosts.write_c` and, where a C compiler is found, a binary
+    for this platform. Parameters ``history.NAME[1]`` … are the measured samples from which it
+    starts, oldest first.
+
+    Parameters
+    ----------
+    model : Model
+        As for :func:`seakeep.hosts.write_c`.
+    path : str or Path
+        File to write; its suffix should be ``.fmu``.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    RequestError
+        If the model cannot be exported, a file is there that seakeep did not write, or the
+        compiler fails.
+    """
+    target = Path(path)
+    check_output(target, KIND)
+    program, name = program_of(model), identifier(target.stem)
+    files = sources(program, name)
+    digest = hashlib.sha256("".join(files.values()).encode()).digest()
+    content: dict[str, Any] = {
+        "name": name,
+        "upper": name.upper(),
+        "mark": f"{MARK}: {KIND},",
+        "guid": f"{{{uuid.UUID(bytes=digest[:16])}}}",
+        "dt": model.dt,
+        "start": _start(program),
+    }
+    files["fmi2.c"] = rendered("fmi2.c", **content)
+    description = rendered("modelDescription.xml", **content, **_description(program))
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        replacing(target) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
+    ):
+        archive.writestr("modelDescription.xml", description, zipfile.ZIP_STORED)
+        for file, text in files.items():
+            (Path(folder) / file).write_text(text, encoding="utf-8")
+            archive.writestr(f"sources/{file}", text)
+        if (found := compiler()) is not None:
+            place, suffix = PLATFORMS[platform.system(), platform.machine()]
+            made = _compiled(found, Path(folder), name, suffix)
+            archive.write(made, f"binaries/{place}/{made.name}")
+    return target
+
+
+def compiler() -> list[str] | None:
+    """Command of a C compiler that makes a binary for this platform, or None.
+
+    The environment variable ``CC`` names another one than cc, gcc or clang.
+    """
+    if (platform.system(), platform.machine()) not in PLATFORMS:
+        return None
+    if named := shlex.split(os.environ.get("CC", "")):
+        return named
+    found = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    return None if found is None else [found]
+
+
+def _compiled(compiler: list[str], folder: Path, name: str, suffix: str) -> Path:
+    made = folder / f"{name}{suffix}"
+    flags = ["-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden"]
+    command = [*compiler, *flags, "-o", made.name, f"{name}.c", "fmi2.c", "-lm"]
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        said, failed = done.stderr, done.returncode
+    except OSError as error:
+        said, failed = str(error), 1
+    if failed:
+        raise RequestError(
+            f"the C compiler failed: {shlex.join(command)}\n{said.strip()[:500]}\nMend it, name "
+            "another one in the environment variable CC, or write the sources alone (--c)."
+        )
+    return made
+
+
+class _Channel(NamedTuple):
+    """An input or an output, as the model description has it."""
+
+    name: str
+    unit: str
+    description: str
+    start: float
+    rows: int
+    is_output: bool
+
+
+def _start(program: Program) -> list[float]:
+    """Values of inputs and outputs before any are known: their means in training."""
+    signature = program.model.signature
+    inputs = signature.input_scale.centre[: len(signature.inputs)]
+    return [*inputs.tolist(), *signature.state_scale.centre.tolist()]
+
+
+def _description(program: Program) -> dict[str, Any]:
+    """What the model description says beside names and numbers."""
+    signature = program.model.signature
+    inputs, states = signature.input_labels, signature.state_labels
+    start = _start(program)
+    lengths = [program.history + signature.lead_samples] * len(inputs)
+    lengths += [signature.state_delays + 1] * len(states)
+    channels = [
+        _Channel(_part(label.name), label.units, label.long_name, value, rows, place >= len(inputs))
+        for place, (label, value, rows) in enumerate(
+            zip(inputs + states, start, lengths, strict=True)
+        )
+    ]
+    return {
+        "version": metadata.version("seakeep"),
+        "timing": program.timing,
+        "channels": channels,
+        # Histories stand in the order of C: those of the states, row by row, then the inputs'.
+        "histories": [
+            (channel, row + 1)
+            for group in (channels[len(inputs) :], channels[: len(inputs)])
+            for row in range(group[0].rows if group else 0)
+            for channel in group
+        ],
+        "units": sorted({label.units for label in inputs + states if label.units}),
+    }
+
+
+def _part(name: str) -> str:
+    """Part of a structured name of FMI; what is no identifier stands between quotes."""
+    if name.isascii() and name.isidentifier():
+        return name
+    escaped = name.replace("\\", "\\\\").replace("'", "\\'")
+    return f"'{escaped}'"

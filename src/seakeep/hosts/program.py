@@ -1,0 +1,140 @@
+"""What a model computes in one step, for any host: sizes, coefficients, and observables.
+
+A step from instant k takes the inputs of instant k + ``lead_samples``, so that every model whose
+observables have a finite reach is causal in its newest input. Inputs are aligned already, as
+``forecast_arrays`` takes them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from seakeep.errors import RequestError
+from seakeep.models import FittedAlignment, HankelDMDcModel, HankelEnsemble, Model
+from seakeep.models.inputs import Chain, Lead
+from seakeep.models.interface import Scale
+from seakeep.models.observables import Bound, Observed, Term
+
+__all__ = ["Program", "program_of"]
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A model as its hosts see it.
+
+    Parameters
+    ----------
+    model : HankelDMDcModel
+        The model.
+    lead : int
+        Samples by which delayed regressors look ahead.
+    observed : Observed or None
+        Observables beside the inputs.
+    """
+
+    model: HankelDMDcModel
+    lead: int
+    observed: Observed | None = field(repr=False)
+
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """Numbers of delayed and of direct regressors."""
+        signature = self.model.signature
+        return signature.input_scale.mean.size, signature.direct_scale.mean.size
+
+    @property
+    def scales(self) -> dict[str, Scale]:
+        """Moments by what they belong to."""
+        signature = self.model.signature
+        scales = (signature.state_scale, signature.input_scale, signature.direct_scale)
+        return dict(zip(("state", "delayed", "direct"), scales, strict=True))
+
+    @property
+    def bound(self) -> tuple[Bound, ...]:
+        """Observables of the inputs."""
+        return () if self.observed is None else self.observed.bound
+
+    def terms(self, delayed: bool) -> list[Term]:
+        """Columns of the observables that take the input delays, or of those that do not."""
+        return [term for each in self.bound if each.delayed == delayed for term in each.terms]
+
+    @property
+    def history(self) -> int:
+        """Samples of input before the instant of a step that a start needs."""
+        signature = self.model.signature
+        return signature.input_map.history(signature.input_delays)
+
+    @property
+    def back(self) -> int:
+        """Samples of input before the instant of a step that its newest regressors read."""
+        return max([0, *(each.before - self.lead * each.delayed for each in self.bound)])
+
+    @property
+    def is_aligned(self) -> bool:
+        """Whether the model was trained on inputs carried to the vessel."""
+        return self.model.alignment is not None
+
+    @property
+    def timing(self) -> str:
+        """Which inputs a step takes, as a sentence."""
+        model = self.model
+        said = f"A step of {model.dt:g} s takes the inputs of the instant that it starts from."
+        if ahead := model.lead_samples:
+            said = (
+                f"A step of {model.dt:g} s takes the inputs {ahead} samples ({ahead * model.dt:g} "
+                "s) after the instant that it starts from."
+            )
+        if self.is_aligned:
+            said += " They are waves carried to the vessel, as in its training."
+        return said
+
+
+def program_of(model: Model) -> Program:
+    """What a model computes in one step.
+
+    Parameters
+    ----------
+    model : Model
+        A single linear model.
+
+    Returns
+    -------
+    Program
+
+    Raises
+    ------
+    RequestError
+        If the model is an ensemble or another kind, or has an observable or an input map that was
+        added from outside.
+    """
+    if isinstance(model, HankelEnsemble):
+        raise RequestError(
+            f"an ensemble of {model.n_members} members cannot be exported as one model. Export one "
+            "of them: --member 0, or ensemble.member(0)."
+        )
+    if not isinstance(model, HankelDMDcModel):
+        raise RequestError(
+            f"a model of kind '{model.kind}' cannot be exported; those of delayed states and "
+            "inputs can: hankel_dmdc, arx, fir."
+        )
+    chain = model.signature.input_map
+    lead, observed = 0, None
+    for each in chain.maps if isinstance(chain, Chain) else (chain,):
+        if isinstance(each, Lead):
+            lead = each.samples
+        elif isinstance(each, Observed):
+            observed = each
+        elif not isinstance(each, FittedAlignment):
+            raise RequestError(_strange("input map", each.kind))
+    program = Program(model, lead, observed)
+    for bound in program.bound:
+        if not bound.terms:
+            raise RequestError(_strange("observable", bound.labels[0].name))
+    return program
+
+
+def _strange(what: str, kind: str) -> str:
+    return (
+        f"the {what} '{kind}' is Python code from outside seakeep, which cannot be exported. Fit "
+        "the model without it, or run it in Python."
+    )

@@ -1,0 +1,161 @@
+/* {{ mark }} C source; see {{ name }}.h */
+#include "{{ name }}.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+enum {
+    N = {{ N }},               /* states */
+    EXTENDED = {{ N * (s + 1) }},        /* states and their delays */
+    Q = {{ Q }},               /* measured inputs */
+    DELAYED = {{ n }},         /* regressors with input delays, each newest first */
+    DELAYS = {{ z }},
+    DIRECT = {{ m }},          /* regressors without */
+    ROWS = {{ rows }},            /* rows of the coefficients: all, or those of the newest states */
+    COLUMNS = EXTENDED + DELAYED * (DELAYS + 1) + DIRECT,
+    WINDOW = {{ window }},          /* rows of inputs that are remembered */
+    NOW = {{ now }}               /* that of the instant which a step starts from */
+};
+
+const char *const {{ name }}_state_names[] = { {{ state_labels | map(attribute="name") | map("text") | join(", ") }} };
+const char *const {{ name }}_state_units[] = { {{ state_labels | map(attribute="units") | map("text") | join(", ") }} };
+const char *const {{ name }}_input_names[] = { {{ (input_labels | map(attribute="name") | map("text") | list or ["0"]) | join(", ") }} };
+const char *const {{ name }}_input_units[] = { {{ (input_labels | map(attribute="units") | map("text") | list or ["0"]) | join(", ") }} };
+
+{% macro array(name, values, size="") %}
+static const double {{ name }}[{{ size }}] = {
+{{ values | numbers }}
+};
+{% endmacro %}
+/* Rows of [A B] on standardised deviations. */
+{{ array("coefficients", coefficients) }}
+{% for kind, scale in scales.items() %}
+{{ array(kind ~ "_mean", scale.mean) -}}
+{{ array(kind ~ "_std", scale.std) -}}
+{{ array(kind ~ "_centre", scale.centre) -}}
+{{ array(kind ~ "_reach", scale.reach) }}
+{% endfor %}
+{% for each in kernels %}
+{{ array("kernel_%d" % loop.index0, each) }}
+{% endfor %}
+{% if kernels %}
+/* Weighted sum of squares of a derivative of one input; u is its sample at the filter's middle. */
+static double slow_square(const double *u, int order, const double *kernel, int half)
+{
+    double sum = 0.0;
+    for (int k = -half; k <= half; k++) {
+        const double *at = u + k * Q;
+        double value = *at;
+        if (order == 1)
+            value = (at[Q] - at[-Q]) / (2.0 * {{ upper }}_STEP);
+        else if (order == 2)
+            value = (at[Q] - 2.0 * at[0] + at[-Q]) / ({{ upper }}_STEP * {{ upper }}_STEP);
+        sum += kernel[half - k] * value * value;
+    }
+    return sum;
+}
+
+{% endif %}
+/* Take one more row of inputs, and make the regressors of the next step. */
+static void push({{ name }}_model *m, const double *u)
+{
+    double *v = m->regressors + EXTENDED, *direct = v + DELAYED * (DELAYS + 1);
+    double *newest = m->inputs + (WINDOW - 1) * Q;
+    memmove(m->inputs, m->inputs + Q, (WINDOW - 1) * Q * sizeof(double));
+    memmove(v + DELAYED, v, DELAYS * DELAYED * sizeof(double));
+    for (int i = 0; i < Q; i++)
+        newest[i] = u[i];
+{% if n %}
+    u = m->inputs + (NOW + {{ lead }}) * Q;
+{% endif %}
+{% for each in delayed %}
+    v[{{ loop.index0 }}] = {{ each }};
+{% endfor %}
+{% if m %}
+    u = m->inputs + NOW * Q;
+{% endif %}
+{% for each in direct %}
+    direct[{{ loop.index0 }}] = {{ each }};
+{% endfor %}
+    for (int i = 0; i < DELAYED; i++)
+        v[i] = (v[i] - delayed_mean[i]) / delayed_std[i];
+    for (int i = 0; i < DIRECT; i++)
+        direct[i] = (direct[i] - direct_mean[i]) / direct_std[i];
+}
+
+/* Remember how far inputs go beyond those of training. */
+static void widen({{ name }}_model *m, int delays)
+{
+    const double *v = m->regressors + EXTENDED, *direct = v + DELAYED * (DELAYS + 1);
+    for (int i = 0; i < DELAYED * (delays + 1); i++) {
+        int c = i % (DELAYED > 0 ? DELAYED : 1);
+        double value = delayed_mean[c] + delayed_std[c] * v[i];
+        m->excess = fmax(m->excess, fabs(value - delayed_centre[c]) / delayed_reach[c]);
+    }
+    for (int i = 0; i < DIRECT; i++) {
+        double value = direct_mean[i] + direct_std[i] * direct[i];
+        m->excess = fmax(m->excess, fabs(value - direct_centre[i]) / direct_reach[i]);
+    }
+}
+
+static int all_finite(const double *values, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (!(fabs(values[i]) <= DBL_MAX))
+            return 0;
+    return 1;
+}
+
+int {{ name }}_start({{ name }}_model *m, const double *x_history, const double *u_history)
+{
+    if (!all_finite(x_history, EXTENDED) || !all_finite(u_history, {{ upper }}_U_ROWS * Q))
+        return 1;
+    memset(m, 0, sizeof *m);
+    m->excess = 1.0;
+    for (int i = 0; i < N; i++) {
+        m->x[i] = x_history[EXTENDED - N + i];
+        m->limit[i] = state_reach[i];
+        for (int row = 0; row < EXTENDED / N; row++) {
+            double value = x_history[EXTENDED - (row + 1) * N + i];
+            m->regressors[row * N + i] = (value - state_mean[i]) / state_std[i];
+            m->limit[i] = fmax(m->limit[i], fabs(value - state_centre[i]));
+        }
+    }
+    for (int row = 0; row < {{ upper }}_U_ROWS; row++)
+        push(m, u_history + row * Q);
+    if (DELAYS > 0)
+        widen(m, DELAYS - 1);
+    return 0;
+}
+
+int {{ name }}_step({{ name }}_model *m, const double *u)
+{
+    double next[ROWS], x[N];
+    int lost = 0;
+    if (!all_finite(u, Q))
+        return 1;
+    push(m, u);
+    widen(m, 0);
+    for (int row = 0; row < ROWS; row++) {
+        const double *weights = coefficients + row * COLUMNS;
+        next[row] = 0.0;
+        for (int i = 0; i < COLUMNS; i++)
+            next[row] += weights[i] * m->regressors[i];
+    }
+    memmove(m->regressors + ROWS, m->regressors, (EXTENDED - ROWS) * sizeof(double));
+    memcpy(m->regressors, next, sizeof next);
+    for (int i = 0; i < N; i++) {
+        x[i] = state_mean[i] + state_std[i] * next[i];
+        if (!(fabs(x[i] - state_centre[i]) <= {{ growth }} * m->limit[i] * m->excess))
+            lost = 1;
+    }
+    for (int i = 0; lost && i < N; i++)
+        x[i] = m->regressors[i] = NAN;
+    memcpy(m->x, x, sizeof x);
+{% for each in readouts %}
+    if (!lost)
+        m->x[{{ each.column }}] = {{ each.code }};
+{% endfor %}
+    return lost ? 2 : 0;
+}

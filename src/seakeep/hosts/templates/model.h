@@ -1,0 +1,55 @@
+/* {{ mark }} C header
+ *
+ * A seakeep model that runs one step at a time: plain C99, no memory but the struct below, no
+ * dependency but the C library. Values are in the units of {{ name }}_state_units and
+ * {{ name }}_input_units.
+ *
+ *     {{ name }}_model m;
+ *     {{ name }}_start(&m, x_history, u_history);
+ *     for (;;) { ... status = {{ name }}_step(&m, u); ... m.x[0] ... }
+ *
+ * Instant k is that of the last row of x_history. The step from k to k + 1 takes the inputs of
+ * instant k + {{ upper }}_LEAD: where the model looks ahead, its time is that much behind its input.
+{% if aligned %}
+ * This model was trained on waves carried to the vessel. Give it inputs carried likewise.
+{% endif %}
+ */
+#ifndef {{ upper }}_H
+#define {{ upper }}_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define {{ upper }}_STATES {{ N }}
+#define {{ upper }}_INPUTS {{ Q }}
+#define {{ upper }}_LEAD {{ lead_samples }}
+#define {{ upper }}_X_ROWS {{ s + 1 }} /* of x_history: instants k - {{ s }} to k */
+#define {{ upper }}_U_ROWS {{ history + lead_samples }} /* of u_history: instants k - {{ history }} to k - 1 + {{ upper }}_LEAD */
+#define {{ upper }}_STEP {{ dt | hex }} /* s */
+
+extern const char *const {{ name }}_state_names[], *const {{ name }}_state_units[];
+extern const char *const {{ name }}_input_names[], *const {{ name }}_input_units[];
+
+/* All that a model remembers. To save and restore it, copy it as it is. */
+typedef struct {
+    double x[{{ N }}]; /* states at this instant */
+    double regressors[{{ N * (s + 1) + n * (z + 1) + m }}];
+    double inputs[{{ [1, window * Q] | max }}];
+    double limit[{{ N }}];
+    double excess;
+} {{ name }}_model;
+
+/* Start from measured states and inputs, oldest row first, one row after the other.
+ * Returns 0, or 1 if a value is not finite; the model is not started then. */
+int {{ name }}_start({{ name }}_model *m, const double *x_history, const double *u_history);
+
+/* Make one step with one row of inputs. Returns 0; 1 if an input is not finite, and the model is
+ * as it was; 2 if the run is lost: a state is ten times as far from its mean as it ever was in
+ * training, in proportion to the waves. All states are NaN from then on. */
+int {{ name }}_step({{ name }}_model *m, const double *u);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,79 @@
+"""Models with all that hosts must compute, small enough to compile in a blink."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import Expression, HankelDMDc, HankelDMDcModel, Powers, ReadOut, SlowSquares
+from seakeep.baselines import ARX
+from seakeep.hosts.program import program_of
+
+DT, PERIOD = 0.1, 8  # s, samples
+STATES, INPUTS = ["surge", "load"], ["eta", "wave probe"]
+OBSERVABLES = (
+    SlowSquares(("eta", "wave probe"), orders=(0, 1, 2), lags=(0, 1), period=PERIOD * DT),
+    Powers("eta", (2, 3), products=False),
+    Powers(("eta", "wave probe"), (4,), products=True),
+    Expression("mixed", "cos(9*eta)*abs(`wave probe`)/(1 + square(eta)) - average(-eta, eta**2)"),
+    Expression("root", "sqrt(2 + sin(`wave probe`) - 0.1)"),
+)
+
+
+def sea_run(seed, samples=400):
+    """Two probes, a surge that follows them, and the load of a line that falls slack."""
+    rng = np.random.default_rng(seed)
+    eta, probe = rng.standard_normal((2, samples + 2)) * 0.3
+    surge = np.zeros(samples + 2)
+    for k in range(1, samples + 1):
+        surge[k + 1] = 1.6 * surge[k] - 0.7 * surge[k - 1] + 0.3 * eta[k] + probe[k] * eta[k]
+    load = np.maximum(2.0, 5.0 + 8.0 * surge) + 0.1 * rng.standard_normal(samples + 2)
+    channels = {"eta": (eta, "m"), "wave probe": (probe, "m"), "surge": (surge, "m")}
+    channels["load"] = (load, "N")
+    return xr.Dataset(
+        {name: ("time", values[2:], {"units": unit}) for name, (values, unit) in channels.items()},
+        coords={"time": DT * np.arange(samples)},
+    )
+
+
+@dataclass(frozen=True)
+class Case:
+    """A model, arrays that it starts from, and what it forecasts."""
+
+    model: HankelDMDcModel
+    x_history: np.ndarray
+    u: np.ndarray  # rows of the history of a host, then those of the steps
+    expected: np.ndarray
+
+    @property
+    def rows(self):
+        """Rows of input before the first step."""
+        return len(self.u) - len(self.expected)
+
+
+def case_of(model, steps=60, start=200):
+    run = sea_run(9)
+    x = run[STATES].to_array().values.T[: start + 1]
+    u = run[INPUTS].to_array().values.T if model.inputs else np.zeros((len(run.time), 0))
+    end = start + steps + model.lead_samples
+    expected = model.forecast_arrays(x, u[: start + 1], u[start + 1 : end], steps)
+    s, history = model.signature.state_delays, program_of(model).history
+    return Case(model, x[-s - 1 :], u[start - history : end], expected)
+
+
+@pytest.fixture(scope="session")
+def cases():
+    runs = {f"run{seed}": sea_run(seed) for seed in range(3)}
+    hinge = [ReadOut("load", of=("surge",), kind="hinge")]
+    kept = {"delay_rows": "exact", "readouts": hinge}
+    full = HankelDMDc(3, 6, 1.0, lead=5, observables=OBSERVABLES).fit(runs, STATES, INPUTS)
+    short = HankelDMDc(2, 4, 1e-3, **kept).fit(runs, STATES, INPUTS)
+    models = {
+        "full": full,
+        "short": short,
+        "arx": ARX(0, 0).fit(runs, STATES, INPUTS),
+        "autonomous": HankelDMDc(4, 0, 1.0, delay_rows="exact").fit(runs, STATES, []),
+        "unstable": replace(short, coefficients=1.3 * short.coefficients),
+    }
+    return {name: case_of(model) for name, model in models.items()}

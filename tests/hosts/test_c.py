@@ -1,0 +1,172 @@
+"""The C of a model computes what Python does, in one program with the C of other models."""
+
+import ctypes
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from seakeep import BayesianHankelDMDc, Fixed, ProbeAlignment, RequestError
+from seakeep.baselines import Subspace
+from seakeep.hosts import write_c
+from seakeep.hosts.c import identifier
+from seakeep.models import OBSERVABLES, Bound, ChannelLabel, HankelDMDc
+
+NAMES = ["full", "short", "arx", "autonomous", "unstable"]
+FINITE, REFUSED, LOST = 0, 1, 2
+
+
+class Host:
+    """A program that runs a model; its struct begins with the states."""
+
+    def __init__(self, library, name, states):
+        self.start, self.step = (getattr(library, f"{name}_{verb}") for verb in ("start", "step"))
+        self.memory = (ctypes.c_double * 2000)()  # more than any struct of these tests
+        self.states = states
+
+    @property
+    def x(self):
+        return np.array(self.memory[: self.states])
+
+
+def pointer(values):
+    return np.ascontiguousarray(values).ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+
+
+@pytest.fixture(scope="module")
+def library(cases, tmp_path_factory):
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("there is no C compiler")
+    folder = tmp_path_factory.mktemp("library")
+    files = [path for name in NAMES for path in write_c(cases[name].model, folder, name)]
+    sources = [path.name for path in files if path.suffix == ".c"]
+    flags = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
+    command = [compiler, *flags, "-o", "models.so", *sources, "-lm"]
+    subprocess.run(command, cwd=folder, check=True)
+    return ctypes.CDLL(str(folder / "models.so"))
+
+
+@pytest.fixture
+def host(library, cases):
+    def started(name):
+        case = cases[name]
+        made = Host(library, name, len(case.model.states))
+        history = pointer(case.x_history), pointer(case.u[: case.rows])
+        assert made.start(made.memory, *history) == FINITE
+        return made
+
+    return started
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_step_is_that_of_forecast_arrays(name, host, cases):
+    case, run = cases[name], host(name)
+    np.testing.assert_array_equal(run.x, case.x_history[-1])
+    for row, expected in zip(case.u[case.rows :], case.expected, strict=True):
+        status = run.step(run.memory, pointer(row))
+        assert status == (LOST if np.isnan(expected).any() else FINITE)
+        # The same sums in another order, of numbers of the order of ten.
+        np.testing.assert_allclose(run.x, expected, rtol=1e-12, atol=1e-12)
+
+
+def test_one_of_these_models_diverges(cases):
+    lost = {name: bool(np.isnan(case.expected).any()) for name, case in cases.items()}
+    assert [name for name in NAMES if lost[name]] == ["unstable"]
+
+
+def test_what_is_copied_goes_on_as_the_original_to_the_last_bit(host, cases):
+    case, run = cases["full"], host("full")
+    for row in case.u[case.rows :][:20]:
+        run.step(run.memory, pointer(row))
+    kept = bytes(run.memory)
+    once = []
+    for row in case.u[case.rows :][20:]:
+        run.step(run.memory, pointer(row))
+        once.append(run.x)
+    run.memory[:] = [0.0] * len(run.memory)
+    ctypes.memmove(run.memory, kept, len(kept))
+    for row, expected in zip(case.u[case.rows :][20:], once, strict=True):
+        run.step(run.memory, pointer(row))
+        np.testing.assert_array_equal(run.x, expected)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_an_input_that_is_not_finite_leaves_the_model_as_it_was(bad, host):
+    run = host("full")
+    before = bytes(run.memory)
+    assert run.step(run.memory, pointer([0.1, bad])) == REFUSED
+    assert bytes(run.memory) == before
+
+
+def test_a_start_from_what_is_not_finite_is_refused(library, cases):
+    case = cases["short"]
+    run = Host(library, "short", 2)
+    gap = case.x_history.copy()
+    gap[0, 1] = np.nan
+    history = pointer(case.u[: case.rows])
+    assert run.start(run.memory, pointer(gap), history) == REFUSED
+    assert not any(run.memory)
+
+
+def test_names_and_units_are_text_of_c(library, cases):
+    texts = ctypes.c_char_p * 2
+    assert list(texts.in_dll(library, "full_input_names")) == [b"eta", b"wave probe"]
+    assert list(texts.in_dll(library, "full_state_units")) == [b"m", b"N"]
+
+
+@pytest.mark.parametrize(
+    ("file", "name"), [("rom", "rom"), ("my model-2", "my_model_2"), ("3d", "m_3d"), ("η", "m__")]
+)
+def test_a_file_name_becomes_an_identifier(file, name):
+    assert identifier(file) == name
+
+
+def test_a_file_that_seakeep_did_not_write_stays(tmp_path, cases):
+    (tmp_path / "rom.c").write_text("int main(void) { return 0; }")
+    with pytest.raises(RequestError, match="exists and is no C source that seakeep wrote"):
+        write_c(cases["arx"].model, tmp_path)
+    assert not (tmp_path / "rom.h").exists()
+    (tmp_path / "rom.c").unlink()
+    write_c(cases["arx"].model, tmp_path)
+    write_c(cases["arx"].model, tmp_path)
+
+
+def test_a_model_on_aligned_waves_says_so(tmp_path, make_run, channels):
+    spec = HankelDMDc(2, 2, 1.0, alignment=ProbeAlignment(surge="none", celerity=2.0))
+    header = write_c(spec.fit(make_run(), **channels), tmp_path)[0].read_text()
+    assert "Give it inputs carried likewise" in header
+
+
+class TestWhatCannotBeExported:
+    def test_an_ensemble(self, tmp_path, make_run, channels):
+        lengths = dict.fromkeys(("state_delay", "input_delay"), Fixed(1.0))
+        spec = BayesianHankelDMDc(
+            encounter_period=0.2, train_length=None, ridge=Fixed(1.0), n_members=2, **lengths
+        )
+        ensemble = spec.fit(make_run(), **channels)
+        with pytest.raises(RequestError, match="Export one of them: --member 0"):
+            write_c(ensemble, tmp_path)
+        write_c(ensemble.member(0), tmp_path)
+
+    def test_a_subspace_model(self, tmp_path, make_run, channels):
+        model = Subspace(2, 2, order=2).fit(make_run(), **channels)
+        with pytest.raises(RequestError, match="kind 'subspace' cannot be exported"):
+            write_c(model, tmp_path)
+
+    def test_an_observable_in_python_alone(self, tmp_path, make_run, channels, monkeypatch):
+        class Rectified:
+            kind = "rectified"
+
+            def reach(self, dt):
+                return 0, 0
+
+            def bind(self, inputs, period, dt):
+                label = ChannelLabel("rectified", "m", "rectified")
+                return Bound((label,), True, 0, 0, lambda values: np.abs(values[:, :1]))
+
+        monkeypatch.setitem(OBSERVABLES, "rectified", Rectified)
+        model = HankelDMDc(2, 2, 1.0, observables=[Rectified()]).fit(make_run(), **channels)
+        with pytest.raises(RequestError, match="'rectified' is Python code from outside seakeep"):
+            write_c(model, tmp_path)

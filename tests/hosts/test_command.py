@@ -1,0 +1,50 @@
+"""``seakeep export``: what it writes, what it says, and what it refuses."""
+
+import pytest
+
+from seakeep import cli
+
+
+@pytest.fixture
+def run(cases, tmp_path, monkeypatch, capsys):
+    cases["full"].model.save(tmp_path / "my-model.nc")
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words):
+        status = cli.main(["export", "my-model.nc", *words])
+        return status, capsys.readouterr().err
+
+    return call
+
+
+def test_sources_take_the_name_of_the_model_and_the_instants_are_told(run, tmp_path):
+    status, said = run("--c", "library")
+    assert status == 0
+    assert {path.name for path in (tmp_path / "library").iterdir()} == {"my_model.c", "my_model.h"}
+    lead = "A step of 0.1 s takes the inputs 16 samples (1.6 s) after the instant that it starts"
+    assert lead in said
+
+
+def test_an_fmu_without_a_compiler_is_announced(run, monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    status, said = run("--fmu", "rom.fmu")
+    assert status == 0
+    assert "rom.fmu holds sources alone: no C compiler was found" in said
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((), "nothing to write. Give --c DIR"),
+        (("--c", "library", "--steps", "5"), "--steps belongs to --onnx"),
+        (("--fmu", "rom.zip"), "rom.zip ends in '.zip'"),
+        (("--c", "library", "--member", "0"), "--member is for ensembles"),
+        (("--mat", "rom.mat"), "the model is driven by observables too"),
+    ],
+)
+def test_wrong_requests_are_refused_and_write_nothing(words, message, run, tmp_path):
+    status, said = run(*words)
+    assert status == 2
+    assert message in " ".join(said.split())
+    assert [path.name for path in tmp_path.iterdir()] == ["my-model.nc"]

@@ -1,0 +1,191 @@
+"""An FMU validates, runs as Python does, and goes on from a state in another process."""
+
+import subprocess
+import sys
+import zipfile
+
+import numpy as np
+import pytest
+
+from seakeep import RequestError
+from seakeep.hosts import write_fmu
+from seakeep.hosts.fmu import compiler
+
+fmpy = pytest.importorskip("fmpy")
+if compiler() is None:
+    pytest.skip("there is no C compiler", allow_module_level=True)
+from fmpy.fmi2 import FMU2Slave  # noqa: E402
+from fmpy.validation import validate_fmu  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def fmu(cases, tmp_path_factory):
+    return write_fmu(cases["full"].model, tmp_path_factory.mktemp("fmu") / "rom.fmu")
+
+
+@pytest.fixture(scope="module")
+def unpacked(fmu, tmp_path_factory):
+    return fmpy.extract(fmu, tmp_path_factory.mktemp("unpacked"))
+
+
+def start_values(case):
+    """Histories as parameters, oldest sample first."""
+    names = {"eta": "eta", "wave probe": "'wave probe'"}
+    found = {}
+    for labels, values in (
+        (case.model.states, case.x_history),
+        (case.model.inputs, case.u[: case.rows]),
+    ):
+        for label, series in zip(labels, values.T, strict=True):
+            name = names.get(label, label)
+            found |= {f"history.{name}[{row}]": value for row, value in enumerate(series, 1)}
+    return found
+
+
+@pytest.fixture
+def slave(fmu, unpacked, cases):
+    """The FMU past its initialization."""
+    description = fmpy.read_model_description(fmu)
+    made = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=str(unpacked),
+        modelIdentifier="rom",
+        instanceName="vessel",
+    )
+    made.instantiate()
+    made.setupExperiment(startTime=0.0)
+    made.enterInitializationMode()
+    references = {each.name: each.valueReference for each in description.modelVariables}
+    values = start_values(cases["full"])
+    made.setReal([references[name] for name in values], list(values.values()))
+    made.exitInitializationMode()
+    yield made
+    made.freeInstance()
+
+
+def run(slave, case, first, stop):
+    """States after the steps from `first` to before `stop`."""
+    dt, found = case.model.dt, []
+    for step in range(first, stop):
+        slave.setReal([0, 1], list(case.u[case.rows + step]))
+        slave.doStep(step * dt, dt)
+        found.append(slave.getReal([2, 3]))
+    return np.array(found)
+
+
+def test_fmpy_finds_no_fault(fmu):
+    assert validate_fmu(str(fmu)) == []
+
+
+def test_fmpy_simulates_what_forecast_arrays_forecasts(fmu, cases):
+    case = cases["full"]
+    steps, dt = len(case.expected), case.model.dt
+    fields = [("time", float), *((name, float) for name in ("eta", "'wave probe'"))]
+    rows = [(step * dt, *u) for step, u in enumerate(case.u[case.rows :])]
+    result = fmpy.simulate_fmu(
+        str(fmu),
+        stop_time=steps * dt,
+        start_values=start_values(case),
+        input=np.array(rows, dtype=fields),
+    )
+    found = np.stack([result[name] for name in case.model.states], axis=1)
+    np.testing.assert_array_equal(found[0], case.x_history[-1])
+    np.testing.assert_allclose(found[1:], case.expected, rtol=1e-12, atol=1e-12)
+
+
+OTHER_PROCESS = """
+import sys
+import numpy as np
+from fmpy.fmi2 import FMU2Slave
+
+folder, guid, state, inputs, dt = sys.argv[1:]
+slave = FMU2Slave(guid=guid, unzipDirectory=folder, modelIdentifier="rom", instanceName="other")
+slave.instantiate()
+slave.setupExperiment(startTime=0.0)
+slave.enterInitializationMode()
+slave.exitInitializationMode()
+slave.setFMUstate(slave.deSerializeFMUstate(open(state, "rb").read()))
+for number, u in enumerate(np.load(inputs)):
+    slave.setReal([0, 1], list(u))
+    slave.doStep(number * float(dt), float(dt))
+    print(*(value.hex() for value in slave.getReal([2, 3])))
+"""
+
+
+def test_another_process_goes_on_from_a_state_to_the_last_bit(
+    slave, fmu, unpacked, cases, tmp_path
+):
+    case = cases["full"]
+    run(slave, case, 0, 20)
+    state = slave.getFMUstate()
+    (tmp_path / "state").write_bytes(slave.serializeFMUstate(state))
+    np.save(tmp_path / "inputs.npy", case.u[case.rows + 20 :])
+    expected = run(slave, case, 20, len(case.expected))
+    slave.setFMUstate(state)
+    np.testing.assert_array_equal(run(slave, case, 20, len(case.expected)), expected)
+    slave.freeFMUstate(state)
+    given = [unpacked, slave.guid, tmp_path / "state", tmp_path / "inputs.npy", case.model.dt]
+    done = subprocess.run(
+        [sys.executable, "-c", OTHER_PROCESS, *map(str, given)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = [[float.fromhex(word) for word in line.split()] for line in done.stdout.splitlines()]
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_a_reset_starts_from_the_means_again(slave, cases):
+    case = cases["full"]
+    run(slave, case, 0, 5)
+    slave.reset()
+    slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    np.testing.assert_allclose(slave.getReal([2, 3]), case.model.state_mean, rtol=1e-15)
+
+
+class TestWhatIsRefused:
+    def test_another_step(self, slave, capsys):
+        with pytest.raises(Exception, match="fmi2DoStep failed with status 3"):
+            slave.doStep(0.0, 0.2)
+        assert "the communication step must be 0.1 s" in capsys.readouterr().out
+
+    def test_a_gap_in_the_input_which_leaves_the_state(self, slave, cases):
+        case = cases["full"]
+        before = run(slave, case, 0, 3)
+        slave.setReal([0], [np.nan])
+        with pytest.raises(Exception, match="fmi2DoStep failed with status 2"):
+            slave.doStep(0.3, 0.1)
+        assert slave.getReal([2, 3]) == list(before[-1])
+        expected = case.expected[3:10]
+        np.testing.assert_allclose(run(slave, case, 3, 10), expected, rtol=1e-12, atol=1e-12)
+
+    def test_an_output_or_a_history_set_in_service(self, slave):
+        for reference in (2, 4, 10**6):
+            with pytest.raises(Exception, match="fmi2SetReal failed with status 3"):
+                slave.setReal([reference], [0.0])
+
+    def test_a_state_of_another_fmu(self, slave):
+        state = slave.getFMUstate()
+        content = slave.serializeFMUstate(state)
+        slave.freeFMUstate(state)
+        for wrong in (b"another one" + content[11:], content[:-1]):
+            with pytest.raises(Exception, match="fmi2DeSerializeFMUstate failed with status 3"):
+                slave.deSerializeFMUstate(wrong)
+
+
+def test_without_a_compiler_the_sources_are_there_alone(cases, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    with zipfile.ZipFile(write_fmu(cases["arx"].model, tmp_path / "arx.fmu")) as archive:
+        names = archive.namelist()
+    listed = ["modelDescription.xml", "sources/arx.h", "sources/arx.c", "sources/fmi2.c"]
+    assert names == listed
+
+
+def test_a_compiler_that_fails_is_quoted(cases, tmp_path, monkeypatch):
+    monkeypatch.setenv("CC", f"{sys.executable} -c 'raise SystemExit(\"no licence\")'")
+    with pytest.raises(RequestError, match=r"the C compiler failed: (.|\n)*no licence(.|\n)*CC"):
+        write_fmu(cases["arx"].model, tmp_path / "arx.fmu")
+    assert not (tmp_path / "arx.fmu").exists()
