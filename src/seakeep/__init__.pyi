@@ -1,6 +1,7 @@
 from . import (
     baselines,
     campaign,
+    check,
     core,
     hosts,
     metrics,
@@ -58,6 +59,7 @@ __all__ = [
     "Uniform",
     "baselines",
     "campaign",
+    "check",
     "core",
     "estimate_probe_offset",
     "hosts",

@@ -50,7 +50,7 @@ MISTAKES = [
         'column = "Heave"',
         'colum = "Heave"',
         "channels.heave.colum: unknown key, received 'Heave'. Did you mean 'column'? "
-        "Keys here: column, instrument, unit, unit_assumed, sign, offset, long_name.",
+        "Keys here: column, instrument, unit, unit_assumed, sign, offset, accuracy, long_name.",
     ),
     (
         "[preparation]",

@@ -63,6 +63,13 @@ def test_offset_is_added_in_the_files_unit_before_the_sign(edited):
     np.testing.assert_allclose(run["heave"], expected, rtol=1e-15)  # order of two products
 
 
+def test_accuracy_is_kept_in_si_units(edited):
+    path = edited(('column = "Heave"', 'column = "Heave"\nsign = -1\naccuracy = 0.5'))
+    run = read_campaign(path).read_run("first")
+    assert run["heave"].attrs["accuracy"] == pytest.approx(0.5e-3)  # mm
+    assert "accuracy" not in run["eta_fwd"].attrs
+
+
 def test_a_run_may_differ(edited):
     path = edited(
         (

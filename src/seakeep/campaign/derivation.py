@@ -81,6 +81,9 @@ def _derived(dataset: Channels, name: str, settings: DerivedSettings, dt: float)
         "long_name": long_name_of(name, settings.long_name),
         "derived_from": origin,
     }
+    if settings.step in ("low_pass", "band_pass"):  # the same reading, in a band
+        source = dataset[str(settings.source)].attrs
+        attributes |= {key: source[key] for key in ("accuracy",) if key in source}
     return xr.Variable("time", values, attributes)
 
 

@@ -364,7 +364,7 @@ def _refuse_other_unit(
 
 def _converted(
     table: xr.Dataset, name: str, settings: ChannelSettings, path: Path
-) -> tuple[FloatArray, dict[str, str]]:
+) -> tuple[FloatArray, dict[str, Any]]:
     """Values and attributes of a channel."""
     wanted = settings.column or name
     column = _column(table, name, settings)
@@ -378,7 +378,13 @@ def _converted(
     target = canonical.units if canonical else si_unit(unit)
     factor = conversion(unit, target, f"channel '{name}' (column '{wanted}' of {path})")
     values = settings.sign * factor * (column.to_numpy().astype(float) + settings.offset)
-    return values, {"units": target, "long_name": long_name_of(name, settings.long_name)}
+    attributes: dict[str, Any] = {
+        "units": target,
+        "long_name": long_name_of(name, settings.long_name),
+    }
+    if settings.accuracy is not None:
+        attributes["accuracy"] = factor * settings.accuracy
+    return values, attributes
 
 
 def cleaned(run: Run) -> Run:

@@ -158,6 +158,10 @@ class ChannelSettings(Table):
     offset: Finite = Field(
         default=0.0, description="added to the reading, in the file's unit, before the sign"
     )
+    accuracy: Annotated[Finite, Field(ge=0)] | None = Field(
+        default=None,
+        description="standard uncertainty of the instrument, in the file's unit (type B)",
+    )
     long_name: str | None = Field(default=None, description="name for labels")
 
 

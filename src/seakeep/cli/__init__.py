@@ -13,6 +13,7 @@ import typer
 from seakeep.cli import (
     calibrating,
     campaigns,
+    checking,
     exporting,
     information,
     modelling,
@@ -68,6 +69,7 @@ app.command("calibrate")(calibrating.calibrate)
 app.command("forecast")(modelling.forecast)
 app.command("compare")(modelling.compare)
 app.command("export")(exporting.export)
+app.command("check")(checking.check)
 app.command("study")(studying.study)
 app.command("report")(studying.report)
 app.command("reproduce")(studying.reproduce)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import BoolArray, FloatArray
 from seakeep.core.wave_bands import PER_OCTAVE, band_edges, band_energy
 from seakeep.models import labelled, store
 from seakeep.models.interface import Model
@@ -94,6 +94,20 @@ class Coverage:
         )
         return cls(tuple(channels), first, _shares(energy))
 
+    def is_trained(self, frequency: FloatArray) -> BoolArray:
+        """Whether frequencies (Hz) lie in bands that were trained, or beside one.
+
+        Returns
+        -------
+        ndarray of bool, shape (channel, frequency)
+        """
+        edges = band_edges(self.first, self.shares.shape[1])
+        band = np.searchsorted(edges, frequency, side="right") - 1
+        inside = (band >= 0) & (band < self.shares.shape[1])
+        known = _with_neighbours(self.shares >= TRAINED)
+        result: BoolArray = inside & known[:, np.clip(band, 0, self.shares.shape[1] - 1)]
+        return result
+
     def compare(self, inputs: FloatArray, dt: float) -> list[Waves]:
         """Compare the inputs (time, channel) of a forecast with those of training."""
         found = _shares(band_energy(inputs, dt, self.first, self.shares.shape[1]))
@@ -104,9 +118,7 @@ class Coverage:
             is_trained = self.shares[column] >= TRAINED
             if not is_trained.any() or not found[column].any():
                 continue  # a constant has no period
-            known = is_trained.copy()
-            known[1:] |= is_trained[:-1]
-            known[:-1] |= is_trained[1:]
+            known = _with_neighbours(is_trained)
             peak = int(np.argmax(found[column]))
             inside = np.flatnonzero(is_trained)
             out.append(
@@ -163,6 +175,14 @@ def compare_waves(model: Model, run: xr.Dataset, start: float, steps: int) -> li
     if len(values) < 2 or not np.all(np.isfinite(values)):
         return []
     return coverage.compare(values, model.dt)
+
+
+def _with_neighbours(is_trained: BoolArray) -> BoolArray:
+    """Bands (…, band) and those beside them: the leakage of a taper reaches there."""
+    known = is_trained.copy()
+    known[..., 1:] |= is_trained[..., :-1]
+    known[..., :-1] |= is_trained[..., 1:]
+    return known
 
 
 def _shares(energy: FloatArray) -> FloatArray:

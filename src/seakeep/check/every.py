@@ -1,0 +1,83 @@
+"""All checks of a model on the runs of a campaign; what cannot be judged says why."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import xarray as xr
+
+from seakeep.check.coherence import coherence
+from seakeep.check.response import measured_response, response, validation
+from seakeep.errors import SeakeepError, SeakeepWarning
+from seakeep.models import Model
+
+__all__ = ["CHECKS", "Checked", "check_model"]
+
+
+def _response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    return response(model, None, runs)
+
+
+CHECKS: dict[str, Callable[[Model, Mapping[str, xr.Dataset]], xr.Dataset]] = {
+    "response": _response,
+    "measured_response": measured_response,
+    "validation": validation,
+    "coherence": coherence,
+}
+"""Checks by name: each takes a model and prepared runs by name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """What the checks found.
+
+    Parameters
+    ----------
+    found : dict of str to Dataset
+        Result of each check that could judge.
+    refused : dict of str to str
+        Why each other one could not.
+    notes : dict of str to tuple of str
+        Warnings of each.
+    """
+
+    found: dict[str, xr.Dataset]
+    refused: dict[str, str]
+    notes: dict[str, tuple[str, ...]]
+
+
+def check_model(
+    model: Model,
+    runs: Mapping[str, xr.Dataset],
+    progress: Callable[[int, int, str], None] | None = None,
+) -> Checked:
+    """Check a model on prepared runs.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    runs : mapping of str to Dataset
+        Prepared runs by name, as ``campaign.prepare()`` gives them.
+    progress : callable, optional
+        Called as ``progress(done, total, check)``.
+
+    Returns
+    -------
+    Checked
+    """
+    found, refused, notes = {}, {}, {}
+    for number, (name, check) in enumerate(CHECKS.items()):
+        if progress is not None:
+            progress(number, len(CHECKS), name)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                found[name] = check(model, runs)
+            except SeakeepError as error:
+                refused[name] = str(error)
+        ours = [str(each.message) for each in caught if issubclass(each.category, SeakeepWarning)]
+        notes[name] = tuple(dict.fromkeys(ours))
+    return Checked(found, refused, notes)

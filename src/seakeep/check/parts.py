@@ -1,0 +1,295 @@
+"""What every check reads of runs: their test parts, without gaps, and free runs over them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from seakeep.arrays import BoolArray, FloatArray
+from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
+from seakeep.models import HankelDMDcModel, HankelEnsemble, InputMap, Model, SlowSquares
+from seakeep.models.inputs import Chain, Lead, Measured
+from seakeep.models.interface import Span
+from seakeep.models.labelled import channel_matrix, check_step
+from seakeep.models.observables import HALF_WIDTH, Observed
+from seakeep.signals import encounter_period
+from seakeep.signals.time_axis import stretches
+from seakeep.waves import wavenumber
+
+__all__ = [
+    "FreeRun",
+    "Part",
+    "encounter_period_of",
+    "free_runs",
+    "irregular",
+    "is_regular",
+    "reference_probe",
+    "regressors",
+    "units_of",
+    "used_parts",
+    "wave_turns",
+]
+
+
+class Part(NamedTuple):
+    """The longest stretch without gaps of what a campaign uses of a run, in physical units.
+
+    Attributes
+    ----------
+    run : Dataset
+        The whole run.
+    time : ndarray, shape (time,)
+        Instants, s.
+    states, inputs : ndarray, shape (time, channel)
+        Inputs are aligned as the model aligns them.
+    """
+
+    run: xr.Dataset
+    time: FloatArray
+    states: FloatArray
+    inputs: FloatArray
+
+
+class FreeRun(NamedTuple):
+    """A free run over a test part, and the measurement at its instants.
+
+    Attributes
+    ----------
+    start : float
+        Instant of the last measured state, s.
+    time : ndarray, shape (time,)
+    forecast, measured : ndarray, shape (time, N)
+        Of an ensemble the mean of its members.
+    """
+
+    start: float
+    time: FloatArray
+    forecast: FloatArray
+    measured: FloatArray
+
+
+def is_regular(run: xr.Dataset) -> bool:
+    """Whether a run states that its waves are regular."""
+    return bool(run.attrs.get("waves") == "regular")
+
+
+def irregular(runs: Mapping[str, xr.Dataset], what: str) -> dict[str, xr.Dataset]:
+    """Runs that are not regular; an error says what cannot be had without them."""
+    found = {name: run for name, run in runs.items() if not is_regular(run)}
+    if not found:
+        raise DataError(
+            f"all runs ({', '.join(runs)}) are in regular waves, which hold one frequency each: "
+            f"{what} takes a run in irregular waves."
+        )
+    return found
+
+
+def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
+    """Parts of runs that train or test; a run that cannot be used warns."""
+    found = {}
+    for name, run in runs.items():
+        check_step(run, name, model.dt)
+        time = np.asarray(run["time"].values, dtype=float)
+        states = channel_matrix(run, model.states, name)
+        try:
+            inputs = channel_matrix(run, model.inputs, name)
+            if isinstance(model, HankelDMDcModel) and model.alignment is not None:
+                aligned = model.aligned_inputs(run)
+                inputs = channel_matrix(aligned, model.inputs, name)
+        except DataError as error:
+            warnings.warn(f"{name} is left out: {error}", SeakeepWarning, stacklevel=3)
+            continue
+        begin, end = _used_span(run)
+        whole = np.isfinite(states).all(axis=1) & np.isfinite(inputs).all(axis=1)
+        inside = whole & (time >= begin - 1e-6) & (time <= end + 1e-6)
+        pieces = stretches(inside)
+        if not pieces:
+            warnings.warn(
+                f"{name} is left out: no sample of it has all channels of the model.",
+                SeakeepWarning,
+                stacklevel=3,
+            )
+            continue
+        first, stop = max(pieces, key=lambda piece: piece[1] - piece[0])
+        found[name] = Part(run, time[first:stop], states[first:stop], inputs[first:stop])
+    return found
+
+
+def free_runs(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, FreeRun]:
+    """Free runs from the first possible instant of each test part to its end.
+
+    Raises
+    ------
+    DataError
+        If no run can be forecast, with the reason of each.
+    """
+    found, reasons = {}, []
+    for name, run in runs.items():
+        try:
+            found[name] = _free_run(model, run, name)
+        except SeakeepError as error:
+            reasons.append(f"{name}: {error}")
+    if not found:
+        raise DataError("no run can be forecast. " + " ".join(reasons))
+    for reason in reasons:
+        warnings.warn(f"left out: {reason}", SeakeepWarning, stacklevel=3)
+    return found
+
+
+def _free_run(model: Model, run: xr.Dataset, name: str) -> FreeRun:
+    time = np.asarray(run["time"].values, dtype=float)
+    begin, end = _test_span(run)
+    if time.size <= model.history_samples:
+        raise DataError(
+            f"the run has {time.size} samples and a forecast reads {model.history_samples} before "
+            "its first. Give a longer run."
+        )
+    start = max(begin, float(time[model.history_samples - 1]))
+    last = int(np.searchsorted(time, end + 0.5 * model.dt)) - 1
+    last = min(last, time.size - max(model.signature.lead_samples, 1))
+    at = int(np.argmin(np.abs(time - start)))
+    if last - at < 2:
+        raise DataError("its test part ends before the first forecast. Give a longer run.")
+    if isinstance(model, HankelEnsemble):
+        found = model.forecast_summary(run, start, last - at).sel(statistic="mean")
+    else:
+        found = model.forecast(run, start, last - at)
+    measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
+    forecast = channel_matrix(found, model.states, name)
+    return FreeRun(float(time[at]), time[at + 1 : last + 1], forecast, measured)
+
+
+def _test_span(run: xr.Dataset) -> tuple[float, float]:
+    """Span that tests; all of a run that states none."""
+    time = run["time"].values
+    begin, end = run.attrs.get("test_span", (time[0], time[-1]))
+    return float(begin), float(end)
+
+
+def _used_span(run: xr.Dataset) -> tuple[float, float]:
+    """Span that holds what trains and what tests; all of a run that states neither."""
+    spans = [run.attrs[key] for key in ("train_span", "test_span") if key in run.attrs]
+    if not spans:
+        return _test_span(run)
+    return float(min(each[0] for each in spans)), float(max(each[1] for each in spans))
+
+
+def encounter_period_of(model: Model, runs: Mapping[str, xr.Dataset]) -> float:
+    """Encounter period that runs state, s, or that of the first input."""
+    for run in runs.values():
+        if "encounter_period" in run.attrs:
+            return float(run.attrs["encounter_period"])
+    for part in used_parts(model, runs).values():
+        if part.inputs.shape[1]:
+            return encounter_period(part.inputs[:, 0], model.dt)
+    raise RequestError(
+        "the encounter period is not known: the runs state none, and the model has no input. Set "
+        "run.attrs['encounter_period'] (s)."
+    )
+
+
+def regressors(model: Model, part: Part) -> FloatArray:
+    """Columns that drive a model over a part: inputs, then observables, each at the instant itself.
+
+    Leads and lags add nothing to a coherence, and cost some of it in segments of finite length.
+
+    Returns
+    -------
+    ndarray, shape (time, column)
+        NaN where a row reads what is not there.
+    """
+    input_map = model.signature.input_map
+    maps = input_map.maps if isinstance(input_map, Chain) else (input_map,)
+    chain = Chain(tuple(_at_once(each) for each in maps if not isinstance(each, Lead)))
+    run = part.run.sel(time=slice(part.time[0] - 1e-6, part.time[-1] + 1e-6))
+    size, reach = run.sizes["time"], chain.reads(Span(0, 0, 1))
+    first, stop = -reach.first, size - (reach.stop - 1)
+    width = sum(map(len, chain.regressors(model.signature.input_labels)))
+    out = np.full((size, width), np.nan)
+    if stop > first:
+        values = channel_matrix(run, model.inputs, "the run")
+        drive = chain.wrap(Measured(values), run, [Span(first, first, stop)])
+        out[first:stop] = np.concatenate(drive.rows(first, stop), axis=1)
+    return out
+
+
+def _at_once(each: InputMap) -> InputMap:
+    if not isinstance(each, Observed):
+        return each
+    now = [
+        replace(one, lags=(0,), lead=HALF_WIDTH / one.cutoff)  # the middle of its filter
+        if isinstance(one, SlowSquares)
+        else one
+        for one in each.observables
+    ]
+    return replace(each, observables=tuple(now), lead=0)
+
+
+def reference_probe(model: Model, runs: Mapping[str, xr.Dataset]) -> int:
+    """Input that waves are counted from: the elevation that stands farthest downstream.
+
+    Raises
+    ------
+    RequestError
+        If no input is a wave elevation.
+    """
+    waves = elevations(model)
+    if not waves.any():
+        raise RequestError(
+            "no input of the model is a wave elevation (inputs: "
+            f"{', '.join(model.inputs) or 'none'}): there is no wave to count a response from. "
+            "Name elevations eta_…, in metres."
+        )
+    places = positions(model, runs)
+    if places is None:
+        return int(np.flatnonzero(waves)[-1])
+    return int(np.argmax(np.where(waves, places, -np.inf)))
+
+
+def elevations(model: Model) -> BoolArray:
+    """Which inputs are wave elevations."""
+    return np.array([name.startswith("eta") for name in model.inputs], dtype=bool)
+
+
+def positions(model: Model, runs: Mapping[str, xr.Dataset]) -> FloatArray | None:
+    """Position of each elevation, m (NaN of another input); None where one is not stated."""
+    waves = elevations(model)
+    for run in runs.values():
+        places = np.array(
+            [float(run[name].attrs.get("x_position", np.nan)) for name in model.inputs]
+        )
+        if np.isfinite(places[waves]).all():
+            return places
+    return None
+
+
+def wave_turns(
+    model: Model, runs: Mapping[str, xr.Dataset], frequency: FloatArray, reference: int
+) -> FloatArray | None:
+    """Phase of the wave at each input behind that at the reference, rad, by linear dispersion.
+
+    Returns
+    -------
+    ndarray, shape (frequency, input), or None
+        NaN for an input that is no elevation; None where the positions or the water depth are
+        not stated.
+    """
+    places = positions(model, runs)
+    depths = [run.attrs["water_depth"] for run in runs.values() if "water_depth" in run.attrs]
+    if places is None or not depths:
+        return None
+    k = wavenumber(2 * np.pi * frequency, float(depths[0]))
+    result: FloatArray = np.asarray(k)[:, None] * (places - places[reference])
+    return result
+
+
+def units_of(model: Model, names: Sequence[str]) -> list[str]:
+    """SI units of states or inputs of a model."""
+    signature = model.signature
+    labels = {each.name: each.units for each in signature.state_labels + signature.input_labels}
+    return [labels[name] for name in names]

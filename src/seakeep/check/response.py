@@ -1,0 +1,400 @@
+"""Response to waves of one frequency: the model's own, the measured one, and whether they agree."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.arrays import ComplexArray, FloatArray, as_real
+from seakeep.check.parts import (
+    Part,
+    encounter_period_of,
+    is_regular,
+    reference_probe,
+    units_of,
+    used_parts,
+    wave_turns,
+)
+from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
+from seakeep.core.response import frequency_response
+from seakeep.core.spectra import cross_spectra
+from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
+from seakeep.models import HankelDMDcModel, HankelEnsemble, Model
+from seakeep.models.engine import Dynamics
+from seakeep.models.inputs import Chain, Lead
+
+__all__ = ["measured_response", "response", "transfer", "validation"]
+
+WAVE = "wave"
+"""Name of the input that is a wave which passes all probes."""
+SEGMENT = 16
+"""Encounter periods of a segment of Welch's method."""
+POWER = 0.02
+"""Part of the highest power of the wave from which on a frequency is a point."""
+FREQUENCIES = 120
+LEVEL = 0.95
+
+
+def response(
+    model: Model,
+    frequencies: npt.ArrayLike | None = None,
+    runs: Mapping[str, xr.Dataset] | None = None,
+) -> xr.Dataset:
+    r"""Transfer functions of a model from its matrices, per input and for a passing wave.
+
+    The answer to small waves: observables that are squares or cubes vanish there. Inputs are those
+    that the model is driven by: with an alignment, waves where the vessel is.
+
+    Parameters
+    ----------
+    model : HankelDMDcModel, LinearModel or HankelEnsemble
+        The model.
+    frequencies : array_like, shape (frequency,), optional
+        Hz; by default 120 around those that were trained.
+    runs : mapping of str to Dataset, optional
+        Runs that state the positions of the probes and the water depth. With them a further input
+        "wave" is a wave that passes all probes by linear dispersion, counted from the probe
+        farthest downstream: with several probes, this is the RAO.
+
+    Returns
+    -------
+    Dataset
+        Over (state, input, frequency): ``amplitude`` (in ``units`` over (state, input)) and
+        ``phase`` (degrees, positive where the response is early); ``trained`` over (input,
+        frequency), whether training holds energy there; of an ensemble the mean of the members'
+        complex responses, and ``amplitude_lower``, ``amplitude_upper`` and ``phase_spread`` (half
+        the width of the band) at 95 %. NaN for a state that a read-out makes. ``attrs``
+        ``reference`` names the probe.
+
+    Raises
+    ------
+    RequestError
+        If the model has no input, or is not a model of delayed states and inputs.
+
+    Examples
+    --------
+    >>> import seakeep
+    >>> run = xr.Dataset({"eta": ("time", np.sin(np.arange(900.0) ** 1.2), {"units": "m"})},
+    ...                  coords={"time": 0.1 * np.arange(900)})
+    >>> run["heave"] = 0.5 * run.eta.shift(time=1, fill_value=0.0).assign_attrs(units="m")
+    >>> run.heave.attrs["units"] = "m"
+    >>> spec = seakeep.HankelDMDc(state_delays=0, input_delays=2, ridge=1e-9, delay_rows="exact")
+    >>> found = response(spec.fit(run, ["heave"], ["eta"]), [0.5])
+    >>> round(float(found.amplitude[0, 0, 0]), 3), str(found.units[0, 0].values)
+    (0.5, 'm/m')
+    """
+    if not model.inputs:
+        raise RequestError("the model has no input: it answers no wave. Check its modes instead.")
+    wanted = _default_frequencies(model) if frequencies is None else frequencies
+    frequency = np.atleast_1d(as_real(wanted, "frequencies"))
+    if frequency.min() <= 0 or frequency.max() > 0.5 / model.dt:
+        raise RequestError(
+            f"frequencies must lie above 0 and up to half the sampling rate ({0.5 / model.dt:.4g} "
+            f"Hz); received {frequency.min():.4g} to {frequency.max():.4g} Hz."
+        )
+    size = len(model.inputs)
+    each = np.stack([transfer(model, one, frequency)[:, :, :size] for one in _dynamics(model)])
+    names, reference = list(model.inputs), ""
+    if runs is not None and size > 1:
+        each, reference = _with_wave(model, runs, frequency, each)
+        names = names if not reference else [*names, WAVE]
+    made = [r.column for r in model.signature.readouts if r.function is not None]
+    each[:, :, made] = np.nan
+    return _labelled(model, frequency, names, each, reference)
+
+
+def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> ComplexArray:
+    """Transfer functions of a member from all regressors, physical units, (frequency, N, n + m)."""
+    rows, driven = dynamics.matrices
+    found = frequency_response(
+        rows,
+        driven,
+        2 * np.pi * frequency * model.dt,
+        len(dynamics.state_scale.mean),
+        len(dynamics.input_scale.mean),
+        dynamics.input_delays,
+    )
+    scale = np.concatenate([dynamics.input_scale.std, dynamics.direct_scale.std])
+    early = np.exp(2j * np.pi * frequency * model.dt * _lead(model))
+    early = np.where(np.arange(scale.size) < len(model.inputs), early[:, None], 1.0)
+    result: ComplexArray = found * dynamics.state_scale.std[:, None] / scale * early[:, None]
+    return result
+
+
+def _lead(model: Model) -> int:
+    input_map = model.signature.input_map
+    maps = input_map.maps if isinstance(input_map, Chain) else (input_map,)
+    return sum(each.samples for each in maps if isinstance(each, Lead))
+
+
+def _dynamics(model: Model) -> list[Dynamics]:
+    if isinstance(model, HankelDMDcModel):
+        return [model.dynamics]
+    if isinstance(model, HankelEnsemble):
+        return [model.dynamics(member) for member in range(model.n_members)]
+    raise RequestError(
+        f"a model of kind '{model.kind}' has no matrices of delayed states and inputs, from which "
+        "a response is read. Check a Hankel model, an ARX or a FIR model."
+    )
+
+
+def _default_frequencies(model: Model) -> FloatArray:
+    highest = 0.5 / model.dt
+    low = highest / 200
+    coverage = getattr(model, "coverage", None)
+    if coverage is not None:
+        grid = np.geomspace(low, highest, 400)
+        known = grid[coverage.is_trained(grid).any(axis=0)]
+        if known.size:
+            low, highest = 0.5 * known[0], min(highest, 1.3 * known[-1])
+    return np.geomspace(low, highest, FREQUENCIES)
+
+
+def _with_wave(
+    model: Model, runs: Mapping[str, xr.Dataset], frequency: FloatArray, each: ComplexArray
+) -> tuple[ComplexArray, str]:
+    """Responses with that to a passing wave, and its probe; without, where it is not known."""
+    reference = reference_probe(model, runs)
+    turns = wave_turns(model, runs, frequency, reference)
+    if turns is None:
+        return each, ""
+    waves = np.nan_to_num(np.exp(-1j * turns))  # other inputs are still
+    passing = np.einsum("mfnq,fq->mfn", each, waves)[..., None]
+    return np.concatenate([each, passing], axis=-1), model.inputs[reference]
+
+
+def _labelled(
+    model: Model, frequency: FloatArray, names: list[str], each: ComplexArray, reference: str
+) -> xr.Dataset:
+    mean = each.mean(axis=0)
+    dims = ("state", "input", "frequency")
+    quantiles = {}
+    if len(each) > 1:
+        bounds = np.quantile(np.abs(each), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2], axis=0)
+        turned = np.abs(np.angle(each * np.conj(mean)))
+        quantiles = {
+            "amplitude_lower": (dims, np.moveaxis(bounds[0], 0, 2)),
+            "amplitude_upper": (dims, np.moveaxis(bounds[1], 0, 2)),
+            "phase_spread": (dims, np.degrees(np.moveaxis(np.quantile(turned, LEVEL, 0), 0, 2))),
+        }
+    waves = [reference if name == WAVE else name for name in names]
+    of = units_of(model, waves)
+    units = [[_ratio(x, u) for u in of] for x in units_of(model, model.states)]
+    coverage = getattr(model, "coverage", None)
+    known = np.ones((len(names), frequency.size), dtype=bool)
+    if coverage is not None:
+        rows = coverage.is_trained(frequency)
+        known = rows[[coverage.channels.index(name) for name in waves]]
+    return xr.Dataset(
+        {
+            "amplitude": (dims, np.moveaxis(np.abs(mean), 0, 2), {"long_name": "amplitude"}),
+            "phase": (
+                dims,
+                np.moveaxis(np.degrees(np.angle(mean)), 0, 2),
+                {"units": "deg", "long_name": "phase before the wave"},
+            ),
+            **quantiles,
+            "trained": (("input", "frequency"), known),
+        },
+        coords={
+            "state": model.states,
+            "input": names,
+            "frequency": ("frequency", frequency, {"units": "Hz", "long_name": "frequency"}),
+            "units": (("state", "input"), units),
+        },
+        attrs={"reference": reference or waves[-1]},
+    )
+
+
+def _ratio(units: str, per: str) -> str:
+    return f"{units or '1'}/{per}" if per and per != "1" else units
+
+
+def measured_response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """Measured response per wave amplitude: points with expanded uncertainty.
+
+    Each run in regular waves is one point, by a harmonic fit in windows of whole periods (ITTC
+    7.5-02-07-02.1: type A over the windows, type B from ``attrs["accuracy"]`` of the channels,
+    their standard uncertainty). Runs in irregular waves together give a point per frequency, by
+    cross-spectra with the reference probe.
+
+    Parameters
+    ----------
+    model : Model
+        Names the channels, and aligns the waves.
+    runs : mapping of str to Dataset
+        Prepared runs; what trains or tests of them is taken.
+
+    Returns
+    -------
+    Dataset
+        Over ``point``: ``run``, ``kind`` ("regular" or "irregular"), ``frequency`` (Hz) and
+        ``wave_amplitude`` (m, of regular waves); over (point, state): ``amplitude``, ``phase``
+        (degrees), ``amplitude_uncertainty`` and ``phase_uncertainty`` (expanded, 95 %),
+        ``coherence`` (irregular waves), and ``offset`` with ``offset_uncertainty``: the mean of a
+        regular run less the model's mean state. ``attrs["reference"]`` names the probe.
+
+    Raises
+    ------
+    DataError
+        If no run gives a point, with the reason of each.
+
+    Warns
+    -----
+    SeakeepWarning
+        Of each run that gives none, with the reason.
+    """
+    reference = reference_probe(model, runs)
+    parts = used_parts(model, runs)
+    points, reasons = [], []
+    for name, part in parts.items():
+        if is_regular(part.run):
+            try:
+                points.append(_regular_point(model, name, part, reference))
+            except SeakeepError as error:
+                reasons.append(f"{name}: {error}")
+    pieces = [part for part in parts.values() if not is_regular(part.run)]
+    if pieces:
+        try:
+            period = encounter_period_of(model, runs)
+            points.append(_irregular_points(model, pieces, reference, period))
+        except SeakeepError as error:
+            reasons.append(f"irregular waves: {error}")
+    if not points:
+        raise DataError("no run gives a measured response. " + " ".join(reasons))
+    for reason in reasons:
+        warnings.warn(f"no measured response from {reason}", SeakeepWarning, stacklevel=2)
+    out = xr.concat(points, dim="point", coords="minimal", join="outer")
+    out["phase"].attrs = {"units": "deg", "long_name": "phase before the wave"}
+    return out.assign_attrs(reference=model.inputs[reference])
+
+
+def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Dataset:
+    wave = part.inputs[:, reference]
+    frequency = dominant_frequency(wave, model.dt)
+    both = np.concatenate([wave[:, None], part.states], axis=1)
+    harmonics, means = harmonic_fits(both, model.dt, frequency)
+    amplitude, answer = np.abs(harmonics[:, 0]).mean(), np.abs(harmonics[:, 1:]).mean(axis=0)
+    accuracy = [_accuracy(part.run, each) for each in [model.inputs[reference], *model.states]]
+    ratio = answer / amplitude
+    type_b = np.hypot(accuracy[1:], ratio * accuracy[0]) / amplitude
+    found = estimate(harmonics[:, 1:] / harmonics[:, :1], type_b)
+    offset = means[:, 1:] - model.signature.state_scale.centre
+    sure = estimate(offset.astype(complex), np.array(accuracy[1:]))
+    return _point(
+        model,
+        {"run": name, "kind": "regular", "frequency": frequency, "wave_amplitude": amplitude},
+        {
+            "amplitude": np.abs(found.ratio),
+            "phase": np.degrees(np.angle(found.ratio)),
+            "amplitude_uncertainty": found.amplitude,
+            "phase_uncertainty": np.degrees(found.phase),
+            "coherence": np.full(len(model.states), np.nan),
+            "offset": sure.ratio.real,
+            "offset_uncertainty": sure.amplitude,
+        },
+    )
+
+
+def _accuracy(run: xr.Dataset, channel: str) -> float:
+    return float(run[channel].attrs.get("accuracy", 0.0))
+
+
+def _irregular_points(model: Model, parts: list[Part], reference: int, period: float) -> xr.Dataset:
+    pieces = [(part.inputs[:, [reference]], part.states) for part in parts]
+    spectra = cross_spectra(pieces, model.dt, round(SEGMENT * period / model.dt))
+    power = spectra.input_power[:, 0]
+    if not power.max() > 0:
+        raise DataError(
+            f"{model.inputs[reference]} holds no energy: it is constant. Look for a dead probe."
+        )
+    gain, radius = spectra.gain()
+    coherence = spectra.ordinary()[:, 0]
+    name = ", ".join(str(part.run.attrs.get("run", "run")) for part in parts)
+    points = []
+    for at in np.flatnonzero((power >= POWER * power.max()) & (spectra.frequency > 0)):
+        amplitude, half = np.abs(gain[at, 0]), radius[at, 0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turn = np.where(half < amplitude, np.arcsin(np.minimum(half / amplitude, 1)), np.pi)
+        nothing = np.full(len(model.states), np.nan)
+        points.append(
+            _point(
+                model,
+                {"run": name, "kind": "irregular", "frequency": spectra.frequency[at],
+                 "wave_amplitude": np.nan},
+                {
+                    "amplitude": amplitude,
+                    "phase": np.degrees(np.angle(gain[at, 0])),
+                    "amplitude_uncertainty": half,
+                    "phase_uncertainty": np.degrees(turn),
+                    "coherence": coherence[at],
+                    "offset": nothing,
+                    "offset_uncertainty": nothing,
+                },
+            )
+        )  # fmt: skip
+    return xr.concat(points, dim="point", coords="minimal")
+
+
+def _point(
+    model: Model, of_point: Mapping[str, object], values: Mapping[str, FloatArray]
+) -> xr.Dataset:
+    return xr.Dataset(
+        {key: (("point", "state"), value[None]) for key, value in values.items()},
+        coords={"state": model.states}
+        | {key: ("point", [value]) for key, value in of_point.items()},
+    )
+
+
+def validation(
+    model: Model, runs: Mapping[str, xr.Dataset], measured: xr.Dataset | None = None
+) -> xr.Dataset:
+    r"""Judge the response by ASME V&V 20: comparison error against validation uncertainty.
+
+    :math:`E = S - D` with S the model's and D the measured amplitude;
+    :math:`U_{val} = \sqrt{U_D^2 + U_S^2}` with :math:`U_D` of the measurement and :math:`U_S` half
+    the width of an ensemble's band (0 of a single model, whose own uncertainty is not known).
+
+    Parameters
+    ----------
+    model : Model
+        As for :func:`response`.
+    runs : mapping of str to Dataset
+        As for :func:`measured_response`.
+    measured : Dataset, optional
+        What :func:`measured_response` found of them.
+
+    Returns
+    -------
+    Dataset
+        Over (point, state): ``model``, ``measured``, ``error``, ``uncertainty`` (95 %), in the
+        units of the amplitude, and ``within``: whether \|E\| < U_val, so that the error cannot be
+        told from the uncertainty.
+    """
+    measured = measured_response(model, runs) if measured is None else measured
+    frequency, place = np.unique(measured["frequency"].values, return_inverse=True)
+    found = response(model, frequency, runs)
+    own = found.sel(input=WAVE if WAVE in found["input"] else found.attrs["reference"])
+    amplitude = own["amplitude"].values[:, place].T
+    spread = np.zeros_like(amplitude)
+    if "amplitude_lower" in own:
+        width = own["amplitude_upper"] - own["amplitude_lower"]
+        spread = 0.5 * width.values[:, place].T
+    error = amplitude - measured["amplitude"].values
+    uncertainty = np.hypot(spread, measured["amplitude_uncertainty"].values)
+    dims = ("point", "state")
+    return xr.Dataset(
+        {
+            "model": (dims, amplitude),
+            "measured": (dims, measured["amplitude"].values),
+            "error": (dims, error),
+            "uncertainty": (dims, uncertainty),
+            "within": (dims, np.abs(error) < uncertainty),
+        },
+        coords={name: measured[name] for name in ("run", "kind", "frequency", "state")}
+        | {"units": ("state", own["units"].values)},
+    )

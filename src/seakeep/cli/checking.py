@@ -1,0 +1,54 @@
+"""``seakeep check``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from seakeep.cli.console import messages, progress_bar, results
+from seakeep.cli.options import CampaignFile, ModelFile, read_files
+from seakeep.files import check_output, make_folder
+
+__all__ = ["check"]
+
+
+def check(
+    model: ModelFile,
+    campaign: CampaignFile,
+    run: Annotated[
+        list[str] | None,
+        typer.Option("--run", help="Name of a run (repeatable); by default all that serve."),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Folder for the page, its figures and tables.")
+    ] = Path("check"),
+) -> None:
+    """Say what a model is worth: a page with figures and tables.
+
+    Its response to waves beside the measured one, with uncertainties, and what its inputs can tell
+    of each state at all. What the runs cannot tell is named, with the reason.
+
+    Example: seakeep check model.nc docs/tutorial/campaign.toml -o check
+    """
+    from seakeep.campaign import load_prepared, read_campaign
+    from seakeep.check import check_model
+    from seakeep.models import load_model
+    from seakeep.report.check_page import check_sections, write_check
+
+    make_folder(out)
+    identified = load_model(model)
+    read = read_campaign(campaign)
+    check_output(out / "report.html", "report", read_files(read, model))
+    with progress_bar("Preparing") as progress:
+        runs = load_prepared(read, names=run or None, progress=progress)
+    with progress_bar("Checking") as progress:
+        checked = check_model(identified, runs, progress)
+    for section in check_sections(checked):
+        for text in (*section.points, *section.notices):
+            results().print(f"{section.title}: {text}", soft_wrap=True)
+    kind = f"{len(identified.states)} states, {len(identified.inputs)} inputs"
+    words = f"{model.name}, a model of kind {identified.kind} ({kind}), on {read.name}."
+    page = write_check(checked, out, f"{model.stem}: what the model is worth", words)
+    messages().print(f"Wrote {page}.")

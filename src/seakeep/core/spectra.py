@@ -1,0 +1,188 @@
+r"""Cross-spectra of inputs and outputs, coherence, and what no linear map can explain.
+
+Bendat and Piersol, Random Data (2010), chapters 7 and 9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import signal, stats
+
+from seakeep.arrays import ComplexArray, FloatArray
+from seakeep.errors import DataError
+
+__all__ = ["Spectra", "cross_spectra"]
+
+OVERLAP_CORRELATION = 1 / 36
+"""Squared correlation of the spectra of two Hann segments that share a half (Welch, 1967)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """Spectra of inputs and outputs.
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (frequency,)
+        Cycles per unit of time.
+    inputs : ndarray of complex, shape (frequency, input, input)
+        Cross-spectra of the inputs, :math:`S_{ij} = E[U_i^* U_j]`, one-sided densities.
+    cross : ndarray of complex, shape (frequency, input, output)
+        :math:`E[U_i^* X_n]`.
+    outputs : ndarray, shape (frequency, output)
+        Spectra of the outputs.
+    averages : float
+        Number of independent segments.
+    """
+
+    frequency: FloatArray
+    inputs: ComplexArray
+    cross: ComplexArray
+    outputs: FloatArray
+    averages: float
+
+    @property
+    def input_power(self) -> FloatArray:
+        """Spectra of the inputs, shape (frequency, input)."""
+        result: FloatArray = np.diagonal(self.inputs, axis1=1, axis2=2).real
+        return result
+
+    def only(self, inputs: Sequence[int]) -> Spectra:
+        """Those of some of the inputs."""
+        chosen = list(inputs)
+        among = self.inputs[:, chosen][:, :, chosen]
+        return Spectra(self.frequency, among, self.cross[:, chosen], self.outputs, self.averages)
+
+    def ordinary(self) -> FloatArray:
+        """Coherence of each pair, shape (frequency, input, output)."""
+        both = self.input_power[:, :, None] * self.outputs[:, None]
+        out: FloatArray = np.zeros_like(both)
+        np.divide(np.abs(self.cross) ** 2, both, out=out, where=both > 0)
+        return out
+
+    def multiple(self) -> FloatArray:
+        r"""Coherence of each output with all inputs, shape (frequency, output).
+
+        Corrected for what q inputs explain of noise by chance:
+        :math:`1 - (1 - \gamma^2)\,n/(n - q)`, at least zero.
+        """
+        rest = np.divide(
+            self.unexplained(), self.outputs,
+            out=np.ones_like(self.outputs), where=self.outputs > 0,
+        )  # fmt: skip
+        result: FloatArray = np.clip(1.0 - rest, 0.0, 1.0)
+        return result
+
+    def unexplained(self) -> FloatArray:
+        """Spectra of what no linear map of the inputs explains, shape (frequency, output)."""
+        size = self.inputs.shape[1]
+        if self.averages <= size + 1:
+            raise DataError(
+                f"the records hold {self.averages:.1f} independent segments, and coherence with "
+                f"{size} input{'s' * (size > 1)} takes {size + 2} or more. Give longer records, or "
+                "a shorter segment."
+            )
+        # Relative to the power of each input, so that units do not matter.
+        power = np.sqrt(self.input_power)
+        scale = np.divide(1.0, power, out=np.zeros_like(power), where=power > 0)
+        scaled = self.inputs * scale[:, :, None] * scale[:, None]
+        cross = self.cross * scale[:, :, None]
+        gain = np.linalg.pinv(scaled, rcond=1e-9, hermitian=True) @ cross
+        explained = np.sum(np.conj(cross) * gain, axis=1).real
+        left = np.clip(self.outputs - explained, 0.0, None)
+        rest: FloatArray = left * self.averages / (self.averages - size)
+        return rest
+
+    def bound(self) -> FloatArray:
+        """Least NRMSE of a linear map of the inputs, shape (output,); NaN without power."""
+        total = self.outputs.sum(axis=0)
+        out = np.full(total.shape, np.nan)
+        rest = np.minimum(self.unexplained().sum(axis=0), total)  # no map at all leaves the total
+        result: FloatArray = np.sqrt(np.divide(rest, total, out=out, where=total > 0))
+        return result
+
+    def gain(self) -> tuple[ComplexArray, FloatArray]:
+        r"""Transfer function of each pair, and the radius of its 95 % circle.
+
+        Returns
+        -------
+        gain : ndarray of complex, shape (frequency, input, output)
+            :math:`S_{ux}/S_{uu}`.
+        radius : ndarray, shape (frequency, input, output)
+            :math:`\sqrt{F_{2,\,n-2}\;2/(n-2)\,(1-\gamma^2) S_{xx}/S_{uu}}` with n twice the
+            number of averages (Bendat and Piersol, equation 9.90); infinite without power.
+        """
+        power = self.input_power[:, :, None]
+        gain = np.divide(self.cross, power, out=np.zeros_like(self.cross), where=power > 0)
+        freedom = max(2 * self.averages - 2, 1e-3)
+        quantile = float(stats.f.ppf(0.95, 2, freedom))
+        left = (1.0 - self.ordinary()) * self.outputs[:, None]
+        squares = np.full(left.shape, np.inf)
+        np.divide(2 / freedom * quantile * left, power, out=squares, where=power > 0)
+        return gain, np.sqrt(squares)
+
+
+def cross_spectra(
+    pieces: Sequence[tuple[FloatArray, FloatArray]], dt: float, segment: int
+) -> Spectra:
+    """Spectra by Welch's method, averaged over records: Hann segments that share a half.
+
+    Parameters
+    ----------
+    pieces : sequence of (ndarray, ndarray)
+        Inputs (time, input) and outputs (time, output) of each record, without gaps. The mean of
+        each record is removed, not that of each segment: slow motions count.
+    dt : float
+        Time step, s.
+    segment : int
+        Samples of a segment; records that are shorter are left out.
+
+    Returns
+    -------
+    Spectra
+
+    Raises
+    ------
+    DataError
+        If no record holds a segment.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> u = rng.standard_normal((9000, 1))
+    >>> found = cross_spectra([(u, u + rng.standard_normal((9000, 1)))], 1.0, 90)
+    >>> round(float(found.bound()[0]), 1)  # half of the variance is noise
+    0.7
+    """
+    long_enough = [piece for piece in pieces if len(piece[0]) >= segment]
+    if not long_enough:
+        longest = max((len(u) for u, _ in pieces), default=0)
+        raise DataError(
+            f"the longest record without gaps has {longest * dt:.4g} s, and spectra take a segment "
+            f"of {segment * dt:.4g} s. Give longer records, or a shorter segment."
+        )
+    size, averages, weight = long_enough[0][0].shape[1], 0.0, 0
+    driven: Any = 0.0
+    power: Any = 0.0
+    how = {"fs": 1.0 / dt, "nperseg": segment, "window": "hann", "detrend": False}
+    for inputs, outputs in long_enough:
+        both = np.concatenate([inputs, outputs], axis=1)
+        series = (both - both.mean(axis=0)).T
+        frequency, found = signal.csd(series[:size, None], series[None], **how)
+        count = (len(inputs) - segment // 2) // (segment - segment // 2)
+        driven = driven + count * found
+        power = power + count * signal.welch(series[size:], **how)[1]
+        weight += count
+        averages += count / (1 + 2 * OVERLAP_CORRELATION * (count - 1) / count)
+    spectra: ComplexArray = np.moveaxis(driven / weight, 2, 0).astype(complex)
+    return Spectra(
+        frequency=frequency,
+        inputs=spectra[:, :, :size],
+        cross=spectra[:, :, size:],
+        outputs=(power / weight).T,
+        averages=averages,
+    )

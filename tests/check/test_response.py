@@ -1,0 +1,160 @@
+"""Response of a model and of a measurement: exact where the law is known, sure where it is not."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from moored import moored_run
+
+from seakeep import HankelDMDc, check
+from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
+from seakeep.errors import DataError, RequestError
+from seakeep.waves import wavenumber
+
+DT, DEPTH, PLACES = 0.1, 3.6, {"eta_fwd": -1.5, "eta_cog": 0.0}
+FREQUENCIES = np.array([0.3, 0.5, 0.8, 1.7])
+
+
+def answer(frequency):
+    """Heave per wave at the vessel: 0.8 of the wave 0.2 s before, 0.4 of that 0.5 s before."""
+    turn = -2j * np.pi * np.asarray(frequency)
+    return 0.8 * np.exp(0.2 * turn) + 0.4 * np.exp(0.5 * turn)
+
+
+def vessel_run(frequencies, seed=0, samples=3000, noise=1e-5, **attrs):
+    """Waves past two probes, and a heave that answers them by :func:`answer`."""
+    rng = np.random.default_rng(seed)
+    f = np.asarray(frequencies)
+    time, phase = DT * np.arange(samples), rng.uniform(0, 2 * np.pi, f.size)
+    turn = np.outer(time, 2 * np.pi * f) + phase
+    waves = {
+        name: 0.02 * np.cos(turn - wavenumber(2 * np.pi * f, DEPTH) * x).sum(axis=1)
+        for name, x in PLACES.items()
+    }
+    heave = 0.02 * (answer(f) * np.exp(1j * turn)).real.sum(axis=1)
+    channels = {**waves, "heave": heave + noise * rng.standard_normal(samples)}
+    run = xr.Dataset(
+        {name: ("time", values, {"units": "m"}) for name, values in channels.items()},
+        coords={"time": ("time", time, {"units": "s"})},
+        attrs={"water_depth": DEPTH, "encounter_period": 1.6, **attrs},
+    )
+    for name, x in PLACES.items():
+        run[name].attrs["x_position"] = x
+    return run
+
+
+@pytest.fixture(scope="module")
+def sea():
+    rng = np.random.default_rng(3)
+    return vessel_run(rng.uniform(0.3, 0.9, 60), run="sea", waves="irregular")
+
+
+@pytest.fixture(scope="module")
+def model(sea):
+    spec = HankelDMDc(0, 12, 1e-8, delay_rows="exact", ridge_scale="per_snapshot")
+    return spec.fit(sea, ["heave"], ["eta_fwd", "eta_cog"])
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("rows", ["exact", "ridge"])
+def test_the_response_is_that_of_python_control(rows):
+    control = pytest.importorskip("control")
+    spec = HankelDMDc(4, 6, 0.1, delay_rows=rows)
+    model = spec.fit(moored_run(), ["surge", "heave", "pitch"], ["eta"])
+    found = check.response(model, FREQUENCIES)
+    system = model.to_control()
+    known = control.frequency_response(system, 2 * np.pi * FREQUENCIES).frdata
+    ours = found["amplitude"].values * np.exp(1j * np.radians(found["phase"].values))
+    # The same matrices, solved in another order: rounding times the condition of the system.
+    assert np.abs(ours - known).max() < 1e-9 * np.abs(known).max()
+
+
+def test_the_response_is_what_a_free_run_settles_to():
+    lead = HankelDMDc(2, 4, 0.1, delay_rows="exact", lead=3)
+    model = lead.fit(moored_run(), ["surge", "heave"], ["eta"])
+    t = 0.1 * np.arange(-900, 900)
+    wave = 1e-3 * np.cos(2 * np.pi * 0.8 * t)
+    rest = np.tile(model.state_mean, (900, 1))
+    forecast = model.forecast_arrays(rest, wave[:900, None], wave[900:, None], 800)
+    found = check.response(model, [0.8]).isel(input=0, frequency=0)
+    turn = np.exp(2j * np.pi * 0.8 * 0.1 * np.arange(800))
+    known = 1e-3 * found.amplitude.values * np.exp(1j * np.radians(found.phase.values))
+    still = forecast[-200:] - (known * turn[-200:, None]).real
+    # The mean of the input was not zero, so the run settles to another level: a constant is left.
+    assert np.ptp(still, axis=0) == pytest.approx([0, 0], abs=1e-9)
+
+
+def test_a_passing_wave_adds_the_probes(sea, model):
+    found = check.response(model, FREQUENCIES[:3], {"sea": sea})
+    assert list(found["input"].values) == ["eta_fwd", "eta_cog", "wave"]
+    assert found.attrs["reference"] == "eta_cog"
+    wave = found.sel(input="wave", state="heave")
+    ours = wave.amplitude.values * np.exp(1j * np.radians(wave.phase.values))
+    # Sensor noise of 1e-5 beside waves of 0.1 m, and the ridge.
+    assert np.abs(ours - answer(FREQUENCIES[:3])).max() < 2e-3
+    assert found.trained.sel(input="wave").values.tolist() == [True, True, True]
+    assert not check.response(model, [2.5]).trained.any()
+
+
+def test_measured_points_hold_the_truth_in_their_intervals(sea, model):
+    runs = {"sea": sea} | {
+        f"at {f}": vessel_run([f], 7, 1200, 1e-3, run=f"at {f}", waves="regular")
+        for f in (0.4, 0.6317)
+    }
+    found = check.measured_response(model, runs)
+    assert found.attrs["reference"] == "eta_cog"
+    regular = found.sel(point=found.kind == "regular")
+    assert regular.frequency.values == pytest.approx([0.4, 0.6317], abs=1e-4)
+    truth = np.abs(answer(regular.frequency.values))
+    error = np.abs(regular.amplitude.sel(state="heave").values - truth)
+    sure = regular.amplitude_uncertainty.sel(state="heave").values
+    assert np.all(error < 2 * sure)
+    assert np.all(sure < 0.02)
+    judged = check.validation(model, runs, found)
+    assert judged.within.sel(point=judged.kind == "regular").all()
+
+
+def test_accuracy_of_the_instruments_widens_the_interval(model):
+    exact = vessel_run([0.5], 7, 1200, 1e-4, waves="regular")
+    rough = exact.copy(deep=True)
+    rough.eta_cog.attrs["accuracy"] = 1e-3  # of 0.02 m: 5 %
+    found = [check.measured_response(model, {"run": run}) for run in (exact, rough)]
+    wide = float(found[1].amplitude_uncertainty[0, 0])
+    # Two standard uncertainties of the ratio; the scatter over windows adds little.
+    assert wide == pytest.approx(1.96 * 0.05 * float(found[1].amplitude[0, 0]), rel=0.03)
+    assert wide > 5 * float(found[0].amplitude_uncertainty[0, 0])
+
+
+def test_intervals_of_a_harmonic_fit_cover_as_they_say():
+    rng = np.random.default_rng(5)
+    time = DT * np.arange(900)
+    wave = np.cos(2 * np.pi * 0.5 * time)
+    truth = 0.7 * np.exp(0.4j)
+    clean = (truth * np.exp(2j * np.pi * 0.5 * time)).real
+    many = clean[:, None] + 0.3 * rng.standard_normal((900, 500))
+    harmonics, _ = harmonic_fits(np.column_stack([wave, many]), DT, 0.5)
+    found = estimate(harmonics[:, 1:] / harmonics[:, :1], np.zeros(500))
+    inside = np.abs(np.abs(found.ratio) - 0.7) < found.amplitude
+    turned = np.abs(np.angle(found.ratio / truth)) < found.phase
+    # 500 repetitions know a coverage of 95 % to 1 % (one SD).
+    assert 0.92 <= inside.mean() <= 0.98
+    assert 0.92 <= turned.mean() <= 0.98
+
+
+def test_what_cannot_be_judged_says_why(sea, model):
+    with pytest.raises(RequestError, match="the model has no input: it answers no wave"):
+        check.response(HankelDMDc(2, 0, 1.0).fit(sea, ["heave"], []))
+    with pytest.raises(RequestError, match=r"up to half the sampling rate \(5 Hz\); received 9"):
+        check.response(model, [9.0])
+    short = vessel_run([0.5], 1, 100, waves="regular")
+    why = (
+        r"no run gives a measured response\. short: the record holds 5\.0 periods of the wave "
+        r"\(2 s\); its scatter takes 9 or more"
+    )
+    with pytest.raises(DataError, match=why):
+        check.measured_response(model, {"short": short})
+    dead = sea.assign(eta_cog=sea.eta_cog * 0)
+    dead.eta_cog.attrs = sea.eta_cog.attrs
+    with pytest.raises(DataError, match="eta_cog holds no energy: it is constant"):
+        check.measured_response(model, {"dead": dead})
+    with pytest.raises(DataError, match="it has no frequency"):
+        dominant_frequency(np.ones(100), 0.1)

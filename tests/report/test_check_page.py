@@ -1,0 +1,62 @@
+"""``seakeep check``: the page, its files, and what it says of what cannot be judged."""
+
+import csv
+
+import numpy as np
+import pytest
+from tutorial_study import put_tutorial
+
+from seakeep.check import Checked
+from seakeep.cli import main
+from seakeep.errors import RequestError
+
+pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+
+from matplotlib.figure import Figure
+
+from seakeep.report.check_page import check_sections
+from seakeep.report.figures import checks
+
+
+@pytest.fixture(scope="module")
+def checked(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("check")
+    put_tutorial(folder, "")
+    campaign, model = str(folder / "campaign.toml"), str(folder / "model.nc")
+    assert main(["fit", campaign, "-o", model]) == 0
+    assert main(["check", model, campaign, "-o", str(folder / "out")]) == 0
+    return folder / "out"
+
+
+def test_the_page_holds_its_figures_and_tables(checked):
+    page = (checked / "report.html").read_text("utf-8")
+    for name in ("response", "coherence"):
+        assert (checked / "figures" / f"{name}.png").exists()
+        assert f'id="figure-{name}"' in page
+    with (checked / "tables" / "possible.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert {"heave", "pitch"} < {row["state"] for row in rows}
+    for row in rows:
+        assert 0 < float(row["linear bound"]) <= 1
+        assert f"{row['state']}: model" in page
+
+
+def test_a_page_says_what_cannot_be_judged():
+    refused = {"coherence": "all runs are regular.", "response": "the model has no input."}
+    notes = {"measured_response": ("run_3 is left out: it is short.",)}
+    response, possible, *_ = check_sections(Checked({}, refused, notes))
+    assert response.notices == (
+        "Cannot be judged: the model has no input.",
+        "run_3 is left out: it is short.",
+    )
+    assert possible.notices == ("Cannot be judged: all runs are regular.",)
+
+
+def test_figures_draw_on_axes_that_are_given():
+    figure = Figure()
+    with pytest.raises(RequestError, match="axes holds 1 Axes and the figure draws 2 panels"):
+        checks.panels(figure.subplots(), 2, 3, (1, 1))
+    axes = figure.subplots(1, 2)
+    same, places = checks.panels(axes, 2, 3, (1, 1))
+    assert same is figure
+    assert np.all(np.array(places) == axes)
