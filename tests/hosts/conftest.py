@@ -8,7 +8,7 @@ import xarray as xr
 
 from seakeep import Expression, HankelDMDc, HankelDMDcModel, Powers, ReadOut, SlowSquares
 from seakeep.baselines import ARX
-from seakeep.hosts.program import program_of
+from seakeep.hosts import start_rows
 
 DT, PERIOD = 0.1, 8  # s, samples
 STATES, INPUTS = ["surge", "load"], ["eta", "wave probe"]
@@ -54,12 +54,12 @@ class Case:
 
 def case_of(model, steps=60, start=200):
     run = sea_run(9)
-    x = run[STATES].to_array().values.T[: start + 1]
+    x = run[STATES].to_array().values.T
     u = run[INPUTS].to_array().values.T if model.inputs else np.zeros((len(run.time), 0))
-    end = start + steps + model.lead_samples
-    expected = model.forecast_arrays(x, u[: start + 1], u[start + 1 : end], steps)
-    s, history = model.signature.state_delays, program_of(model).history
-    return Case(model, x[-s - 1 :], u[start - history : end], expected)
+    now, end = start + 1, start + steps + model.lead_samples
+    expected = model.forecast_arrays(x[:now], u[:now], u[now:end], steps)
+    x_history, u_history = start_rows(model, run, start * DT)
+    return Case(model, x_history, np.concatenate([u_history, u[end - steps : end]]), expected)
 
 
 @pytest.fixture(scope="session")

@@ -125,7 +125,7 @@ def test_a_file_name_becomes_an_identifier(file, name):
 
 def test_a_file_that_seakeep_did_not_write_stays(tmp_path, cases):
     (tmp_path / "rom.c").write_text("int main(void) { return 0; }")
-    with pytest.raises(RequestError, match="exists and is no C source that seakeep wrote"):
+    with pytest.raises(RequestError, match="exists and is not a C source that seakeep wrote"):
         write_c(cases["arx"].model, tmp_path)
     assert not (tmp_path / "rom.h").exists()
     (tmp_path / "rom.c").unlink()

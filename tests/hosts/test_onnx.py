@@ -50,7 +50,7 @@ def test_the_graph_names_its_channels(cases, tmp_path):
 
 def test_a_file_that_seakeep_did_not_write_stays(cases, tmp_path):
     (tmp_path / "m.onnx").write_bytes(b"weights of somebody")
-    with pytest.raises(RequestError, match="is no ONNX graph that seakeep wrote"):
+    with pytest.raises(RequestError, match="is not a graph for ONNX that seakeep wrote"):
         write_onnx(cases["arx"].model, tmp_path / "m.onnx")
     (tmp_path / "m.onnx").unlink()
     write_onnx(cases["arx"].model, tmp_path / "m.onnx")

@@ -3,5 +3,6 @@
 from seakeep.hosts.c import write_c
 from seakeep.hosts.fmu import write_fmu
 from seakeep.hosts.graph import write_onnx
+from seakeep.hosts.program import start_rows
 
-__all__ = ["write_c", "write_fmu", "write_onnx"]
+__all__ = ["start_rows", "write_c", "write_fmu", "write_onnx"]

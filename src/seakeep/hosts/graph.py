@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["write_onnx"]
 
-KIND = "ONNX graph"
+KIND = "graph for ONNX"
 OPSET, IR = 17, 8
 """Versions of the operators and of the file: those of ONNX 1.12, of 2022."""
 END = np.iinfo(np.int64).max

@@ -9,13 +9,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+import xarray as xr
+
+from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError
-from seakeep.models import FittedAlignment, HankelDMDcModel, HankelEnsemble, Model
+from seakeep.models import FittedAlignment, HankelDMDcModel, HankelEnsemble, Model, labelled
 from seakeep.models.inputs import Chain, Lead
 from seakeep.models.interface import Scale
 from seakeep.models.observables import Bound, Observed, Term
 
-__all__ = ["Program", "program_of"]
+__all__ = ["Program", "program_of", "start_rows"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +135,59 @@ def program_of(model: Model) -> Program:
         if not bound.terms:
             raise RequestError(_strange("observable", bound.labels[0].name))
     return program
+
+
+def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray, FloatArray]:
+    """Measured rows from which an exported model starts.
+
+    Parameters
+    ----------
+    model : Model
+        As for :func:`seakeep.hosts.write_c`.
+    run : Dataset
+        As for :meth:`HankelDMDcModel.forecast`; its inputs are aligned here, if the model does so.
+    start : float
+        Instant k of the last measured state, s.
+
+    Returns
+    -------
+    x_history : ndarray, shape (s + 1, N)
+        States up to instant k, oldest first.
+    u_history : ndarray, shape (rows, Q)
+        Inputs up to instant k − 1 + ``lead_samples``, oldest first. The first step takes the row
+        after them.
+
+    Raises
+    ------
+    RequestError
+        If the run does not hold these rows.
+    DataError
+        If there are gaps in them, or step or units of the run are not those of the model.
+    """
+    program = program_of(model)
+    signature = program.model.signature
+    name = labelled.run_name(run, "the run")
+    labelled.check_run(run, name)
+    labelled.check_step(run, name, signature.dt)
+    labelled.check_units(run, signature.state_labels + signature.input_labels, name)
+    time = np.asarray(run["time"].values, dtype=float)
+    at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
+    aligned = program.model.aligned_inputs(run) if program.is_aligned else run
+    rows = []
+    for source, names, first, stop in (
+        (run, signature.states, at - signature.state_delays, at + 1),
+        (aligned, signature.inputs, at - program.history, at + signature.lead_samples),
+    ):
+        if first < 0 or stop > time.size:
+            raise RequestError(
+                f"start = {start:g} s leaves no room in {name} for the {stop - first} samples of "
+                f"{', '.join(names)} that the model starts from: {at - first} before it and "
+                f"{max(stop - at - 1, 0)} after it. Choose an instant further inside the run."
+            )
+        values = labelled.channel_matrix(source, names, name, slice(first, stop))
+        labelled.check_finite(values, names, name, first, time)
+        rows.append(values)
+    return rows[0], rows[1]
 
 
 def _strange(what: str, kind: str) -> str:
