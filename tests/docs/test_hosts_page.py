@@ -1,0 +1,26 @@
+"""The page on other programs runs: its commands, its Python and its C, which print the same."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from pages import play
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "howto/hosts.md").read_text(encoding="utf-8")
+
+
+def test_the_page_runs_and_its_c_prints_what_python_does(tmp_path, monkeypatch):
+    for name in ("fmpy", "onnx", "onnxruntime"):
+        pytest.importorskip(name)
+    if shutil.which("cc") is None:
+        pytest.skip("there is no C compiler")
+    shutil.copytree(DOCS / "tutorial", tmp_path / "tutorial")
+    monkeypatch.chdir(tmp_path / "tutorial")
+    play(PAGE, "hosts.md")
+    Path("main.c").write_text(re.findall(r"^```c\n(.*?)^```$", PAGE, re.M | re.S)[0], "utf-8")
+    shell = re.findall(r"^```sh\n(.*?)^```$", PAGE, re.M | re.S)[0]
+    done = subprocess.run(shell, shell=True, check=True, capture_output=True, text=True)
+    assert done.stdout in PAGE
