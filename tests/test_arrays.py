@@ -158,13 +158,13 @@ CALLS = {
     **{
         f"metrics.{name}": (both(getattr(metrics, name)), TABLE, TABLE)
         for name in metrics.__all__
-        if name not in ("Measure", "labelled")
+        if name not in ("Measure", "anrmse_differences", "labelled")
     },
 }  # fmt: skip
 # Of no array: settings, a file, Datasets, units, clocks, results of others.
 WITHOUT_ARRAYS = {
     "signals.contact_sheet", "signals.froude_factor", "signals.lowpass_taps",
-    "signals.pool_drift", "signals.track_video", "metrics.labelled",
+    "signals.pool_drift", "signals.track_video", "metrics.labelled", "metrics.anrmse_differences",
     "core.training_window", "statistics.overlap_block",
 }  # fmt: skip
 ROOMS = {

@@ -433,3 +433,31 @@ def test_bounds_take_the_place_of_the_value():
         metrics.error_over_time(**pair, interval=0.9)
     with pytest.raises(RequestError, match="interval must lie between 0 and 1"):
         metrics.nrmse(**pair, interval=95)
+
+
+def test_errors_that_models_share_cancel_in_their_difference():
+    rng = np.random.default_rng(0)
+    measured = [labelled(rng.normal(size=(300, 2))) for _ in range(2)]
+    errors = [labelled(rng.normal(size=(300, 2))) for _ in measured]
+    first, half, equal = (
+        [m + scale * e for m, e in zip(measured, errors, strict=True)] for scale in (0.2, 0.1, 0.2)
+    )
+    found = metrics.anrmse_differences([first, half, equal], measured)
+    for name, of in (("anrmse", first), ("all_anrmse", first)):
+        own = [metrics.anrmse(predicted=p, measured=m) for p, m in zip(of, measured, strict=True)]
+        np.testing.assert_array_equal(found[name][0], own if name == "anrmse" else np.mean(own))
+    # Half the error in every sample is half the ANRMSE in every draw, to rounding.
+    for key in ("change", "lower", "upper"):
+        np.testing.assert_allclose(found[key], [[0, 0], [-0.5, -0.5], [0, 0]], atol=1e-12)
+        np.testing.assert_allclose(found[f"all_{key}"], [0, -0.5, 0], atol=1e-12)
+
+
+def test_the_interval_of_a_difference_holds_it_as_often_as_it_says():
+    rng = np.random.default_rng(1)
+    held = []
+    for _ in range(100):
+        m, shared, own = (labelled(rng.normal(size=(150, 1)), ("heave",)) for _ in range(3))
+        found = metrics.anrmse_differences([[m + shared], [m + 0.8 * shared + 0.3 * own]], [m])
+        truth = np.sqrt(0.8**2 + 0.3**2) - 1.0
+        held.append(float(found["lower"][1, 0]) <= truth <= float(found["upper"][1, 0]))
+    assert np.mean(held) >= 0.89  # 100 trials have a standard error of 0.022

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import functools
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, Protocol, TypeVar, overload
 
 import numpy as np
@@ -40,6 +40,7 @@ from seakeep.pairing import pair
 __all__ = [
     "Measure",
     "anrmse",
+    "anrmse_differences",
     "error_over_time",
     "fit_percent",
     "is_slack",
@@ -189,23 +190,145 @@ def _valued(
         return measure(**arrays, **known)
     p, m, _, _ = core.paired(arrays["predicted"], arrays["measured"], None)
     tails = fraction(level, "interval")
+    block = _block(p, m)
+    axis = max(p.ndim, m.ndim) - 2  # of the draws, behind members and windows
+    found = _redrawn(measure, p, m, known, block)
+    return _bounds(found, m.shape[-2] / block, tails, axis)
+
+
+def _block(p: FloatArray, m: FloatArray) -> int:
+    """Instants over which the squared errors of a forecast depend on each other."""
     square = np.nansum(((p - m) / m.std(axis=-2, keepdims=True)) ** 2, axis=-1)
     square = np.where(np.isfinite(square), square, 0.0).reshape(-1, p.shape[-2]).mean(axis=0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeakeepWarning)  # few blocks widen the interval
-        block = 1 if np.ptp(square) == 0 else block_length(square, "politis_white")
-    rows = bootstrap_indices(len(square), REDRAWN, block, np.random.default_rng(0))
+        return 1 if np.ptp(square) == 0 else block_length(square, "politis_white")
+
+
+def _redrawn(
+    measure: Callable[..., Any],
+    p: FloatArray,
+    m: FloatArray,
+    known: Mapping[str, Any],
+    block: int,
+    seed: int = 0,
+) -> FloatArray:
+    """A measure over redrawn blocks of instants; draws lie on the axis of time."""
+    rows = bootstrap_indices(m.shape[-2], REDRAWN, block, np.random.default_rng(seed))
     step = max(1, AT_ONCE // max(p.size, m.size))
     pieces = [rows[first : first + step] for first in range(0, REDRAWN, step)]
-    axis = max(p.ndim, m.ndim) - 2  # of the draws, behind members and windows
-    found = np.concatenate(
-        [measure(predicted=p[..., at, :], measured=m[..., at, :], **known) for at in pieces], axis
+    return np.concatenate(
+        [measure(predicted=p[..., at, :], measured=m[..., at, :], **known) for at in pieces],
+        max(p.ndim, m.ndim) - 2,
     )
-    tail = outer_tail(len(square) / block, tails)
+
+
+def _bounds(found: FloatArray, blocks: float, level: float, axis: int) -> FloatArray:
+    """Quantiles over an axis of draws, further out for few blocks."""
+    tail = outer_tail(blocks, level)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a channel that is never judged
         out: FloatArray = np.nanquantile(found, [tail, 1.0 - tail], axis=axis)
     return out
+
+
+def anrmse_differences(
+    predicted: Sequence[Sequence[xr.Dataset]],
+    measured: Sequence[xr.Dataset],
+    interval: float = 0.95,
+) -> xr.Dataset:
+    """Compare the ANRMSE of several models over the same runs, paired with the first model.
+
+    Parameters
+    ----------
+    predicted : sequence of sequence of Dataset
+        Forecasts, per model and run.
+    measured : sequence of Dataset
+        Measurement of each run.
+    interval : float, optional
+        Probability between the bounds.
+
+    Returns
+    -------
+    Dataset
+        Over (model, run): ``anrmse``, ``change`` (relative to the first model, −0.2 for 20 %
+        less) and its bounds ``lower`` and ``upper``; the same over ``model`` for the mean over
+        the runs, as ``all_anrmse``, ``all_change`` and so on. All models are redrawn in the same
+        blocks of instants, so that errors that they share cancel. The bounds hold for these runs:
+        they do not contain the spread between runs.
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`anrmse`.
+
+    Examples
+    --------
+    >>> import numpy as np, xarray as xr
+    >>> rng = np.random.default_rng(0)
+    >>> heave = xr.Dataset({"heave": ("time", rng.normal(size=500))})
+    >>> near, far = heave + 0.1 * rng.normal(size=500), heave + 0.2 * rng.normal(size=500)
+    >>> found = anrmse_differences([[far], [near]], [heave])
+    >>> bool(-0.6 < found["lower"][1, 0] < found["upper"][1, 0] < -0.4)
+    True
+    """
+    level = fraction(interval, "interval")
+    values, draws, blocks = [], [], 0.0
+    bounds = []
+    for seed, (each, *forecasts) in enumerate(zip(measured, *predicted, strict=True)):
+        own, redrawn, held = _anrmse_of_run(forecasts, each, seed)
+        values.append(own)
+        draws.append(redrawn)
+        blocks += held
+        bounds.append(_bounds(_change(redrawn), held, level, -1))
+    anrmses, pooled = np.stack(values, axis=-1), np.mean(draws, axis=0)
+    means = anrmses.mean(axis=-1)
+    lower, upper = np.stack(bounds, axis=-1)
+    all_lower, all_upper = _bounds(_change(pooled), blocks, level, -1)
+    grid, single = ("model", "run"), ("model",)
+    return xr.Dataset(
+        {
+            "anrmse": (grid, anrmses),
+            "change": (grid, _change(anrmses)),
+            "lower": (grid, lower),
+            "upper": (grid, upper),
+            "all_anrmse": (single, means),
+            "all_change": (single, _change(means)),
+            "all_lower": (single, all_lower),
+            "all_upper": (single, all_upper),
+        },
+        attrs={"level": level},
+    )
+
+
+def _change(values: FloatArray) -> FloatArray:
+    """Change from the first entry, relative to it; zero for the first itself."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        out: FloatArray = values / values[0] - 1.0
+    return out
+
+
+def _anrmse_of_run(
+    forecasts: Sequence[xr.Dataset], measured: xr.Dataset, seed: int
+) -> tuple[FloatArray, FloatArray, float]:
+    """ANRMSE of several forecasts of a run, its draws (forecast, draw), and the blocks held."""
+    pairs = [pair(predicted=each, measured=measured) for each in forecasts]
+    known = [
+        {
+            "training_std": [each[name].attrs.get("training_std", 0.0) for name in of.names],
+            "noise_std": [measured[name].attrs.get("noise_std", 0.0) for name in of.names],
+        }
+        for each, of in zip(forecasts, pairs, strict=True)
+    ]
+    arrays = [(of.arrays["predicted"], of.arrays["measured"]) for of in pairs]
+    block = max(_block(p, m) for p, m in arrays)
+    own = [
+        core.anrmse(predicted=p, measured=m, **k) for (p, m), k in zip(arrays, known, strict=True)
+    ]
+    redrawn = [
+        _redrawn(core.anrmse, p, m, k, block, seed) for (p, m), k in zip(arrays, known, strict=True)
+    ]
+    return np.array(own, dtype=float), np.stack(redrawn), arrays[0][1].shape[-2] / block
 
 
 is_slack: Measure[xr.Dataset, BoolArray] = labelled(core.is_slack, "channel", label="slackness")

@@ -456,7 +456,12 @@ def test_several_models_are_judged_over_the_same_instants(run, place):
         name: row["nrmse"] for name, row in single.items()
     }
     drawn = importlib.util.find_spec("matplotlib") is not None
-    assert (place / "both/unseen_model.png").exists() == drawn
+    assert (place / "both/unseen.png").exists() == drawn
+    assert (place / "both/errors_by_run.png").exists() == drawn
+    assert "unseen: change of ANRMSE from model" in out
+    with (place / "both/differences.csv").open(encoding="utf-8", newline="") as file:
+        changes = list(csv.DictReader(file))
+    assert [row["model"] for row in changes] == 2 * ["model", "ensemble"]
 
 
 def test_baselines_stand_beside_a_model_and_their_loss_is_not_its_own(run, place):

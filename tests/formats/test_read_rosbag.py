@@ -203,7 +203,9 @@ def test_messages_that_are_missing(tmp_path):
 def test_foreign_and_empty(tmp_path, name):
     path = tmp_path / name
     path.write_bytes("tid;hiv é\n1;2\n".encode("latin-1"))
-    with pytest.raises(DataError, match=r"is no (MCAP|ROS 2 bag) file: it holds text and starts"):
+    with pytest.raises(
+        DataError, match=r"is not a valid (MCAP|ROS 2 bag) file: it holds text and starts"
+    ):
         read_table(path)
     path.write_bytes(b"")
     with pytest.raises(DataError, match=r"is empty \(0 bytes\)"):

@@ -11,8 +11,10 @@ import xarray as xr
 from seakeep.report.comparison import (
     band_findings,
     comparison_blocks,
+    difference_blocks,
     model_blocks,
     write_comparison,
+    write_differences,
     write_forecast,
 )
 from seakeep.report.style import LINES
@@ -20,6 +22,7 @@ from seakeep.study import (
     Comparison,
     at_full_scale,
     comparison_table,
+    difference_table,
     forecast_at_full_scale,
     in_degrees,
 )
@@ -264,6 +267,53 @@ def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path)
     path = write_comparison(tables, tmp_path / "t.csv")
     rows = list(csv.DictReader(path.read_text().splitlines()))
     assert [row["model"] for row in rows[::3]] == list(tables)
+
+
+def waves_of(period, factor, run):
+    """A comparison in regular waves."""
+    wave = {"eta_fwd": ("time", np.sin(2 * np.pi * TIME / period), {"units": "m"})}
+    inputs = xr.Dataset(wave, coords={"time": TIME})
+    return replace(comparison(factor), run=run, inputs=inputs)
+
+
+def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
+    runs = {"long": 2.0, "short": 1.0}
+    found = {
+        name: [waves_of(period, factor, run) for run, period in runs.items()]
+        for name, factor in {"ours": 0.9, "theirs": 0.8}.items()
+    }
+    table = difference_table(found)
+    np.testing.assert_allclose(table["wave_period"], [2.0, 1.0], rtol=1e-3)  # by interpolation
+    by_run, changes = difference_blocks(table)
+    assert by_run.columns == ("run", "waves, s", "ours", "theirs")
+    assert by_run.rows[0] == ("short", "1", "0.100", "0.200")
+    assert by_run.rows[-1] == ("mean", "", "0.100", "0.200")
+    assert changes.rows[0] == ("ours", "0.100", "", "", "")
+    # Twice the error at every instant, in every draw.
+    assert changes.rows[1] == ("theirs", "0.200", "+100 %", "+100 to +100 %", "worse")
+    path = write_differences(table, tmp_path / "d.csv")
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    assert [(row["run"], row["model"]) for row in rows] == [
+        *((run, model) for model in found for run in runs),
+        *(("", model) for model in found),
+    ]
+    (only,) = difference_blocks(difference_table({k: each[:1] for k, each in found.items()}))
+    assert only.title == "long: change of ANRMSE from ours"
+
+
+def test_figures_of_several_models_name_each_of_them():
+    pytest.importorskip("matplotlib")
+    from seakeep.report.overlay import error_figure, overlay_figure
+
+    found = {"ours": [waves_of(1.0, 0.9, "r")], "theirs": [waves_of(1.0, 0.5, "r")]}
+    figure = overlay_figure({name: each[0] for name, each in found.items()})
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ["measured", "ours, ANRMSE 0.100", "theirs, ANRMSE 0.500"]
+    assert figure.axes[0].get_title(loc="right") == "NRMSE 0.100 · 0.500"
+    assert "ANRMSE" not in figure.get_suptitle()
+    axes = error_figure(difference_table(found)).axes[0]
+    assert axes.get_xticklabels()[0].get_text() == "r\n1 s"
+    assert [line.get_label() for line in axes.get_lines()] == list(found)
 
 
 def test_the_figure_judges_as_the_table_does_where_loads_are_shown_in_kilonewtons():

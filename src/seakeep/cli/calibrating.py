@@ -101,7 +101,7 @@ def calibrate(
     """
     check_place(out, ".nc")
     from seakeep.campaign import load_prepared, read_campaign
-    from seakeep.models import HankelEnsemble, load_model
+    from seakeep.models import is_ensemble, load_model
     from seakeep.models.calibration import check_scale
     from seakeep.models.forecasts import counted
     from seakeep.signals.time_axis import instant_text, span_text
@@ -109,7 +109,7 @@ def calibrate(
 
     check_scale(scale)
     fitted = load_model(ensemble)
-    if not isinstance(fitted, HankelEnsemble):
+    if not is_ensemble(fitted):
         raise RequestError(
             f"{ensemble} holds a single model, which has no band. Fit an ensemble (kind = "
             "'bayesian_hankel_dmdc' in [model])."

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -37,6 +36,8 @@ if TYPE_CHECKING:
 __all__ = ["compare", "fit", "forecast"]
 
 TABLE = "comparison.csv"
+DIFFERENCES = "differences.csv"
+ERRORS = "errors_by_run"
 
 
 def fit(
@@ -61,7 +62,7 @@ def fit(
     """
     check_place(out, ".nc")
     from seakeep.campaign import read_campaign
-    from seakeep.models import HankelEnsemble
+    from seakeep.models import is_ensemble
     from seakeep.study import fit_campaign
 
     read = read_campaign(campaign)
@@ -69,7 +70,7 @@ def fit(
     with member_executor(workers, scheduler) as executor:
         with progress_bar("Fitting") as progress:
             identified = fit_campaign(read, model, progress, executor=executor)
-        if isinstance(identified, HankelEnsemble):
+        if is_ensemble(identified):
             with progress_bar("Stability") as progress:
                 identified.spectral_radii(executor=executor, progress=quietly(progress))
     typer.echo(identified.summary())
@@ -129,7 +130,7 @@ def forecast(
         raise RequestError(f"{out} ends in '{out.suffix}'; a forecast is written as .nc or .csv.")
     check_place(out)
     from seakeep.campaign import read_campaign
-    from seakeep.models import HankelEnsemble, load_model
+    from seakeep.models import is_ensemble, load_model
     from seakeep.quality import warn_of_runs
     from seakeep.report.comparison import forecast_header, forecast_words, write_forecast
     from seakeep.signals.time_axis import instant_text
@@ -139,7 +140,7 @@ def forecast(
     identified = load_model(model)
     read = read_campaign(campaign)
     check_output(out, "forecast", read_files(read, model), forecast_header(identified.states))
-    if not isinstance(identified, HankelEnsemble):
+    if not is_ensemble(identified):
         given = {"--level": level is not None, "--band": band is not None, "--members": members}
         _refuse_for_one(model, given | {"--scheduler": scheduler is not None})
     elif members and (level is not None or band is not None):
@@ -151,7 +152,7 @@ def forecast(
     warn_of_runs([prepared], [*identified.states, *identified.inputs])
     first = instant_of(start, read, [prepared], "--start")
     count = None if steps is None else samples_of(steps, read, [prepared], identified.dt, "--steps")
-    if isinstance(identified, HankelEnsemble):
+    if is_ensemble(identified):
         with (
             member_executor(workers, scheduler) as executor,
             progress_bar("Forecasting") as progress,
@@ -233,7 +234,8 @@ def compare(
 
     Prints a table per run and writes it as CSV, with an overlay figure per run. For an ensemble the
     members' mean is judged, and how much of the measurement their band holds. Several models are
-    judged over the same instants.
+    judged over the same instants, with the change of the error from the first one, its interval,
+    and a figure of the errors by wave period.
 
     Example: seakeep compare model.nc docs/tutorial/campaign.toml -o comparison
 
@@ -243,17 +245,24 @@ def compare(
         raise RequestError(f"--format must be png, svg or pdf; received '{format_}'.")
     from seakeep.campaign import read_campaign
     from seakeep.models import load_model
-    from seakeep.report.comparison import write_comparison
-    from seakeep.study import at_full_scale, compare_models, comparison_table, in_degrees
+    from seakeep.report.comparison import difference_blocks, write_comparison, write_differences
+    from seakeep.study import (
+        at_full_scale,
+        compare_models,
+        comparison_table,
+        difference_table,
+        in_degrees,
+    )
 
     make_folder(out)
     names = _named(model)
     fitted = {name: load_model(path) for name, path in names.items()}
     shown = _band(fitted, level, band, scheduler)
     read = read_campaign(campaign)
-    figures = _figures(fitted, run or read.test_runs, out, format_)
+    figures = _figures(run or read.test_runs, out, format_)
     used = read_files(read, *model)
     check_output(out / TABLE, "table", used, "run,channel,channel_units,.*")
+    check_output(out / DIFFERENCES, "table", used, "run,wave_period,model,.*")
     for path in figures.values():
         check_output(path, "figure", used)
     if baselines:
@@ -277,7 +286,14 @@ def compare(
         found = {name: [in_degrees(each) for each in of] for name, of in found.items()}
     tables = {name: comparison_table(of) for name, of in found.items()}
     _print_comparison(tables, {name: each.kind for name, each in fitted.items()})
-    written = [write_comparison(tables, out / TABLE), *_draw(found, figures)]
+    written = [write_comparison(tables, out / TABLE)]
+    differences = None
+    if len(found) > 1:
+        differences = difference_table(found)
+        for block in difference_blocks(differences):
+            print_table(block)
+        written.append(write_differences(differences, out / DIFFERENCES))
+    written += _draw({name: found[name] for name in names}, figures, differences)
     messages().print("Wrote " + ", ".join(map(str, written)))
     if not all(each.complete for name in names for each in found[name]):
         raise typer.Exit(1)
@@ -289,22 +305,15 @@ def _named(files: list[Path]) -> dict[str, Path]:
     return {p.stem if stems.count(p.stem) == 1 else str(p.with_suffix("")): p for p in files}
 
 
-def _figures(
-    models: Iterable[str], runs: list[str], out: Path, suffix: str
-) -> dict[tuple[str, str], Path]:
-    """File of the figure of each model and run, where figures can be drawn."""
+def _figures(runs: list[str], out: Path, suffix: str) -> dict[str, Path]:
+    """File of the figure of each run, and of all runs (""), where figures can be drawn."""
     if find_spec("matplotlib") is None:
         messages().print(
             "Note: no figures, because matplotlib is not installed. "
             "Install it with: pip install 'seakeep[figures]'"
         )
         return {}
-    names = {name: "_" + re.sub(r"[^\w.-]", "_", name) for name in models}
-    if len(names) == 1:
-        names = dict.fromkeys(names, "")
-    return {
-        (name, run): out / f"{run}{end}.{suffix}" for name, end in names.items() for run in runs
-    }
+    return {run: out / f"{run or ERRORS}.{suffix}" for run in (*runs, "")}
 
 
 def _with_baselines(fitted: Mapping[str, Model], campaign: Campaign) -> dict[str, Model]:
@@ -339,19 +348,22 @@ def _print_comparison(tables: Mapping[str, xr.Dataset], kinds: Mapping[str, str]
 
 
 def _draw(
-    found: Mapping[str, list[Comparison]], figures: Mapping[tuple[str, str], Path]
+    found: Mapping[str, list[Comparison]],
+    figures: Mapping[str, Path],
+    differences: xr.Dataset | None,
 ) -> list[Path]:
     if not figures:
         return []
-    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.overlay import error_figure, overlay_figure
     from seakeep.report.style import save_figure
 
-    return [
-        save_figure(overlay_figure(each), figures[name, each.run])
-        for name, of in found.items()
-        for each in of
-        if (name, each.run) in figures
-    ]
+    written = []
+    for of_run in zip(*found.values(), strict=True):
+        figure = overlay_figure(dict(zip(found, of_run, strict=True)))
+        written.append(save_figure(figure, figures[of_run[0].run]))
+    if differences is not None:
+        written.append(save_figure(error_figure(differences), figures[""]))
+    return written
 
 
 def _scale(campaign: Campaign) -> float:
@@ -394,9 +406,9 @@ def _band(
     """Level and kind of band that were asked for; a calibrated one knows its level."""
     if band not in (None, "members", "calibrated"):
         raise RequestError(f"--band must be members or calibrated; received '{band}'.")
-    from seakeep.models import HankelEnsemble
+    from seakeep.models import is_ensemble
 
-    ensembles = [each for each in models.values() if isinstance(each, HankelEnsemble)]
+    ensembles = [each for each in models.values() if is_ensemble(each)]
     if not ensembles:
         given = {"--level": level is not None, "--band": band is not None}
         _refuse_for_one(", ".join(models), given | {"--scheduler": scheduler is not None})

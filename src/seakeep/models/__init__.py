@@ -10,7 +10,7 @@ from seakeep.models.observables import OBSERVABLES, Bound, Expression, Powers, S
 from seakeep.models.offsets import ProbeOffset, estimate_probe_offset
 from seakeep.models.priors import Fixed, LogUniform, Uniform
 from seakeep.models.readouts import FittedReadOut, ReadOut
-from seakeep.models.registry import KINDS, load_model
+from seakeep.models.registry import KINDS, is_ensemble, load_model
 from seakeep.models.settings import Select
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
 from seakeep.models.summaries import summarize
@@ -47,6 +47,7 @@ __all__ = [
     "Waves",
     "compare_waves",
     "estimate_probe_offset",
+    "is_ensemble",
     "load_model",
     "processes",
     "summarize",

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TypeVar, overload
+from typing import TypeGuard, TypeVar, overload
 
 from seakeep.errors import DataError, RequestError
 from seakeep.models import store
 from seakeep.models.baselines import ARX, FIR, HoldLast, Mean, Subspace
+from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.interface import Model, Spec
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
 
-__all__ = ["KINDS", "load_model"]
+__all__ = ["KINDS", "is_ensemble", "load_model"]
 
 KINDS: dict[str, type[Spec]] = {
     each.kind: each for each in (HankelDMDc, BayesianHankelDMDc, Mean, HoldLast, FIR, ARX, Subspace)
@@ -19,6 +20,11 @@ KINDS: dict[str, type[Spec]] = {
 """Specs by the word that TOML tables and files call their kind; one line adds a model."""
 
 Kind = TypeVar("Kind")
+
+
+def is_ensemble(model: Model) -> TypeGuard[HankelEnsemble]:
+    """Whether a model has members, and so a band, as its kind in :data:`KINDS` states."""
+    return KINDS[model.kind].is_ensemble
 
 
 @overload

@@ -14,14 +14,17 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.files import MARK, replacing, write_netcdf
 from seakeep.report.tables import MISSING, Table, plain_cell
+from seakeep.study.judge import verdict
 
 __all__ = [
     "band_findings",
     "comparison_blocks",
+    "difference_blocks",
     "forecast_header",
     "forecast_words",
     "model_blocks",
     "write_comparison",
+    "write_differences",
     "write_forecast",
 ]
 
@@ -192,6 +195,61 @@ def _skill(
     heads = ("model", *(f"below {each}" for each in references))
     title = f"{run}: ANRMSE against the baselines'"
     return Table(f"skill_{run}", title, heads, tuple(rows), "", tuple(range(1, len(heads))))
+
+
+def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
+    """Errors of several models run by run, and over all runs their change from the first one."""
+    models, runs = ([str(each) for each in table[key].values] for key in ("model", "run"))
+    if len(runs) > 1:
+        order = np.argsort(table["wave_period"].values, kind="stable")
+        rows = [
+            (
+                runs[k],
+                _text(table["wave_period"][k], "{:.3g}"),
+                *(_text(each, "{:.3f}") for each in table["anrmse"].values[:, k]),
+            )
+            for k in order
+        ]
+        rows.append(("mean", "", *(_text(each, "{:.3f}") for each in table["all_anrmse"].values)))
+        heads = ("run", "waves, s", *models)
+        numeric, last = tuple(range(1, len(heads))), (len(rows) - 1,)
+        title = f"{len(runs)} runs by wave period: ANRMSE"
+        yield Table("by_run", title, heads, tuple(rows), "", numeric, averages=last)
+    changes = []
+    for k, name in enumerate(models):
+        value, low, high = (
+            100.0 * float(table[f"all_{key}"][k]) for key in ("change", "lower", "upper")
+        )
+        known = k > 0 and bool(np.isfinite([low, high]).all())
+        changes.append(
+            (
+                name,
+                _text(table["all_anrmse"][k], "{:.3f}"),
+                _text(value, "{:+z.0f} %") if k else "",
+                f"{low:+z.0f} to {high:+z.0f} %" if known else "",
+                verdict(low, high) if known else "",
+            )
+        )
+    of = f"{len(runs)} runs" if len(runs) > 1 else runs[0]
+    title = f"{of}: change of ANRMSE from {models[0]}"
+    note = "Paired intervals over redrawn blocks of the forecast; they hold for these runs."
+    heads = ("model", "ANRMSE", "change", "95 %", "verdict")
+    yield Table("differences", title, heads, tuple(changes), note, (1, 2, 3))
+
+
+def write_differences(table: xr.Dataset, path: Path) -> Path:
+    """Write errors of several models as CSV, a row per run and model, and per model for all."""
+    each = table[["anrmse", "change", "lower", "upper", "wave_period"]].to_dataframe()
+    every = table[[name for name in table.data_vars if str(name).startswith("all_")]]
+    of_all = every.to_dataframe().rename(columns=lambda name: name.removeprefix("all_"))
+    whole = pd.concat([each.reset_index(), of_all.reset_index().assign(run="")])
+    front = ["run", "wave_period", "model"]
+    whole = whole[front + [name for name in whole.columns if name not in front]]
+    with replacing(path) as temporary:
+        whole.map(lambda cell: plain_cell(cell) if isinstance(cell, str) else cell).to_csv(
+            temporary, index=False
+        )
+    return path
 
 
 def band_findings(table: xr.Dataset) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,7 @@ from seakeep.study import Comparison, comparison_table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["overlay_figure"]
+__all__ = ["error_figure", "overlay_figure"]
 
 LONG = 60
 """A record of more periods than this is drawn as an envelope, with a part of it enlarged."""
@@ -55,15 +55,63 @@ ACROSS = 84
 BAND: dict[str, Any] = {"color": COLOURS["ensemble"], "alpha": 0.35, "linewidth": 0.6}
 
 
-def overlay_figure(comparison: Comparison) -> Figure:
-    """Time histories of every state, forecast over measurement, with the inputs below."""
+SEVERAL: tuple[dict[str, Any], ...] = (
+    {**LINES["forecast"], "marker": "o"},
+    {**LINES["ensemble"], "marker": "s"},
+    {"color": "#009E73", "linewidth": 1.2, "linestyle": (0, (1, 1)), "marker": "^"},
+    {"color": "#CC79A7", "linewidth": 1.2, "linestyle": (0, (8, 2)), "marker": "D"},
+    {"color": "#E69F00", "linewidth": 1.2, "linestyle": (0, (3, 1, 1, 1, 1, 1)), "marker": "v"},
+    {"color": "#56B4E9", "linewidth": 1.2, "linestyle": (0, (6, 1, 1, 1)), "marker": "P"},
+    {"color": "#56606B", "linewidth": 1.2, "linestyle": (0, (2, 2)), "marker": "X"},
+)
+"""Colour, dash and marker of each of several models."""
+
+
+def overlay_figure(comparison: Comparison | Mapping[str, Comparison]) -> Figure:
+    """Time histories of every state, forecasts over measurement, with the inputs below.
+
+    Several comparisons are those of one run by several models, by the models' names.
+    """
+    compared = comparison if isinstance(comparison, Mapping) else {"": comparison}
     with figure_style():
-        return _draw(comparison)
+        return _draw(compared)
 
 
-def _draw(comparison: Comparison) -> Figure:
-    table = comparison_table([comparison]).isel(run=0)
-    comparison = _with_prefixes(comparison)
+def error_figure(table: xr.Dataset) -> Figure:
+    """ANRMSE of each model in each run, by wave period; `table` of :func:`difference_table`."""
+    order = np.argsort(table["wave_period"].values, kind="stable")
+    periods, runs = table["wave_period"].values[order], table["run"].values[order]
+    names = [str(name) for name in table["model"].values]
+    with figure_style():
+        figure = new_figure(max(4.5, 1.5 + 0.8 * len(runs)), 3.2)
+        axes = figure.subplots()
+        for k, name in enumerate(names):
+            style = {**SEVERAL[k % len(SEVERAL)], "linestyle": "", "markersize": 5}
+            place = np.arange(len(runs)) + 0.7 * ((k + 0.5) / len(names) - 0.5)
+            axes.plot(place, table["anrmse"].values[k, order], label=plain_text(name), **style)
+        axes.set_xticks(
+            range(len(runs)),
+            [
+                plain_text(str(run)) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
+                for run, period in zip(runs, periods, strict=True)
+            ],
+        )
+        axes.tick_params(axis="x", labelrotation=45 if len(runs) > 8 else 0)
+        errors = table["anrmse"].values[np.isfinite(table["anrmse"].values)]
+        if errors.size and 0.0 < 10.0 * errors.min() < errors.max():
+            axes.set_yscale("log")
+        else:
+            axes.set_ylim(bottom=0.0)
+        axes.set_xlabel("run, and mean period of its waves")
+        axes.set_ylabel("ANRMSE [measured SD]")
+        figure.legend(loc="outside lower center", ncols=min(len(names), 4))
+        return figure
+
+
+def _draw(several: Mapping[str, Comparison]) -> Figure:
+    tables = [comparison_table([each]).isel(run=0) for each in several.values()]
+    compared = dict(zip(several, _with_prefixes(list(several.values())), strict=True))
+    comparison = next(iter(compared.values()))
     states = [str(name) for name in comparison.measured.data_vars]
     alike = _of_one_unit(comparison.inputs)
     rows = len(states) + len(alike)
@@ -76,10 +124,11 @@ def _draw(comparison: Comparison) -> Figure:
         each.margins(x=0.01)
     for row, name in enumerate(states):
         if period is not None:
-            _draw_envelopes(axes[row, 0], comparison, name, period)
-        _draw_state(axes[row, -1], comparison, name)
+            _draw_envelopes(axes[row, 0], compared, name, period)
+        _draw_state(axes[row, -1], compared, name)
         axes[row, 0].set_ylabel(_label(comparison.measured[name]), fontsize=LABEL)
-        axes[row, 0].set_title(_judgement(table.sel(channel=name)), loc="right", fontsize=8, pad=2)
+        judged = _judgement([table.sel(channel=name) for table in tables])
+        axes[row, 0].set_title(judged, loc="right", fontsize=8, pad=2)
     for names, (first, last) in zip(alike, axes[len(states) :, [0, -1]], strict=True):
         if period is not None:
             _draw_input_envelopes(first, comparison.inputs, names, period)
@@ -100,8 +149,9 @@ def _draw(comparison: Comparison) -> Figure:
         for column in range(columns)
         for handle, label in zip(*axes[0, column].get_legend_handles_labels(), strict=True)
     }
-    figure.legend(keys.values(), keys.keys(), loc="outside lower center", ncols=len(keys))
-    figure.suptitle(_title(comparison), x=0.01, ha="left")
+    columns = min(len(keys), 3) if len(compared) > 1 else len(keys)
+    figure.legend(keys.values(), keys.keys(), loc="outside lower center", ncols=columns)
+    figure.suptitle(_title(list(compared.values())), x=0.01, ha="left")
     return figure
 
 
@@ -130,18 +180,25 @@ def _of_one_unit(inputs: xr.Dataset) -> list[list[str]]:
     return list(groups.values())
 
 
-def _with_prefixes(comparison: Comparison) -> Comparison:
+def _with_prefixes(comparisons: Sequence[Comparison]) -> list[Comparison]:
     """Loads in kN or MN where they are large: one factor per state, and one for alike inputs."""
-    forecast, measured, inputs = (
-        each.copy() for each in (comparison.forecast, comparison.measured, comparison.inputs)
-    )
-    band = None if comparison.band is None else comparison.band.copy()
-    for name in map(str, measured.data_vars):
-        among = [each for each in (measured, forecast, band) if each is not None]
-        _apply_prefix([(each, name) for each in among])
-    for names in _of_one_unit(inputs):
-        _apply_prefix([(inputs, name) for name in names])
-    return replace(comparison, forecast=forecast, measured=measured, inputs=inputs, band=band)
+    out = [
+        replace(
+            each,
+            forecast=each.forecast.copy(),
+            measured=each.measured.copy(),
+            inputs=each.inputs.copy(),
+            band=None if each.band is None else each.band.copy(),
+        )
+        for each in comparisons
+    ]
+    for name in map(str, out[0].measured.data_vars):
+        among = [part for each in out for part in (each.measured, each.forecast, each.band)]
+        _apply_prefix([(part, name) for part in among if part is not None])
+    for each in out:
+        for names in _of_one_unit(each.inputs):
+            _apply_prefix([(each.inputs, name) for name in names])
+    return out
 
 
 def _apply_prefix(channels: Iterable[tuple[xr.Dataset, str]]) -> None:
@@ -173,20 +230,25 @@ def _legend_over(axes: Any, handles: list[Any], labels: list[str]) -> None:
     )
 
 
-def _judgement(rows: xr.Dataset) -> str:
-    nrmse = float(rows["nrmse"])
-    words = f"NRMSE {nrmse:.3f}" if np.isfinite(nrmse) else "not judged"
-    if "coverage" in rows and np.isfinite(float(rows["coverage"])):
-        words += f", {float(rows['coverage']):.0f} % in the band"
+def _judgement(rows: Sequence[xr.Dataset]) -> str:
+    errors = [float(each["nrmse"]) for each in rows]
+    if not np.isfinite(errors).any():
+        return "not judged"
+    words = "NRMSE " + " · ".join(f"{e:.3f}" if np.isfinite(e) else "lost" for e in errors)
+    if len(rows) == 1 and "coverage" in rows[0] and np.isfinite(float(rows[0]["coverage"])):
+        words += f", {float(rows[0]['coverage']):.0f} % in the band"
     return words
 
 
-def _title(comparison: Comparison) -> str:
-    parts = [comparison.run, comparison.sea_state, f"ANRMSE {comparison.anrmse:.3f}"]
+def _title(comparisons: Sequence[Comparison]) -> str:
+    comparison = comparisons[0]
+    parts = [comparison.run, comparison.sea_state]
+    if len(comparisons) == 1:
+        parts.append(f"ANRMSE {comparison.anrmse:.3f}")
     if (scale := comparison.full_scale) is not None:
         told = f"sea state as stated: {comparison.sea_state}" if comparison.sea_state else ""
         parts[1:2] = [f"full scale, λ = {scale:g}", told]
-    if comparison.status != "ok":
+    if len(comparisons) == 1 and comparison.status != "ok":
         parts.append(comparison.status)
     return plain_text(" · ".join(part for part in parts if part))
 
@@ -210,10 +272,19 @@ def _period_if_long(series: xr.DataArray) -> float | None:
     return period if (time[-1] - time[0]) / period >= LONG else None
 
 
-def _forecast_style(comparison: Comparison) -> tuple[str, dict[str, Any]]:
-    if comparison.band is None:
-        return "forecast", LINES["forecast"]
-    return "ensemble mean", LINES["ensemble"]
+def _styles(compared: Mapping[str, Comparison]) -> list[tuple[Comparison, str, dict[str, Any]]]:
+    """Each comparison with what a legend calls its forecast, and its line."""
+    if len(compared) == 1:
+        (each,) = compared.values()
+        if each.band is None:
+            return [(each, "forecast", LINES["forecast"])]
+        return [(each, "ensemble mean", LINES["ensemble"])]
+    out = []
+    for k, (name, each) in enumerate(compared.items()):
+        style = {key: value for key, value in SEVERAL[k % len(SEVERAL)].items() if key != "marker"}
+        status = "" if each.status == "ok" else f", {each.status}"
+        out.append((each, plain_text(f"{name}, ANRMSE {each.anrmse:.3f}{status}"), style))
+    return out
 
 
 def _band_of(comparison: Comparison, name: str) -> tuple[xr.DataArray, xr.DataArray, str] | None:
@@ -226,15 +297,18 @@ def _band_of(comparison: Comparison, name: str) -> tuple[xr.DataArray, xr.DataAr
     return lower, upper, f"{100 * float(attrs['level']):g} % {kind}band"
 
 
-def _draw_state(axes: Any, comparison: Comparison, name: str) -> None:
-    measured, forecast = comparison.measured[name], comparison.forecast[name]
-    label, style = _forecast_style(comparison)
+def _draw_state(axes: Any, compared: Mapping[str, Comparison], name: str) -> None:
+    styles = _styles(compared)
+    measured = styles[0][0].measured[name]
     solid = dict(LINES["measured"])
-    if (band := _band_of(comparison, name)) is not None:
-        solid = THIN
-        axes.fill_between(forecast["time"], band[0], band[1], label=band[2], **BAND)
+    for each, _, style in styles:
+        if (band := _band_of(each, name)) is not None:
+            solid = THIN
+            fill = BAND if len(styles) == 1 else {**BAND, "color": style["color"], "alpha": 0.2}
+            axes.fill_between(each.forecast["time"], band[0], band[1], label=band[2], **fill)
     axes.plot(measured["time"], measured, label="measured", **solid)
-    axes.plot(forecast["time"], forecast, label=label, **style)
+    for each, label, style in styles:
+        axes.plot(each.forecast["time"], each.forecast[name], label=label, **style)
 
 
 def _envelope(series: xr.DataArray, period: float) -> tuple[Any, Any, Any]:
@@ -247,18 +321,22 @@ def _envelope(series: xr.DataArray, period: float) -> tuple[Any, Any, Any]:
     return edges, low, high
 
 
-def _draw_envelopes(axes: Any, comparison: Comparison, name: str, period: float) -> None:
-    edges, low, high = _envelope(comparison.measured[name], period)
-    style = {"color": "#BDBDBD", "linewidth": 0}
-    axes.stairs(high, edges, baseline=low, fill=True, label="measured, envelope", **style)
-    if (band := _band_of(comparison, name)) is not None:
-        (_, low, high), (_, lifted, topmost) = (_envelope(each, period) for each in band[:2])
-        for bottom, top in ((low, lifted), (high, topmost)):
-            axes.stairs(top, edges, baseline=bottom, fill=True, **BAND)
-    style = _forecast_style(comparison)[1]
-    _, low, high = _envelope(comparison.forecast[name], period)
-    for reached in (low, high):
-        axes.stairs(reached, edges, baseline=None, color=style["color"], linewidth=0.8)
+def _draw_envelopes(
+    axes: Any, compared: Mapping[str, Comparison], name: str, period: float
+) -> None:
+    styles = _styles(compared)
+    edges, low, high = _envelope(styles[0][0].measured[name], period)
+    measured = {"color": "#BDBDBD", "linewidth": 0}
+    axes.stairs(high, edges, baseline=low, fill=True, label="measured, envelope", **measured)
+    for each, _, style in styles:
+        if (band := _band_of(each, name)) is not None:
+            fill = BAND if len(styles) == 1 else {**BAND, "color": style["color"], "alpha": 0.2}
+            (_, low, high), (_, lifted, topmost) = (_envelope(edge, period) for edge in band[:2])
+            for bottom, top in ((low, lifted), (high, topmost)):
+                axes.stairs(top, edges, baseline=bottom, fill=True, **fill)
+        _, low, high = _envelope(each.forecast[name], period)
+        for reached in (low, high):
+            axes.stairs(reached, edges, baseline=None, color=style["color"], linewidth=0.8)
 
 
 def _draw_input_envelopes(axes: Any, inputs: xr.Dataset, names: list[str], period: float) -> None:

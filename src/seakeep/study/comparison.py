@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,13 +15,13 @@ from seakeep import metrics, statistics
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.conventions import displayed
-from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
-from seakeep.models import KINDS, HankelEnsemble, Model
+from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasts import status_at_clock
 from seakeep.models.training import is_constant
 from seakeep.quality import warn_of_runs
-from seakeep.signals import froude_factor
+from seakeep.signals import encounter_period, froude_factor
 from seakeep.signals.time_axis import span_text
 from seakeep.study.fit import warn_of_repeats, warn_of_waves
 from seakeep.study.full_scale import to_full_scale
@@ -33,6 +33,7 @@ __all__ = [
     "compare",
     "compare_models",
     "comparison_table",
+    "difference_table",
     "forecast_at_full_scale",
     "in_degrees",
     "instant_of",
@@ -347,10 +348,10 @@ def compare_models(
         def forecast_run(
             run: xr.Dataset, start: float, steps: int, model: Model = model
         ) -> xr.Dataset:
-            if not KINDS[model.kind].is_ensemble:
+            if not is_ensemble(model):
                 return model.forecast(run, start=start, steps=steps)
             tell = None if members is None else _named(members, str(run.attrs["run"]))
-            return cast("HankelEnsemble", model).forecast_summary(
+            return model.forecast_summary(
                 run, start, steps, level, band=band, executor=executor, progress=tell
             )
 
@@ -492,6 +493,45 @@ def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
             continue
         table[name].attrs = {"units": units, "long_name": label}
     return table
+
+
+def difference_table(found: Mapping[str, Sequence[Comparison]]) -> xr.Dataset:
+    """Compare the errors of several models, run by run and over all runs.
+
+    Parameters
+    ----------
+    found : mapping of str to sequence of Comparison
+        From :func:`compare_models`.
+
+    Returns
+    -------
+    Dataset
+        As :func:`seakeep.metrics.anrmse_differences` gives it, with the names of models and runs,
+        and ``wave_period`` over ``run``: the mean zero-up-crossing period of the first wave input
+        over the forecast, s; NaN without one.
+    """
+    first = next(iter(found.values()))
+    out = metrics.anrmse_differences(
+        [[each.forecast for each in of] for of in found.values()],
+        [each.measured for each in first],
+        INTERVAL,
+    )
+    runs = [each.run for each in first]
+    periods = [_wave_period(each.inputs) for each in first]
+    return out.assign(wave_period=("run", periods, {"units": "s"})).assign_coords(
+        model=list(found), run=runs
+    )
+
+
+def _wave_period(inputs: xr.Dataset) -> float:
+    """Mean period of the first wave elevation among the inputs, s; NaN where there is none."""
+    waves = [each for name, each in inputs.data_vars.items() if str(name).startswith("eta")]
+    if not waves or waves[0].size < 3:
+        return np.nan
+    try:
+        return encounter_period(waves[0].values, float(np.diff(waves[0]["time"].values[:2])[0]))
+    except DataError:
+        return np.nan
 
 
 INTERVAL = 0.95
