@@ -30,6 +30,7 @@ from .models import (
     SlowSquares,
     Uniform,
     estimate_probe_offset,
+    load_live,
     load_model,
     summarize,
 )
@@ -63,6 +64,7 @@ __all__ = [
     "core",
     "estimate_probe_offset",
     "hosts",
+    "load_live",
     "load_model",
     "metrics",
     "models",

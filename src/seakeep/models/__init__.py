@@ -6,6 +6,7 @@ from seakeep.models.inputs import FittedAlignment, ProbeAlignment
 from seakeep.models.interface import InputMap, Model, Needs, Signature, Spec
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.linear import HankelDMDcModel
+from seakeep.models.live import Live, load_live
 from seakeep.models.observables import OBSERVABLES, Bound, Expression, Powers, SlowSquares
 from seakeep.models.offsets import ProbeOffset, estimate_probe_offset
 from seakeep.models.priors import Fixed, LogUniform, Uniform
@@ -32,6 +33,7 @@ __all__ = [
     "HankelEnsemble",
     "HeldEnsemble",
     "InputMap",
+    "Live",
     "LogUniform",
     "Model",
     "Needs",
@@ -48,6 +50,7 @@ __all__ = [
     "compare_waves",
     "estimate_probe_offset",
     "is_ensemble",
+    "load_live",
     "load_model",
     "processes",
     "summarize",

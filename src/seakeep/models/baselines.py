@@ -94,16 +94,9 @@ class LinearSpec(HankelSettings):
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
     ) -> LinearModel:
         """Fit the model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
-        data = gather(as_runs(runs), states, inputs, stop, self)
-        solution = self.solve(data)
-        signature = data.signature(self)
-        return self.model(
-            settings=self,
-            coefficients=solution.coefficients,
-            signature=signature,
-            training=data.training(solution),
-            coverage=Coverage.of(signature.inputs, data.inputs, data.dt),
-        )
+        named = as_runs(runs)
+        data = gather(named, states, inputs, stop, self)
+        return self.model.fitted(self, data, self.solve(data), named)
 
     def solve(self, data: TrainingData) -> Solution:
         """Coefficients on standardised deviations, shape (N, N(s+1) + n(z+1) + m)."""

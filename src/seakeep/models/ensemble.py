@@ -41,10 +41,12 @@ from seakeep.models.forecasts import (
     window_coords,
     with_units,
 )
+from seakeep.models.growth import LeadErrors, Stretch, lead_errors
 from seakeep.models.inputs import Chain, FittedAlignment
 from seakeep.models.interface import Json, Signature
 from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
+from seakeep.models.live import Live
 from seakeep.models.members import (
     TrainingArrays,
     identify_member,
@@ -909,6 +911,41 @@ class HeldEnsemble(_Forecasts):
             0
         ]
         return BandForecast(mean, std, lower, upper, len(out) - len(kept))
+
+    def live(
+        self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
+    ) -> Live:
+        """Put the members into service; see :meth:`HankelDMDcModel.live`.
+
+        The filter predicts with the mean of the members, whose errors on what they learnt from
+        are found here; a forecast runs all of them.
+
+        Parameters
+        ----------
+        like, noise
+            As in :class:`seakeep.models.Live`.
+
+        Returns
+        -------
+        Live
+            Without samples yet.
+
+        Raises
+        ------
+        RequestError
+            If a noise is out of range.
+        """
+        return Live(self, self.members, self.errors, like=like, noise=noise)
+
+    @cached_property
+    def errors(self) -> LeadErrors:
+        """Errors of the members' mean on what they learnt from."""
+        signature, arrays = self.signature, self.ensemble.arrays
+        stretches = [
+            Stretch(x, u, v, signature.history_samples - 1, min(len(x) - 1, len(u)))
+            for x, u, v in zip(arrays.states, arrays.delayed, arrays.direct, strict=True)
+        ]
+        return lead_errors(self.members, stretches, signature.readouts)
 
 
 def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Dataset:

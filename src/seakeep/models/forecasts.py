@@ -31,6 +31,7 @@ __all__ = [
     "is_usable",
     "label_channels",
     "one_run",
+    "rows_by_name",
     "status_at_clock",
     "statuses",
     "verdict",
@@ -391,16 +392,16 @@ def check_arrays(
     states, inputs, count = signature.states, signature.inputs, int(steps)
     s = signature.state_delays
     z = signature.input_map.history(signature.input_delays)
-    x = _finite("x_history", _rows("x_history", x_history, s + 1, states, "s + 1")[-s - 1 :])
+    x = _finite("x_history", rows_by_name("x_history", x_history, s + 1, states, "s + 1")[-s - 1 :])
     if not inputs:
         return engine.array_windows(signature, x[None], np.zeros((1, z + count, 0)), count)
-    past = _rows("u_history", u_history, z + 1, inputs, "z + 1")
+    past = rows_by_name("u_history", u_history, z + 1, inputs, "z + 1")
     u = _finite("u_history", past[-z - 1 :])
     future = np.zeros((0, len(inputs))) if np.size(u_future) == 0 else u_future
     needed = count - 1 + signature.lead_samples
     meaning = "steps − 1 + lead_samples" if signature.lead_samples else "steps − 1"
     least = needed if ahead == "refuse" else 0
-    after = _finite("u_future", _rows("u_future", future, least, inputs, meaning)[:needed])
+    after = _finite("u_future", rows_by_name("u_future", future, least, inputs, meaning)[:needed])
     driving = np.concatenate([u, after])
     if missing := needed - len(after):
         known = np.concatenate([_finite("u_history", past), after])
@@ -408,9 +409,10 @@ def check_arrays(
     return engine.array_windows(signature, x[None], driving[None], count)
 
 
-def _rows(
+def rows_by_name(
     name: str, value: npt.ArrayLike, least: int, names: Sequence[str], meaning: str
 ) -> FloatArray:
+    """Rows of numbers (time, channel); columns that have names are taken by name."""
     array = as_real(_by_name(name, value, names), name, greatest=np.inf)
     channels = len(names)
     if array.ndim != 2 or array.shape[1] != channels or array.shape[0] < least:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Self
@@ -14,14 +14,18 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import ComplexArray, FloatArray
+from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import export, labelled, store
 from seakeep.models.engine import Dynamics, Windows, linear_runs
 from seakeep.models.forecasts import SingleModel, check_arrays, counted, one_run
+from seakeep.models.growth import LeadErrors, training_errors
 from seakeep.models.inputs import Chain, FittedAlignment, Measured
 from seakeep.models.interface import Scale, Signature, Span
+from seakeep.models.live import Live
+from seakeep.models.readouts import FittedReadOut
 from seakeep.models.settings import HankelSettings
-from seakeep.models.training import Training
+from seakeep.models.training import Training, TrainingData
 from seakeep.models.validity import Coverage
 
 if TYPE_CHECKING:
@@ -49,6 +53,8 @@ class HankelDMDcModel(SingleModel, store.Saved):
         Waves that it was trained in.
     selection : str
         How free runs chose what the settings left open; empty where they stated all.
+    errors : LeadErrors or None
+        Its errors in training, which :meth:`live` weighs; None in files that do not hold them.
     """
 
     kind: ClassVar[str] = "hankel_dmdc"
@@ -58,6 +64,27 @@ class HankelDMDcModel(SingleModel, store.Saved):
     training: Training
     coverage: Coverage = field(repr=False)
     selection: str = ""
+    errors: LeadErrors | None = field(default=None, repr=False)
+
+    @classmethod
+    def fitted(
+        cls,
+        settings: HankelSettings,
+        data: TrainingData,
+        solution: Solution,
+        runs: Mapping[str, xr.Dataset],
+        readouts: tuple[FittedReadOut, ...] = (),
+    ) -> Self:
+        """The model that a regression on data of these runs found."""
+        signature = replace(data.signature(settings), readouts=readouts)
+        model = cls(
+            settings=settings,
+            coefficients=solution.coefficients,
+            signature=signature,
+            training=data.training(solution),
+            coverage=Coverage.of(signature.inputs, data.inputs, data.dt),
+        )
+        return replace(model, errors=training_errors(model.dynamics, data, signature, runs))
 
     def __post_init__(self) -> None:
         self.coefficients.flags.writeable = False
@@ -268,6 +295,28 @@ class HankelDMDcModel(SingleModel, store.Saved):
         values: FloatArray = self.free_runs([windows])[0][0, 0]
         return values
 
+    def live(
+        self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
+    ) -> Live:
+        """Put the model into service: samples in one at a time, estimates and forecasts out.
+
+        Parameters
+        ----------
+        like, noise
+            As in :class:`seakeep.models.Live`.
+
+        Returns
+        -------
+        Live
+            Without samples yet.
+
+        Raises
+        ------
+        RequestError
+            If the model's file holds no errors of its training, or a noise is out of range.
+        """
+        return Live(self, [self.dynamics], self.errors, like=like, noise=noise)
+
     def to_state_space(self) -> signal.StateSpace:
         """Discrete state-space system in physical deviations from the means.
 
@@ -421,6 +470,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
                 "coefficients": (("row", "regressor"), self.coefficients, label),
                 **store.pack_signature(self.signature),
                 **self.coverage.to_variables(),
+                **({} if self.errors is None else self.errors.to_variables()),
             },
             attrs={
                 "settings": store.as_json(self.settings.to_json()),
@@ -445,6 +495,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
             training=Training.from_json(store.content(dataset, "training")),
             coverage=Coverage.from_dataset(dataset),
             selection=str(dataset.attrs["selection"]),
+            errors=LeadErrors.from_dataset(dataset, len(signature.states)),
         )
 
 

@@ -332,14 +332,7 @@ class HankelDMDc(HankelSettings):
         """The model of settings that leave nothing to be chosen."""
         data = gather(named, states, inputs, stop, self)
         solution = data.regress(self, self.state_delays, all_rows=self.delay_rows == "ridge")
-        signature = replace(data.signature(self), readouts=readouts)
-        return HankelDMDcModel(
-            settings=self,
-            coefficients=solution.coefficients,
-            signature=signature,
-            training=data.training(solution),
-            coverage=Coverage.of(signature.inputs, data.inputs, data.dt),
-        )
+        return HankelDMDcModel.fitted(self, data, solution, named, readouts)
 
 
 def _check_growth(model: HankelDMDcModel) -> None:

@@ -184,7 +184,7 @@ def rebuilt(source: str | Path, build: Callable[[], Value]) -> Value:
         ) from error
 
 
-def write(dataset: xr.Dataset, path: str | Path, kind: str) -> Path:
+def write(dataset: xr.Dataset, path: str | Path, kind: str, what: str = "model") -> Path:
     """Write a Dataset as a model file.
 
     Parameters
@@ -195,6 +195,8 @@ def write(dataset: xr.Dataset, path: str | Path, kind: str) -> Path:
         File; an earlier model there is replaced.
     kind : str
         Kind of model.
+    what : str, optional
+        What the file holds, as its head states it.
 
     Returns
     -------
@@ -207,9 +209,9 @@ def write(dataset: xr.Dataset, path: str | Path, kind: str) -> Path:
         If the file cannot be written, or another one than a model is there.
     """
     target = Path(path)
-    check_output(target, "model")
+    check_output(target, what)
     labelled = dataset.assign_attrs(
-        **{MARK: "model"},
+        **{MARK: what},
         seakeep_kind=kind,
         seakeep_format=FORMAT_VERSION,
         seakeep_version=metadata.version("seakeep"),

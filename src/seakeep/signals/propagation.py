@@ -28,7 +28,7 @@ from seakeep.arrays import (
     whole_number,
 )
 from seakeep.errors import DataError, RequestError
-from seakeep.signals.calculus import predicted, predicted_extension
+from seakeep.signals.calculus import linear_prediction, predicted, predicted_extension
 from seakeep.signals.lags import as_pair, correlation_peak, parabola_peak
 from seakeep.signals.leakage import is_regular
 from seakeep.signals.waves import encounter_period, welch_segments
@@ -45,6 +45,7 @@ __all__ = [
     "carry_by_dispersion",
     "delay_by_celerity",
     "delay_by_dispersion",
+    "draw_waves",
     "effective_celerity",
     "misplaced_probes",
     "phase_celerity",
@@ -776,12 +777,63 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     for column, values in enumerate(flat.T):
         mean = values.mean()
         deviations = values - mean
-        order = 1
-        if np.ptp(deviations) > 0:
-            slowest = 1.0 / array.shape[0]
-            order = round(MEMORY / max(band_limit(deviations, 1.0, 0.5), slowest))
-        out[:, column] = mean + predicted(deviations, number_of, order)
+        out[:, column] = mean + predicted(deviations, number_of, _memory(deviations))
     return out.reshape((-1, *array.shape[1:]))
+
+
+def draw_waves(
+    series: npt.ArrayLike, count: int, pairs: int, rng: np.random.Generator
+) -> FloatArray:
+    """Draw what may follow elevations, each from its own record: futures about the predicted one.
+
+    Parameters
+    ----------
+    series, count
+        As in :func:`predict_waves`.
+    pairs : int
+        Number of pairs of futures; those of a pair lie opposite each other about the prediction,
+        so that their mean is the prediction.
+    rng : Generator
+        Source of the Gaussian innovations.
+
+    Returns
+    -------
+    ndarray, shape (2 * pairs, count) or (2 * pairs, count, channel)
+        Innovations of the power that the autoregressive model leaves of the record.
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`predict_waves`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> rng = np.random.default_rng(0)
+    >>> futures = draw_waves(rng.standard_normal(400), 5, 3, rng)
+    >>> futures.shape, bool(np.ptp(futures[:3] + futures[3:], axis=0).max() < 1e-12)
+    ((6, 5), True)
+    """
+    array = as_series(series, minimum=4, channels=True)
+    expected = predict_waves(array, count)
+    flat = array.reshape(array.shape[0], -1)
+    errors = np.empty((pairs, int(count), flat.shape[1]))
+    for column, values in enumerate(flat.T):
+        deviations = values - values.mean()
+        order = max(1, min(_memory(deviations), deviations.size // 3))
+        whitening = np.concatenate([[1.0], -linear_prediction(deviations, order)])
+        left = scipy.signal.lfilter(whitening, [1.0], deviations)[order:]
+        innovations = left.std() * rng.standard_normal((pairs, int(count)))
+        errors[..., column] = scipy.signal.lfilter([1.0], whitening, innovations, axis=1)
+    errors = errors.reshape(pairs, *expected.shape)
+    return np.concatenate([expected + errors, expected - errors])
+
+
+def _memory(deviations: FloatArray) -> int:
+    """Order of the autoregressive model of a record: some of its wave periods."""
+    if not np.ptp(deviations) > 0:
+        return 1
+    return round(MEMORY / max(band_limit(deviations, 1.0, 0.5), 1.0 / deviations.size))
 
 
 def _distances(distance: npt.ArrayLike, samples: int) -> FloatArray:

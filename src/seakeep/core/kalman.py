@@ -1,0 +1,158 @@
+r"""Kalman filter of a delay model: the newest sample is regressed, older ones shift.
+
+The state is :math:`[x_{k-s}; …; x_{k-1}; x_k]`, oldest first, of a model
+:math:`x_{k+1} = a\,[x_{k-s}; …; x_k] + f_k + w_k` with white noise w. A measurement reads some
+rows of :math:`x_k`. The covariance depends on which rows were measured and on no value, so means
+may be run again later with the same gains, once a forcing f is known that was a guess before.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import linalg
+
+from seakeep.arrays import BoolArray, FloatArray
+
+__all__ = ["DelayFilter", "process_noise"]
+
+
+class DelayFilter:
+    """Covariance and gains of the filter, in place: nothing grows from step to step.
+
+    Parameters
+    ----------
+    a : ndarray, shape (N, N(s+1))
+        Regressed rows, oldest block first.
+    process : ndarray, shape (N, N)
+        Covariance of the process noise.
+    noise : ndarray, shape (N,)
+        Variances of the measurement noise.
+    covariance : ndarray, shape (N(s+1), N(s+1))
+        Of the state to start from.
+    """
+
+    def __init__(
+        self, a: FloatArray, process: FloatArray, noise: FloatArray, covariance: FloatArray
+    ) -> None:
+        self.a, self.process, self.noise = a, process, noise
+        self.covariance = covariance.copy()
+        self._next = np.empty_like(self.covariance)
+
+    def shift(self, newest: FloatArray | None = None) -> None:
+        """One step in time.
+
+        `newest`, shape (N, N), is the covariance of the new sample where it does not depend on
+        those before; by default the model predicts it.
+        """
+        before, after = self.covariance, self._next
+        count, size = self.a.shape
+        kept = size - count
+        after[:kept, :kept] = before[count:, count:]
+        if newest is None:
+            top = self.a @ before
+            after[kept:, :kept] = top[:, count:]
+            # Exactly symmetric: an antisymmetric error of rounding would grow.
+            block = top @ self.a.T + self.process
+            after[kept:, kept:] = 0.5 * (block + block.T)
+        else:
+            after[kept:, :kept] = 0.0
+            after[kept:, kept:] = newest
+        after[:kept, kept:] = after[kept:, :kept].T
+        self.covariance, self._next = after, before
+
+    def limit(self, variances: FloatArray, *, exactly: bool = False) -> None:
+        """Scale the newest sample's errors down to variances of shape (N,), or `exactly` to them.
+
+        Correlations stay as they are.
+        """
+        newest = slice(len(self.covariance) - len(variances), None)
+        found = np.diagonal(self.covariance)[newest]
+        factor = np.sqrt(variances / np.maximum(found, np.finfo(float).tiny))
+        if not exactly:
+            factor = np.minimum(factor, 1.0)
+        self.covariance[newest] *= factor[:, None]
+        self.covariance[:, newest] *= factor
+
+    def measure(self, seen: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """Update by the rows that were measured.
+
+        Parameters
+        ----------
+        seen : ndarray of bool, shape (N,)
+            Which rows of the newest sample were measured.
+
+        Returns
+        -------
+        gain : ndarray, shape (N(s+1), N)
+            What a unit of innovation adds to the state; zero columns for rows not measured.
+        precision : ndarray, shape (N, N)
+            Inverse covariance of the innovation, zero for rows not measured.
+        """
+        count, size = self.a.shape
+        gain, precision = np.zeros((size, count)), np.zeros((count, count))
+        rows = np.flatnonzero(seen)
+        if not rows.size:
+            return gain, precision
+        places = size - count + rows
+        cross = self.covariance[:, places]
+        innovation = cross[places] + np.diag(self.noise[rows])
+        factor = linalg.cho_factor(innovation, lower=True)
+        found = linalg.cho_solve(factor, cross.T).T
+        self.covariance -= found @ cross.T
+        self.covariance += self.covariance.T.copy()
+        self.covariance *= 0.5
+        exact = places[self.noise[rows] == 0.0]
+        self.covariance[exact] = 0.0
+        self.covariance[:, exact] = 0.0
+        gain[:, rows] = found
+        precision[np.ix_(rows, rows)] = linalg.cho_solve(factor, np.eye(rows.size))
+        return gain, precision
+
+    def ahead(self, steps: int) -> FloatArray:
+        """Variances that today's errors alone leave after 1 … `steps` steps, shape (steps, N)."""
+        count = len(self.a)
+        out = np.empty((steps, count))
+        root = _root(self.covariance)
+        for row in out:
+            newest = self.a @ root
+            root = np.concatenate([root[count:], newest])
+            np.einsum("ij,ij->i", newest, newest, out=row)
+        return out
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """Square root of a covariance, columns of no weight left out."""
+    values, vectors = linalg.eigh(covariance)
+    kept = values > 1e-14 * max(float(values[-1]), np.finfo(float).tiny)
+    root: FloatArray = vectors[:, kept] * np.sqrt(values[kept])
+    return root
+
+
+def process_noise(residual: FloatArray, a: FloatArray, noise: FloatArray) -> FloatArray:
+    r"""Process noise that is left of one-step residuals when measurement noise is taken out.
+
+    A residual of measured histories is :math:`w_k + v_{k+1} - a\,[v_{k-s}; …; v_k]`, so its
+    covariance is Q + R + a (I ⊗ R) aᵀ.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (N, N)
+        Covariance of the residuals.
+    a : ndarray, shape (N, N(s+1))
+        Regressed rows.
+    noise : ndarray, shape (N,)
+        Variances of the measurement noise.
+
+    Returns
+    -------
+    ndarray, shape (N, N)
+        Q; directions that the measurement noise would make negative are kept at 1e-6 of the
+        residual's largest variance.
+    """
+    spread = np.sqrt(np.maximum(np.diagonal(residual), np.finfo(float).tiny))
+    every = np.tile(noise, a.shape[1] // a.shape[0])
+    left = (residual - np.diag(noise) - (a * every) @ a.T) / np.outer(spread, spread)
+    values, vectors = linalg.eigh(left)
+    sound = (vectors * np.maximum(values, 1e-6)) @ vectors.T
+    result: FloatArray = sound * np.outer(spread, spread)
+    return result

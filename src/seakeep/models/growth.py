@@ -1,0 +1,221 @@
+"""How errors grow with the time after a start: what training tells of a model's own errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from scipy.optimize import isotonic_regression
+
+from seakeep.arrays import FloatArray
+from seakeep.models import store
+from seakeep.models.engine import Dynamics, Windows, linear_runs, read_windows
+from seakeep.models.interface import Signature
+from seakeep.models.readouts import FittedReadOut
+from seakeep.models.training import TrainingData
+
+__all__ = ["LeadErrors", "Stretch", "lead_errors", "training_errors"]
+
+WINDOWS = 48
+"""Free runs that the errors are averaged over; a root mean square is known to a tenth then."""
+STEPS = 1024
+"""Single steps that the covariance of the residuals is taken from, at most."""
+CARRIED = 2
+"""Runs, the longest ones, in which the free runs lie where waves are carried to the vessel."""
+REACH = 3
+"""Longest delays of the model that the free runs last."""
+
+
+@dataclass(frozen=True, eq=False)
+class LeadErrors:
+    """Errors of a model in its training runs, physical units.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (N, N)
+        Covariance of the one-step residuals.
+    rms : ndarray, shape (steps, N)
+        Root mean square error of free runs, 1 … steps samples after their starts; it never falls.
+
+    Notes
+    -----
+    Both are raised to what is expected in data that did not train (:func:`lead_errors`).
+    """
+
+    residual: FloatArray
+    rms: FloatArray
+
+    def at(self, leads: npt.ArrayLike) -> FloatArray:
+        """RMS errors at leads (samples from 1 on), shape (…, N); held after the last."""
+        places = np.minimum(np.asarray(leads, dtype=int), len(self.rms)) - 1
+        found: FloatArray = self.rms[places]
+        return found
+
+    def to_variables(self) -> dict[str, tuple[tuple[str, ...], FloatArray]]:
+        """Variables of a file."""
+        return {
+            "residual_covariance": (("state", "other_state"), self.residual),
+            "lead_errors": (("lead", "state"), self.rms),
+        }
+
+    @classmethod
+    def from_dataset(cls, dataset: xr.Dataset, channels: int) -> Self | None:
+        """Read what a file keeps; None where it was written before these were kept."""
+        if "lead_errors" not in dataset:
+            return None
+        return cls(
+            store.numbers(dataset, "residual_covariance", (channels, channels)),
+            store.numbers(dataset, "lead_errors", (None, channels)),
+        )
+
+
+class Source(NamedTuple):
+    """Where a stretch comes from, for free runs that are driven by the states they predict."""
+
+    signature: Signature
+    name: str
+    run: xr.Dataset
+    begin: float
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Training samples in physical units.
+
+    Parameters
+    ----------
+    states, delayed, direct : ndarray, each (time, channel)
+        States and both kinds of regressors.
+    first, last : int
+        Samples between which forecasts may start and end.
+    source : Source, optional
+        Run, and the instant of the first sample in s, where predicted states drive the input.
+    """
+
+    states: FloatArray
+    delayed: FloatArray
+    direct: FloatArray
+    first: int
+    last: int
+    source: Source | None = None
+
+    def windows(self, starts: Sequence[int], s: int, z: int, steps: int) -> Windows:
+        """What free runs from these samples read."""
+        if self.source is not None and steps > 1:
+            signature, name, run, begin = self.source
+            places = [(name, begin + at * signature.dt) for at in starts]
+            return read_windows(signature, {name: run}, places, steps)
+        return Windows(
+            places=(("training", 0.0),) * len(starts),
+            steps=steps,
+            time=(),
+            histories=np.stack([self.states[at - s : at + 1] for at in starts]),
+            delayed=np.stack([self.delayed[at - z : at + steps] for at in starts]),
+            direct=np.stack([self.direct[at : at + steps] for at in starts]),
+        )
+
+
+def lead_errors(
+    members: Sequence[Dynamics],
+    stretches: Sequence[Stretch],
+    readouts: Sequence[FittedReadOut] = (),
+) -> LeadErrors:
+    """Errors of the mean of members in their training runs.
+
+    Residuals are those of the states as they are regressed; free runs are read off as forecasts
+    are.
+    """
+    s = max(each.state_delays for each in members)
+    z = max(each.input_delays for each in members)
+    longest = max(each.last - each.first for each in stretches)
+    steps = max(1, min(REACH * (max(s, z) + 1), longest // 2))
+    residuals = np.concatenate(
+        [
+            _errors(members, each, starts, s, z, 1, ())[:, 0]
+            for each, starts in _places(stretches, 1, STEPS)
+        ]
+    )
+    longest_first = sorted(stretches, key=lambda each: each.first - each.last)
+    carried = any(each.source for each in stretches)
+    parts = [
+        _errors(members, each, starts, s, z, steps, readouts)
+        for each, starts in _places(longest_first[: CARRIED if carried else None], steps, WINDOWS)
+    ]
+    errors = np.concatenate(parts)
+    with np.errstate(over="ignore", invalid="ignore"):
+        square = np.nanmean(np.where(np.isfinite(errors), errors**2, np.nan), axis=0)
+    square = square[np.isfinite(square).all(axis=1)]
+    grown = np.stack([isotonic_regression(each).x for each in square.T], axis=1)
+    factor = _unseen(members, stretches)
+    residual = factor * residuals.T @ residuals / len(residuals)
+    return LeadErrors(residual, np.sqrt(factor * grown))
+
+
+def _unseen(members: Sequence[Dynamics], stretches: Sequence[Stretch]) -> float:
+    """How much larger squared errors are in data that did not train (Akaike, 1970).
+
+    The final prediction error of p coefficients found from n samples, (n + p)/(n − p) times the
+    mean square of the residuals; at most three times, where a ridge makes up for what is missing.
+    """
+    n = sum(each.last - each.first for each in stretches)
+    p = min(np.mean([each.coefficients.shape[1] for each in members]), 0.5 * n)
+    return float((n + p) / (n - p))
+
+
+def _places(stretches: Sequence[Stretch], steps: int, most: int) -> list[tuple[Stretch, list[int]]]:
+    """Starts of windows, spread evenly over the stretches in which one fits."""
+    room = [max(each.last - steps - each.first + 1, 0) for each in stretches]
+    out = []
+    for each, count in zip(stretches, room, strict=True):
+        number = min(count, -(-most * count // max(sum(room), 1)))
+        if number:
+            found = np.linspace(each.first, each.last - steps, number).astype(int)
+            out.append((each, [int(start) for start in found]))
+    return out
+
+
+def _errors(
+    members: Sequence[Dynamics],
+    stretch: Stretch,
+    starts: Sequence[int],
+    s: int,
+    z: int,
+    steps: int,
+    readouts: Sequence[FittedReadOut],
+) -> FloatArray:
+    """Forecast minus measurement, shape (window, steps, N)."""
+    windows = stretch.windows(starts, s, z, steps)
+    found = linear_runs(members, [windows], readouts)[0].mean(axis=0)
+    errors: FloatArray = found - np.stack(
+        [stretch.states[at + 1 : at + steps + 1] for at in starts]
+    )
+    return errors
+
+
+def training_errors(
+    dynamics: Dynamics,
+    data: TrainingData,
+    signature: Signature,
+    runs: Mapping[str, xr.Dataset],
+) -> LeadErrors:
+    """Errors of a single model in the runs that it was fitted to."""
+    stretches = []
+    for number, name in enumerate(data.names):
+        window = data.windows[number]
+        begin = data.first_instants[number] - window.first * data.dt
+        follows = signature.input_map.reads_states == "predicted"
+        stretches.append(
+            Stretch(
+                data.state_scale.physical(data.states[number]),
+                data.input_scale.physical(data.delayed[number]),
+                data.direct_scale.physical(data.direct[number]),
+                window.first_column,
+                window.last,
+                Source(signature, name, runs[name], begin) if follows else None,
+            )
+        )
+    return lead_errors([dynamics], stretches, signature.readouts)

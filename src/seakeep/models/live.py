@@ -1,0 +1,775 @@
+"""A model in service: samples arrive one at a time, some are lost, future waves are not known.
+
+:class:`Live` follows a vessel sample by sample. A Kalman filter on the delayed states fills what
+was not measured (:mod:`seakeep.core.kalman`); a forecast starts from its estimate, as
+:meth:`HankelDMDcModel.forecast` starts from a measured history.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from scipy import special
+
+from seakeep.arrays import BoolArray, FloatArray, as_real, fraction, positive, whole_number
+from seakeep.core.kalman import DelayFilter, process_noise
+from seakeep.errors import RequestError, did_you_mean
+from seakeep.models import engine, store
+from seakeep.models.engine import Dynamics, Windows
+from seakeep.models.forecasts import label_channels, rows_by_name
+from seakeep.models.growth import LeadErrors
+from seakeep.models.inputs import Chain, FittedAlignment, Measured
+from seakeep.models.interface import Regressors, Signature, Span
+from seakeep.models.summaries import statistic_coordinate
+from seakeep.signals.propagation import draw_waves, predict_waves
+
+__all__ = ["Live", "load_live"]
+
+PAIRS = 8
+"""Pairs of futures of the waves that are drawn where they are not known."""
+RECORD = 16
+"""Record that is kept, in longest delays: what waves are predicted from, and carried by."""
+LEAST_RECORD = 512
+"""Samples of record that are kept at least."""
+BLOCK = 16
+"""Samples whose waves an alignment carries together: that costs as much for one as for many."""
+CONSISTENCY = 256
+"""Samples over which the consistency is averaged, as a time constant."""
+RIG = ("water_depth", "celerity", "probe_offset")
+"""Attributes of a run that an alignment reads."""
+Judge = Callable[[int, FloatArray], None]
+"""Takes the slot of a sample and its innovation."""
+
+
+class Servable(Protocol):
+    """What goes into service."""
+
+    @property
+    def signature(self) -> Signature: ...
+    @property
+    def n_members(self) -> int: ...
+    def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
+        """Free runs of members over groups of windows."""
+        ...
+
+    def live(
+        self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
+    ) -> Live:
+        """Put the model into service."""
+        ...
+
+
+class Live:
+    """A model that follows a vessel sample by sample; made by ``model.live()``.
+
+    After :meth:`step` its time is that of the sample, and :attr:`state` estimates that instant;
+    :meth:`forecast` gives the instants after it.
+
+    Parameters
+    ----------
+    model : model or HeldEnsemble
+        What forecasts.
+    members : sequence of Dynamics
+        Its members; the filter predicts with the mean of their one-step predictions.
+    errors : LeadErrors or None
+        Its errors in training, from which the noises are taken.
+    like : Dataset, optional
+        A run with the attributes that hold in service (``water_depth``, ``celerity``,
+        ``probe_offset``, and ``x_position`` of the inputs), where a model with an alignment serves
+        in another rig than it was trained in.
+    noise : mapping of str to float, optional
+        Standard deviations of the measurement noise of some states, in their units. Without them
+        all residuals of training are process noise, which is what least squares makes of them:
+        a measured state is taken as it is.
+
+    Raises
+    ------
+    RequestError
+        If the model's file holds no errors, or a noise is out of range.
+    """
+
+    def __init__(
+        self,
+        model: Servable,
+        members: Sequence[Dynamics],
+        errors: LeadErrors | None,
+        *,
+        like: xr.Dataset | None = None,
+        noise: Mapping[str, float] | None = None,
+    ) -> None:
+        if errors is None:
+            raise RequestError(
+                "the model's file holds no errors of its training, from which a live model takes "
+                "its noises: an older seakeep wrote it. Fit the model again."
+            )
+        self.model, self.signature, self.errors = model, model.signature, errors
+        signature = self.signature
+        self._rig = _rig(signature, like)
+        self._noise = _noise(signature, noise)
+        self._alignment = _alignment(signature)
+        self._offset, self._a, self._b, self._d = _mean_predictor(members, signature)
+        count, s = len(signature.states), signature.state_delays
+        size, variances = count * (s + 1), self._noise**2
+        process = process_noise(errors.residual, self._a, variances)
+        self._filter = DelayFilter(self._a, process, variances, np.zeros((size, size)))
+        self._precision_known = np.linalg.inv(process)
+        # Samples after an instant whose input is needed before its estimate is final.
+        self._time, self._sum, self._weight = math.nan, 0.0, 0.0
+        none = self._run(0, np.zeros((0, len(signature.inputs))))
+        ahead = signature.input_map.look_ahead(none, signature.dt)
+        self._ahead = math.ceil(ahead / signature.dt - 1e-6)
+        self._block = 1 if self._alignment is None else BLOCK
+        longest = max(s, signature.input_delays) + 1
+        needed = 2 * (signature.history_samples + self._ahead + self._block)
+        self._record = max(LEAST_RECORD, needed, RECORD * longest)
+        delayed, direct = signature.input_scale.mean.size, signature.direct_scale.mean.size
+        widths = {"u": len(signature.inputs), "x": count, "y": count}
+        widths |= {"delayed": delayed, "direct": direct}
+        room = 2 * self._record
+        self._kept = {name: np.full((room, width), np.nan) for name, width in widths.items()}
+        slots = self._ahead + self._block + 1
+        self._gains = np.zeros((slots, size, count))
+        self._precisions = np.zeros((slots, count, count))
+        self._plain = np.zeros(slots, dtype=bool)
+        self._history = np.tile(signature.state_scale.centre, (s + 1, 1))
+        self._innovation = np.full(count, np.nan)
+        # Places in the record (how much of it is filled, the last final estimate, the first row of
+        # regressors that is not, the first sample that is predicted), then counts of samples: all,
+        # those since the whole history was measured and whether anything was seen since then, and
+        # complete ones in a row.
+        self._at = {
+            "filled": 0,
+            "final": -1,
+            "rows": signature.history_samples - 1 - signature.input_delays,
+            "begins": signature.history_samples,
+            "taken": 0,
+            "since": 0,
+            "partly": 1,
+            "complete": 0,
+        }
+
+    def __repr__(self) -> str:
+        return (
+            f"{type(self).__name__}(states={self.signature.states}, "
+            f"inputs={self.signature.inputs}, dt={self.signature.dt:g}, time={self.time:g})"
+        )
+
+    @property
+    def time(self) -> float:
+        """Instant of the last sample, s; NaN before the first."""
+        return self._time
+
+    @property
+    def ready(self) -> bool:
+        """Whether there is enough history to forecast: ``history_samples`` of the model."""
+        return self._at["filled"] >= self.signature.history_samples
+
+    @property
+    def state(self) -> FloatArray:
+        """Estimate of the states at :attr:`time`, shape (N,), physical units."""
+        state: FloatArray = self._x[self._last].copy()
+        return state
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the errors of :attr:`state`, shape (N, N)."""
+        count = len(self.signature.states)
+        return self._filter.covariance[-count:, -count:].copy()
+
+    @property
+    def innovation(self) -> FloatArray:
+        """Measurement minus one-step prediction, shape (N,), NaN for what was not measured.
+
+        It belongs to the last instant whose prediction reads no wave that is still to come: the
+        last sample, or with a look-ahead of l samples that of l − 1 samples before.
+        """
+        return self._innovation.copy()
+
+    @property
+    def consistency(self) -> float:
+        """Running mean of the normalised innovation squared, per measured state.
+
+        One where the innovations are as large as the residuals of training, over the last few
+        hundred samples. Well above one, the model no longer fits the vessel, or a sensor its
+        channel; NaN before the first prediction.
+        """
+        return self._sum / self._weight if self._weight else math.nan
+
+    @property
+    def _last(self) -> int:
+        return self._at["filled"] - 1
+
+    @property
+    def _x(self) -> FloatArray:
+        return self._kept["x"]
+
+    def step(
+        self,
+        u: npt.ArrayLike | Mapping[str, float] | None = None,
+        y: npt.ArrayLike | Mapping[str, float] | None = None,
+        time: float | None = None,
+    ) -> FloatArray:
+        """Take one sample, and estimate the states at its instant.
+
+        Parameters
+        ----------
+        u : array_like, shape (Q,), or mapping of names to numbers, optional
+            Measured inputs at this instant, physical units. None where the sample was lost: its
+            inputs are predicted from those before.
+        y : array_like, shape (N,), or mapping of names to numbers, optional
+            Measured states at this instant, NaN for what is missing; a mapping may leave them out.
+        time : float, optional
+            Instant of the sample, s, to check that none was left out. By default one step after
+            the last; the first is 0.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            :attr:`state`.
+
+        Raises
+        ------
+        RequestError
+            If a length, a name or the time does not fit, or an input is not finite. Nothing has
+            changed then, and the same sample can be given again.
+        """
+        signature = self.signature
+        instant = self._instant(time)
+        states = _sample("y", y, signature.states)
+        if np.any(np.isinf(states)):
+            raise RequestError(
+                "y holds an infinite value. Give NaN for a state that was not measured."
+            )
+        inputs = self._inputs(u)
+        self._make_room()
+        at = self._at["filled"]
+        self._kept["u"][at], self._kept["y"][at] = inputs, states
+        # Held until it is estimated: an alignment reads where the vessel is.
+        self._x[at] = np.where(np.isfinite(states), states, self._x[at - 1])
+        self._at["filled"] += 1
+        self._at["taken"] += 1
+        self._time = instant
+        self._filtered(at, np.isfinite(states))
+        return self.state
+
+    def _instant(self, time: float | None) -> float:
+        dt = self.signature.dt
+        expected = 0.0 if math.isnan(self._time) else self._time + dt
+        if time is None:
+            return expected
+        instant = float(as_real(time, "time"))
+        if not math.isfinite(instant):
+            raise RequestError(f"time must be a finite instant in seconds; received {time!r}.")
+        if math.isnan(self._time) or abs(instant - expected) <= 0.01 * dt:
+            return instant
+        if instant <= self._time:
+            raise RequestError(
+                f"time = {instant:g} s is not after the last sample at {self._time:g} s. Samples "
+                "must come in the order of their instants, each once."
+            )
+        raise RequestError(
+            f"time = {instant:g} s is {instant - self._time:g} s after the last sample, and the "
+            f"model steps by {dt:g} s. Call step() without arguments once for each sample that "
+            "was lost; resample the rest to the model's step."
+        )
+
+    def _inputs(self, u: npt.ArrayLike | Mapping[str, float] | None) -> FloatArray:
+        names, filled = self.signature.inputs, self._at["filled"]
+        if not names:
+            return _sample("u", u, names)
+        if u is None:
+            if filled < 4:
+                raise RequestError(
+                    f"the inputs of a lost sample are predicted from those before, and there are "
+                    f"{filled}. Start with at least 4 samples of u."
+                )
+            expected: FloatArray = predict_waves(self._known_inputs(), 1)[0]
+            return expected
+        inputs = _sample("u", u, names)
+        if not np.all(np.isfinite(inputs)):
+            bad = names[int(np.flatnonzero(~np.isfinite(inputs))[0])]
+            raise RequestError(
+                f"u holds a value of '{bad}' that is not finite. Fill it first, or give u = None: "
+                "all inputs of the sample are predicted then."
+            )
+        return inputs
+
+    def _known_inputs(self) -> FloatArray:
+        """Inputs that waves are predicted from: the last ones, always as many once there are."""
+        filled = self._at["filled"]
+        return self._kept["u"][max(filled - self._record, 0) : filled]
+
+    def _make_room(self) -> None:
+        """Move what is kept to the front where the room is used up."""
+        if self._at["filled"] < 2 * self._record:
+            return
+        for values in self._kept.values():
+            values[: self._record] = values[self._record :]
+        for place in ("filled", "final", "rows", "begins"):
+            self._at[place] -= self._record
+
+    def _filtered(self, at: int, seen: BoolArray) -> None:
+        """Covariance and gain of the sample, then the means that its input completes."""
+        place = self._at
+        slot = place["taken"] % len(self._gains)
+        is_exact = bool(seen.all()) and not self._noise.any()
+        plain = is_exact and place["since"] == 0 and at >= place["begins"]
+        self._plain[slot] = plain
+        if not plain:
+            self._gains[slot], self._precisions[slot] = self._updated(at, seen)
+        place["complete"] = place["complete"] + 1 if is_exact else 0
+        if place["complete"] > self.signature.state_delays:
+            place["since"] = place["partly"] = 0
+            self._filter.covariance.fill(0.0)
+        elif not plain:
+            place["since"] += 1
+            place["partly"] |= int(seen.any())
+        self._settle(at)
+
+    def _updated(self, at: int, seen: BoolArray) -> tuple[FloatArray, FloatArray]:
+        if at < self._at["begins"]:
+            self._filter.shift(np.diag(self.signature.state_scale.spread**2))
+        else:
+            self._filter.shift()
+            limit = self.errors.at(self._at["since"] + 1) ** 2
+            blind = not (self._at["partly"] or seen.any())
+            self._filter.limit(limit, exactly=blind)
+        return self._filter.measure(seen)
+
+    def _settle(self, at: int) -> None:
+        """Bring estimates up to the sample `at`: final ones, then those that waves to come move."""
+        place = self._at
+        if at < place["begins"]:
+            self._advance(self._history, at, at, None)
+            place["final"] = at
+            return
+        final = at - max(self._ahead - 1, 0)
+        if final - place["final"] >= self._block:
+            self._find_rows(final, self._known_inputs())
+            place["rows"] = final
+            self._advance(self._history, place["final"] + 1, final, self._judge)
+            place["final"] = final
+        if place["final"] == at:
+            return
+        slots = (place["taken"] - np.arange(at - place["final"])) % len(self._plain)
+        if self._plain[slots].all():
+            self._x[at] = self._kept["y"][at]
+            return
+        known = self._known_inputs()
+        if self._ahead and self.signature.inputs:
+            known = np.concatenate([known, predict_waves(known, self._ahead)])
+        self._find_rows(at, known)
+        self._advance(self._history.copy(), place["final"] + 1, at, None)
+
+    def _advance(self, history: FloatArray, first: int, last: int, judge: Judge | None) -> None:
+        """Run the mean through samples, with the gains that were found for them."""
+        place, s = self._at, self.signature.state_delays
+        for at in range(first, last + 1):
+            slot = (place["taken"] - (self._last - at)) % len(self._gains)
+            measured = self._kept["y"][at]
+            predicted = self.signature.state_scale.centre
+            if at >= place["begins"]:
+                predicted = self._predicted(history, at - 1)
+            innovation = measured - predicted
+            history[:-1] = history[1:]
+            if self._plain[slot]:
+                history[-1] = measured
+            else:
+                history[-1] = predicted
+                told = np.where(np.isfinite(innovation), innovation, 0.0)
+                history += (self._gains[slot] @ told).reshape(history.shape)
+                exact = np.isfinite(measured) & (self._noise == 0)
+                history[-1][exact] = measured[exact]
+            first_kept = max(at - s, 0)
+            self._x[first_kept : at + 1] = history[first_kept - at - 1 :]
+            if judge is not None:
+                judge(slot, innovation)
+
+    def _predicted(self, history: FloatArray, at: int) -> FloatArray:
+        """One-step prediction from the sample `at`."""
+        z = self.signature.input_delays
+        out = self._a @ history.ravel()
+        out += self._offset
+        out += self._b @ self._kept["delayed"][at - z : at + 1].ravel()
+        if self._d.size:
+            out += self._d @ self._kept["direct"][at]
+        return out
+
+    def _judge(self, slot: int, innovation: FloatArray) -> None:
+        """Running normalised innovation squared."""
+        self._innovation = innovation
+        precision = self._precision_known if self._plain[slot] else self._precisions[slot]
+        told = np.where(np.isfinite(innovation), innovation, 0.0)
+        number = np.count_nonzero(np.isfinite(innovation))
+        if number:
+            fade = 1.0 - 1.0 / CONSISTENCY
+            self._sum = fade * self._sum + float(told @ precision @ told) / number
+            self._weight = fade * self._weight + 1.0
+
+    def _find_rows(self, stop: int, known: FloatArray) -> None:
+        """Regressors of the samples up to before `stop`; `known` ends with inputs to come."""
+        first, signature = self._at["rows"], self.signature
+        if stop <= first:
+            return
+        begin = self._at["filled"] - min(self._at["filled"], self._record)
+        measured = Measured(known, begin)
+        # Direct regressors are wanted from the first prediction on.
+        spans = [Span(first, max(first, self._at["begins"] - 1), stop)]
+        run = None
+        if self._alignment is not None:
+            spans.append(Span(first, stop - 1, stop))
+            run = self._run(begin, known)
+            # Samples count from the start of the run there.
+            measured = Measured(known)
+            spans = [Span(*(each - begin for each in span)) for span in spans]
+        wrapped = signature.input_map.wrap(measured, run, spans)
+        found: Regressors = wrapped.rows(spans[0].first, spans[0].stop)
+        self._kept["delayed"][first:stop] = found.delayed
+        self._kept["direct"][first:stop] = found.direct
+
+    def _run(self, begin: int, inputs: FloatArray) -> xr.Dataset:
+        """Dataset of the record from a place on; states to come are held at their last mean."""
+        signature, size = self.signature, len(inputs)
+        states, time = np.empty((size, len(signature.states))), np.arange(size) * signature.dt
+        if size:
+            known = self._x[begin : self._at["filled"]]
+            states[: len(known)] = known
+            states[len(known) :] = known[-1 - signature.state_delays :].mean(axis=0)
+            time += self._time - (len(known) - 1) * signature.dt
+        variables = {
+            label.name: ("time", column, {"units": label.units})
+            for labels, table in (
+                (signature.state_labels, states),
+                (signature.input_labels, inputs),
+            )
+            for label, column in zip(labels, table.T, strict=True)
+        }
+        run = xr.Dataset(variables, coords={"time": time}, attrs=self._rig["run"])
+        for name, position in self._rig["positions"].items():
+            run[name].attrs["x_position"] = position
+        return run
+
+    def forecast(
+        self,
+        steps: int,
+        future: npt.ArrayLike | None = None,
+        *,
+        level: float = 0.95,
+        share: float = 0.5,
+    ) -> xr.Dataset:
+        """Forecast from the estimate of the last sample on.
+
+        Parameters
+        ----------
+        steps : int
+            Number of instants.
+        future : array_like, shape (rows, Q), optional
+            Inputs at the instants after :attr:`time`, if they are known; columns with names are
+            taken by name. Where they end before ``steps − 1 + lead_samples`` rows, the waves are
+            predicted from the record, and futures drawn about the prediction widen the band.
+        level : float, optional
+            Probability of the band.
+        share : float, optional
+            Part of the training SD below which the error is to stay over the lead time.
+
+        Returns
+        -------
+        Dataset
+            States with dimensions (statistic, time): ``mean``, ``std``, ``lower``, ``upper``.
+            Each channel's ``attrs["lead_time"]`` is the time after :attr:`time` up to which its
+            ``std`` stays below ``attrs["share"]`` of its SD in training, s. ``std`` holds the
+            errors of free runs in training, those of the estimate, the spread of the members and
+            that of the waves that are not known.
+
+        Raises
+        ------
+        RequestError
+            If there is too little history yet, or an argument does not fit.
+        """
+        signature, count = self.signature, whole_number(steps, "steps")
+        level, share = fraction(level, "level"), positive(share, "share", "training SD")
+        if not self.ready:
+            raise RequestError(
+                f"there are {self._at['filled']} samples of history and the model needs "
+                f"{signature.history_samples}. Call step {self._missing()} more times first."
+            )
+        futures, known = self._futures(count, future)
+        windows = self._windows(count, futures)
+        values = self.model.free_runs([windows], range(self.model.n_members))[0]
+        kept = values[engine.first_lost(values).max(axis=1) < 0].reshape(-1, *values.shape[2:])
+        table = np.full((4, count, len(signature.states)), np.nan)
+        if len(kept):
+            spread = kept.var(axis=0, ddof=1) if len(kept) > 1 else 0.0
+            table[0] = kept.mean(axis=0) if len(kept) > 1 else kept[0]
+            table[1] = np.sqrt(spread + self._error_variances(count))
+            half = float(special.ndtri(0.5 + 0.5 * level)) * table[1]
+            table[2:] = table[0] - half, table[0] + half
+        variables = label_channels(signature, table, ("statistic", "time"))
+        inside = table[1] <= share * signature.state_scale.spread
+        for column, label in enumerate(signature.state_labels):
+            held = int(np.argmin(np.append(inside[:, column], False)))
+            variables[label.name][2]["lead_time"] = held * signature.dt
+        words = "the mean minus and plus a normal quantile times std"
+        time = self._time + signature.dt * np.arange(1, count + 1)
+        attrs = {"start": self._time, "level": level, "share": share, "known_input": known}
+        attrs |= {"diverged": len(values) - len(kept) // values.shape[1]}
+        return xr.Dataset(
+            variables,
+            coords={
+                "statistic": statistic_coordinate(level, words),
+                "time": ("time", time, {"units": "s", "long_name": "time"}),
+            },
+            attrs=attrs,
+        )
+
+    def _missing(self) -> int:
+        return self.signature.history_samples - self._at["filled"]
+
+    def _futures(self, steps: int, future: npt.ArrayLike | None) -> tuple[list[FloatArray], int]:
+        """Inputs of the record and after it, of each future, and how many rows were given."""
+        names, record = self.signature.inputs, self._known_inputs()
+        if not names:
+            return [record], 0
+        wanted = steps - 1 + self._ahead
+        given = np.zeros((0, len(names)))
+        if future is not None and np.size(future):
+            given = rows_by_name("future", future, 0, names, "any number")[:wanted]
+            if not np.all(np.isfinite(given)):
+                raise RequestError(
+                    "future holds values that are not finite. End it before the first gap: what "
+                    "follows is predicted."
+                )
+        known = np.concatenate([record, given])
+        if len(given) == wanted:
+            return [known], len(given)
+        rng = np.random.default_rng(self._at["taken"])
+        drawn = draw_waves(known, wanted - len(given), PAIRS, rng)
+        return [np.concatenate([known, each]) for each in drawn], len(given)
+
+    def _windows(self, steps: int, futures: Sequence[FloatArray]) -> Windows:
+        """What a forecast reads, for each future."""
+        signature, filled = self.signature, self._at["filled"]
+        if self._alignment is not None:
+            begin = filled - min(filled, self._record)
+            runs = {str(number): self._run(begin, each) for number, each in enumerate(futures)}
+            places = [(name, self._time) for name in runs]
+            return engine.read_windows(signature, runs, places, steps)
+        history = self._x[filled - 1 - signature.state_delays : filled]
+        back = signature.input_map.history(signature.input_delays) + 1
+        size = min(filled, self._record)
+        inputs = np.stack([each[size - back :] for each in futures])
+        if not signature.inputs:
+            inputs = np.zeros((1, signature.input_delays + steps, 0))
+        histories = np.broadcast_to(history, (len(inputs), *history.shape))
+        return engine.array_windows(signature, histories, inputs, steps)
+
+    def _error_variances(self, steps: int) -> FloatArray:
+        """Variances of the model's errors and the estimate's, never above the open loop's."""
+        leads, since = np.arange(1, steps + 1), self._at["since"]
+        own = self.errors.at(leads) ** 2
+        if not self._filter.covariance.any():
+            return own
+        bound = self.errors.at(leads + since) ** 2
+        if not self._at["partly"]:
+            return bound
+        result: FloatArray = np.minimum(own + self._filter.ahead(steps), bound)
+        return result
+
+    def save(self, path: str | Path) -> Path:
+        """Write all that the object holds as plain arrays (NetCDF), to a temporary name first.
+
+        Parameters
+        ----------
+        path : str or Path
+            File; an earlier state there is replaced.
+
+        Returns
+        -------
+        Path
+            The file; :func:`seakeep.load_live` goes on from it as if nothing had happened.
+
+        Raises
+        ------
+        RequestError
+            If the file cannot be written, or another one is there.
+        """
+        arrays: dict[str, tuple[tuple[str, ...], FloatArray]] = {
+            name: ((f"{name}_row", name), each) for name, each in self._kept.items()
+        }
+        arrays |= {
+            "gains": (("slot", "entry", "state"), self._gains),
+            "precisions": (("slot", "state", "other_state"), self._precisions),
+            "plain": (("slot",), self._plain.astype(float)),
+            "covariance": (("entry", "other_entry"), self._filter.covariance),
+            "history": (("delay", "state"), self._history),
+            "innovation": (("state",), self._innovation),
+            "running": (("number",), np.array([self._sum, self._weight, self._time])),
+            "noise": (("state",), self._noise),
+        }
+        words = {"places": json.dumps(self._at), "rig": json.dumps(self._rig)}
+        dataset = xr.Dataset(arrays, attrs=words | {"model": self._fingerprint()})
+        return store.write(dataset, path, "live", "live state")
+
+    def _fingerprint(self) -> str:
+        """What tells the model apart from others."""
+        parts = {"a": self._a, "b": self._b, "d": self._d, "offset": self._offset[None]}
+        named = {name: ((f"{name}_row", f"{name}_column"), each) for name, each in parts.items()}
+        words = {"signature": store.as_json(store.signature_json(self.signature))}
+        return store.checksum(xr.Dataset(named, attrs=words))
+
+    def _restore(self, dataset: xr.Dataset) -> None:
+        """Take over what :meth:`save` wrote."""
+        for name, values in self._kept.items():
+            values[:] = dataset[name].values
+        self._gains[:] = dataset["gains"].values
+        self._precisions[:] = dataset["precisions"].values
+        self._plain[:] = dataset["plain"].values.astype(bool)
+        self._filter.covariance[:] = dataset["covariance"].values
+        self._history[:] = dataset["history"].values
+        self._innovation = dataset["innovation"].values.copy()
+        self._sum, self._weight, self._time = map(float, dataset["running"].values)
+        places = store.content(dataset, "places")
+        self._at = {key: int(places[key]) for key in self._at}
+
+
+def load_live(model: Servable, path: str | Path) -> Live:
+    """Go on from a state that :meth:`Live.save` wrote, as if the process had never stopped.
+
+    Parameters
+    ----------
+    model : model or HeldEnsemble
+        The model that was in service.
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    Live
+        Equal to the last bit; no code from the file is run.
+
+    Raises
+    ------
+    RequestError
+        If there is no such file, or it belongs to another model.
+    DataError
+        If it is damaged.
+    """
+    dataset = store.read(path)
+    if dataset.attrs["seakeep_kind"] != "live":
+        raise RequestError(
+            f"{path} holds a model and no state of a live one. Load it with seakeep.load_model."
+        )
+    live = store.rebuilt(path, lambda: _restored(model, dataset))
+    if live is None:
+        raise RequestError(
+            f"{path} is the state of another model. Load the model that was in service, or start "
+            "anew with model.live()."
+        )
+    return live
+
+
+def _restored(model: Servable, dataset: xr.Dataset) -> Live | None:
+    """The state that a file holds; None where it is another model's."""
+    rig = store.content(dataset, "rig")
+    like = xr.Dataset(
+        {name: ((), 0.0, {"x_position": each}) for name, each in rig["positions"].items()},
+        attrs=rig["run"],
+    )
+    states = model.signature.states
+    noise = dict(zip(states, dataset["noise"].values.tolist(), strict=False))
+    live = model.live(like=like, noise={name: each for name, each in noise.items() if each})
+    if dataset.attrs["model"] != live._fingerprint():
+        return None
+    live._restore(dataset)
+    return live
+
+
+def _mean_predictor(
+    members: Sequence[Dynamics], signature: Signature
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Mean of the members' one-step predictions: x' = offset + a x̂ + b û + d v.
+
+    Physical units; blocks of a and b are oldest first.
+    """
+    count, s, z = len(signature.states), signature.state_delays, signature.input_delays
+    offset = np.zeros(count)
+    a = np.zeros((count, s + 1, count))
+    b = np.zeros((count, z + 1, signature.input_scale.mean.size))
+    d = np.zeros((count, signature.direct_scale.mean.size))
+    for member in members:
+        scale, (on_states, on_inputs) = member.state_scale, member.matrices
+        split = (member.input_delays + 1) * b.shape[2]
+        parts = (
+            (a, on_states[:count], scale),
+            (b, on_inputs[:count, :split], member.input_scale),
+            (d[:, None], on_inputs[:count, split:], member.direct_scale),
+        )
+        offset += scale.mean
+        for out, coefficients, own in parts:
+            blocks = coefficients.reshape(count, -1, out.shape[2]) if out.shape[2] else out[:, :0]
+            physical = blocks * scale.std[:, None, None] / own.std
+            offset -= np.einsum("nlc,c->n", physical, own.mean)
+            out[:, out.shape[1] - physical.shape[1] :] += physical[:, ::-1]
+    number = len(members)
+    flat = a.reshape(count, -1) / number, b.reshape(count, -1) / number
+    return offset / number, *flat, d / number
+
+
+def _alignment(signature: Signature) -> FittedAlignment | None:
+    input_map = signature.input_map
+    return input_map.alignment if isinstance(input_map, Chain) else None
+
+
+def _rig(signature: Signature, like: xr.Dataset | None) -> dict[str, dict[str, float]]:
+    """Attributes of a run that an alignment reads."""
+    if like is None:
+        return {"run": {}, "positions": {}}
+    positions = {
+        name: float(like[name].attrs["x_position"])
+        for name in signature.inputs
+        if name in like and "x_position" in like[name].attrs
+    }
+    found = {key: float(like.attrs[key]) for key in RIG if key in like.attrs}
+    return {"run": found, "positions": positions}
+
+
+def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArray:
+    out, names = np.zeros(len(signature.states)), signature.states
+    units = [label.units for label in signature.state_labels]
+    for name, value in (noise or {}).items():
+        if name not in names:
+            raise RequestError(
+                f"noise names '{name}', which is no state.{did_you_mean(name, names)} States: "
+                f"{', '.join(names)}."
+            )
+        place = names.index(name)
+        out[place] = positive(value, f"noise of {name}", units[place])
+    return out
+
+
+def _sample(name: str, value: object, names: Sequence[str]) -> FloatArray:
+    """One sample in the order of the model; NaN for what a mapping leaves out."""
+    if value is None:
+        return np.full(len(names), np.nan)
+    if isinstance(value, Mapping):
+        for key in value:
+            if key not in names:
+                raise RequestError(
+                    f"{name} names '{key}', which the model does not know."
+                    f"{did_you_mean(str(key), names)} It takes: {', '.join(names) or 'none'}."
+                )
+        value = [value.get(each, math.nan) for each in names]
+    array = as_real(value, name, greatest=np.inf)
+    if array.shape != (len(names),):
+        raise RequestError(
+            f"{name} has shape {array.shape}; one number for each of {', '.join(names) or 'none'} "
+            f"is needed: shape ({len(names)},)."
+        )
+    return array

@@ -1,0 +1,94 @@
+"""The filter of a delay model against a textbook one, and what its covariance must do."""
+
+import numpy as np
+import pytest
+from scipy import linalg
+
+from seakeep.core.kalman import DelayFilter, process_noise
+
+N, S = 2, 2
+SIZE = N * (S + 1)
+A = np.array([[0.1, 0.0, -0.4, 0.2, 1.1, 0.1], [0.0, -0.1, 0.1, -0.3, 0.05, 0.9]])
+PROCESS = np.array([[0.04, 0.01], [0.01, 0.02]])
+
+
+def companion():
+    return np.concatenate([np.eye(SIZE - N, SIZE, N), A])
+
+
+def played(filter_, measured):
+    """Estimates and covariances of a sequence of measurements, NaN for what is missing."""
+    state, out = np.zeros(SIZE), []
+    for y in measured:
+        state = np.concatenate([state[N:], A @ state])
+        filter_.shift()
+        gain, _ = filter_.measure(np.isfinite(y))
+        state = state + gain @ np.nan_to_num(y - state[-N:])
+        out.append((state, filter_.covariance.copy()))
+    return out
+
+
+def measurements(samples=120):
+    rng = np.random.default_rng(3)
+    y = rng.standard_normal((samples, N))
+    y[rng.uniform(size=(samples, N)) < 0.3] = np.nan
+    y[40:60] = np.nan
+    return y
+
+
+@pytest.mark.oracle
+def test_it_is_the_textbook_filter_with_rows_missing():
+    kalman = pytest.importorskip("filterpy.kalman")
+    noise, start = np.array([0.3, 0.1]) ** 2, np.diag(np.arange(1.0, SIZE + 1))
+    textbook = kalman.KalmanFilter(dim_x=SIZE, dim_z=N)
+    textbook.x, textbook.P, textbook.F = np.zeros(SIZE), start.copy(), companion()
+    textbook.Q = np.zeros((SIZE, SIZE))
+    textbook.Q[-N:, -N:] = PROCESS
+    ours = played(DelayFilter(A, PROCESS, noise, start), measurements())
+    for y, (state, covariance) in zip(measurements(), ours, strict=True):
+        textbook.predict()
+        seen = np.flatnonzero(np.isfinite(y))
+        if seen.size:
+            rows = np.eye(N, SIZE, SIZE - N)[seen]
+            textbook.update(y[seen], R=np.diag(noise[seen]), H=rows)
+        # Hundreds of products of numbers of order one.
+        np.testing.assert_allclose(state, textbook.x, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(covariance, textbook.P, rtol=0, atol=1e-10)
+
+
+def test_without_measurements_the_covariance_grows_to_the_open_loop_and_not_beyond():
+    filter_ = DelayFilter(A, PROCESS, np.zeros(N), np.zeros((SIZE, SIZE)))
+    forced = np.zeros((SIZE, SIZE))
+    forced[-N:, -N:] = PROCESS
+    limit = linalg.solve_discrete_lyapunov(companion(), forced)
+    before = 0.0
+    for _ in range(400):
+        filter_.shift()
+        now = filter_.covariance[-1, -1]
+        assert before <= now <= limit[-1, -1] * (1 + 1e-9)  # rounding of the solver
+        before = now
+    np.testing.assert_allclose(filter_.covariance, limit, rtol=1e-9)
+
+
+def test_a_state_measured_without_noise_is_known():
+    filter_ = DelayFilter(A, PROCESS, np.zeros(N), np.eye(SIZE))
+    y = np.array([[1.5, np.nan], [np.nan, 0.25]])
+    (first, _), (state, covariance) = played(filter_, y)
+    assert first[-N] == pytest.approx(1.5, rel=1e-15)
+    assert state[-1] == pytest.approx(0.25, rel=1e-15)
+    assert not covariance[-1].any()
+    assert covariance[-2, -2] > 0
+
+
+def test_errors_of_today_are_carried_as_the_model_carries_them():
+    filter_ = DelayFilter(A, PROCESS, np.zeros(N), np.eye(SIZE))
+    found = filter_.ahead(5)
+    carried = np.linalg.matrix_power(companion(), 5)
+    np.testing.assert_allclose(found[-1], np.diagonal(carried @ carried.T)[-N:], rtol=1e-12)
+
+
+def test_residuals_less_measurement_noise_are_process_noise():
+    noise = np.array([0.02, 0.01])
+    residual = PROCESS + np.diag(noise) + (A * np.tile(noise, S + 1)) @ A.T
+    np.testing.assert_allclose(process_noise(residual, A, noise), PROCESS, rtol=1e-12)
+    assert np.linalg.eigvalsh(process_noise(PROCESS, A, 10 * noise)).min() > 0

@@ -1,0 +1,321 @@
+"""A model in service: estimates, forecasts and states to go on from, sample by sample."""
+
+import numpy as np
+import pytest
+from drifting import INPUTS, STATES, drifting_run
+
+import seakeep
+from seakeep import DataError, HankelDMDc, ProbeAlignment, RequestError, load_live
+
+START, STEPS = 500, 60  # the record that is kept holds all samples up to there
+SQUARES = seakeep.SlowSquares("eta_fwd", orders=(0,), lags=(0, 1))
+SETTINGS = {
+    "plain": {},
+    "ridge rows": {"delay_rows": "ridge"},
+    "lead": {"lead": 6},
+    "observables": {"lead": 6, "observables": (SQUARES, seakeep.Powers("eta_fwd"))},
+    "rest": {"alignment": ProbeAlignment(mode="dispersion", surge="none", offset=-0.3)},
+    "aligned": {
+        "lead": 6,
+        "alignment": ProbeAlignment(mode="dispersion", surge="predicted"),
+        "observables": (SQUARES,),
+    },
+}
+
+
+def spec(**settings):
+    return HankelDMDc(4, 12, **{"ridge": 1.0, "delay_rows": "exact", **settings})
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return [drifting_run(seed) for seed in (1, 2)]
+
+
+@pytest.fixture(scope="module")
+def run():
+    return drifting_run(7)
+
+
+@pytest.fixture(scope="module")
+def models(runs):
+    return {key: spec(**each).fit(runs, STATES, INPUTS) for key, each in SETTINGS.items()}
+
+
+@pytest.fixture(scope="module")
+def ensemble(runs):
+    return seakeep.BayesianHankelDMDc(
+        encounter_period=1.6,
+        train_length=None,
+        state_delay=seakeep.Uniform(0.2, 0.6),
+        input_delay=seakeep.Uniform(0.5, 1.5),
+        ridge=seakeep.Uniform(1, 10),
+        n_members=4,
+        delay_rows="exact",
+        lead=6,
+    ).fit(runs, STATES, INPUTS)
+
+
+def matrix(run, names):
+    return np.stack([run[name].values for name in names], axis=1)
+
+
+def play(live, run, first, stop, lost=(), dead=()):
+    """Step through samples; those that are `lost`, and `dead` channels, are not measured."""
+    u, y = matrix(run, INPUTS), matrix(run, STATES)
+    for name in dead:
+        y[:, STATES.index(name)] = np.nan
+    states = [live.step(u[at], None if at in lost else y[at]) for at in range(first, stop)]
+    return np.array(states)
+
+
+def started(model, run, stop=START):
+    live = model.live(like=run)
+    play(live, run, 0, stop)
+    return live
+
+
+def mean(forecast):
+    return matrix(forecast.sel(statistic="mean"), STATES)
+
+
+@pytest.mark.parametrize("key", SETTINGS)
+def test_fed_with_everything_it_is_the_forecast(models, run, key):
+    model = models[key]
+    live = started(model, run)
+    found = live.forecast(STEPS, matrix(run, INPUTS)[START:])
+    expected = model.forecast(run, start=float(run.time[START - 1]), steps=STEPS)
+    # The same numbers go through the same products; an instant differs by the rounding of its sum.
+    np.testing.assert_array_equal(mean(found), matrix(expected, STATES))
+    np.testing.assert_array_equal(live.state, matrix(run, STATES)[START - 1])
+    assert not live.covariance.any()
+
+
+def test_members_that_are_held_give_the_mean_of_the_ensemble(ensemble, run):
+    live = started(ensemble.hold(), run)
+    found = live.forecast(STEPS, matrix(run, INPUTS)[START:])
+    expected = ensemble.forecast_summary(run, float(run.time[START - 1]), STEPS)
+    np.testing.assert_array_equal(mean(found), mean(expected))
+    for name in STATES:
+        spread = expected[name].sel(statistic="std").values
+        assert np.all(found[name].sel(statistic="std").values > spread)
+
+
+def test_without_states_the_estimate_is_the_open_loop(models, run):
+    model, lost = models["plain"], 200
+    live = started(model, run)
+    estimates = play(live, run, START, START + lost, lost=range(START, START + lost))
+    expected = model.forecast(run, start=float(run.time[START - 1]), steps=lost)
+    # One-step predictions in physical units, and the forecast in deviations: rounding adds up.
+    np.testing.assert_allclose(estimates, matrix(expected, STATES), rtol=0, atol=1e-9)
+
+
+def test_waves_that_come_later_mend_an_estimate_with_a_look_ahead(models, run):
+    model, lost = models["lead"], 100
+    live = started(model, run)
+    estimates = play(live, run, START, START + lost, lost=range(START, START + lost))
+    expected = matrix(model.forecast(run, float(run.time[START - 1]), lost), STATES)
+    # The last look-ahead is driven by waves that are predicted; older estimates by measured ones.
+    more = live.forecast(1, matrix(run, INPUTS)[START + lost :])
+    following = model.forecast(run, start=float(run.time[START - 1]), steps=lost + 1)
+    spread = model.state_scale.spread
+    assert np.all(np.abs(estimates[-1] - expected[-1]) < 0.2 * spread)
+    assert np.all(np.abs(mean(more)[0] - matrix(following, STATES)[-1]) < 0.2 * spread)
+
+
+@pytest.mark.parametrize("lead", [0, 6])
+def test_with_samples_lost_the_error_grows_up_to_the_open_loops(make_run, channels, lead):
+    """On a linear vessel; one that the model does not know may err more after a bad correction."""
+    model = spec(lead=lead).fit([make_run(1200, seed) for seed in (1, 2)], **channels)
+    names, run, rng = channels["states"], make_run(620, 7), np.random.default_rng(0)
+    u, y = matrix(run, channels["inputs"]), matrix(run, names)
+    errors = []
+    for share in (0.1, 0.5, 1.0):
+        live = model.live()
+        lost = (np.arange(620) >= START) & (rng.uniform(size=620) < share)
+        found = [
+            live.step(*each) for each in zip(u, np.where(lost[:, None], np.nan, y), strict=True)
+        ]
+        errors.append(np.sqrt(np.mean((np.array(found) - y)[START:] ** 2, axis=0)))
+    assert np.all(np.diff(errors, axis=0) > 0)
+
+
+def test_a_dead_sensor_is_followed_through_the_others(models, run):
+    model, steps = models["plain"], 200
+    live = started(model, run)
+    found = play(live, run, START, START + steps, dead=["heave"])
+    truth = matrix(run, STATES)[START : START + steps]
+    np.testing.assert_array_equal(found[:, 0], truth[:, 0])
+    np.testing.assert_array_equal(np.isnan(live.innovation), [False, True])
+    deviation = np.sqrt(live.covariance[1, 1])
+    assert 0 < deviation <= model.errors.at(steps)[1]
+    assert np.sqrt(np.mean((found[:, 1] - truth[:, 1]) ** 2)) < 3 * deviation
+    again = play(live, run, START + steps, START + steps + 5)
+    np.testing.assert_array_equal(again[-1], matrix(run, STATES)[START + steps + 4])
+    assert not live.covariance.any()
+
+
+def test_the_covariance_grows_to_the_open_loop_error_and_not_beyond(models, run):
+    model = models["plain"]
+    live = started(model, run)
+    for since in range(1, 120):
+        play(live, run, START + since - 1, START + since, lost=[START + since - 1])
+        deviation = np.sqrt(np.diagonal(live.covariance))
+        np.testing.assert_allclose(deviation, model.errors.at(since), rtol=1e-9)
+    found = live.forecast(10, matrix(run, INPUTS)[START + 119 :])
+    for column, name in enumerate(STATES):
+        limit = model.errors.at(since + np.arange(1, 11))[:, column]
+        np.testing.assert_allclose(found[name].sel(statistic="std"), limit, rtol=1e-9)
+
+
+def test_measurement_noise_makes_an_estimate_of_a_measured_state(models, run):
+    noise = {"heave": 0.05, "surge": 0.02}
+    live = models["plain"].live(noise=noise)
+    rough = run.copy(deep=True)
+    rng = np.random.default_rng(1)
+    rough["heave"].values += noise["heave"] * rng.standard_normal(run.sizes["time"])
+    found = play(live, rough, 0, START)[200:, 1]
+    truth = run["heave"].values[200:START]
+    assert np.std(found - truth) < 0.9 * np.std(rough["heave"].values[200:START] - truth)
+
+
+def test_consistency_is_one_as_in_training_and_rises_with_another_vessel(models, runs, run):
+    live = started(models["plain"], run)
+    assert 0.7 < live.consistency < 1.4
+    other = run.copy(deep=True)
+    other["heave"].values[START:] *= 2
+    play(live, other, START, START + 150)
+    assert live.consistency > 3
+
+
+def test_waves_that_are_not_known_widen_the_band(models, run):
+    model = models["lead"]
+    live = started(model, run)
+    known, unknown = live.forecast(STEPS, matrix(run, INPUTS)[START:]), live.forecast(STEPS)
+    part = live.forecast(STEPS, matrix(run, INPUTS)[START : START + 20])
+    assert (known.attrs["known_input"], part.attrs["known_input"]) == (STEPS + 5, 20)
+    assert unknown.attrs["known_input"] == 0
+    for name in STATES:
+        deviations = [each[name].sel(statistic="std").values for each in (known, part, unknown)]
+        np.testing.assert_allclose(deviations[1][:14], deviations[0][:14], rtol=1e-6)
+        assert np.all(np.diff(deviations, axis=0)[:, -20:] > 0)
+        leads = [each[name].attrs["lead_time"] for each in (unknown, part, known)]
+        assert leads == sorted(leads)
+        width = known[name].sel(statistic="upper") - known[name].sel(statistic="lower")
+        np.testing.assert_allclose(width, 2 * 1.959964 * deviations[0], rtol=1e-6)
+
+
+def test_what_follows_is_predicted_as_the_forecast_predicts_it(models, run):
+    model = models["lead"]
+    cut = run.isel(time=slice(0, START))
+    expected = model.forecast(cut, float(cut.time[-1]), STEPS, ahead="predict")
+    found = started(model, cut).forecast(STEPS)
+    # Futures lie in pairs about the predicted one, and the model is linear in them.
+    np.testing.assert_allclose(mean(found), matrix(expected, STATES), rtol=0, atol=1e-9)
+
+
+def test_a_lost_sample_takes_predicted_inputs(models, run):
+    live, whole = started(models["plain"], run), started(models["plain"], run)
+    found = live.step()
+    expected = play(whole, run, START, START + 1, lost=[START])[0]
+    # One step ahead, waves of twenty samples a period are known to a hundredth.
+    assert np.all(np.abs(found - expected) < 0.02 * models["plain"].state_scale.spread)
+
+
+@pytest.mark.parametrize("key", ["plain", "aligned"])
+def test_a_restarted_process_goes_on_bit_for_bit(models, run, tmp_path, key):
+    live = started(models[key], run)
+    play(live, run, START, START + 10, lost=range(START, START + 10, 2), dead=["heave"])
+    again = load_live(models[key], live.save(tmp_path / "state.nc"))
+    for each in (live, again):
+        play(each, run, START + 10, START + 30, lost=[START + 13])
+    np.testing.assert_array_equal(again.state, live.state)
+    np.testing.assert_array_equal(again.covariance, live.covariance)
+    np.testing.assert_array_equal(again.innovation, live.innovation)
+    assert (again.time, again.consistency) == (live.time, live.consistency)
+    np.testing.assert_array_equal(mean(again.forecast(20)), mean(live.forecast(20)))
+
+
+def test_a_state_of_another_model_is_refused(models, run, tmp_path):
+    path = started(models["plain"], run, 50).save(tmp_path / "state.nc")
+    with pytest.raises(RequestError, match="is the state of another model"):
+        load_live(models["lead"], path)
+    with pytest.raises(DataError, match="which this version does not know"):
+        seakeep.load_model(path)
+    models["plain"].save(tmp_path / "model.nc")
+    with pytest.raises(RequestError, match="holds a model and no state of a live one"):
+        load_live(models["plain"], tmp_path / "model.nc")
+
+
+def test_what_is_kept_does_not_grow_and_does_not_count(models, run, tmp_path):
+    model = models["plain"]
+    live = started(model, run)
+    size = live.save(tmp_path / "a.nc").stat().st_size
+    for _ in range(3):
+        play(live, run, 0, START)
+    assert live.save(tmp_path / "b.nc").stat().st_size < 1.2 * size
+    found = live.forecast(STEPS, matrix(run, INPUTS)[START:])
+    expected = started(model, run).forecast(STEPS, matrix(run, INPUTS)[START:])
+    np.testing.assert_array_equal(mean(found), mean(expected))
+
+
+def test_samples_have_names_and_instants(models, run):
+    live, plain = models["plain"].live(), models["plain"].live()
+    for at in range(40):
+        sample = {name: float(run[name][at]) for name in [*INPUTS, *STATES]}
+        y = {name: sample[name] for name in STATES if name != "heave"}
+        live.step({name: sample[name] for name in INPUTS}, y, time=float(run.time[at]))
+        play(plain, run, at, at + 1, dead=["heave"])
+    np.testing.assert_array_equal(live.state, plain.state)
+    assert live.time == float(run.time[39])
+    assert plain.time == pytest.approx(39 * models["plain"].dt)
+
+
+BAD = {
+    "y has shape": {"y": [1.0]},
+    "u has shape": {"u": [0.0, 0.0, 0.0, 0.0, 0.0]},
+    "u holds a value of 'eta_fwd' that is not finite": {"u": {"eta_cog": 0.0}},
+    "y names 'heav', which the model does not know. Did you mean 'heave'": {"y": {"heav": 1.0}},
+    "y holds an infinite value": {"y": {"heave": np.inf}},
+    "is not after the last sample at": {"time": 1.0},
+    "Call step\\(\\) without arguments once for each sample": {"time": 1e3},
+}
+
+
+@pytest.mark.parametrize("message", BAD)
+def test_a_bad_sample_leaves_the_state_as_it_was(models, run, message):
+    live, untouched = started(models["plain"], run, 100), started(models["plain"], run, 100)
+    good = {"u": matrix(run, INPUTS)[100], "y": matrix(run, STATES)[100]}
+    with pytest.raises(RequestError, match=message):
+        live.step(**good | BAD[message])
+    for each in (live, untouched):
+        each.step(**good)
+    np.testing.assert_array_equal(live.state, untouched.state)
+    assert live.consistency == untouched.consistency
+
+
+def test_what_cannot_be_is_refused(models, run):
+    model = models["plain"]
+    live = model.live()
+    with pytest.raises(RequestError, match="there are 0 samples of history and the model needs 13"):
+        live.forecast(5)
+    with pytest.raises(RequestError, match="Start with at least 4 samples of u"):
+        live.step()
+    with pytest.raises(RequestError, match="noise names 'roll', which is no state"):
+        model.live(noise={"roll": 1.0})
+    live = started(model, run, 20)
+    with pytest.raises(RequestError, match="future holds values that are not finite"):
+        live.forecast(5, np.full((5, len(INPUTS)), np.nan))
+
+
+def test_a_model_without_inputs_serves_too(make_dataset):
+    time = 0.1 * np.arange(400)
+    run = make_dataset(time, heave=np.cos(2 * time) + 0.01 * np.sin(19 * time))
+    model = HankelDMDc(4, 0, 1e-6, delay_rows="exact").fit(run, ["heave"], [])
+    live = model.live()
+    for value in run["heave"].values[:300]:
+        live.step(y=[value])
+    expected = model.forecast(run, start=float(time[299]), steps=20)
+    np.testing.assert_array_equal(
+        live.forecast(20)["heave"].sel(statistic="mean"), expected["heave"]
+    )
