@@ -3,11 +3,12 @@
     python benchmarks/skill.py [--seeds 0 1 …] [--qtf 0 1 …] [--work DIR] [--out FILE.md]
 
 For every seed the virtual tank plays its campaign, for some with the other law of its drift force
-(the force of each pair of waves instead of Newman's approximation), and a study leaves one
-irregular run out at a time: windows of 15 encounter periods of that run, apart, and of 5 periods in
-regular waves. No model reads a measured output after the start of a forecast but `paper`, whose
-alignment reads the measured surge. With SEAKEEP_DATA_DIR the measured sets are judged too. What is
-finished is kept in DIR: the same command goes on where it was stopped.
+(the force of each pair of waves instead of Newman's approximation). One study leaves an irregular
+run out at a time and judges windows of 15 encounter periods of that run, apart. Another one learns
+from all irregular runs and judges windows of 5 periods in regular waves. No model reads a measured
+output after the start of a forecast but `paper`, whose alignment reads the measured surge. With
+SEAKEEP_DATA_DIR the measured sets are judged too. What is finished is kept in DIR: the same command
+continues where it was stopped.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from seakeep.tank.play import play
 from seakeep.tank.settings import default_settings, with_waves
 
 Progress = Callable[[int, int, str], None]
+Results = Mapping[str, StudyResult]
 PLACE = Path(__file__).parents[1] / "examples"
 EXAMPLES = {
     "ntnu_ship_section": {
@@ -54,12 +56,12 @@ CHANNELS = {
 BASELINES = ("hold_last", "mean", "fir", "arx", "subspace")
 STUDY = """
 [study]
-campaign = "campaign.toml"
+campaign = "{campaign}.toml"
 preset = "recommended"
 seed = {seed}
 
 [training]
-scheme = "leave_out"
+scheme = "{scheme}"
 
 [models.paper]
 preset = "paper"
@@ -72,18 +74,25 @@ kind = "bayesian_hankel_dmdc"
 n_members = 12
 
 {baselines}
-[tests.irregular]
-waves = "irregular"
-length = 15
-windows = 40
-placement = "apart"
-{regular}
+{tests}
 [statistics]
 n_series = 10
 
 [output]
 shown_windows = 1
 eigenvalues = false
+"""
+IRREGULAR = """[tests.irregular]
+waves = "irregular"
+length = 15
+windows = 40
+placement = "apart"
+"""
+IN_REGULAR = """
+[tests.{name}]
+runs = ["{name}"]
+length = 5
+placement = "apart"
 """
 SEA_STATES = """
 [study]
@@ -132,33 +141,42 @@ SETS = {WINDOWS: "irregular"} | {f"regular λ/L {r}, 5 T̂": name for name, r in
 WORDS = {"average": "ANRMSE", **CHANNELS}
 
 
-def study_of(work: Path, seed: int, law: str) -> StudyResult:
-    """Result of the study of one campaign, from its folder where it is finished."""
+def studies_of(work: Path, seed: int, law: str) -> Results:
+    """Results of one campaign by test set, from its folder where they are finished."""
     folder = work / f"seed_{seed}_{law}"
     progress = told(folder.name)
-    if not (folder / "campaign.toml").exists():
+    campaign = folder / "campaign.toml"
+    if not campaign.exists():
         settings = with_waves(default_settings(), seed, "jittered")
         drift = settings.drift.model_copy(update={"law": law})
         play(settings.model_copy(update={"drift": drift}), folder, progress=progress)
-    regular = "".join(
-        f'\n[tests.{name}]\nruns = ["{name}"]\nlength = 5\nplacement = "apart"\n'
-        for name in REGULAR
+    whole = campaign.read_text(encoding="utf-8").replace(
+        "train = [60.0, 165.0]\ntest = [165.0, 270.0]", "train = [60.0, 270.0]"
     )
+    (folder / "whole.toml").write_text(whole, encoding="utf-8")
     baselines = "".join(f'[models.{kind}]\nkind = "{kind}"\n\n' for kind in BASELINES)
-    text = STUDY.format(seed=seed, baselines=baselines, regular=regular)
-    return result_of(folder, text, progress)
+    found: dict[str, StudyResult] = {}
+    for name, of, scheme, tests in (
+        ("irregular", "campaign", "leave_out", IRREGULAR),
+        ("regular", "whole", "pooled", "".join(IN_REGULAR.format(name=name) for name in REGULAR)),
+    ):
+        text = STUDY.format(seed=seed, campaign=of, scheme=scheme, baselines=baselines, tests=tests)
+        result = result_of(folder, name, text, progress)
+        found |= dict.fromkeys(result.tests, result)
+    return found
 
 
-def result_of(folder: Path, text: str, progress: Progress) -> StudyResult:
+def result_of(folder: Path, name: str, text: str, progress: Progress) -> StudyResult:
     """Result of a study that is described by a text, in a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "study.toml").write_text(text, encoding="utf-8")
-    return run_study(read_study(folder / "study.toml"), folder / "study", progress=progress)
+    path = folder / f"{name}.toml"
+    path.write_text(text, encoding="utf-8")
+    return run_study(read_study(path), folder / name, progress=progress)
 
 
-def median(result: StudyResult, test: str, model: str, channel: str, key: str = "nrmse") -> float:
+def median(results: Results, test: str, model: str, channel: str, key: str = "nrmse") -> float:
     """Median over the cells; the channel "average" is the ANRMSE."""
-    boxes = result.groups[f"statistics/boxes/{test}"]["median"]
+    boxes = results[test].groups[f"statistics/boxes/{test}"]["median"]
     return float(boxes.sel(measure=key, model=model, channel=channel))
 
 
@@ -182,7 +200,7 @@ def goal(
     return [*what, f"{good:.2f}", f"{stretch:.2f}", *(f"{each:.3f}" for each in values), words]
 
 
-def goals(found: Mapping[str, StudyResult]) -> list[str]:
+def goals(found: Mapping[str, Results]) -> list[str]:
     """Errors of `recommended` in every campaign beside the goals."""
     channel = {short: name for name, short in WORDS.items()}
     rows = []
@@ -200,9 +218,9 @@ def goals(found: Mapping[str, StudyResult]) -> list[str]:
     ]
 
 
-def bands(result: StudyResult, test: str, band: str = "calibrated") -> dict[str, float]:
+def bands(results: Results, test: str, band: str = "calibrated") -> dict[str, float]:
     """Coverage averaged over the channels, of all instants and of the worst thirds; width in SD."""
-    at = result.groups[f"statistics/bands/{test}"].sel(model="ensemble", band=band)
+    at = results[test].groups[f"statistics/bands/{test}"].sel(model="ensemble", band=band)
     inside = {str(part): float(at["inside"].sel(part=part).mean()) for part in at["part"].values}
     waves = [inside[part] for part in inside if "waves" in part]
     horizon = [inside[part] for part in inside if "third" in part]
@@ -219,7 +237,7 @@ def bands(result: StudyResult, test: str, band: str = "calibrated") -> dict[str,
     }
 
 
-def coverage(found: Mapping[str, StudyResult]) -> list[str]:
+def coverage(found: Mapping[str, Results]) -> list[str]:
     """Goals of the bands, and the bands of members and as calibrated in every test set."""
     irregular = [bands(each, "irregular") for each in found.values()]
     steep = [bands(each, "regular_1_5")["all"] for each in found.values()]
@@ -252,7 +270,7 @@ def coverage(found: Mapping[str, StudyResult]) -> list[str]:
     ]
 
 
-def side_by_side(found: Mapping[str, StudyResult]) -> list[str]:
+def side_by_side(found: Mapping[str, Results]) -> list[str]:
     """Errors of all models, averages over the campaigns; in SD of the window and the training."""
     models = ["paper", "recommended", "ensemble", *BASELINES]
     rows = []
@@ -295,8 +313,8 @@ def measured(folder: Path, progress: Progress) -> list[str]:
     ntnu = PLACE / "ntnu_ship_section"
     names = list(seakeep.read_campaign(ntnu / "campaign.toml").settings.runs)
     text = SEA_STATES.format(folder=ntnu.as_posix(), runs=json.dumps(names))
-    left_out = result_of(folder / "sea_states", text, progress)
-    for channel in ("average", *left_out.channels):
+    left_out = {"unseen": result_of(folder, "sea_states", text, progress)}
+    for channel in ("average", *left_out["unseen"].channels):
         cells = [f"{median(left_out, 'unseen', m, channel):.3f}" for m in ("paper", "recommended")]
         what = "tensions, ANRMSE" if channel == "average" else channel
         rows.append(["sea states left out, 15 T̂, median", what, *cells])
@@ -328,8 +346,8 @@ def main() -> None:
     warnings.simplefilter("ignore", seakeep.SeakeepWarning)
     with tempfile.TemporaryDirectory() as temporary:
         work = options.work or Path(temporary)
-        found = {f"seed {seed}": study_of(work, seed, "newman") for seed in options.seeds}
-        found |= {f"seed {seed}, QTF": study_of(work, seed, "qtf") for seed in options.qtf}
+        found = {f"seed {seed}": studies_of(work, seed, "newman") for seed in options.seeds}
+        found |= {f"seed {seed}, QTF": studies_of(work, seed, "qtf") for seed in options.qtf}
         lines = [*goals(found), *coverage(found), *side_by_side(found)]
         if os.environ.get("SEAKEEP_DATA_DIR"):
             lines += measured(work, told("measured"))

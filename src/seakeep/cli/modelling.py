@@ -17,6 +17,7 @@ from seakeep.cli.options import (
     FullScale,
     Level,
     ModelFile,
+    ModelKey,
     Scheduler,
     Steps,
     Workers,
@@ -43,10 +44,7 @@ ERRORS = "errors_by_run"
 def fit(
     campaign: CampaignFile,
     out: Annotated[Path, typer.Option("-o", "--out", help="Model file to write (NetCDF).")],
-    model: Annotated[
-        str | None,
-        typer.Option("--model", help="Key in [models.NAME]; by default the table [model]."),
-    ] = None,
+    model: ModelKey = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
 ) -> None:

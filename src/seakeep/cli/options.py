@@ -23,6 +23,7 @@ __all__ = [
     "FullScale",
     "Level",
     "ModelFile",
+    "ModelKey",
     "Scheduler",
     "Steps",
     "Workers",
@@ -67,6 +68,10 @@ Workers = Annotated[
 ]
 ModelFile = Annotated[
     Path, typer.Argument(help="Model file written by seakeep fit.", metavar="MODEL.nc")
+]
+ModelKey = Annotated[
+    str | None,
+    typer.Option("--model", help="Key in [models.NAME]; by default the table [model]."),
 ]
 Scheduler = Annotated[
     str | None,

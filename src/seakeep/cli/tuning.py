@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from seakeep.cli.console import messages, progress_bar
-from seakeep.cli.options import CampaignFile, Scheduler, Workers, member_executor, read_files
+from seakeep.cli.options import (
+    CampaignFile,
+    ModelKey,
+    Scheduler,
+    Workers,
+    member_executor,
+    read_files,
+)
 from seakeep.errors import RequestError
 from seakeep.files import check_output, check_place, replacing
 
@@ -37,10 +44,7 @@ def tune(
             "-o", "--out", help="Tuned campaign file, beside CAMPAIGN. Default: NAME_tuned.toml."
         ),
     ] = None,
-    model: Annotated[
-        str | None,
-        typer.Option("--model", help="Key in [models.NAME]; by default the table [model]."),
-    ] = None,
+    model: ModelKey = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
 ) -> None:

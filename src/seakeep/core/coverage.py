@@ -106,11 +106,7 @@ def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
         low, high, m = low[:, None], high[:, None], m[:, None]
     if m.shape[-2] < 2:
         raise DataError(f"a window of {m.shape[-2]} instant(s) has no width to judge; give two.")
-    if np.any(low > high):
-        raise RequestError(
-            f"lower exceeds upper at {int(np.count_nonzero(low > high))} instant(s); they are "
-            "given in the wrong order."
-        )
+    _check_order(low, high)
     lost = (np.isnan(low) | np.isnan(high)).any(axis=-2)
     below, above = (m < low).mean(axis=-2), (m > high).mean(axis=-2)
     width = (high - low).mean(axis=-2)
@@ -237,11 +233,7 @@ def _triple(
             f"lower has shape {low.shape}, upper {high.shape} and measured {y.shape}; they do not "
             "fit together."
         ) from None
-    if np.any(low > high):
-        raise RequestError(
-            f"lower exceeds upper at {int(np.count_nonzero(low > high))} instant(s); they are "
-            "given in the wrong order."
-        )
+    _check_order(low, high)
     return low, high, y
 
 
@@ -433,3 +425,11 @@ def box_statistics(values: npt.ArrayLike, reach: float = 1.5) -> BoxStatistics:
         count=int(x.size),
         left_out=int(everything.size - x.size),
     )
+
+
+def _check_order(low: FloatArray, high: FloatArray) -> None:
+    if np.any(low > high):
+        raise RequestError(
+            f"lower exceeds upper at {int(np.count_nonzero(low > high))} instant(s); they are "
+            "given in the wrong order."
+        )

@@ -25,9 +25,9 @@ import xarray as xr
 from scipy import signal
 
 from seakeep.arrays import FloatArray
-from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice, check_integer
+from seakeep.models.checks import check_choice, check_integer, settings_of
 from seakeep.models.interface import Drive, InputMap, Json, Regressors, Span, plain
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.observables import Observed
@@ -268,21 +268,8 @@ class ProbeAlignment:
         RequestError
             If it is something else, or a key is not known.
         """
-        if value is None or isinstance(value, cls):
-            return value
-        if not isinstance(value, Mapping):
-            raise RequestError(
-                f"alignment must be a seakeep.ProbeAlignment or None; received {value!r}. Write "
-                "alignment=seakeep.ProbeAlignment(mode='effective', surge='measured')."
-            )
-        known = [each.name for each in fields(cls)]
-        for key in value:
-            if key not in known:
-                raise RequestError(
-                    f"alignment: unknown key '{key}'.{did_you_mean(str(key), known)} Keys: "
-                    f"{', '.join(known)}."
-                )
-        return cls(**value)
+        example = "mode='effective', surge='measured'"
+        return settings_of(cls, "alignment", value, example)
 
     def fit(
         self,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import numbers
 import warnings
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import ClassVar, Literal, Self
 
@@ -13,7 +12,7 @@ import numpy as np
 
 from seakeep.core.embedding import History
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
-from seakeep.models.checks import check_choice, check_integer
+from seakeep.models.checks import check_choice, check_integer, settings_of
 from seakeep.models.inputs import Lead, ProbeAlignment
 from seakeep.models.interface import Fittable, Json, Needs, plain
 from seakeep.models.observables import Observable, Observing, observables_of
@@ -139,21 +138,7 @@ class Select:
     @classmethod
     def of(cls, value: object) -> Self | None:
         """Return settings as they are, or made of a table of their keys; None stays None."""
-        if value is None or isinstance(value, cls):
-            return value
-        known = list(cls.__dataclass_fields__)
-        if not isinstance(value, Mapping):
-            raise RequestError(
-                f"select must be a seakeep.Select or None; received {value!r}. Write "
-                "select=seakeep.Select(observables=True)."
-            )
-        for key in value:
-            if key not in known:
-                raise RequestError(
-                    f"select: unknown key '{key}'.{did_you_mean(str(key), known)} Keys: "
-                    f"{', '.join(known)}."
-                )
-        return cls(**value)
+        return settings_of(cls, "select", value, "observables=True")
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,13 @@ import numpy as np
 from seakeep.arrays import FloatArray
 from seakeep.core.bands import split_bands
 from seakeep.report.tables import Table, probability, signed
-from seakeep.statistics import overlap_block, two_way_interval
+from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
-from seakeep.study.judge import average_of, median_of, training_order
+from seakeep.study.judge import average_of, blocks_of, median_of, training_order
 from seakeep.study.plan import random_stream
 from seakeep.study.reproduce import SLOW
 
-__all__ = ["CLAIMS", "Finding", "claims_table"]
+__all__ = ["CLAIMS", "Verdict", "claims_table"]
 
 Results = Mapping[str, StudyResult]
 Statistic = Callable[..., FloatArray]
@@ -61,8 +61,8 @@ class Interval(NamedTuple):
         return f"{form(self.value)} [{low}, {high}]"
 
 
-class Finding(NamedTuple):
-    """What a study has to say on a claim.
+class Verdict(NamedTuple):
+    """What a study shows of a claim.
 
     Attributes
     ----------
@@ -130,12 +130,7 @@ def _interval(
     result: StudyResult, tests: tuple[str, ...], statistic: Statistic, *cells: FloatArray
 ) -> Interval:
     """A statistic of cells (training, window, …) with its interval."""
-    spans = []
-    for data in (result.tests[test] for test in tests):
-        length = float(data["time"].values[-1])
-        places = zip(data["run"].values.astype(str), data["start"].values, strict=True)
-        spans += [(run, float(start), float(start) + length) for run, start in places]
-    blocks = training_order(result.groups["training"])[1], overlap_block(spans)
+    blocks = blocks_of([result.tests[test] for test in tests], result.groups["training"])
     rng = random_stream(int(result.attrs["seed"]), "claims")
     lower, upper = two_way_interval(statistic, *cells, rng=rng, blocks=blocks)
     value = statistic(*(each[None] for each in cells))[0]
@@ -180,33 +175,33 @@ def _error(
     return _interval(result, tests, _median, cells[..., picked])
 
 
-def _robust(results: Results) -> Finding:
+def _robust(results: Results) -> Verdict:
     result = results["paper"]
     own, fir = (_error(result, ("irregular",), model=m) for m in (ENSEMBLE, "fir"))
     worst = float(np.nanmax(average_of(_cells(result, ("irregular",), ENSEMBLE, "nrmse"))))
-    return Finding(
+    return Verdict(
         f"median ANRMSE {own.text()}, worst cell {worst:.2f}; FIR {fir.text()}",
         all_of([own.below(USEFUL), worst < 1.0]),
         f"Median below {USEFUL:g}, no cell above 1. FIR is the best linear filter of the waves.",
     )
 
 
-def _trend(results: Results) -> Finding:
+def _trend(results: Results) -> Verdict:
     at = results["paper"].groups["statistics/trend/irregular"]["p_value"].sel(band="all")
     values = [float(at.sel(model=model)) for model in (SINGLE, ENSEMBLE)]
     raw = results["raw"].groups["statistics/trend/irregular"]["p_value"].sel(band="all")
     kept = [probability(float(raw.sel(model=model))) for model in (SINGLE, ENSEMBLE)]
-    return Finding(
+    return Verdict(
         f"p = {' and '.join(map(probability, values))}; act (b): {' and '.join(kept)}",
         min(values) > 0.05,
         "Mann–Kendall test of ε(t), both models; p below 0.05 is a trend.",
     )
 
 
-def _any_length(results: Results) -> Finding:
+def _any_length(results: Results) -> Verdict:
     period = float(results["paper"].attrs["encounter_period"])
     length = float(results["paper"].tests["irregular"]["time"].values[-1])
-    return Finding(
+    return Verdict(
         f"{length / period:.0f} T̂ were forecast, as in the paper",
         None,
         "No longer windows are judged; this tank's drift (18 T̂) is slower than a window.",
@@ -226,11 +221,11 @@ def _share(result: StudyResult, measure: str, channels: tuple[str, ...]) -> Inte
     return _interval(result, ("irregular",), statistic, cells)
 
 
-def _who_errs(results: Results) -> Finding:
+def _who_errs(results: Results) -> Verdict:
     shares = {words: _share(results["paper"], key, LOADS) for key, words in MEASURES.items()}
     raw = _share(results["raw"], "nrmse", SLOW)
     below = [each.below(0.5) for each in shares.values()]
-    return Finding(
+    return Verdict(
         f"loads make {', '.join(f'{each.part()} of {words}' for words, each in shares.items())}; "
         f"act (b): surge and loads {raw.part()} of ANRMSE",
         all_of([None if each is None else not each for each in below]),
@@ -238,7 +233,7 @@ def _who_errs(results: Results) -> Finding:
     )
 
 
-def _load_divergence(results: Results) -> Finding:
+def _load_divergence(results: Results) -> Verdict:
     at = (
         results["paper"]
         .groups["statistics/divergence"]["mean"]
@@ -246,19 +241,19 @@ def _load_divergence(results: Results) -> Finding:
     )
     loads = float(at.sel(channel=list(LOADS)).mean())
     others = float(at.sel(channel=list(_motions(results["paper"]))).mean())
-    return Finding(
+    return Verdict(
         f"{loads:.4f} against {others:.4f}: a factor of {loads / others:.0f}",
         loads > 10**0.5 * others,
         "Mean JSD of the loads and of the nine others; a factor above √10.",
     )
 
 
-def _densities(results: Results) -> Finding:
+def _densities(results: Results) -> Verdict:
     result = results["paper"]
     at = result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
     at = at.sel(channel=list(_motions(result)))
     within = int((at["mean"] <= at["noise_floor_upper"]).sum())
-    return Finding(
+    return Verdict(
         f"{within} of {at.sizes['channel']} motions within the noise of the record",
         within == at.sizes["channel"],
         "JSD below the upper bound of the measurement's divergence from itself.",
@@ -277,29 +272,29 @@ def _against_single(
     }
 
 
-def _better(results: Results) -> Finding:
+def _better(results: Results) -> Verdict:
     found = _against_single(results["paper"], ("irregular",), _change)
-    return Finding(
+    return Verdict(
         ", ".join(f"{words} {each.percent()}" for words, each in found.items()),
         all_of([each.below(0.0) for each in found.values()]),
         "Change of the median from the deterministic to the Bayesian model.",
     )
 
 
-def _dispersion(results: Results) -> Finding:
+def _dispersion(results: Results) -> Verdict:
     def statistic(drawn: FloatArray, other: FloatArray) -> FloatArray:
         with np.errstate(invalid="ignore", divide="ignore"):  # a redraw may hold one cell alone
             return _spread(drawn) / _spread(other) - 1.0
 
     found = _against_single(results["paper"], ("irregular",), statistic)
-    return Finding(
+    return Verdict(
         ", ".join(f"{words} {each.percent()}" for words, each in found.items()),
         all_of([each.below(0.0) for each in found.values()]),
         "Change of the inter-quartile range.",
     )
 
 
-def _always_better(results: Results) -> Finding:
+def _always_better(results: Results) -> Verdict:
     result = results["paper"]
     verdicts = [
         each.below(0.0)
@@ -307,7 +302,7 @@ def _always_better(results: Results) -> Finding:
         for each in _against_single(result, (test,), _change).values()
     ]
     better, worse = verdicts.count(True), verdicts.count(False)
-    return Finding(
+    return Verdict(
         f"better in {better}, worse in {worse}, undecided in {verdicts.count(None)} of "
         f"{len(verdicts)}",
         all_of(verdicts),
@@ -320,12 +315,12 @@ def _coverage(result: StudyResult, channels: tuple[str, ...], key: str) -> float
     return float(at[key].sel(channel=list(channels)).mean())
 
 
-def _narrow(results: Results) -> Finding:
+def _narrow(results: Results) -> Verdict:
     result = results["paper"]
     width = _coverage(result, _motions(result), "relative_width")
     inside = _coverage(result, _motions(result), "inside")
     error = _error(result, ("irregular",), _motions(result))
-    return Finding(
+    return Verdict(
         f"motions: {width:.2f} SD wide, {100 * inside:.0f} % of the instants inside 95 %",
         width < USEFUL,
         f"Width below {USEFUL:g} SD. The median error is {error.value:.2f} SD: the spread of the "
@@ -333,16 +328,16 @@ def _narrow(results: Results) -> Finding:
     )
 
 
-def _load_band(results: Results) -> Finding:
+def _load_band(results: Results) -> Verdict:
     inside = _coverage(results["paper"], LOADS, "inside")
-    return Finding(
+    return Verdict(
         f"{100 * inside:.0f} % of the instants of the loads inside 95 %",
         inside < 0.9,
         "Fewer than 90 %.",
     )
 
 
-def _slow_loads(results: Results) -> Finding:
+def _slow_loads(results: Results) -> Verdict:
     result = results["raw"]
     test = result.tests["irregular"]
     split = float(result.settings["statistics"]["split_period"])
@@ -359,7 +354,7 @@ def _slow_loads(results: Results) -> Finding:
         for column in range(len(LOADS))
     ]
     told = zip(LOADS, found, strict=True)
-    return Finding(
+    return Verdict(
         "act (b): " + ", ".join(f"{n.removeprefix('mooring_')} {f.text()}" for n, f in told),
         all_of([each.below(1.0) for each in found]),
         "NRMSE of what is slower than the waves; below 1 it beats the mean. Act (a) has none left. "
@@ -367,21 +362,21 @@ def _slow_loads(results: Results) -> Finding:
     )
 
 
-def _peaks(results: Results) -> Finding:
+def _peaks(results: Results) -> Verdict:
     loads = _error(results["paper"], ("irregular",), LOADS, "nammae")
-    return Finding(
+    return Verdict(
         f"median NAMMAE of the loads {loads.text()} SD",
         loads.below(1.0),
         "Less than one SD. Slap and slack lines of the tank make peaks that no linear model has.",
     )
 
 
-def _regular(results: Results) -> Finding:
+def _regular(results: Results) -> Verdict:
     result = results["paper"]
     motions = [_error(result, (test,), _motions(result)) for test in REGULAR]
     loads = [_error(result, (test,), LOADS) for test in REGULAR]
     worse = all(b.value > a.value for a, b in zip(motions, loads, strict=True))
-    return Finding(
+    return Verdict(
         f"λ/L 1.5, 2, 3: motions {', '.join(f.text() for f in motions)}; loads "
         f"{', '.join(f.text() for f in loads)}",
         all_of([*(each.below(USEFUL) for each in motions), worse]),
@@ -389,7 +384,7 @@ def _regular(results: Results) -> Finding:
     )
 
 
-def _against_irregular(results: Results) -> Finding:
+def _against_irregular(results: Results) -> Verdict:
     result = results["paper"]
     tests = ("irregular", *REGULAR)
     sizes = [result.tests[test].sizes["window"] for test in tests]
@@ -409,14 +404,14 @@ def _against_irregular(results: Results) -> Finding:
         for key, words in MEASURES.items()
     }
     above = found["ANRMSE"].below(0.0)
-    return Finding(
+    return Verdict(
         ", ".join(f"{words} {each.percent()}" for words, each in found.items()),
         all_of([None if above is None else not above, found["NAMMAE"].below(0.0)]),
         "Median over all regular windows against that in irregular waves.",
     )
 
 
-def _phase(results: Results) -> Finding:
+def _phase(results: Results) -> Verdict:
     result = results["paper"]
     found = {}
     for words, channels in (("loads", LOADS), ("motions", _motions(result))):
@@ -427,21 +422,21 @@ def _phase(results: Results) -> Finding:
             for test in REGULAR
         ]
         found[words] = float(np.nanmedian(np.abs(np.concatenate([x.values for x in leads]))))
-    return Finding(
+    return Verdict(
         f"median |phase|: loads {found['loads']:.0f}°, motions {found['motions']:.0f}°",
         found["loads"] > found["motions"],
         "At the wave's frequency, over the three regular runs.",
     )
 
 
-def _stern(results: Results) -> Finding:
+def _stern(results: Results) -> Verdict:
     result = results["paper"]
     errors = [_error(result, (test,), ("mooring_stern",)) for test in REGULAR]
     slack = results["raw"].groups["runs"]["slack"].sel(name="mooring_stern")
     parts = [f"{100 * float(slack.sel(run=run)):.0f} %" for run in REGULAR]
     values = [each.value for each in errors]
     judged = bool(np.isfinite(values).all())
-    return Finding(
+    return Verdict(
         f"NRMSE {', '.join(e.text() if e.value == e.value else 'only noise' for e in errors)}; "
         f"slack {', '.join(parts)} of the time",
         values[0] > values[1] > values[2] if judged else values[1] > values[2],
@@ -449,7 +444,7 @@ def _stern(results: Results) -> Finding:
     )
 
 
-CLAIMS: tuple[tuple[str, Callable[[Results], Finding]], ...] = (
+CLAIMS: tuple[tuple[str, Callable[[Results], Verdict]], ...] = (
     ("Reliable and robust prediction for unseen irregular waves", _robust),
     ("No trend in ε(t) over 15 T̂", _trend),
     ("The same accuracy for arbitrarily long sequences", _any_length),

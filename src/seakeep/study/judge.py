@@ -154,10 +154,8 @@ def difference_table(
     (:func:`seakeep.statistics.two_way_interval`); ``blocks`` of each that overlap are drawn
     together. Where the interval holds zero the study cannot tell (:func:`verdict`).
     """
-    ends = test["start"].values + float(test["time"].values[-1])
-    spans = list(zip(test["run"].values.astype(str), test["start"].values, ends, strict=True))
-    order, block = training_order(training)
-    blocks = block, statistics.overlap_block(spans)
+    order, _ = training_order(training)
+    blocks = blocks_of([test], training)
     judged = test["judged"].values[order]
     cells = np.stack(
         [
@@ -193,6 +191,15 @@ def difference_table(
         },
         attrs={"blocks": blocks},
     )
+
+
+def blocks_of(tests: Sequence[xr.Dataset], training: xr.Dataset) -> tuple[int, int]:
+    """How many neighbours overlap: training sets, and windows of test sets one after the other."""
+    spans: list[tuple[str, float, float]] = []
+    for test in tests:
+        ends = test["start"].values + float(test["time"].values[-1])
+        spans += zip(test["run"].values.astype(str), test["start"].values, ends, strict=True)
+    return training_order(training)[1], statistics.overlap_block(spans)
 
 
 def training_order(training: xr.Dataset) -> tuple[npt.NDArray[np.intp], int]:
