@@ -20,7 +20,9 @@ from fmpy.validation import validate_fmu  # noqa: E402
 
 @pytest.fixture(scope="module")
 def fmu(cases, tmp_path_factory):
-    return write_fmu(cases["full"].model, tmp_path_factory.mktemp("fmu") / "rom.fmu")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CC", "cc -Wall -Wextra -Wno-unused-parameter -Werror")
+        return write_fmu(cases["full"].model, tmp_path_factory.mktemp("fmu") / "rom.fmu")
 
 
 @pytest.fixture(scope="module")
