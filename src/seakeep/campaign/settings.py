@@ -541,8 +541,8 @@ class RunSettings(Table):
         default_factory=dict, description="instrument = its file, relative to the campaign file"
     )
     sea_state: str = Field(default="", description="a name for the sea state")
-    waves: Literal["regular", "irregular"] | None = Field(
-        default=None, description="'regular' or 'irregular'"
+    waves: Literal["regular", "irregular", "still"] | None = Field(
+        default=None, description="'regular', 'irregular', or 'still' of a free decay"
     )
     role: Literal["train", "test", "unused"] | None = Field(
         default=None, description="'train', 'test' or 'unused'"

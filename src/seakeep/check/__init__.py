@@ -1,15 +1,25 @@
-"""What a model is worth: its response to waves, and what its inputs can tell of a state at all."""
+"""What a model is worth: response, coherence, modes, decay, residuals, statistics and validity."""
 
 from seakeep.check.coherence import coherence
 from seakeep.check.every import CHECKS, Checked, check_model
+from seakeep.check.free import decay, measured_decay, modes
+from seakeep.check.peaks import statistics
+from seakeep.check.residuals import residuals
 from seakeep.check.response import measured_response, response, validation
+from seakeep.check.sea import validity
 
 __all__ = [
     "CHECKS",
     "Checked",
     "check_model",
     "coherence",
+    "decay",
+    "measured_decay",
     "measured_response",
+    "modes",
+    "residuals",
     "response",
+    "statistics",
     "validation",
+    "validity",
 ]

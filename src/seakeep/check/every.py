@@ -9,22 +9,40 @@ from dataclasses import dataclass
 import xarray as xr
 
 from seakeep.check.coherence import coherence
+from seakeep.check.free import decay, measured_decay, modes
+from seakeep.check.peaks import statistics
+from seakeep.check.residuals import residuals
 from seakeep.check.response import measured_response, response, validation
+from seakeep.check.sea import validity
 from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models import Model
 
 __all__ = ["CHECKS", "Checked", "check_model"]
 
 
+Check = Callable[[Model, Mapping[str, xr.Dataset]], xr.Dataset]
+
+
 def _response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     return response(model, None, runs)
 
 
-CHECKS: dict[str, Callable[[Model, Mapping[str, xr.Dataset]], xr.Dataset]] = {
+def _alone(check: Callable[[Model], xr.Dataset]) -> Check:
+    """A check that looks at no run."""
+    return lambda model, runs: check(model)
+
+
+CHECKS: dict[str, Check] = {
     "response": _response,
     "measured_response": measured_response,
     "validation": validation,
     "coherence": coherence,
+    "decay": _alone(decay),
+    "measured_decay": measured_decay,
+    "modes": _alone(modes),
+    "residuals": residuals,
+    "statistics": statistics,
+    "validity": validity,
 }
 """Checks by name: each takes a model and prepared runs by name."""
 

@@ -13,6 +13,7 @@ import xarray as xr
 from seakeep.arrays import BoolArray, FloatArray
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
 from seakeep.models import HankelDMDcModel, HankelEnsemble, InputMap, Model, SlowSquares
+from seakeep.models.engine import Windows
 from seakeep.models.inputs import Chain, Lead, Measured
 from seakeep.models.interface import Span
 from seakeep.models.labelled import channel_matrix, check_step
@@ -26,13 +27,16 @@ __all__ = [
     "Part",
     "encounter_period_of",
     "free_runs",
+    "free_windows",
     "irregular",
     "is_regular",
+    "one_step",
     "reference_probe",
     "regressors",
     "units_of",
     "used_parts",
     "wave_turns",
+    "window_of",
 ]
 
 
@@ -141,7 +145,14 @@ def free_runs(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, FreeRun
     return found
 
 
-def _free_run(model: Model, run: xr.Dataset, name: str) -> FreeRun:
+def window_of(model: Model, run: xr.Dataset) -> tuple[int, int]:
+    """First sample of a run that a forecast of its test part may start from, and the last sample.
+
+    Raises
+    ------
+    DataError
+        If the test part ends before.
+    """
     time = np.asarray(run["time"].values, dtype=float)
     begin, end = _test_span(run)
     if time.size <= model.history_samples:
@@ -155,6 +166,13 @@ def _free_run(model: Model, run: xr.Dataset, name: str) -> FreeRun:
     at = int(np.argmin(np.abs(time - start)))
     if last - at < 2:
         raise DataError("its test part ends before the first forecast. Give a longer run.")
+    return at, last
+
+
+def _free_run(model: Model, run: xr.Dataset, name: str) -> FreeRun:
+    at, last = window_of(model, run)
+    time = np.asarray(run["time"].values, dtype=float)
+    start = float(time[at])
     if isinstance(model, HankelEnsemble):
         found = model.forecast_summary(run, start, last - at).sel(statistic="mean")
     else:
@@ -162,6 +180,48 @@ def _free_run(model: Model, run: xr.Dataset, name: str) -> FreeRun:
     measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
     forecast = channel_matrix(found, model.states, name)
     return FreeRun(float(time[at]), time[at + 1 : last + 1], forecast, measured)
+
+
+def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) -> FloatArray:
+    """Free runs from several starts, (window, steps, N); of an ensemble the members' mean."""
+    found = model.forecast_windows(run, starts.tolist(), steps)
+    values = np.stack([found[name].values for name in model.states], axis=-1)
+    result: FloatArray = values.mean(axis=0) if "member" in found.dims else values
+    return result
+
+
+def one_step(model: Model, run: xr.Dataset, first: int, last: int) -> FloatArray:
+    """States one step after each sample from `first` to before `last`, (sample, N).
+
+    Regressors of the run are made once; of an ensemble the members' mean.
+    """
+    signature, name = model.signature, str(run.attrs.get("run", "the run"))
+    z, s, count = signature.input_delays, signature.state_delays, last - first
+    values = channel_matrix(run, model.inputs, name)
+    spans = [Span(first - z, first, first + 1), Span(first - z, last - 1, last)]
+    drive = signature.input_map.wrap(Measured(values), run, spans)
+    rows = drive.rows(first - z, last)
+    states = channel_matrix(run, model.states, name)[first - s : last]
+    made = model.free_runs(  # type: ignore[attr-defined]
+        [
+            Windows(
+                places=((name, 0.0),) * count,
+                steps=1,
+                time=(run.variables["time"][:1],) * count,
+                histories=_windowed(states, s + 1),
+                delayed=_windowed(rows.delayed, z + 1),
+                direct=rows.direct[z:, None],
+            )
+        ],
+        range(model.n_members),
+    )[0]
+    result: FloatArray = made[:, :, 0].mean(axis=0)
+    return result
+
+
+def _windowed(values: FloatArray, length: int) -> FloatArray:
+    """Stretches of `length` samples, one sample apart, (window, length, channel)."""
+    return np.lib.stride_tricks.sliding_window_view(values, length, axis=0).swapaxes(1, 2)
 
 
 def _test_span(run: xr.Dataset) -> tuple[float, float]:

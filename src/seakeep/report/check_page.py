@@ -16,7 +16,7 @@ from seakeep.report.figures import checks
 from seakeep.report.page import write_page
 from seakeep.report.section import Drawing, Section
 from seakeep.report.style import shown_unit
-from seakeep.report.tables import Table, number
+from seakeep.report.tables import Table, number, probability
 
 __all__ = ["CHECK_SECTIONS", "check_sections", "write_check"]
 
@@ -194,9 +194,224 @@ def _advice(model: float, linear: float, more: float) -> str:
     return "As good as inputs and observables allow."
 
 
+def decay_section(checked: Checked) -> Section | None:
+    """Return free decay, beside measured ones, and the modes."""
+    figures, tables, words = [], [], []
+    if (found := checked.found.get("decay")) is not None:
+        rows: list[tuple[str, ...]] = [
+            (
+                str(motion),
+                number(float(own["period"]), 3),
+                number(float(own["damping_ratio"]), 3),
+                number(float(own["p"]), 3),
+                "0",
+                "model",
+            )
+            for motion in found["motion"].values
+            for own in (found.sel(motion=motion),)
+        ]
+        if (measured := checked.found.get("measured_decay")) is not None:
+            rows += [_decay_row(measured.sel(run=run)) for run in measured["run"].values]
+        columns = ("motion", "period [s]", "damping ratio", "p", "q [1/m or 1/rad]", "of")
+        note = "Decrement of a cycle p + q a. A linear model's does not depend on the amplitude a."
+        tables.append(Table("decay", "Free decay", columns, tuple(rows), note, (1, 2, 3, 4)))
+        caption = "What is left of an offset of one training SD after its release in still water."
+        figures.append(Drawing("decay", caption, partial(checks.decay, found)))
+        words.append(
+            "The model holds an offset for the length of its history, and is released. A motion "
+            "with fewer than three extremes has neither period nor damping."
+        )
+    if (modes := checked.found.get("modes")) is not None:
+        caption = "Modes that decay slowest: states that take part in each (parts of one)."
+        figures.append(Drawing("modes", caption, partial(checks.modes, modes)))
+        tables.append(_modes_table(modes))
+    if not figures:
+        return None
+    title = "Free decay and modes"
+    return Section("decay", title, tuple(words), figures=tuple(figures), tables=tuple(tables))
+
+
+def _decay_row(own: xr.Dataset) -> tuple[str, ...]:
+    keys = ("period", "damping_ratio", "p", "q")
+    return (
+        str(own["motion"].values),
+        *(number(float(own[key]), 3) for key in keys),
+        str(own["run"].values),
+    )
+
+
+def _modes_table(found: xr.Dataset) -> Table:
+    rows = []
+    for k in range(found.sizes["mode"]):
+        own = found.isel(mode=k)
+        largest = own["participation"].values.argsort()[::-1][:2]
+        parts = ", ".join(
+            f"{own['state'].values[at]} {float(own['participation'][at]):.2f}" for at in largest
+        )
+        rows.append(
+            (
+                *(number(float(own[key]), 4) for key in ("period", "damping_ratio")),
+                *(number(float(own[key]), 4) for key in ("decay_time", "modulus")),
+                parts,
+            )
+        )
+    columns = ("period [s]", "damping ratio", "decay time [s]", "modulus", "states that take part")
+    title = f"All {found.sizes['mode']} modes"
+    return Table("modes", title, columns, tuple(rows), "", (0, 1, 2, 3), folded=True)
+
+
+def residuals_section(checked: Checked) -> Section | None:
+    """Return whiteness, past inputs, bands and age of the errors."""
+    found = checked.found.get("residuals")
+    if found is None:
+        return None
+    lag, past = float(found["lag"][-1]), found.get("input_correlation")
+    rows = []
+    for state in found["state"].values:
+        own = found.sel(state=state)
+        beyond = number(np.nan)
+        if past is not None:
+            share = (np.abs(own["input_correlation"]) > own["input_limit"]).mean()
+            beyond = f"{100 * float(share):.0f} %"
+        rows.append(
+            (
+                str(state),
+                number(float(own["one_step"]), 4),
+                f"{float(own['ljung_box']):.0f}",
+                probability(float(own["probability"])),
+                beyond,
+                *(number(float(own["band_nrmse"].sel(band=band))) for band in found["band"].values),
+                *(number(float(own["age_nrmse"][at])) for at in (found.sizes["lag"] - 2, -1)),
+            )
+        )
+    period = float(found.attrs["encounter_period"])
+    columns = (
+        *("state", "one step [SD]", "Ljung–Box Q", "p", "past inputs beyond limit"),
+        *(
+            "slow",
+            "wave",
+            "above",
+            "after 1 T",
+            f"after {found.sizes['age'] * _dt(found) / period:.0f} T",
+        ),
+    )
+    table = Table(
+        "residuals",
+        "Errors of one step, and of free runs by band and age (in measured SDs)",
+        columns,
+        tuple(rows),
+        f"Ljung–Box up to a lag of {lag:.3g} s ({found.sizes['lag'] - 1} samples) over "
+        f"{found.attrs['instants']} instants; p is the probability of white noise. Of white "
+        "residuals 5 % of the lags lie beyond the limit. Bands: below 0.5, to 2, and above 2 "
+        f"cycles per encounter period ({period:.3g} s).",
+        tuple(range(1, len(columns))),
+        heat=(5, 6, 7, 8, 9),
+    )
+    caption = (
+        "Per state: autocorrelation of one-step errors and their correlation with past inputs "
+        "(grey: 95 % limits), spectrum of the error of free runs over that of the measurement, and "
+        "error against the age of the forecast."
+    )
+    drawing = Drawing("residuals", caption, partial(checks.residuals, found))
+    words = (
+        "A model that has taken all from the data leaves one-step errors that are white and know "
+        "nothing of past inputs. With long records even small errors fail this test: read it with "
+        "the size of the error.",
+    )
+    return Section("residuals", "Residuals", words, figures=(drawing,), tables=(table,))
+
+
+def _dt(found: xr.Dataset) -> float:
+    return float(found["lag"][1] - found["lag"][0])
+
+
+def statistics_section(checked: Checked) -> Section | None:
+    """Return the statistics of responses that designers read."""
+    found = checked.found.get("statistics")
+    if found is None:
+        return None
+    rows = []
+    for state, unit in zip(found["state"].values, found["units"].values, strict=True):
+        factor, shown = displayed(str(unit))
+        for kind in found["kind"].values:
+            own = found.sel(state=state, kind=kind)
+            low, high = (factor * float(own[f"extreme_{each}"]) for each in ("lower", "upper"))
+            known = np.isfinite(low)
+            rows.append(
+                (
+                    f"{state} [{shown_unit(shown)}]",
+                    str(kind),
+                    f"{factor * float(own['significant_double_amplitude']):.4g}",
+                    number(float(own["zero_crossing_period"]), 3),
+                    f"{int(own['peaks'])}",
+                    number(float(own["weibull_shape"]), 2),
+                    f"{factor * float(own['extreme']):.4g}" if known else number(np.nan),
+                    f"{low:.4g} to {high:.4g}" if known else number(np.nan),
+                )
+            )
+    hours = float(found.attrs["duration"]) / 3600
+    columns = (
+        *("state", "of", "significant double amplitude", "zero-crossing period [s]", "peaks"),
+        *("Weibull shape", "extreme", "95 % of it"),
+    )
+    table = Table(
+        "statistics",
+        "Statistics of responses over the tests in irregular waves",
+        columns,
+        tuple(rows),
+        f"Extreme: most probable largest deviation from the mean in {hours:.3g} h of "
+        "these records' time (3 h at full scale), by Weibull's law; its interval is what the fit "
+        "does not know. Rayleigh's law has the shape 2.",
+        tuple(range(2, len(columns))),
+    )
+    caption = (
+        "How often a peak exceeds a level, measured and forecast, beside Rayleigh and Weibull."
+    )
+    drawing = Drawing("exceedance", caption, partial(checks.exceedance, found))
+    title = "Statistics of responses"
+    return Section("statistics", title, figures=(drawing,), tables=(table,))
+
+
+def validity_section(checked: Checked) -> Section | None:
+    """Return where each test lies against the training."""
+    found = checked.found.get("validity")
+    if found is None:
+        return None
+    rows = []
+    for run in found["run"].values:
+        own = found.sel(run=run)
+        for part in found["part"].values:
+            at = own.sel(part=part)
+            if np.isfinite(at["height"]):
+                keys = (("height", 3), ("period", 2), ("steepness", 4), ("drift", 3))
+                cells = (number(float(at[key]), digits) for key, digits in keys)
+                waves = str(own["waves"].values)
+                rows.append((str(run), str(part), waves, *cells))
+    columns = (
+        *("run", "part", "waves", "height [m]", "period [s]", "steepness", "mean surge [m]"),
+    )
+    outside = [
+        f"{run}: {text}. What the model says there is an extrapolation."
+        for run, text in zip(found["run"].values, found["outside"].values, strict=True)
+        if text
+    ]
+    caption = "Height and period of the waves that trained the model, and of each test."
+    return Section(
+        "validity",
+        "Validity",
+        points=tuple(outside) or ("All tests lie inside the waves that trained the model.",),
+        figures=(Drawing("validity", caption, partial(checks.validity, found)),),
+        tables=(Table("validity", "Waves", columns, tuple(rows), "", (3, 4, 5, 6)),),
+    )
+
+
 CHECK_SECTIONS: list[tuple[str, tuple[str, ...], Callable[[Checked], Section | None]]] = [
     ("Response", ("response", "measured_response", "validation"), response_section),
     ("What is possible", ("coherence",), possible_section),
+    ("Free decay and modes", ("decay", "measured_decay", "modes"), decay_section),
+    ("Residuals", ("residuals",), residuals_section),
+    ("Statistics of responses", ("statistics",), statistics_section),
+    ("Validity", ("validity",), validity_section),
 ]
 """Title, the checks that it shows, and what makes it."""
 

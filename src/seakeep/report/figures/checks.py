@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["coherence", "response"]
+__all__ = ["coherence", "decay", "exceedance", "modes", "residuals", "response", "validity"]
 
 UNTRAINED: dict[str, Any] = {"color": "#DDDDDD", "alpha": 0.6, "linewidth": 0}
 MARKS: dict[str, dict[str, Any]] = {
@@ -200,4 +200,241 @@ def coherence(
             place.set_ylabel(f"coherence, {short_label(name)} [1]")
         if axes is None:
             _legend_below(figure, places[0])
+    return figure
+
+
+def modes(
+    found: xr.Dataset, *, most: int = 12, axes: Sequence[Axes] | Axes | None = None
+) -> Figure:
+    """Draw the modes that decay slowest: which states take part, with period and damping.
+
+    Parameters
+    ----------
+    found : Dataset
+        From :func:`seakeep.check.modes`.
+    most : int, optional
+        Number of modes.
+    axes : Axes, optional
+        One; by default that of a new figure.
+
+    Returns
+    -------
+    Figure
+    """
+    at = found.isel(mode=slice(0, most))
+    states = [str(name) for name in at["state"].values]
+    with figure_style():
+        figure, (place,) = panels(
+            axes, 1, 1, (2.8 + 0.5 * len(states), 0.9 + 0.24 * at.sizes["mode"])
+        )
+        shares = at["participation"].values
+        picture = place.imshow(shares, cmap="Greys", vmin=0, vmax=1, aspect="auto")
+        for (row, column), value in np.ndenumerate(shares):
+            if value >= 0.05:
+                style = {"ha": "center", "va": "center", "fontsize": 7}
+                place.text(column, row, f"{value:.2f}", color="w" if value > 0.5 else "k", **style)
+        place.set_xticks(range(len(states)), [short_label(name) for name in states])
+        place.set_yticks(
+            range(at.sizes["mode"]), [_mode_words(at.isel(mode=k)) for k in range(at.sizes["mode"])]
+        )
+        place.grid(False)
+        place.set_ylabel("mode: period, damping ratio")
+        figure.colorbar(picture, ax=place, label="participation [1]")
+    return figure
+
+
+def _mode_words(mode: xr.Dataset) -> str:
+    period, ratio = float(mode["period"]), float(mode["damping_ratio"])
+    if not np.isfinite(period):
+        return f"decays in {float(mode['decay_time']):.3g} s"
+    return f"{period:.3g} s, {ratio:.3f}"
+
+
+def decay(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Figure:
+    """Draw what is left of an offset after its release, motion by motion.
+
+    Parameters
+    ----------
+    found : Dataset
+        From :func:`seakeep.check.decay`.
+    axes : Axes or sequence of Axes, optional
+        One for each motion; by default those of a new figure.
+
+    Returns
+    -------
+    Figure
+    """
+    motions = [str(name) for name in found["motion"].values]
+    with figure_style():
+        figure, places = panels(axes, len(motions), 3, (3.0, 1.8))
+        for name, place in zip(motions, places, strict=True):
+            own = found.sel(motion=name)
+            left = own["displacement"].values
+            place.axhline(0.0, color=COLOURS["input"], linewidth=0.6)
+            place.plot(own["time"], left, **{**LINES["forecast"], "linestyle": "-"})
+            moving = np.flatnonzero(np.abs(left) > 0.01)
+            place.set_xlim(0, float(own["time"][min(moving[-1] + 2, left.size - 1)]))
+            place.set_xlabel("time after the release [s]")
+            place.set_ylabel(f"{short_label(name)} over offset [1]")
+    return figure
+
+
+def residuals(
+    found: xr.Dataset,
+    *,
+    states: Sequence[str] | None = None,
+    axes: Sequence[Axes] | Axes | None = None,
+) -> Figure:
+    """Draw correlations of one-step errors, the spectrum of free runs' errors, and their age.
+
+    Parameters
+    ----------
+    found : Dataset
+        From :func:`seakeep.check.residuals`.
+    states : sequence of str, optional
+        States to draw; by default all.
+    axes : Axes or sequence of Axes, optional
+        Four for each state; by default those of a new figure.
+
+    Returns
+    -------
+    Figure
+    """
+    chosen = _chosen(found, states)
+    grey = {"color": "#BBBBBB", "linewidth": 0.8}
+    with figure_style():
+        figure, places = panels(axes, 4 * len(chosen), 4, (2.6, 1.75))
+        for number, name in enumerate(chosen):
+            own, (white, past, spectrum, age) = found.sel(state=name), places[4 * number :][:4]
+            limit = float(own["limit"])
+            white.axhspan(-limit, limit, **UNTRAINED)
+            white.plot(own["lag"][1:], own["autocorrelation"][1:], **LINES["measured"])
+            white.set(xlabel="lag [s]", ylabel="autocorrelation [1]")
+            white.set_title(f"{short_label(name)}: errors of one step", loc="left", fontsize=8)
+            if "input_correlation" in own:
+                for each, line in zip(
+                    own["input"].values, ("-", (0, (4, 1.5)), ":") * 9, strict=False
+                ):
+                    wide = float(own["input_limit"].sel(input=each))
+                    past.axhspan(-wide, wide, **UNTRAINED)
+                    style = {"color": COLOURS["measured"], "linewidth": 1.0, "linestyle": line}
+                    values = own["input_correlation"].sel(input=each)
+                    past.plot(own["lag"], values, **style, label=str(each))
+                past.legend(fontsize=6, loc="upper right")
+            past.set(xlabel="lag of the input [s]", ylabel="correlation [1]")
+            past.set_title("with past inputs", loc="left", fontsize=8)
+            power = own["measured_spectrum"].values
+            top = power.max() if power.max() > 0 else 1.0
+            spectrum.semilogy(own["frequency"][1:], power[1:] / top, **grey, label="measured")
+            error = own["error_spectrum"].values[1:] / top
+            spectrum.semilogy(own["frequency"][1:], error, **LINES["forecast"], label="error")
+            energy = found["measured_spectrum"].sum("state").values
+            last = np.flatnonzero(energy > 1e-3 * energy.max())[-1]
+            spectrum.set_xlim(0, 1.5 * float(own["frequency"][last]))
+            spectrum.set_ylim(bottom=1e-6)
+            spectrum.set(xlabel="frequency [Hz]", ylabel="power over peak [1]")
+            spectrum.set_title("free runs", loc="left", fontsize=8)
+            spectrum.legend(fontsize=6, loc="upper right")
+            age.plot(own["age"], own["age_nrmse"], **LINES["forecast"])
+            age.set_ylim(bottom=0)
+            age.set(xlabel="age of the forecast [s]", ylabel="error [SD]")
+    return figure
+
+
+def exceedance(
+    found: xr.Dataset,
+    *,
+    states: Sequence[str] | None = None,
+    axes: Sequence[Axes] | Axes | None = None,
+) -> Figure:
+    """Draw how often peaks exceed a level, measured and forecast, beside Rayleigh and Weibull.
+
+    Parameters
+    ----------
+    found : Dataset
+        From :func:`seakeep.check.statistics`.
+    states : sequence of str, optional
+        States to draw; by default all.
+    axes : Axes or sequence of Axes, optional
+        One for each state; by default those of a new figure.
+
+    Returns
+    -------
+    Figure
+    """
+    chosen = _chosen(found, states)
+    with figure_style():
+        figure, places = panels(axes, len(chosen), 3, (3.0, 2.0))
+        for name, place in zip(chosen, places, strict=True):
+            own = found.sel(state=name)
+            factor, units = displayed(str(own["units"].values))
+            measured = own.sel(kind="measured")
+            largest = float(np.nanmax(own["peak"], initial=0.0))
+            level = np.linspace(0, 1.1 * largest or 1.0, 200)
+            rayleigh = np.exp(-0.5 * (level / max(float(measured["rayleigh_scale"]), 1e-300)) ** 2)
+            thin = {"color": COLOURS["input"], "linewidth": 0.9}
+            place.semilogy(factor * level, rayleigh, **thin, linestyle=":", label="Rayleigh")
+            k, b = float(measured["weibull_shape"]), float(measured["weibull_scale"])
+            if np.isfinite(k):
+                weibull = np.exp(-((level / b) ** k))
+                place.semilogy(factor * level, weibull, **thin, label="Weibull of the measured")
+            marks = (("measured", "o", "none"), ("forecast", "x", LINES["forecast"]["color"]))
+            for kind, mark, face in marks:
+                at = own.sel(kind=kind)
+                style = {
+                    "marker": mark,
+                    "markersize": 3,
+                    "linestyle": "none",
+                    "markerfacecolor": face,
+                }
+                colour = LINES[kind]["color"]
+                place.semilogy(
+                    factor * at["peak"], at["exceedance"], color=colour, **style, label=kind
+                )
+            place.set_ylim(0.3 / max(int(own["peaks"].max()), 1), 1.3)
+            place.set_xlim(0, factor * level[-1])
+            place.set_xlabel(f"peak of {short_label(name)} [{shown_unit(units) or '?'}]")
+            place.set_ylabel("exceeded by [1]")
+        if axes is None:
+            _legend_below(figure, places[0])
+    return figure
+
+
+def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Figure:
+    """Draw height against period of the waves, those that trained and those of each test.
+
+    Parameters
+    ----------
+    found : Dataset
+        From :func:`seakeep.check.validity`.
+    axes : Axes, optional
+        One; by default that of a new figure.
+
+    Returns
+    -------
+    Figure
+    """
+    with figure_style():
+        figure, (place,) = panels(axes, 1, 1, (6.0, 3.2))
+        train, test = (found.sel(part=each) for each in ("train", "test"))
+        style = {"linestyle": "none", "marker": "o", "markersize": 11, "color": "#BBBBBB"}
+        place.plot(train["period"], train["height"], **style, label="trained")
+        outside = test["outside"].values != ""
+        for chosen, label, mark, colour in (
+            (~outside, "test, inside", "s", COLOURS["ensemble"]),
+            (outside, "test, outside", "X", COLOURS["forecast"]),
+        ):
+            at = test.isel(run=np.flatnonzero(chosen))
+            style = {"linestyle": "none", "marker": mark, "markersize": 6, "color": colour}
+            place.plot(at["period"], at["height"], **style, label=label)
+        for run in test["run"].values[outside]:
+            at = test.sel(run=run)
+            place.annotate(
+                str(run), (float(at["period"]), float(at["height"])), (6, 4),
+                textcoords="offset points", fontsize=7,
+            )  # fmt: skip
+        place.set(xlabel="mean zero-crossing period [s]", ylabel="wave height [m]")
+        place.margins(x=0.12, y=0.15)
+        place.set_ylim(bottom=0)
+        place.legend(loc="lower right")
     return figure

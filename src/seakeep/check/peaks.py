@@ -1,0 +1,125 @@
+"""Statistics of responses, as designers read them: measured against forecast."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from seakeep.arrays import FloatArray
+from seakeep.check.parts import free_runs, irregular
+from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
+from seakeep.errors import SeakeepError
+from seakeep.models import Model
+from seakeep.signals import zero_up_crossings
+
+__all__ = ["statistics"]
+
+HOURS = 3.0
+KINDS = ("measured", "forecast")
+
+
+def statistics(
+    model: Model, runs: Mapping[str, xr.Dataset], duration: float | None = None
+) -> xr.Dataset:
+    r"""Peaks of each state over the test parts in irregular waves, measured and forecast.
+
+    A peak is the largest deviation from the mean of its run between two zero-up-crossings.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    runs : mapping of str to Dataset
+        Prepared runs; test parts of those in irregular waves are taken.
+    duration : float, optional
+        Time of the extreme, s; by default three hours at full scale, by Froude's law with
+        ``attrs["scale_factor"]``.
+
+    Returns
+    -------
+    Dataset
+        Over (state, kind), kind "measured" or "forecast": ``significant_double_amplitude`` (four
+        SDs), ``zero_crossing_period`` (s), ``peaks`` (how many), ``rayleigh_scale`` (the SD),
+        ``weibull_shape`` and ``weibull_scale`` (maximum likelihood), ``extreme`` (most probable
+        in the duration by Weibull's law) with ``extreme_lower`` and ``extreme_upper`` (95 %, what
+        the fit does not know); over (state, kind, rank): ``peak`` and ``exceedance``, largest
+        first. ``attrs["duration"]`` (s).
+
+    Raises
+    ------
+    DataError
+        If no run in irregular waves can be forecast.
+    """
+    waves = irregular(runs, "a statistic of peaks")
+    free = free_runs(model, waves)
+    if duration is None:
+        scale = float(next(iter(waves.values())).attrs.get("scale_factor", 1.0))
+        duration = 3600 * HOURS / np.sqrt(scale)
+    rows: dict[tuple[str, str], dict[str, float]] = {}
+    peaks: dict[tuple[str, str], FloatArray] = {}
+    for column, state in enumerate(model.states):
+        for kind in KINDS:
+            series = [getattr(each, kind)[:, column] for each in free.values()]
+            peaks[state, kind], periods = _peaks(series, model.dt)
+            rows[state, kind] = _row(series, peaks[state, kind], periods, duration)
+    most = max(each.size for each in peaks.values())
+    sorted_peaks = np.full((len(model.states), 2, most), np.nan)
+    exceedance = np.full_like(sorted_peaks, np.nan)
+    for number, state in enumerate(model.states):
+        for side, kind in enumerate(KINDS):
+            found = np.sort(peaks[state, kind])[::-1]
+            sorted_peaks[number, side, : found.size] = found
+            exceedance[number, side, : found.size] = np.arange(1, found.size + 1) / (found.size + 1)
+    names = next(iter(rows.values()))
+    units = [label.units for label in model.signature.state_labels]
+    return xr.Dataset(
+        {
+            **{
+                key: (("state", "kind"), [[rows[s, k][key] for k in KINDS] for s in model.states])
+                for key in names
+            },
+            "peak": (("state", "kind", "rank"), sorted_peaks),
+            "exceedance": (("state", "kind", "rank"), exceedance),
+        },
+        coords={"state": model.states, "kind": list(KINDS), "units": ("state", units)},
+        attrs={"duration": duration},
+    )
+
+
+def _peaks(series: list[FloatArray], dt: float) -> tuple[FloatArray, FloatArray]:
+    """Peaks and zero-crossing periods of several records."""
+    peaks, periods = [np.empty(0)], [np.empty(0)]
+    for each in series:
+        x = each - each.mean()
+        if not np.all(np.isfinite(x)):
+            continue  # a free run that was lost
+        try:
+            crossings = zero_up_crossings(x, dt)
+        except SeakeepError:  # a record without waves has no peaks
+            continue
+        if crossings.size > 1:
+            peaks.append(peaks_between(x, crossings / dt))
+            periods.append(np.diff(crossings))
+    return np.concatenate(peaks), np.concatenate(periods)
+
+
+def _row(
+    series: list[FloatArray], peaks: FloatArray, periods: FloatArray, duration: float
+) -> dict[str, float]:
+    spread = float(np.sqrt(np.mean(np.concatenate([x - x.mean() for x in series]) ** 2)))
+    period = float(periods.mean()) if periods.size else np.nan
+    law = fit_weibull(peaks)
+    extreme, lower, upper = most_probable_extreme(law, duration / period if period else np.nan)
+    return {
+        "significant_double_amplitude": 4 * spread,
+        "zero_crossing_period": period,
+        "peaks": float(peaks.size),
+        "rayleigh_scale": spread,
+        "weibull_shape": law.shape,
+        "weibull_scale": law.scale,
+        "extreme": extreme,
+        "extreme_lower": lower,
+        "extreme_upper": upper,
+    }

@@ -1,0 +1,192 @@
+"""What is left unexplained: whiteness, past inputs, spectrum, bands, and age of the forecast."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from seakeep.arrays import FloatArray
+from seakeep.check.parts import (
+    FreeRun,
+    encounter_period_of,
+    free_runs,
+    free_windows,
+    one_step,
+    window_of,
+)
+from seakeep.core.spectra import cross_spectra
+from seakeep.core.whiteness import autocorrelation, input_correlation, ljung_box
+from seakeep.errors import DataError, SeakeepError, SeakeepWarning
+from seakeep.models import Model
+from seakeep.models.labelled import channel_matrix
+
+__all__ = ["residuals"]
+
+BANDS = {"slow": (0.0, 0.5), "wave": (0.5, 2.0), "above": (2.0, np.inf)}
+"""Bands, in cycles per encounter period."""
+SEGMENT = 8
+"""Encounter periods of a segment of the spectra, at most."""
+AGES = 15
+"""Encounter periods over which a forecast grows old."""
+
+
+def residuals(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    r"""Test the errors of one step, and say where and when those of free runs arise.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    runs : mapping of str to Dataset
+        Prepared runs; their test parts are taken.
+
+    Returns
+    -------
+    Dataset
+        Of errors of one step: ``autocorrelation`` over (state, lag), ``limit`` (95 % of white
+        noise), ``ljung_box`` and its ``probability`` over state, up to one encounter period;
+        ``input_correlation`` over (state, input, lag) with past inputs and ``input_limit`` over
+        (state, input); ``one_step`` over state, their NRMSE. Of free runs over the test parts:
+        ``error_spectrum`` and ``measured_spectrum`` over (state, frequency); ``band_nrmse`` over
+        (state, band), in SDs of the whole state, bands below 0.5, to 2 and above 2 cycles per
+        encounter period; ``age_nrmse`` over (state, age): the error against the time since the
+        start, from starts an encounter period apart.
+
+    Raises
+    ------
+    DataError
+        If no run can be judged, with the reason of each.
+
+    Warns
+    -----
+    SeakeepWarning
+        Of each run that is left out, with the reason.
+    """
+    free = free_runs(model, runs)
+    period = encounter_period_of(model, runs)
+    lags = round(period / model.dt)
+    steps, ages, reasons = [], [], []
+    for name in free:
+        try:
+            steps.append(_one_step(model, runs[name], name))
+        except SeakeepError as error:
+            reasons.append(f"one-step errors of {name}: {error}")
+            continue
+        ages.append(_aged(model, runs[name], name, lags))
+    if not steps:
+        raise DataError("no run can be judged. " + " ".join(reasons))
+    for reason in reasons:
+        warnings.warn(f"left out: {reason}", SeakeepWarning, stacklevel=2)
+    errors = [(error, inputs) for error, inputs, _ in steps]
+    count = sum(len(error) for error, _ in errors)
+    if count <= 2 * lags:
+        raise DataError(
+            f"the test parts hold {count} instants, and whiteness over an encounter period takes "
+            f"more than {2 * lags}. Test on longer runs."
+        )
+    correlation = autocorrelation([error for error, _ in errors], lags)
+    statistic, probability = ljung_box(correlation, count)
+    spread = np.sqrt(np.mean(np.concatenate([m - m.mean(axis=0) for *_, m in steps]) ** 2, axis=0))
+    whole = np.concatenate([error for error, _ in errors])
+    found = {
+        "autocorrelation": (("state", "lag"), correlation.T),
+        "limit": ((), 1.96 / np.sqrt(count)),
+        "ljung_box": ("state", statistic),
+        "probability": ("state", probability),
+        "one_step": ("state", _ratio(np.sqrt(np.mean(whole**2, axis=0)), spread)),
+        **_of_free_runs(model, free, period),
+        **_of_ages(ages, spread),
+    }
+    if model.inputs:
+        past, limit = input_correlation(errors, lags)
+        found["input_correlation"] = (("state", "input", "lag"), past.transpose(1, 2, 0))
+        found["input_limit"] = (("state", "input"), limit)
+    lag = model.dt * np.arange(lags + 1)
+    return xr.Dataset(
+        found,
+        coords={
+            "state": model.states,
+            "input": model.inputs,
+            "lag": ("lag", lag, {"units": "s", "long_name": "lag"}),
+            "age": ("age", model.dt * np.arange(1, AGES * lags + 1), {"units": "s"}),
+            "band": list(BANDS),
+        },
+        attrs={"instants": count, "encounter_period": period},
+    )
+
+
+def _ratio(error: FloatArray, spread: FloatArray) -> FloatArray:
+    out: FloatArray = np.full(error.shape, np.nan)
+    np.divide(error, spread, out=out, where=spread > 0)
+    return out
+
+
+def _one_step(
+    model: Model, run: xr.Dataset, name: str
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Errors of one step over the test part, inputs and measured states at the same instants."""
+    first, last = window_of(model, run)
+    made = one_step(model, run, first, last)
+    after = slice(first + 1, last + 1)
+    measured = channel_matrix(run, model.states, name, after)
+    inputs = channel_matrix(run, model.inputs, name, after)
+    sound = np.isfinite(made).all(axis=1) & np.isfinite(measured).all(axis=1)
+    if sound.sum() < 2:
+        raise DataError("the model diverges, or nothing is measured.")
+    return (made - measured)[sound], inputs[sound], measured[sound]
+
+
+def _aged(model: Model, run: xr.Dataset, name: str, lags: int) -> FloatArray:
+    """Squared errors over the time since each of several starts, (window, steps, N)."""
+    first, last = window_of(model, run)
+    time = np.asarray(run["time"].values, dtype=float)
+    count = min(AGES * lags, last - first)
+    starts = np.arange(first, last - count + 1, lags)
+    made = free_windows(model, run, time[starts], count)
+    measured = channel_matrix(run, model.states, name)
+    rows = starts[:, None] + np.arange(1, count + 1)
+    squares = np.full((len(starts), AGES * lags, len(model.states)), np.nan)
+    squares[:, :count] = (made - measured[rows]) ** 2
+    return squares
+
+
+def _of_ages(ages: list[FloatArray], spread: FloatArray) -> dict[str, object]:
+    squares = np.concatenate(ages)
+    known = np.isfinite(squares)
+    total = np.where(known, squares, 0.0).sum(axis=0)
+    counted = known.sum(axis=0)
+    out = np.full(total.shape, np.nan)
+    mean = np.divide(total, counted, out=out, where=counted > 0)
+    return {"age_nrmse": (("state", "age"), _ratio(np.sqrt(mean), spread + 0 * mean).T)}
+
+
+def _of_free_runs(model: Model, free: Mapping[str, FreeRun], period: float) -> dict[str, object]:
+    """Spectra of error and measurement, and the errors of the bands."""
+    runs = list(free.values())
+    pieces = []
+    for each in runs:
+        error = each.forecast - each.measured
+        sound = np.isfinite(error).all(axis=1)
+        pieces.append((error[sound], each.measured[sound]))
+    segment = min(round(SEGMENT * period / model.dt), max(len(e) for e, _ in pieces))
+    if segment < 16:
+        raise DataError(
+            f"free runs hold for {segment} instants at most: there is no spectrum of their error."
+        )
+    found = cross_spectra(pieces, model.dt, segment)
+    error, power = found.input_power, found.outputs
+    cycles = found.frequency * period
+    total = power.sum(axis=0)
+    bands = [
+        np.sqrt(_ratio(error[(cycles >= low) & (cycles < high)].sum(axis=0), total))
+        for low, high in BANDS.values()
+    ]
+    return {
+        "error_spectrum": (("state", "frequency"), error.T),
+        "measured_spectrum": (("state", "frequency"), power.T),
+        "frequency": ("frequency", found.frequency, {"units": "Hz", "long_name": "frequency"}),
+        "band_nrmse": (("state", "band"), np.stack(bands, axis=1)),
+    }

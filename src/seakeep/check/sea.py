@@ -1,0 +1,133 @@
+"""Validity: where the waves of each test lie against those that trained the model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from seakeep.check.parts import is_regular, reference_probe, used_parts
+from seakeep.core.harmonics import dominant_frequency
+from seakeep.errors import DataError
+from seakeep.models import Model, compare_waves
+from seakeep.signals import encounter_period
+from seakeep.waves import wavenumber
+
+__all__ = ["validity"]
+
+MARGIN = 1.1
+"""Times the highest or steepest training waves from which on a test lies outside."""
+
+
+def validity(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """Height, period, steepness and drift of each run, and what lies outside the training.
+
+    Parameters
+    ----------
+    model : Model
+        The model; it keeps which spans trained it, and the periods of its waves.
+    runs : mapping of str to Dataset
+        Prepared runs, those that trained the model among them.
+
+    Returns
+    -------
+    Dataset
+        Over (run, part), part "train" or "test": ``height`` (m; four SDs, of regular waves twice
+        the root of two), ``period`` (s; mean zero-up-crossing), ``steepness`` (height over wave
+        length, NaN where the water depth is not known) and ``drift`` (mean surge, m, NaN without
+        surge), NaN of a part that a run does not have; over run: ``waves`` and ``outside``, in
+        words what of its test lies outside the training, or an empty text.
+
+    Raises
+    ------
+    DataError
+        If no run can be read.
+    RequestError
+        If no input is a wave elevation.
+    """
+    reference = reference_probe(model, runs)
+    surge = model.states.index("surge") if "surge" in model.states else None
+    keys = ("height", "period", "steepness", "drift")
+    rows, reach = {}, []
+    for name, part in used_parts(model, runs).items():
+        trained = model.training_spans.get(name)
+        tested = part.run.attrs.get("test_span")
+        if tested is None and trained is None:
+            tested = (part.time[0], part.time[-1])
+        values = np.full((2, len(keys)), np.nan)
+        for number, span in enumerate((trained, tested)):
+            if span is None:
+                continue
+            inside = (part.time >= span[0] - 1e-6) & (part.time <= span[1] + 1e-6)
+            if inside.sum() < 16:
+                continue
+            wave = part.inputs[inside, reference]
+            values[number, :3] = _sea(wave, model.dt, part.run)
+            if surge is not None:
+                values[number, 3] = part.states[inside, surge].mean()
+                if number == 0:
+                    x = part.states[inside, surge]
+                    reach += [float(x.min()), float(x.max())]
+        rows[name] = (part.run, values)
+    if not rows:
+        raise DataError("no run has all channels of the model: there are no waves to compare.")
+    table = np.stack([values for _, values in rows.values()])
+    highest = {
+        key: float(np.nanmax(table[:, 0, column], initial=-np.inf))
+        for column, key in enumerate(keys)
+    }
+    outside = [
+        _outside(model, run, dict(zip(keys, values[1], strict=True)), highest, reach)
+        for run, values in rows.values()
+    ]
+    return xr.Dataset(
+        {key: (("run", "part"), table[:, :, column]) for column, key in enumerate(keys)}
+        | {
+            "waves": ("run", [str(run.attrs.get("waves") or "") for run, _ in rows.values()]),
+            "outside": ("run", outside),
+        },
+        coords={"run": list(rows), "part": ["train", "test"]},
+        attrs={"reference": model.inputs[reference]},
+    )
+
+
+def _sea(wave: np.ndarray, dt: float, run: xr.Dataset) -> tuple[float, float, float]:
+    """Height, period and steepness of a wave record; NaN where it is constant."""
+    if not np.ptp(wave) > 0:
+        return np.nan, np.nan, np.nan
+    regular = is_regular(run)
+    height = (2 * np.sqrt(2) if regular else 4.0) * float(wave.std())
+    period = 1 / dominant_frequency(wave, dt) if regular else encounter_period(wave, dt)
+    depth = run.attrs.get("water_depth")
+    steepness = np.nan
+    if depth is not None:
+        k = float(wavenumber(2 * np.pi / period, float(depth)))
+        steepness = height * k / (2 * np.pi)
+    return height, period, steepness
+
+
+def _outside(
+    model: Model,
+    run: xr.Dataset,
+    test: Mapping[str, float],
+    highest: Mapping[str, float],
+    reach: list[float],
+) -> str:
+    told = []
+    for key, unit in (("height", " m"), ("steepness", "")):
+        if test[key] > MARGIN * highest[key] and np.isfinite(highest[key]):
+            told.append(f"{key} {test[key]:.3g}{unit}, trained up to {highest[key]:.3g}{unit}")
+    if np.isfinite(test["period"]):
+        time = run["time"].values
+        begin, end = run.attrs.get("test_span", (time[0], time[-1]))
+        steps = round((float(end) - float(begin)) / model.dt)
+        found = compare_waves(model, run, float(begin), steps)
+        told += [each.text for each in found if each.text]
+    if reach and np.isfinite(test["drift"]) and not min(reach) <= test["drift"] <= max(reach):
+        side = "downstream" if test["drift"] > max(reach) else "upstream"
+        told.append(
+            f"mean surge {test['drift']:.3g} m, {side} of the trained {min(reach):.3g} to "
+            f"{max(reach):.3g} m"
+        )
+    return "; ".join(told)

@@ -1,0 +1,95 @@
+"""Modes and decay of systems whose law is known."""
+
+import numpy as np
+import pytest
+import scipy
+import xarray as xr
+
+from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, check
+from seakeep.core.decay import free_decay
+from seakeep.errors import DataError, RequestError
+
+DT, FREQUENCY, RATIO = 0.05, 2.0, 0.06  # s, rad/s, 1
+
+
+def oscillator_run(seed=0, samples=2000):
+    """A heave that is a mass on a spring with linear damping, driven by noise; exact in time."""
+    A = np.array([[0, 1], [-(FREQUENCY**2), -2 * RATIO * FREQUENCY]])
+    step, drive, *_ = scipy.signal.cont2discrete(
+        (A, np.array([[0.0], [1.0]]), np.eye(2), np.zeros((2, 1))), DT
+    )
+    force = np.random.default_rng(seed).standard_normal(samples)
+    state = np.zeros((samples, 2))
+    for k in range(samples - 1):
+        state[k + 1] = step @ state[k] + drive[:, 0] * force[k]
+    channels = {"heave": state[:, 0], "heave_rate": state[:, 1], "eta": force}
+    units = {"heave": "m", "heave_rate": "m/s", "eta": "m"}
+    return xr.Dataset(
+        {key: ("time", value, {"units": units[key]}) for key, value in channels.items()},
+        coords={"time": DT * np.arange(samples)},
+        attrs={"encounter_period": 3.0},
+    )
+
+
+def measured_decay_run(linear, quadratic):
+    """A heave released from 1 m, with linear and quadratic damping."""
+
+    def rate(_, s):
+        return [s[1], -2 * linear * FREQUENCY * s[1] - quadratic * abs(s[1]) * s[1] - 4 * s[0]]
+
+    time = DT * np.arange(900)
+    found = scipy.integrate.solve_ivp(rate, (0, time[-1]), [1.0, 0.0], t_eval=time, rtol=1e-8)
+    heave = ("time", found.y[0], {"units": "m"})
+    return xr.Dataset({"heave": heave}, coords={"time": time}, attrs={"waves": "still"})
+
+
+@pytest.fixture(scope="module")
+def model():
+    return HankelDMDc(0, 0, 1e-9).fit(oscillator_run(), ["heave", "heave_rate"], ["eta"])
+
+
+def test_the_decay_of_an_oscillator_is_its_own(model):
+    found = check.decay(model)
+    period = 2 * np.pi / (FREQUENCY * np.sqrt(1 - RATIO**2))
+    # Extremes between samples by a parabola: (ωΔt)²/12 of a step.
+    assert float(found.period[0]) == pytest.approx(period, rel=1e-3)
+    assert float(found.damping_ratio[0]) == pytest.approx(RATIO, rel=2e-3)
+    assert float(found.displacement[0, 0]) == 1.0
+
+
+def test_modes_say_which_states_take_part(model):
+    found = check.modes(model)
+    assert float(found.damping_ratio[0]) == pytest.approx(RATIO, rel=1e-4)  # the ridge
+    # Heave and its rate hold half of the energy each.
+    assert found.participation[0].values == pytest.approx([0.5, 0.5], abs=0.01)
+    assert found.participation.sum("state").values == pytest.approx(1.0)
+
+
+def test_quadratic_damping_is_found_from_a_decay(model):
+    found = check.measured_decay(model, {"still": measured_decay_run(0.02, 0.3)})
+    assert found.motion.item() == "heave"
+    # Equivalent linearisation: p = 2πζ, q = 8b/3, to second order in the damping.
+    assert float(found.p[0]) == pytest.approx(2 * np.pi * 0.02, rel=0.03)
+    assert float(found.q[0]) == pytest.approx(8 / 3 * 0.3, rel=0.03)
+
+
+def test_too_few_extremes_are_nothing():
+    found = free_decay(np.exp(-np.arange(200) / 20), 0.1)
+    assert np.isnan(found.period)
+    assert found.cycles == 0
+
+
+def test_what_cannot_be_judged_says_why(model):
+    run = oscillator_run(samples=400)
+    with pytest.raises(DataError, match=r"no run is a free decay in still water\. State waves ="):
+        check.measured_decay(model, {"run": run})
+    rates = HankelDMDc(1, 0, 1.0).fit(run, ["heave_rate"], ["eta"])
+    with pytest.raises(RequestError, match="no state of the model is a rigid motion"):
+        check.decay(rates)
+    spec = BayesianHankelDMDc(
+        encounter_period=3.0, train_length=Fixed(3), state_delay=Fixed(0.1),
+        input_delay=Fixed(0.1), ridge=Fixed(1.0), n_members=2, seed=0,
+    )  # fmt: skip
+    ensemble = spec.fit(run, ["heave"], ["eta"])
+    with pytest.raises(RequestError, match=r"Of an ensemble, check a member"):
+        check.modes(ensemble)

@@ -1,0 +1,106 @@
+"""Peaks of responses: laws against scipy, intervals by simulation, and where the sea is another."""
+
+import numpy as np
+import pytest
+import scipy
+import xarray as xr
+
+from seakeep import HankelDMDc, check
+from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
+from seakeep.errors import DataError
+
+
+def sea_run(height=0.04, period=2.0, seed=0, samples=3000, **attrs):
+    """A narrow sea, and a heave that follows it a sample later."""
+    rng = np.random.default_rng(seed)
+    time = 0.1 * np.arange(samples)
+    f = rng.uniform(0.8, 1.2, 60) / period
+    waves = np.cos(2 * np.pi * np.outer(time, f) + rng.uniform(0, 2 * np.pi, 60)).sum(axis=1)
+    wave = height / 4 * waves / waves.std()
+    heave = 0.8 * np.roll(wave, 1) + 1e-5 * rng.standard_normal(samples)
+    return xr.Dataset(
+        {"eta": ("time", wave, {"units": "m"}), "heave": ("time", heave, {"units": "m"})},
+        coords={"time": time},
+        attrs={"encounter_period": period, "waves": "irregular", "water_depth": np.inf, **attrs},
+    )
+
+
+@pytest.fixture(scope="module")
+def train():
+    return sea_run(run="train")
+
+
+@pytest.fixture(scope="module")
+def model(train):
+    return HankelDMDc(0, 1, 1e-6, delay_rows="exact").fit({"train": train}, ["heave"], ["eta"])
+
+
+def test_weibull_is_that_of_scipy():
+    peaks = 2.0 * np.random.default_rng(0).weibull(1.7, 400)
+    found = fit_weibull(peaks)
+    shape, _, scale = scipy.stats.weibull_min.fit(peaks, floc=0)
+    # scipy keeps the bias of maximum likelihood, and stops at 1e-4.
+    assert found.shape / (1 - 1.38 / 400) == pytest.approx(shape, rel=1e-3)
+    assert found.scale == pytest.approx(scale, rel=3e-3)  # of a shape without bias
+
+
+def test_intervals_of_the_extreme_cover_as_they_say():
+    rng = np.random.default_rng(4)
+    true = 2.0 * np.log(1000) ** (1 / 1.7)
+    inside = []
+    for _ in range(500):
+        _, low, high = most_probable_extreme(fit_weibull(2.0 * rng.weibull(1.7, 60)), 1000)
+        inside.append(low < true < high)
+    # 500 repetitions know a coverage of 95 % to 1 % (one SD).
+    assert 0.92 <= np.mean(inside) <= 0.98
+
+
+def test_a_sine_has_one_peak_a_cycle():
+    t = np.arange(400) * 0.1
+    crossings = np.arange(1, 6) * 2 * np.pi / 0.1
+    assert peaks_between(np.sin(t), crossings) == pytest.approx(1.0, abs=2e-3)
+
+
+def test_statistics_of_a_narrow_sea_are_those_of_rayleigh(model):
+    run = sea_run(seed=3, scale_factor=36.0)
+    found = check.statistics(model, {"test": run}).sel(state="heave")
+    assert found.attrs["duration"] == pytest.approx(3 * 3600 / 6)
+    assert found.significant_double_amplitude.values == pytest.approx(0.032, rel=0.01)
+    assert found.zero_crossing_period.values == pytest.approx(2.0, rel=0.05)
+    assert found.weibull_shape.values == pytest.approx(2.0, abs=0.5)
+    low, high = (
+        float(found[f"extreme_{each}"].sel(kind="measured")) for each in ("lower", "upper")
+    )
+    assert low < 0.008 * np.sqrt(2 * np.log(900)) < high
+    ranked = found.peak.sel(kind="forecast").values
+    assert np.all(np.diff(ranked[np.isfinite(ranked)]) <= 0)
+
+
+def test_waves_outside_the_training_are_named(model, train):
+    runs = {
+        "train": train,
+        "alike": sea_run(seed=1),
+        "steep": sea_run(height=0.08, seed=2),
+        "short": sea_run(period=1.0, seed=2, encounter_period=1.0),
+    }
+    found = check.validity(model, runs)
+    told = dict(zip(found.run.values, found.outside.values, strict=True))
+    assert told["train"] == told["alike"] == ""
+    assert "height 0.08 m, trained up to 0.04 m" in told["steep"]
+    assert "outside the periods that trained the model" in told["short"]
+    assert "steepness" in told["short"]
+    assert found.height.sel(run="train", part="train") == pytest.approx(0.04, rel=0.01)
+
+
+def test_what_cannot_be_judged_says_why(model):
+    regular = sea_run(waves="regular")
+    with pytest.raises(DataError, match="a statistic of peaks takes a run in irregular waves"):
+        check.statistics(model, {"regular": regular})
+    lost = sea_run()
+    lost["eta"] = lost.eta * np.nan
+    lost.eta.attrs["units"] = "m"
+    with (
+        pytest.warns(match="no sample of it has all channels"),
+        pytest.raises(DataError, match="no run has all channels of the model"),
+    ):
+        check.validity(model, {"lost": lost})

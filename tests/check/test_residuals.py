@@ -1,0 +1,95 @@
+"""Residuals of models that are right and wrong, and the oracles of their tests."""
+
+import numpy as np
+import pytest
+import scipy
+import xarray as xr
+
+from seakeep import HankelDMDc, check
+from seakeep.check.parts import one_step
+from seakeep.core.whiteness import autocorrelation, input_correlation, ljung_box
+from seakeep.errors import DataError
+
+
+def noisy_run(seed=0, samples=3000):
+    """Heave answers the wave one and two samples before, with white process noise."""
+    rng = np.random.default_rng(seed)
+    wave = scipy.signal.lfilter([1.0], [1.0, -0.8], rng.standard_normal(samples))
+    driven = 0.5 * np.roll(wave, 1) + 0.3 * np.roll(wave, 2) + 0.2 * rng.standard_normal(samples)
+    heave = scipy.signal.lfilter([1.0], [1.0, -0.6], driven)
+    return xr.Dataset(
+        {"eta": ("time", wave, {"units": "m"}), "heave": ("time", heave, {"units": "m"})},
+        coords={"time": 0.1 * np.arange(samples)},
+        attrs={"encounter_period": 2.0, "test_span": (150.0, 299.9)},
+    )
+
+
+@pytest.fixture(scope="module")
+def run():
+    return noisy_run()
+
+
+def fitted(run, input_delays):
+    spec = HankelDMDc(0, input_delays, 1e-6, delay_rows="exact")
+    return spec.fit(run.isel(time=slice(0, 1500)), ["heave"], ["eta"])
+
+
+def test_a_right_model_leaves_white_errors(run):
+    found = check.residuals(fitted(run, 1), {"run": run})
+    assert float(found.probability[0]) > 0.01
+    beyond = np.abs(found.input_correlation) > found.input_limit
+    assert float(beyond.mean()) < 0.15
+    assert found.attrs["instants"] == 1499
+
+
+def test_a_model_without_a_delay_is_found_out_by_past_inputs(run):
+    found = check.residuals(fitted(run, 0), {"run": run})
+    assert float(found.probability[0]) < 1e-3
+    worst = np.abs(found.input_correlation[0, 0]) / found.input_limit[0, 0]
+    assert float(worst.max()) > 3
+
+
+def test_one_step_is_that_of_forecasts(run):
+    model = fitted(run, 3)
+    many = one_step(model, run, 100, 130)
+    each = model.forecast_windows(run, run.time.values[100:130].tolist(), 1)
+    # The same products, in matrices of other shapes.
+    np.testing.assert_allclose(many[:, 0], each.heave.values[:, 0], rtol=1e-12, atol=1e-14)
+
+
+def test_bands_and_ages_add_up(run):
+    found = check.residuals(fitted(run, 1), {"run": run})
+    squares = (found.band_nrmse**2).sum("band")
+    whole = found.error_spectrum.sum("frequency") / found.measured_spectrum.sum("frequency")
+    assert squares.values == pytest.approx(whole.values)
+    assert float(found.age_nrmse[0, 0]) == pytest.approx(float(found.one_step[0]), rel=0.3)
+    assert float(found.age_nrmse[0, -1]) < 1
+
+
+@pytest.mark.oracle
+def test_ljung_box_is_that_of_statsmodels():
+    diagnostic = pytest.importorskip("statsmodels.stats.diagnostic")
+    x = scipy.signal.lfilter([1, 0.2], [1], np.random.default_rng(1).standard_normal(400))
+    ours = ljung_box(autocorrelation([x[:, None]], 12), 400)
+    known = diagnostic.acorr_ljungbox(x, lags=[12])
+    assert ours[0][0] == pytest.approx(known["lb_stat"].item(), rel=1e-9)  # rounding of an FFT
+    assert ours[1][0] == pytest.approx(known["lb_pvalue"].item(), rel=1e-8)
+
+
+def test_limits_of_the_correlation_with_inputs_cover_as_they_say():
+    rng = np.random.default_rng(2)
+    wave = scipy.signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal((2000, 1)), axis=0)
+    errors = scipy.signal.lfilter([1.0], [1.0, -0.5], rng.standard_normal((2000, 500)), axis=0)
+    found, limit = input_correlation([(errors, wave)], 40)
+    inside = np.abs(found[10, :, 0]) < limit[:, 0]
+    # 500 repetitions know a coverage of 95 % to 1 % (one SD).
+    assert 0.92 <= inside.mean() <= 0.98
+
+
+def test_a_short_test_says_so(run):
+    short = run.isel(time=slice(0, 40)).assign_attrs(test_span=(0.0, 3.9))
+    with pytest.raises(DataError, match="whiteness over an encounter period takes more than 40"):
+        check.residuals(fitted(run, 1), {"short": short})
+    shorter = run.isel(time=slice(0, 2)).assign_attrs(test_span=(0.0, 0.1))
+    with pytest.raises(DataError, match=r"no run can be forecast\. short: "):
+        check.residuals(fitted(run, 3), {"short": shorter})
