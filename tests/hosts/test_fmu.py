@@ -7,7 +7,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from seakeep import RequestError
+from seakeep import HankelDMDc, RequestError
 from seakeep.hosts import write_fmu
 from seakeep.hosts.fmu import compiler
 
@@ -175,6 +175,17 @@ class TestWhatIsRefused:
         for wrong in (b"another one" + content[11:], content[:-1]):
             with pytest.raises(Exception, match="fmi2DeSerializeFMUstate failed with status 3"):
                 slave.deSerializeFMUstate(wrong)
+
+
+@pytest.mark.parametrize("wave", ["eta", 'wave <1> & "2"', "c\\d'e", "η */ x"])
+def test_any_name_of_a_channel_is_sound(wave, make_run, channels, tmp_path, monkeypatch):
+    run = make_run().rename(eta_fwd=wave)
+    run[wave].attrs |= {"units": "<m> 'µ'", "long_name": f"wave, {wave}"}
+    model = HankelDMDc(0, 0, 1.0).fit(run, channels["states"], [wave, "eta_cog"])
+    monkeypatch.setenv("PATH", str(tmp_path))  # names are not a matter of the binary
+    fmu = write_fmu(model, tmp_path / "rom.fmu")
+    assert validate_fmu(str(fmu)) == []
+    assert fmpy.read_model_description(fmu).modelVariables[0].unit == "<m> 'µ'"
 
 
 def test_without_a_compiler_the_sources_are_there_alone(cases, tmp_path, monkeypatch):

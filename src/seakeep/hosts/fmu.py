@@ -153,6 +153,8 @@ def _description(program: Program) -> dict[str, Any]:
     return {
         "version": metadata.version("seakeep"),
         "timing": program.timing,
+        # Structured names are ASCII.
+        "convention": "structured" if all(each.name.isascii() for each in channels) else "flat",
         "channels": channels,
         # Histories stand in the order of C: those of the states, row by row, then the inputs'.
         "histories": [

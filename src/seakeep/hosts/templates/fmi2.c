@@ -163,11 +163,12 @@ EXPORT Status FMI(fmi2SetReal)(void *c, const Reference at[], size_t count, cons
     Instance *instance = c;
     State *state = &instance->state;
     for (size_t i = 0; i < count; i++) {
-        if (at[i] >= COUNT || (at[i] >= OUTPUTS && at[i] < X_HISTORY))
+        int place = at[i] < COUNT ? (int)at[i] : OUTPUTS;
+        if (place >= OUTPUTS && place < X_HISTORY)
             return report(instance, ERROR, "there is no variable to set with this value reference");
-        if (at[i] >= X_HISTORY && state->started)
+        if (place >= X_HISTORY && state->started)
             return report(instance, ERROR, "histories are set before the end of initialization");
-        state->values[at[i]] = values[i];
+        state->values[place] = values[i];
     }
     if (!state->started)
         memcpy(state->values + OUTPUTS, state->values + U_HISTORY - N, N * sizeof(double));
