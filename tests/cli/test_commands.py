@@ -91,9 +91,9 @@ def test_the_example_of_each_help_runs(verb, run, place):
     status, out, _ = run(f"{verb} --help")
     assert status == 0
     examples = re.findall(
-        r"(?:Example|An ensemble|Two models): (seakeep .*?)(?:\n\n|\Z)", out, re.DOTALL
+        r"(?:Example|An ensemble|Two models|In service): (seakeep .*?)(?:\n\n|\Z)", out, re.DOTALL
     )
-    assert len(examples) == 1 + (verb in ("fit", "forecast", "compare"))
+    assert len(examples) == {"fit": 2, "forecast": 2, "compare": 3}.get(verb, 1)
     for example in examples:
         words = " ".join(example.split())
         if verb == "tank":
@@ -441,6 +441,20 @@ def test_compare_prints_the_table_and_writes_figure_and_csv(run, place):
     assert "judged/unseen.svg" in err
 
 
+def test_compare_judges_models_in_service_against_lead_time(run, place):
+    pytest.importorskip("matplotlib")
+    status, out, err = run(f"compare model.nc {CAMPAIGN} --nowcast --steps '1 T' -o served")
+    assert status == 0
+    assert "unseen: model in service" in out
+    assert "lead time s" in out
+    header, *rows = (place / "served/nowcast.csv").read_text().splitlines()
+    assert header == "model,run,channel,lead,error,claimed,coverage,lead_time"
+    errors = [float(row.split(",")[4]) for row in rows if row.split(",")[2] == "heave"]
+    assert len(errors) == 16  # steps of an encounter period
+    assert errors[0] < errors[-1]
+    assert "served/nowcast.csv, served/nowcast_unseen.png" in err
+
+
 def test_several_models_are_judged_over_the_same_instants(run, place):
     status, out, err = run(f"compare model.nc ensemble.nc {CAMPAIGN} -o both")
     assert status == 0, err
@@ -559,6 +573,8 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
             r"--band must be members or calibrated; received 'wide'\.",
         ),
         (f"compare model.nc {CAMPAIGN} --band members", 2, r"--band is for ensembles, and"),
+        (f"compare model.nc {CAMPAIGN} --nowcast --start 20", 2, r"--start and --nowcast do not"),
+        (f"compare model.nc {CAMPAIGN} --nowcast --steps 9999", 2, r"a forecast of 9999 steps"),
         (
             f"calibrate model.nc {CAMPAIGN} --steps 100 -o c.nc",
             2,

@@ -227,6 +227,14 @@ def compare(
             "compare with them.",
         ),
     ] = False,
+    nowcast: Annotated[
+        bool,
+        typer.Option(
+            "--nowcast",
+            help="Play the runs to the models sample by sample, without waves to come, and judge "
+            "skill against lead time (--steps: the longest).",
+        ),
+    ] = False,
 ) -> None:
     """Judge forecasts of test runs against the measurement.
 
@@ -238,19 +246,15 @@ def compare(
     Example: seakeep compare model.nc docs/tutorial/campaign.toml -o comparison
 
     Two models: seakeep compare model.nc ensemble.nc docs/tutorial/campaign.toml --baselines
+
+    In service: seakeep compare model.nc docs/tutorial/campaign.toml --nowcast --steps '2 T' -o now
     """
     if format_ not in ("png", "svg", "pdf"):
         raise RequestError(f"--format must be png, svg or pdf; received '{format_}'.")
     from seakeep.campaign import read_campaign
     from seakeep.models import load_model
     from seakeep.report.comparison import difference_blocks, write_comparison, write_differences
-    from seakeep.study import (
-        at_full_scale,
-        compare_models,
-        comparison_table,
-        difference_table,
-        in_degrees,
-    )
+    from seakeep.study import compare_models, comparison_table, difference_table
 
     make_folder(out)
     names = _named(model)
@@ -265,6 +269,11 @@ def compare(
         check_output(path, "figure", used)
     if baselines:
         fitted = _with_baselines(fitted, read)
+    if nowcast:
+        _refuse_in_service({"--start": start is not None, "--full-scale": full_scale})
+        serving = {n: each for n, each in fitted.items() if n in names or hasattr(each, "live")}
+        _nowcast(serving, read, run or read.test_runs, steps, shown["level"], out, figures, used)
+        return
     with member_executor(workers, scheduler) as executor, progress_bar("Comparing") as progress:
         found = compare_models(
             fitted,
@@ -277,11 +286,7 @@ def compare(
             **shown,
             executor=executor,
         )
-    if full_scale:
-        scale = _scale(read)
-        found = {name: [at_full_scale(each, scale) for each in of] for name, of in found.items()}
-    if not radians:
-        found = {name: [in_degrees(each) for each in of] for name, of in found.items()}
+    found = _displayed(found, _scale(read) if full_scale else None, radians)
     tables = {name: comparison_table(of) for name, of in found.items()}
     _print_comparison(tables, {name: each.kind for name, each in fitted.items()})
     written = [write_comparison(tables, out / TABLE)]
@@ -295,6 +300,58 @@ def compare(
     messages().print("Wrote " + ", ".join(map(str, written)))
     if not all(each.complete for name in names for each in found[name]):
         raise typer.Exit(1)
+
+
+def _displayed(
+    found: dict[str, list[Comparison]], scale: float | None, radians: bool
+) -> dict[str, list[Comparison]]:
+    """Comparisons at full scale, where there is a scale, and in degrees, if wanted."""
+    from seakeep.study import at_full_scale, in_degrees
+
+    if scale is not None:
+        found = {name: [at_full_scale(each, scale) for each in of] for name, of in found.items()}
+    if radians:
+        return found
+    return {name: [in_degrees(each) for each in of] for name, of in found.items()}
+
+
+def _refuse_in_service(given: Mapping[str, bool]) -> None:
+    """Refuse options that forecasts from all over a run have no place for."""
+    for option, stated in given.items():
+        if stated:
+            raise RequestError(
+                f"{option} and --nowcast do not go together: forecasts start all over the runs, "
+                "and their errors are in training SDs. Leave one of them out."
+            )
+
+
+def _nowcast(
+    models: Mapping[str, Model],
+    campaign: Campaign,
+    runs: list[str],
+    steps: str | None,
+    level: float,
+    out: Path,
+    figures: Mapping[str, Path],
+    used: list[Path],
+) -> None:
+    """Judge models in service: tables on the terminal, a CSV file, a figure per run."""
+    from seakeep.report.nowcast import HEADER, nowcast_blocks, nowcast_figure, write_nowcasts
+    from seakeep.report.style import save_figure
+    from seakeep.study import nowcasts
+
+    table = out / "nowcast.csv"
+    check_output(table, "table", used, HEADER)
+    drawn = {name: each.with_name(f"nowcast_{each.name}") for name, each in figures.items() if name}
+    for path in drawn.values():
+        check_output(path, "figure", used)
+    with progress_bar("Playing") as progress:
+        found = nowcasts(models, campaign, runs, steps, level=level, progress=progress)
+    for block in nowcast_blocks(found):
+        print_table(block)
+    written = [write_nowcasts(found, table)]
+    written += [save_figure(nowcast_figure(found, run), path) for run, path in drawn.items()]
+    messages().print("Wrote " + ", ".join(map(str, written)))
 
 
 def _named(files: list[Path]) -> dict[str, Path]:

@@ -74,7 +74,7 @@ class Live:
 
     Parameters
     ----------
-    model : model or HeldEnsemble
+    model : HankelDMDcModel or HeldEnsemble
         What forecasts.
     members : sequence of Dynamics
         Its members; the filter predicts with the mean of their one-step predictions.
@@ -644,7 +644,7 @@ def load_live(model: Servable, path: str | Path) -> Live:
 
     Parameters
     ----------
-    model : model or HeldEnsemble
+    model : HankelDMDcModel or HeldEnsemble
         The model that was in service.
     path : str or Path
         The file.

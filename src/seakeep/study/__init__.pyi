@@ -11,6 +11,7 @@ from .comparison import (
 )
 from .fit import fit_baselines, fit_campaign, training_runs
 from .full_scale import to_full_scale
+from .nowcast import nowcast, nowcasts
 from .resolve import build_spec
 from .run import run_study
 from .settings import Study, StudySettings, read_study
@@ -32,6 +33,8 @@ __all__ = [
     "fit_campaign",
     "forecast_at_full_scale",
     "in_degrees",
+    "nowcast",
+    "nowcasts",
     "read_result",
     "read_study",
     "run_study",

@@ -1,0 +1,161 @@
+"""Skill against lead time: a model in service, to which waves to come are not known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import cast
+
+import numpy as np
+import xarray as xr
+
+from seakeep.campaign import Campaign, load_prepared
+from seakeep.campaign.prepare import Progress
+from seakeep.errors import RequestError
+from seakeep.models import HankelEnsemble, Model
+from seakeep.models.labelled import channel_matrix
+from seakeep.models.live import Servable
+from seakeep.study.comparison import samples_of
+
+__all__ = ["nowcast", "nowcasts"]
+
+STARTS = 24
+"""Forecasts of a run: enough for a root mean square known to a seventh."""
+HORIZON = "5 T"
+
+
+def nowcasts(
+    models: Mapping[str, Model],
+    campaign: Campaign,
+    runs: Sequence[str] = (),
+    steps: int | str | None = None,
+    *,
+    share: float = 0.5,
+    level: float = 0.95,
+    progress: Progress | None = None,
+) -> dict[str, xr.Dataset]:
+    """Play runs of a campaign to models in service, and judge what they forecast.
+
+    Parameters
+    ----------
+    models : mapping of str to Model
+        Models by name; an ensemble is held.
+    campaign : Campaign
+        The campaign.
+    runs : sequence of str, optional
+        Runs; by default those that test.
+    steps : int or str, optional
+        Longest lead, samples or a length; by default five encounter periods.
+    share : float, optional
+        Part of the training SD below which the error is to stay over the lead time.
+    level : float, optional
+        Probability of the band.
+    progress : callable, optional
+        Called as ``progress(done, total, what)`` after each run and model.
+
+    Returns
+    -------
+    dict of str to Dataset
+        :func:`nowcast` of each model, over ``run``.
+
+    Raises
+    ------
+    RequestError
+        If a model cannot serve, or a run is too short.
+    """
+    served = {name: _servable(name, model) for name, model in models.items()}
+    prepared = load_prepared(campaign, names=list(runs) or campaign.test_runs)
+    out: dict[str, list[xr.Dataset]] = {name: [] for name in models}
+    total, done = len(models) * len(prepared), 0
+    for name, model in served.items():
+        dt = model.signature.dt
+        count = samples_of(steps or HORIZON, campaign, list(prepared.values()), dt, "steps")
+        for key, run in prepared.items():
+            found = nowcast(model, run, count, share=share, level=level)
+            out[name].append(found.assign_coords(run=key))
+            done += 1
+            if progress is not None:
+                progress(done, total, f"{name}, {key}")
+    return {name: xr.concat(each, "run") for name, each in out.items()}
+
+
+def nowcast(
+    model: Servable, run: xr.Dataset, steps: int, *, share: float = 0.5, level: float = 0.95
+) -> xr.Dataset:
+    """Play a run to a model in service, sample by sample, and judge its forecasts.
+
+    Parameters
+    ----------
+    model : HankelDMDcModel or HeldEnsemble
+        What has ``live``.
+    run : Dataset
+        A prepared run; in its test span, if it states one, forecasts start at even distances.
+    steps : int
+        Longest lead, samples.
+    share, level : float
+        As in :func:`nowcasts`.
+
+    Returns
+    -------
+    Dataset
+        Over (channel, lead): ``error`` and ``claimed``, root mean square error and what the model
+        says of it, in training SDs, and ``coverage`` of the band, %; over channel ``lead_time``,
+        s, up to which ``error`` stays below ``attrs["share"]``. No wave after a start is read.
+
+    Raises
+    ------
+    RequestError
+        If no forecast of so many steps fits into the run.
+    """
+    signature = model.signature
+    time, name = run["time"].values, str(run.attrs.get("run", "the run"))
+    begin, end = run.attrs.get("test_span", (time[0], time[-1]))
+    first = max(int(np.searchsorted(time, begin)), signature.history_samples - 1)
+    last = int(np.searchsorted(time, end + 0.5 * signature.dt)) - 1 - steps
+    if last < first:
+        raise RequestError(
+            f"{name} has {time.size} samples, and a forecast of {steps} steps takes "
+            f"{signature.history_samples} of history before. Give fewer steps, or another run."
+        )
+    starts = set(np.linspace(first, last, min(STARTS, last - first + 1)).astype(int).tolist())
+    u = channel_matrix(run, signature.inputs, name)
+    y = channel_matrix(run, signature.states, name)
+    spread = signature.state_scale.spread
+    live = model.live(like=run)
+    squares, claimed, inside = np.zeros((3, steps, len(spread)))
+    for at in range(last + 1):
+        live.step(u[at], y[at])
+        if at in starts:
+            found = live.forecast(steps, level=level)
+            statistics = np.stack([found[each].values for each in signature.states], axis=-1)
+            mean, std, lower, upper = statistics
+            truth = y[at + 1 : at + steps + 1]
+            squares += ((mean - truth) / spread) ** 2
+            claimed += (std / spread) ** 2
+            inside += (lower <= truth) & (truth <= upper)
+    error = np.sqrt(squares / len(starts))
+    held = [int(np.argmin(np.append(each <= share, False))) for each in error.T]
+    lead = signature.dt * np.arange(1, steps + 1)
+    return xr.Dataset(
+        {
+            "error": (("lead", "channel"), error, {"units": "training SD"}),
+            "claimed": (("lead", "channel"), np.sqrt(claimed / len(starts))),
+            "coverage": (("lead", "channel"), 100.0 * inside / len(starts), {"units": "%"}),
+            "lead_time": ("channel", signature.dt * np.array(held), {"units": "s"}),
+        },
+        coords={
+            "lead": ("lead", lead, {"units": "s", "long_name": "lead time"}),
+            "channel": signature.states,
+        },
+        attrs={"share": share, "level": level, "starts": len(starts)},
+    )
+
+
+def _servable(name: str, model: Model) -> Servable:
+    if isinstance(model, HankelEnsemble):
+        return model.hold()
+    if not hasattr(model, "live"):
+        raise RequestError(
+            f"{name} is a {model.kind} model, which cannot be put into service: it has no delayed "
+            "states to estimate. Name a Hankel or ARX model."
+        )
+    return cast("Servable", model)
