@@ -29,6 +29,7 @@ VERBS = (
         "forecast",
         "compare",
         "export",
+        "check",
         "study",
     ),
     *("report", "reproduce", "datasets", "track", "info"),
