@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,14 @@ from seakeep.core.bands import split_bands
 from seakeep.report.tables import Table, probability, signed
 from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
-from seakeep.study.judge import average_of, blocks_of, median_of, training_order
+from seakeep.study.judge import (
+    average_of,
+    band_of,
+    blocks_of,
+    median_of,
+    phase_leads,
+    training_order,
+)
 from seakeep.study.plan import random_stream
 from seakeep.study.reproduce import SLOW
 
@@ -42,6 +50,12 @@ class Interval(NamedTuple):
             return True
         return False if self.lower > bound else None
 
+    def below_other(self, other: Interval) -> bool | None:
+        """Whether it lies below another number; None where the intervals meet."""
+        if self.upper < other.lower:
+            return True
+        return False if self.lower > other.upper else None
+
     def percent(self) -> str:
         """Text of a relative change."""
         return self._text(lambda value: f"{signed(100 * value, 0)} %")
@@ -50,6 +64,10 @@ class Interval(NamedTuple):
         """Text of a share."""
         return self._text(lambda value: f"{100 * value:.0f} %")
 
+    def degrees(self) -> str:
+        """Text of an angle."""
+        return self._text(lambda value: f"{value:.0f}°")
+
     def text(self) -> str:
         """Text of an error."""
         return self._text(lambda value: f"{value:.2f}")
@@ -57,7 +75,7 @@ class Interval(NamedTuple):
     def _text(self, form: Callable[[float], str]) -> str:
         if np.isnan(self.lower):
             return form(self.value)
-        low, high = (form(each).removesuffix(" %") for each in (self.lower, self.upper))
+        low, high = (form(each).rstrip(" %°") for each in (self.lower, self.upper))
         return f"{form(self.value)} [{low}, {high}]"
 
 
@@ -234,17 +252,21 @@ def _who_errs(results: Results) -> Verdict:
 
 
 def _load_divergence(results: Results) -> Verdict:
-    at = (
-        results["paper"]
-        .groups["statistics/divergence"]["mean"]
-        .sel(model=ENSEMBLE, variant="paper")
+    at = results["paper"].groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
+    loads, others = (
+        at.sel(channel=list(names)).mean("channel") for names in (LOADS, _motions(results["paper"]))
     )
-    loads = float(at.sel(channel=list(LOADS)).mean())
-    others = float(at.sel(channel=list(_motions(results["paper"]))).mean())
+    low, value, high = (
+        float(loads[a] / others[b])
+        for a, b in (("lower", "upper"), ("mean", "mean"), ("upper", "lower"))
+    )
+    below = Interval(value, low, high).below(10**0.5)
     return Verdict(
-        f"{loads:.4f} against {others:.4f}: a factor of {loads / others:.0f}",
-        loads > 10**0.5 * others,
-        "Mean JSD of the loads and of the nine others; a factor above √10.",
+        f"{float(loads['mean']):.4f} against {float(others['mean']):.4f}: a factor of {value:.0f} "
+        f"[{low:.1f}, {high:.0f}]",
+        None if below is None else not below,
+        "Mean JSD of the loads and of the nine others; a factor above √10. The interval joins the "
+        "bounds of both, which is wide.",
     )
 
 
@@ -310,29 +332,42 @@ def _always_better(results: Results) -> Verdict:
     )
 
 
-def _coverage(result: StudyResult, channels: tuple[str, ...], key: str) -> float:
-    at = result.groups["statistics/coverage/irregular"].sel(model=ENSEMBLE, against="measured")
-    return float(at[key].sel(channel=list(channels)).mean())
+def _mean(drawn: FloatArray) -> FloatArray:
+    """Mean over cells (series, training, window, channel)."""
+    return average_of(drawn.reshape(len(drawn), -1))
+
+
+def _band(result: StudyResult, channels: tuple[str, ...]) -> tuple[Interval, Interval]:
+    """Part of the instants inside the band of irregular waves, and its width in window SDs."""
+    test, picked = result.tests["irregular"], _columns(result, channels)
+    order, _ = training_order(result.groups["training"])
+    lower, upper = (bound[order][..., picked] for bound in band_of(test, ENSEMBLE, None))
+    measured = test["measured"].values[..., picked]
+    judged = test["judged"].values[order][..., None]
+    inside = ((measured >= lower) & (measured <= upper)).mean(axis=2)
+    width = (upper - lower).mean(axis=2) / measured.std(axis=1, ddof=1)
+    cells = (np.where(judged, each, np.nan) for each in (inside, width))
+    found = [_interval(result, ("irregular",), _mean, each) for each in cells]
+    return found[0], found[1]
 
 
 def _narrow(results: Results) -> Verdict:
     result = results["paper"]
-    width = _coverage(result, _motions(result), "relative_width")
-    inside = _coverage(result, _motions(result), "inside")
+    inside, width = _band(result, _motions(result))
     error = _error(result, ("irregular",), _motions(result))
     return Verdict(
-        f"motions: {width:.2f} SD wide, {100 * inside:.0f} % of the instants inside 95 %",
-        width < USEFUL,
+        f"motions: {width.text()} SD wide, {inside.part()} of the instants inside 95 %",
+        width.below(USEFUL),
         f"Width below {USEFUL:g} SD. The median error is {error.value:.2f} SD: the spread of the "
         "hyperparameters is not the error.",
     )
 
 
 def _load_band(results: Results) -> Verdict:
-    inside = _coverage(results["paper"], LOADS, "inside")
+    inside, _ = _band(results["paper"], LOADS)
     return Verdict(
-        f"{100 * inside:.0f} % of the instants of the loads inside 95 %",
-        inside < 0.9,
+        f"{inside.part()} of the instants of the loads inside 95 %",
+        inside.below(0.9),
         "Fewer than 90 %.",
     )
 
@@ -375,11 +410,11 @@ def _regular(results: Results) -> Verdict:
     result = results["paper"]
     motions = [_error(result, (test,), _motions(result)) for test in REGULAR]
     loads = [_error(result, (test,), LOADS) for test in REGULAR]
-    worse = all(b.value > a.value for a, b in zip(motions, loads, strict=True))
+    worse = [a.below_other(b) for a, b in zip(motions, loads, strict=True)]
     return Verdict(
         f"λ/L 1.5, 2, 3: motions {', '.join(f.text() for f in motions)}; loads "
         f"{', '.join(f.text() for f in loads)}",
-        all_of([*(each.below(USEFUL) for each in motions), worse]),
+        all_of([*(each.below(USEFUL) for each in motions), *worse]),
         f"Median NRMSE of the motions below {USEFUL:g}, of the loads larger, in all three.",
     )
 
@@ -413,20 +448,28 @@ def _against_irregular(results: Results) -> Verdict:
 
 def _phase(results: Results) -> Verdict:
     result = results["paper"]
-    found = {}
-    for words, channels in (("loads", LOADS), ("motions", _motions(result))):
-        leads = [
-            result.groups[f"statistics/response/{test}"]["phase_lead"].sel(
-                model=ENSEMBLE, channel=list(channels)
-            )
-            for test in REGULAR
-        ]
-        found[words] = float(np.nanmedian(np.abs(np.concatenate([x.values for x in leads]))))
+    order, _ = training_order(result.groups["training"])
+    cells = np.concatenate(
+        [np.abs(phase_leads(result.groups, test, ENSEMBLE)[order]) for test in REGULAR], axis=1
+    )
+    loads, motions = (
+        cells[..., _columns(result, channels)] for channels in (LOADS, _motions(result))
+    )
+    found = [_interval(result, REGULAR, _every_median, each) for each in (loads, motions)]
+    more = _interval(
+        result, REGULAR, lambda a, b: _every_median(a) - _every_median(b), loads, motions
+    )
+    below = more.below(0.0)
     return Verdict(
-        f"median |phase|: loads {found['loads']:.0f}°, motions {found['motions']:.0f}°",
-        found["loads"] > found["motions"],
+        f"median |phase|: loads {found[0].degrees()}, motions {found[1].degrees()}",
+        None if below is None else not below,
         "At the wave's frequency, over the three regular runs.",
     )
+
+
+def _every_median(drawn: FloatArray) -> FloatArray:
+    """Median over cells and channels (series, training, window, channel)."""
+    return median_of(drawn.reshape(len(drawn), -1))
 
 
 def _stern(results: Results) -> Verdict:
@@ -434,12 +477,12 @@ def _stern(results: Results) -> Verdict:
     errors = [_error(result, (test,), ("mooring_stern",)) for test in REGULAR]
     slack = results["raw"].groups["runs"]["slack"].sel(name="mooring_stern")
     parts = [f"{100 * float(slack.sel(run=run)):.0f} %" for run in REGULAR]
-    values = [each.value for each in errors]
-    judged = bool(np.isfinite(values).all())
+    judged = [each for each in errors if np.isfinite(each.value)]
+    falls = [longer.below_other(shorter) for shorter, longer in pairwise(judged)]
     return Verdict(
         f"NRMSE {', '.join(e.text() if e.value == e.value else 'only noise' for e in errors)}; "
         f"slack {', '.join(parts)} of the time",
-        values[0] > values[1] > values[2] if judged else values[1] > values[2],
+        all_of(falls) if falls else None,
         "λ/L 1.5, 2, 3. The tank's drift force and pretension decide how slack the line is.",
     )
 

@@ -634,20 +634,9 @@ def _parts(
     forecasts = data[f"{model}_mean"].values
     slack = np.isnan(data[f"{model}_nrmse"].values)
     for row, column in zip(rows, columns, strict=True):
-        turn = 2 * np.pi * frequencies[column] * time
-        basis = np.stack([np.ones_like(time), np.cos(turn), np.sin(turn)], axis=1)
-        orthonormal, triangle = np.linalg.qr(basis)
-        predicted, truth = forecasts[row, column], measured[column]
-        error = predicted - truth
-        inside = (orthonormal.T @ error) ** 2
-        total = np.sum(error**2, axis=0)
-        found = np.stack([inside[0], inside[1:].sum(axis=0), total - inside.sum(axis=0)])
-        found /= time.size * truth.var(axis=0, ddof=1)
-        # The first of an orthonormal basis of (1, cos, sin) is the mean; amplitudes need (1, …).
-        complex_of = [
-            np.linalg.solve(triangle, orthonormal.T @ series) for series in (predicted, truth)
-        ]
-        response = np.divide(*[each[1] - 1j * each[2] for each in complex_of])
+        found, response = _in_waves(
+            time, frequencies[column], forecasts[row, column], measured[column]
+        )
         squares.append(np.where(slack[row, column], np.nan, found))
         responses.append(np.where(slack[row, column], np.nan, response))
     known, answer = np.stack(squares), np.stack(responses)
@@ -659,6 +648,39 @@ def _parts(
         direction = np.nanmean(answer / np.abs(answer), axis=0)
     columns_of = [*errors, np.nanmedian(np.abs(answer), axis=0), np.degrees(np.angle(direction))]
     return [np.where(lost, np.nan, each) for each in columns_of]
+
+
+def _in_waves(
+    time: FloatArray, frequency: float, predicted: FloatArray, truth: FloatArray
+) -> tuple[FloatArray, npt.NDArray[np.complex128]]:
+    """Squared error by parts, shape (3, channel), and forecast over measurement in the wave."""
+    turn = 2 * np.pi * frequency * time
+    basis = np.stack([np.ones_like(time), np.cos(turn), np.sin(turn)], axis=1)
+    orthonormal, triangle = np.linalg.qr(basis)
+    error = predicted - truth
+    inside = (orthonormal.T @ error) ** 2
+    total = np.sum(error**2, axis=0)
+    found = np.stack([inside[0], inside[1:].sum(axis=0), total - inside.sum(axis=0)])
+    found /= time.size * truth.var(axis=0, ddof=1)
+    # The first of an orthonormal basis of (1, cos, sin) is the mean; amplitudes need (1, …).
+    complex_of = [np.linalg.solve(triangle, orthonormal.T @ each) for each in (predicted, truth)]
+    return found, np.divide(*[each[1] - 1j * each[2] for each in complex_of])
+
+
+def phase_leads(groups: Mapping[str, xr.Dataset], test: str, model: str) -> FloatArray:
+    """Phase of the forecast before the measurement, degrees, over (training, window, channel).
+
+    NaN where a cell or a channel is not judged.
+    """
+    data = groups[f"tests/{test}"]
+    frequencies = groups["runs"]["wave_frequency"].sel(run=data["run"].values.astype(str)).values
+    time, measured = data["time"].values, data["measured"].values
+    forecasts, errors = data[f"{model}_mean"].values, data[f"{model}_nrmse"].values
+    out = np.full(errors.shape, np.nan)
+    for row, column in zip(*np.nonzero(data["judged"].values), strict=True):
+        place = frequencies[column], forecasts[row, column], measured[column]
+        out[row, column] = np.degrees(np.angle(_in_waves(time, *place)[1]))
+    return np.where(np.isnan(errors), np.nan, out)
 
 
 def _with_waves(
