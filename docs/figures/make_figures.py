@@ -1,6 +1,8 @@
 """Draw the figures of the documentation and of the measured examples.
 
     python docs/figures/make_figures.py indices     # docs/figures/indices.svg and .png
+    python docs/figures/make_figures.py instants    # docs/figures/instants.svg
+    python docs/figures/make_figures.py in_service  # docs/figures/in_service.png
     python docs/figures/make_figures.py tutorial    # docs/figures/unseen.png and band.png
     python docs/figures/make_figures.py study       # the tutorial's study report; needs Chromium
     python docs/figures/make_figures.py tank        # the virtual tank's; extras tank and video
@@ -182,6 +184,54 @@ def indices():
         save(figure, HERE / "indices.png")
 
 
+# --- the instants of a model in service ----------------------------------------------------------
+MISSING = {"facecolor": "white", "edgecolor": "black", "linestyle": ":"}
+ESTIMATED = {"facecolor": "#9CC3E5", "edgecolor": "black"}
+
+
+def instants():
+    """Which instants a live model has read, estimates and forecasts."""
+    with mpl.rc_context(
+        {"svg.fonttype": "path", "svg.hashsalt": "seakeep", "hatch.linewidth": 0.7}
+    ):
+        figure = Figure(figsize=(10.0, 10.0 * 6.4 / 25.4))
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        panel(axes, "after live.step(u, y) of instant k, with a look-ahead of 3 samples", 6.4)
+        rows = {"inputs u": 4.0, "states y": 2.9, "state estimates": 1.8}
+        for text, row in rows.items():
+            label(axes, row, text)
+        for at in range(8):
+            missing = at in (2, 6)
+            cell(axes, at, rows["inputs u"], READ)
+            cell(axes, at, rows["states y"], MISSING if missing else READ)
+            cell(axes, at, rows["state estimates"], ESTIMATED)
+            axes.text(at, 4.75, index_name("k", at - 7), ha="center", fontsize=9)
+        for at in range(8, 18):
+            cell(axes, at, rows["inputs u"], MISSING)
+            axes.text(at, 4.75, index_name("k", at - 7), ha="center", fontsize=9)
+            if at < 16:
+                cell(axes, at, rows["state estimates"], WRITTEN)
+        axes.plot([7.5, 7.5], [1.2, 5.1], color="black", lw=1.2, ls="--")
+        axes.text(7.6, 5.2, "live.time", fontsize=10, ha="center")
+        brace(axes, 0, 5, 1.25, "final", above=False)
+        brace(axes, 6, 7, 1.25, "mended as\nwaves arrive", above=False)
+        brace(axes, 8, 15, 1.25, "live.forecast(8)", above=False)
+        words = "dotted: not measured. Inputs to come are given as future, or predicted"
+        axes.text(8.0, 2.9, words, fontsize=9.5, va="center")
+        figure.savefig(HERE / "instants.svg", metadata={"Date": None})
+
+
+def in_service():
+    """A minute without a sensor, as the example plays it."""
+    campaign = ROOT / "docs" / "tutorial" / "campaign.toml"
+    with tempfile.TemporaryDirectory() as folder:
+        model = Path(folder) / "model.nc"
+        fit_campaign(seakeep.read_campaign(campaign)).save(model)
+        script = [sys.executable, EXAMPLES / "in_service" / "play.py"]
+        out = HERE / "in_service.png"
+        subprocess.run([*script, model, campaign, "unseen", "heave", out], check=True)
+
+
 # --- figures of results --------------------------------------------------------------------------
 def save(figure, path):
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -288,7 +338,10 @@ def chain():
         quality_figure(shown, agreements).savefig(HERE / "quality_sheet.png", dpi=90)
 
 
-DRAWINGS = {each.__name__: each for each in (indices, tutorial, study, ntnu, sjtu, tank, chain)}
+DRAWINGS = {
+    each.__name__: each
+    for each in (indices, instants, in_service, tutorial, study, ntnu, sjtu, tank, chain)
+}
 
 if __name__ == "__main__":
     for wanted in sys.argv[1:] or ["indices"]:
