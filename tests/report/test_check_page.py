@@ -41,6 +41,17 @@ def test_the_page_holds_its_figures_and_tables(checked):
         assert f"{row['state']}: model" in page
 
 
+def test_a_forecast_compares_its_waves_with_those_of_training(checked, monkeypatch):
+    asked = []
+    monkeypatch.setattr("seakeep.study.fit.warn_of_waves", lambda *given: asked.append(given[2:]))
+    folder = checked.parent
+    files = [str(folder / name) for name in ("model.nc", "campaign.toml")]
+    out = str(folder / "forecast.csv")
+    given = ["--run", "unseen", "--start", "20", "--steps", "40", "-o", out]
+    assert main(["forecast", *files, *given]) == 0
+    assert asked == [("unseen", 20.0, 40)]
+
+
 def test_a_page_says_what_cannot_be_judged():
     refused = {"coherence": "all runs are regular.", "response": "the model has no input."}
     notes = {"measured_response": ("run_3 is left out: it is short.",)}

@@ -7,6 +7,7 @@ from seakeep.check.peaks import statistics
 from seakeep.check.residuals import residuals
 from seakeep.check.response import measured_response, response, validation
 from seakeep.check.sea import validity
+from seakeep.check.second_order import drift
 
 __all__ = [
     "CHECKS",
@@ -14,6 +15,7 @@ __all__ = [
     "check_model",
     "coherence",
     "decay",
+    "drift",
     "measured_decay",
     "measured_response",
     "modes",

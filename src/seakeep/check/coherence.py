@@ -22,8 +22,10 @@ from seakeep.models import Model
 
 __all__ = ["coherence"]
 
-SEGMENT = 16
-"""Encounter periods of a segment of Welch's method."""
+SHORTEST, LONGEST = 16, 64
+"""Encounter periods of a segment of Welch's method: long ones resolve a lightly damped response."""
+AVERAGES = 10
+"""Independent segments per input, and one more, that are kept where the records are long enough."""
 
 
 def coherence(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
@@ -56,15 +58,19 @@ def coherence(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
 
     Notes
     -----
-    A segment of 16 encounter periods resolves a lightly damped response or a long delay between
-    probe and vessel incompletely: the bound is then an upper one, and a model may lie below it.
+    Segments have 16 to 64 encounter periods, as long as there are ten of them per input and one
+    more. They resolve a lightly damped response, or a long delay between probe and vessel,
+    incompletely: the bound is then an upper one, and a model may lie below it.
     Slow motions count with all their power.
     """
     if not model.inputs:
         raise RequestError("the model has no input, with which a state could be coherent.")
     waves = irregular(runs, "coherence")
     parts = used_parts(model, waves)
-    segment = round(SEGMENT * encounter_period_of(model, waves) / model.dt)
+    period = encounter_period_of(model, waves) / model.dt
+    samples = sum(len(part.time) for part in parts.values())
+    wanted = 2 * samples / (AVERAGES * (len(model.inputs) + 1))
+    segment = round(np.clip(wanted, SHORTEST * period, LONGEST * period))
     pieces = []
     for part in parts.values():
         columns = regressors(model, part)

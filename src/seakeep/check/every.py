@@ -14,6 +14,7 @@ from seakeep.check.peaks import statistics
 from seakeep.check.residuals import residuals
 from seakeep.check.response import measured_response, response, validation
 from seakeep.check.sea import validity
+from seakeep.check.second_order import drift
 from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models import Model
 
@@ -43,6 +44,7 @@ CHECKS: dict[str, Check] = {
     "residuals": residuals,
     "statistics": statistics,
     "validity": validity,
+    "drift": drift,
 }
 """Checks by name: each takes a model and prepared runs by name."""
 

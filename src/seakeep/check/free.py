@@ -9,9 +9,10 @@ import scipy
 import xarray as xr
 
 from seakeep.arrays import FloatArray
+from seakeep.check.parts import single_model
 from seakeep.core.decay import free_decay
 from seakeep.errors import DataError, RequestError
-from seakeep.models import HankelDMDcModel, Model
+from seakeep.models import Model
 from seakeep.models.labelled import channel_matrix
 from seakeep.models.linear import modes as modes_of
 
@@ -20,15 +21,6 @@ __all__ = ["MOTIONS", "decay", "measured_decay", "modes"]
 MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 LONGEST, SHORTEST = 20000, 200
 """Samples of a decay."""
-
-
-def _single(model: Model) -> HankelDMDcModel:
-    if not isinstance(model, HankelDMDcModel):
-        raise RequestError(
-            f"free motion is that of one Hankel or ARX model; received one of kind '{model.kind}'. "
-            "Of an ensemble, check a member: seakeep.check.modes(ensemble.member(0))."
-        )
-    return model
 
 
 def modes(model: Model) -> xr.Dataset:
@@ -51,7 +43,7 @@ def modes(model: Model) -> xr.Dataset:
     RequestError
         If it is an ensemble, or no model of delayed states.
     """
-    single = _single(model)
+    single = single_model(model)
     values, left, right = scipy.linalg.eig(single.A, left=True)
     order = np.argsort(-np.abs(values), kind="stable")
     order = order[values[order].imag >= 0]
@@ -87,7 +79,7 @@ def decay(model: Model) -> xr.Dataset:
     RequestError
         If no state is a rigid motion, or the model is none of delayed states.
     """
-    single = _single(model)
+    single = single_model(model)
     motions = [name for name in single.states if name in MOTIONS]
     if not motions:
         raise RequestError(
@@ -115,13 +107,14 @@ def decay(model: Model) -> xr.Dataset:
         rows.append(left)
         found.append(free_decay(left[np.isfinite(left)], single.dt))
     units = {each.name: each.units for each in single.state_labels}
+    linear = np.array([each.decrements.mean() if each.cycles else np.nan for each in found])
     return xr.Dataset(
         {
             "displacement": (("motion", "time"), np.array(rows)),
             "offset": ("motion", offsets),
             "period": ("motion", [each.period for each in found], {"units": "s"}),
-            "damping_ratio": ("motion", [each.damping_ratio for each in found]),
-            "p": ("motion", [each.p for each in found]),
+            "damping_ratio": ("motion", linear / np.hypot(2 * np.pi, linear)),
+            "p": ("motion", linear),
         },
         coords={
             "motion": motions,

@@ -33,6 +33,7 @@ __all__ = [
     "one_step",
     "reference_probe",
     "regressors",
+    "single_model",
     "units_of",
     "used_parts",
     "wave_turns",
@@ -288,6 +289,17 @@ def _at_once(each: InputMap) -> InputMap:
         for one in each.observables
     ]
     return replace(each, observables=tuple(now), lead=0)
+
+
+def single_model(model: Model) -> HankelDMDcModel:
+    """The model itself, where it is one of delayed states and inputs."""
+    if not isinstance(model, HankelDMDcModel):
+        raise RequestError(
+            "free motion and second order are those of one Hankel or ARX model; received one of "
+            f"kind '{model.kind}'. Of an ensemble, check a member: "
+            "seakeep.check.modes(ensemble.member(0))."
+        )
+    return model
 
 
 def reference_probe(model: Model, runs: Mapping[str, xr.Dataset]) -> int:

@@ -134,6 +134,7 @@ def forecast(
     from seakeep.signals.time_axis import instant_text
     from seakeep.study import forecast_at_full_scale, with_degrees
     from seakeep.study.comparison import instant_of, samples_of
+    from seakeep.study.fit import warn_of_waves
 
     identified = load_model(model)
     read = read_campaign(campaign)
@@ -150,6 +151,8 @@ def forecast(
     warn_of_runs([prepared], [*identified.states, *identified.inputs])
     first = instant_of(start, read, [prepared], "--start")
     count = None if steps is None else samples_of(steps, read, [prepared], identified.dt, "--steps")
+    left = round((float(prepared["time"][-1]) - first) / identified.dt)
+    warn_of_waves(identified, prepared, run, first, left if count is None else count)
     if is_ensemble(identified):
         with (
             member_executor(workers, scheduler) as executor,

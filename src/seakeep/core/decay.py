@@ -72,6 +72,8 @@ def free_decay(series: FloatArray, dt: float) -> Decay:
     nothing = np.empty(0)
     if ranges.size < 2:
         return Decay(np.nan, np.nan, np.nan, np.nan, 0, nothing, nothing)
+    first = int(np.argmax(ranges))  # other modes die out before
+    instants, ranges = instants[first:], ranges[first:]
     above = ranges >= SMALLEST * ranges.max()
     kept = int(np.argmin(above)) if not above.all() else ranges.size
     ranges = ranges[:kept]

@@ -42,6 +42,7 @@ from seakeep.models.forecasts import (
     with_units,
 )
 from seakeep.models.growth import LeadErrors, Stretch, lead_errors
+from seakeep.models.html import text_html
 from seakeep.models.inputs import Chain, FittedAlignment
 from seakeep.models.interface import Json, Signature
 from seakeep.models.labelled import Runs
@@ -369,6 +370,10 @@ class HankelEnsemble(_Forecasts, store.Saved):
             f"{type(self).__name__}(n_members={self.n_members}, states={self.states}, "
             f"inputs={self.inputs}, dt={self.dt:g}; print(ensemble.summary()) says more)"
         )
+
+    def _repr_html_(self) -> str:
+        """Summary, for notebooks."""
+        return text_html(self.summary())
 
     @property
     def n_members(self) -> int:

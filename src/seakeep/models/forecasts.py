@@ -17,6 +17,7 @@ from seakeep.models import engine
 from seakeep.models.checks import check_choice
 from seakeep.models.engine import Windows, first_lost
 from seakeep.models.executor import Progress
+from seakeep.models.html import text_html
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import ChannelLabel, run_name
 from seakeep.models.training import Training
@@ -118,6 +119,14 @@ class SingleModel(Forecaster):
     ) -> list[FloatArray]:
         """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
         raise NotImplementedError
+
+    def summary(self) -> str:
+        """Text that says what the model is."""
+        raise NotImplementedError
+
+    def _repr_html_(self) -> str:
+        """Summary, for notebooks."""
+        return text_html(self.summary())
 
     @property
     def training_spans(self) -> dict[str, tuple[float, float]]:

@@ -13,6 +13,7 @@ import numpy as np
 from seakeep.core.embedding import History
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models.checks import check_choice, check_integer, settings_of
+from seakeep.models.html import settings_html
 from seakeep.models.inputs import Lead, ProbeAlignment
 from seakeep.models.interface import Fittable, Json, Needs, plain
 from seakeep.models.observables import Observable, Observing, observables_of
@@ -250,6 +251,10 @@ class HankelSettings:
             self.history == "inside",
             after,
         )
+
+    def _repr_html_(self) -> str:
+        """Settings as a table, for notebooks."""
+        return settings_html(type(self).__name__, self.to_json())
 
     def to_json(self) -> Json:
         """Settings as JSON values."""

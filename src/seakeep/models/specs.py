@@ -17,6 +17,7 @@ from seakeep.models.checks import check_choice
 from seakeep.models.draws import Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.executor import Progress
+from seakeep.models.html import settings_html
 from seakeep.models.inputs import Chain, ProbeAlignment
 from seakeep.models.interface import Json, Needs, Signature, Span, Spec, plain
 from seakeep.models.labelled import Runs, Stop, as_runs
@@ -458,6 +459,10 @@ class BayesianHankelDMDc:
         object.__setattr__(self, "select", Select.of(self.select))
         object.__setattr__(self, "alignment", self.shared(0.5 * period).alignment)
         object.__setattr__(self, "seed_sequence", _seed_sequence(self.seed))
+
+    def _repr_html_(self) -> str:
+        """Settings as a table, for notebooks."""
+        return settings_html(type(self).__name__, self.to_json())
 
     def shared(self, dt: float) -> HankelSettings:
         """What all members share; its delays, window and λ are not used."""

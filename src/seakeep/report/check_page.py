@@ -405,6 +405,51 @@ def validity_section(checked: Checked) -> Section | None:
     )
 
 
+def drift_section(checked: Checked) -> Section | None:
+    """Return the second order: mean drift and slow response per amplitude squared."""
+    found = checked.found.get("drift")
+    if found is None:
+        return None
+    rows = []
+    for state, unit in zip(found["state"].values, found["units"].values, strict=True):
+        own = found.sel(state=state)
+        if "offset" not in own or not np.isfinite(own["slow_response"]).any():
+            continue
+        factor, shown = displayed(str(unit))
+        for point in range(own.sizes["point"]):
+            at = own.isel(point=point)
+            f = float(at["point_frequency"])
+            mean = own["slow_response"][0]
+            inside = float(mean["frequency"][0]) <= f <= float(mean["frequency"][-1])
+            made = float(np.interp(f, mean["frequency"], mean)) if inside else np.nan
+            rows.append(
+                (
+                    f"{state} [{shown_unit(shown)}]",
+                    str(at["run"].values),
+                    number(f),
+                    number(factor * made, 4),
+                    _with_sure(factor * at["offset"], factor * at["offset_uncertainty"], 4),
+                )
+            )
+    columns = ("state", "run", "frequency [Hz]", "model", "measured")
+    note = (
+        "Offset from the rest in still water, as the model has it, over the wave amplitude "
+        "squared; ± expanded uncertainty at 95 % of the measured mean."
+    )
+    title = "Mean offset in regular waves, per amplitude squared"
+    tables = (Table("drift", title, columns, tuple(rows), note, (2, 3, 4)),) if rows else ()
+    words = (
+        "What the observables make of one wave (the mean) and of two whose frequencies differ (a "
+        "slow response at the difference, half of it per amplitude squared, so that it tends to "
+        f"the mean), probed with an amplitude of {float(found.attrs['amplitude']):.3g} m.",
+    )
+    caption = (
+        "Mean and slow response per wave amplitude squared, against the frequency of the wave."
+    )
+    drawing = Drawing("drift", caption, partial(checks.drift, found))
+    return Section("second-order", "Second order", words, figures=(drawing,), tables=tables)
+
+
 CHECK_SECTIONS: list[tuple[str, tuple[str, ...], Callable[[Checked], Section | None]]] = [
     ("Response", ("response", "measured_response", "validation"), response_section),
     ("What is possible", ("coherence",), possible_section),
@@ -412,6 +457,7 @@ CHECK_SECTIONS: list[tuple[str, tuple[str, ...], Callable[[Checked], Section | N
     ("Residuals", ("residuals",), residuals_section),
     ("Statistics of responses", ("statistics",), statistics_section),
     ("Validity", ("validity",), validity_section),
+    ("Second order", ("drift",), drift_section),
 ]
 """Title, the checks that it shows, and what makes it."""
 

@@ -138,6 +138,7 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
             at.plot(time, x, color=COLOURS["measured"], linewidth=0.6)
             _mark(at, time, x, flags)
             at.set_ylabel(axis_label(name, units, run[name].attrs.get("long_name")), fontsize=8)
+            _show_constant(at, x)
         for at, name in zip(axes[len(names) :], lagging, strict=True):
             each = agreements[name]
             limit = LATE * each.period
@@ -153,6 +154,17 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
         figure.align_ylabels(axes)
         axes[-1].set_xlabel("time [s]")
     return figure
+
+
+def _show_constant(at: Any, x: Any) -> None:
+    """Say that a channel is constant, and keep its axis from showing rounding."""
+    known = x[np.isfinite(x)]
+    if known.size and np.ptp(known) <= 1e-9 * max(np.abs(known).max(), 1e-300):
+        value = float(known[0])
+        reach = 0.1 * abs(value) or 1.0
+        at.set_ylim(value - reach, value + reach)
+        words = {"xy": (0.5, 0.8), "xycoords": "axes fraction", "ha": "center", "fontsize": 8}
+        at.annotate(f"constant: {value:.4g}", **words)
 
 
 def _broken(instants: Any, lags: Any) -> tuple[Any, Any]:

@@ -17,8 +17,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["coherence", "decay", "exceedance", "modes", "residuals", "response", "validity"]
+__all__ = [
+    "coherence",
+    "decay",
+    "drift",
+    "exceedance",
+    "modes",
+    "residuals",
+    "response",
+    "validity",
+]
 
+NARROWEST = 7.5
+"""Inches: a page stretches figures to its width, and a legend needs room."""
 UNTRAINED: dict[str, Any] = {"color": "#DDDDDD", "alpha": 0.6, "linewidth": 0}
 MARKS: dict[str, dict[str, Any]] = {
     "regular": {"color": COLOURS["measured"], "marker": "o", "markersize": 5, "zorder": 4},
@@ -40,7 +51,7 @@ def panels(
     if axes is None:
         columns = -(-count // -(-count // most))
         rows = -(-count // columns)
-        figure = new_figure(size[0] * columns, 0.5 + size[1] * rows)
+        figure = new_figure(max(size[0] * columns, NARROWEST), 0.5 + size[1] * rows)
         return figure, grid_of_axes(figure, count, most)
     given = list(np.ravel(np.asarray(axes, dtype=object)))
     if len(given) != count:
@@ -115,7 +126,7 @@ def response(
                 place.set_xlim(float(found["frequency"][0]), float(found["frequency"][-1]))
                 place.set_xlabel("frequency [Hz]")
         if axes is None:
-            _legend_below(figure, places[0])
+            legend_below(figure, places[0])
     return figure
 
 
@@ -147,7 +158,7 @@ def _points(gain: Any, turn: Any, measured: xr.Dataset, factor: float) -> None:
             )
 
 
-def _legend_below(figure: Any, place: Any) -> None:
+def legend_below(figure: Any, place: Any) -> None:
     handles, labels = place.get_legend_handles_labels()
     unique = dict(zip(labels, handles, strict=True))
     figure.legend(unique.values(), unique, loc="outside lower center", ncols=min(len(unique), 5))
@@ -199,7 +210,7 @@ def coherence(
             place.set(xlim=(0, top), ylim=(0, 1.02), xlabel="frequency [Hz]")
             place.set_ylabel(f"coherence, {short_label(name)} [1]")
         if axes is None:
-            _legend_below(figure, places[0])
+            legend_below(figure, places[0])
     return figure
 
 
@@ -396,7 +407,7 @@ def exceedance(
             place.set_xlabel(f"peak of {short_label(name)} [{shown_unit(units) or '?'}]")
             place.set_ylabel("exceeded by [1]")
         if axes is None:
-            _legend_below(figure, places[0])
+            legend_below(figure, places[0])
     return figure
 
 
@@ -437,4 +448,54 @@ def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) ->
         place.margins(x=0.12, y=0.15)
         place.set_ylim(bottom=0)
         place.legend(loc="lower right")
+    return figure
+
+
+def drift(
+    found: xr.Dataset,
+    *,
+    states: Sequence[str] | None = None,
+    axes: Sequence[Axes] | Axes | None = None,
+) -> Figure:
+    """Draw mean drift and slow response per amplitude squared, offsets of regular runs beside.
+
+    Parameters
+    ----------
+    found : Dataset
+        From :func:`seakeep.check.drift`.
+    states : sequence of str, optional
+        States to draw; by default those that have a response.
+    axes : Axes or sequence of Axes, optional
+        One for each state; by default those of a new figure.
+
+    Returns
+    -------
+    Figure
+    """
+    known = found["state"].values[found["slow_response"].notnull().any(["difference", "frequency"])]
+    chosen = _chosen(found, states or [str(name) for name in known])
+    with figure_style():
+        figure, places = panels(axes, len(chosen), 3, (3.0, 2.0))
+        for name, place in zip(chosen, places, strict=True):
+            own = found.sel(state=name)
+            factor, units = displayed(str(own["units"].values))
+            place.axhline(0.0, color=COLOURS["input"], linewidth=0.5)
+            line = {**LINES["forecast"], "linestyle": "-", "label": "model, mean"}
+            place.plot(own["frequency"], factor * own["slow_response"][0], **line)
+            dashes = ((0, (4, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)), (0, (8, 2)))
+            for number, dash in zip(range(1, own.sizes["difference"]), dashes, strict=False):
+                at = own.isel(difference=number)
+                style = {"color": COLOURS["ensemble"], "linewidth": 0.9, "linestyle": dash}
+                label = f"model, difference {float(at['difference']):.3g} Hz"
+                place.plot(at["frequency"], factor * at["slow_response"], **style, label=label)
+            if "offset" in own:
+                style = {**MARKS["regular"], "linestyle": "none", "elinewidth": 0.8}
+                sure = factor * own["offset_uncertainty"]
+                offset = factor * own["offset"]
+                label = "measured, regular waves"
+                place.errorbar(own["point_frequency"], offset, sure, **style, label=label)
+            place.set_xlabel("frequency [Hz]")
+            place.set_ylabel(f"{short_label(name)} [{shown_unit(units) or '?'}]")
+        if axes is None:
+            legend_below(figure, places[0])
     return figure

@@ -1,0 +1,32 @@
+"""Figures of labelled results: each function returns a matplotlib Figure, or draws on given Axes.
+
+Forecasts: :func:`overlay`, :func:`band`, :func:`errors`. Results of :mod:`seakeep.check`:
+:func:`response`, :func:`coherence`, :func:`decay`, :func:`modes`, :func:`residuals`,
+:func:`exceedance`, :func:`validity`, :func:`drift`.
+"""
+
+from seakeep.report.figures.checks import (
+    coherence,
+    decay,
+    drift,
+    exceedance,
+    modes,
+    residuals,
+    response,
+    validity,
+)
+from seakeep.report.figures.forecasts import band, errors, overlay
+
+__all__ = [
+    "band",
+    "coherence",
+    "decay",
+    "drift",
+    "errors",
+    "exceedance",
+    "modes",
+    "overlay",
+    "residuals",
+    "response",
+    "validity",
+]

@@ -1,0 +1,74 @@
+"""Mean drift and slow response of a model whose law is known."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import HankelDMDc, Powers, SlowSquares, check
+from seakeep.core.observables import slow_kernel
+from seakeep.errors import RequestError
+
+DT, PERIOD = 0.1, 1.0
+GAIN, MEMORY = 0.3, 0.9
+
+
+def drifting_run(seed=0, samples=2000, waves=None, **attrs):
+    """A surge that remembers, and is pushed by the square of the wave."""
+    rng = np.random.default_rng(seed)
+    time = DT * np.arange(samples)
+    if waves is None:
+        f, phase = rng.uniform(0.7, 1.3, 40), rng.uniform(0, 2 * np.pi, 40)
+        wave = 0.1 * np.cos(2 * np.pi * np.outer(time, f) + phase).sum(axis=1)
+    else:
+        wave = 0.5 * np.cos(2 * np.pi * waves * time)
+    surge = np.zeros(samples)
+    for k in range(samples - 1):
+        surge[k + 1] = MEMORY * surge[k] + GAIN * wave[k] ** 2
+    return xr.Dataset(
+        {"eta": ("time", wave, {"units": "m"}), "surge": ("time", surge, {"units": "m"})},
+        coords={"time": time},
+        attrs={"encounter_period": PERIOD, **attrs},
+    )
+
+
+@pytest.fixture(scope="module")
+def model():
+    spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=(Powers("eta", (2,)),))
+    return spec.fit(drifting_run(), ["surge"], ["eta"])
+
+
+def test_drift_of_a_square_is_its_own(model):
+    regular = drifting_run(samples=1500, waves=0.9).assign_attrs(waves="regular")
+    settled = regular.isel(time=slice(300, None))
+    found = check.drift(model, {"sea": drifting_run(), "regular": settled})
+    # η² has the mean a²/2, and a²/2 cos Δt of each wave of a pair: G = 0.3 / (e^{iΔ} − 0.9).
+    turn = np.exp(2j * np.pi * found.difference.values * DT)
+    law = 0.5 * GAIN / np.abs(turn - MEMORY)
+    ours = found.slow_response.sel(state="surge").values
+    assert ours == pytest.approx(np.repeat(law[:, None], ours.shape[1], 1), rel=1e-4)  # the ridge
+    assert float(found.offset[0, 0]) == pytest.approx(law[0], rel=1e-2)  # windows of whole periods
+    assert str(found.units[0].values) == "m/m²"
+
+
+def test_slow_squares_answer_by_their_filter():
+    observable = SlowSquares("eta", orders=(0,), lags=(0,), lead=1.5)
+    spec = HankelDMDc(0, 0, 1e-6, delay_rows="exact", observables=(observable,))
+    model = spec.fit(drifting_run(), ["surge"], ["eta"])
+    found = check.drift(model, {"sea": drifting_run()}).sel(state="surge")
+    mean, slow = found.slow_response.values[0], found.slow_response.values[1:]
+    assert np.allclose(mean, mean[0], rtol=1e-3)  # the filter leaves a hundredth of twice the wave
+    # A model is a pole and a gain behind the filter of the square.
+    kernel = slow_kernel(1 / 30, 15)
+    lag = np.arange(-15, 16)
+    pole = model.A[0, 0]
+    for difference, row in zip(found.difference.values[1:], slow, strict=True):
+        turn = 2 * np.pi * difference * DT
+        filtered = abs(np.sum(kernel * np.exp(-1j * turn * lag)))
+        ratio = filtered * abs((1 - pole) / (np.exp(1j * turn) - pole))
+        assert row[0] / mean[0] == pytest.approx(ratio, rel=1e-2)
+
+
+def test_a_linear_model_has_no_drift():
+    model = HankelDMDc(1, 1, 1.0).fit(drifting_run(), ["surge"], ["eta"])
+    with pytest.raises(RequestError, match=r"the model has no observables, so that its mean"):
+        check.drift(model, {"sea": drifting_run()})

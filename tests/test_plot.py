@@ -1,0 +1,89 @@
+"""Figures of labelled results: what they draw, and on which Axes."""
+
+import numpy as np
+import pytest
+from moored import moored_run
+
+import seakeep
+from seakeep import BayesianHankelDMDc, HankelDMDc, Uniform, check
+from seakeep.errors import RequestError
+
+pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+
+from matplotlib.figure import Figure
+
+STATES = ["surge", "heave", "pitch"]
+
+
+@pytest.fixture(scope="module")
+def run():
+    return moored_run(seed=2).assign_attrs(encounter_period=1.0, waves="irregular")
+
+
+@pytest.fixture(scope="module")
+def model(run):
+    return HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, STATES, ["eta"])
+
+
+def labels(figure):
+    return [label for each in figure.axes for label in (each.get_xlabel(), each.get_ylabel())]
+
+
+def test_overlay_draws_each_channel_with_units_on_its_axes(run, model):
+    forecast = model.forecast(run, start=10.0, steps=50)
+    figure = seakeep.plot.overlay(forecast, run)
+    assert len(figure.axes) == 3
+    assert "[deg]" in figure.axes[2].get_ylabel()
+    lines = {line.get_label(): line for line in figure.axes[1].get_lines()}
+    np.testing.assert_array_equal(lines["forecast"].get_ydata(), forecast.heave.values)
+    given = Figure().subplots()
+    assert seakeep.plot.overlay(forecast, run, channels=["heave"], axes=given) is given.figure
+    assert len(given.get_lines()) == 2
+    with pytest.raises(RequestError, match=r"axes holds 1 Axes and the figure draws 3 panels"):
+        seakeep.plot.overlay(forecast, run, axes=given)
+    with pytest.raises(RequestError, match=r"forecast has no channel 'heav'\. Channels: surge,"):
+        seakeep.plot.overlay(forecast, run, channels=["heav"])
+
+
+def test_band_takes_members_or_their_statistics(run, model):
+    spec = BayesianHankelDMDc(
+        encounter_period=1.0, train_length=Uniform(20, 30), state_delay=Uniform(0.2, 0.4),
+        input_delay=Uniform(0.3, 0.6), ridge=Uniform(0.01, 0.1), n_members=4, seed=0,
+    )  # fmt: skip
+    ensemble = spec.fit(run, ["heave"], ["eta"])
+    members = ensemble.forecast(run, start=10.0, steps=50)
+    for forecast in (members, ensemble.forecast_summary(run, start=10.0, steps=50)):
+        figure = seakeep.plot.band(forecast, run)
+        assert len(figure.axes[0].collections) == 1
+    with pytest.raises(RequestError, match=r"it has no band\. Draw it with seakeep\.plot\.overlay"):
+        seakeep.plot.band(model.forecast(run, start=10.0, steps=50), run)
+
+
+def test_every_check_has_a_figure_with_labelled_axes(run, model):
+    squares = (seakeep.Powers("eta", (2,)),)
+    curved = HankelDMDc(2, 4, 0.01, delay_rows="exact", observables=squares)
+    curved = curved.fit(run, STATES, ["eta"])
+    runs = {"run": run}
+    drawn = {
+        seakeep.plot.response: (check.response(model), check.measured_response(model, runs)),
+        seakeep.plot.coherence: (check.coherence(curved, runs),),
+        seakeep.plot.decay: (check.decay(model),),
+        seakeep.plot.modes: (check.modes(model),),
+        seakeep.plot.residuals: (check.residuals(model, runs),),
+        seakeep.plot.exceedance: (check.statistics(model, runs),),
+        seakeep.plot.validity: (check.validity(model, runs),),
+        seakeep.plot.drift: (check.drift(curved, runs),),
+    }
+    for draw, results in drawn.items():
+        figure = draw(*results)
+        assert figure.axes
+        bare = [each for each in labels(figure)[1::2] if not each]
+        assert not bare, draw.__name__
+        figure.canvas.draw()
+    with pytest.raises(RequestError, match=r"there is no state 'yaw'\. States: surge, heave, pi"):
+        seakeep.plot.coherence(check.coherence(curved, runs), states=["yaw"])
+
+
+def test_models_and_settings_show_themselves_in_notebooks(model):
+    assert model._repr_html_().startswith("<pre>Hankel DMD with control: 3 states")
+    assert "<th>ridge</th><td>0.01</td>" in HankelDMDc(2, 4, 0.01)._repr_html_()
