@@ -181,9 +181,6 @@ def read_arguments() -> argparse.Namespace:
         default=Path("benchmarks/results"),
         help="folder of the tables and figures; the default holds those that are published",
     )
-    parser.add_argument(
-        "--figures", type=Path, help="copy the figures of the scaling here, such as docs/figures"
-    )
     parser.add_argument("--no-peers", action="store_true", help="leave other packages out")
     parts = ["one", "ensemble", "study", "scaling"]
     parser.add_argument("--only", choices=parts, help="one part alone; the others are kept")
@@ -194,7 +191,7 @@ def main() -> None:
     """Run what the command line asks for."""
     arguments = read_arguments()
     if arguments.only == "scaling":
-        print(scaling.run(arguments.out, arguments.figures))
+        print(scaling.run(arguments.out))
         return
     sections, notes, survey = {}, {}, {}
     if arguments.only in (None, "one"):
@@ -226,7 +223,7 @@ def main() -> None:
     part = arguments.only is not None
     print(timing.write(arguments.out, sections, notes, survey, part))
     if arguments.only is None:
-        print(scaling.run(arguments.out, arguments.figures))
+        print(scaling.run(arguments.out))
 
 
 if __name__ == "__main__":

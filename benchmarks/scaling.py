@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import shutil
 import time
 import tracemalloc
 from collections.abc import Callable
@@ -70,7 +69,7 @@ AXES: dict[str, tuple[str, str, tuple[int, ...]]] = {
 
 
 def fit_operations(size: Size, rows: str) -> float:
-    """Additions and multiplications of a fit (docs/scaling.md)."""
+    """Additions and multiplications of a fit (benchmarks/README.md)."""
     p, a, n, width = size.regressors, size.extended, size.m - 1, size.states + size.inputs
     primal = 2 * width * p * n + 3 * p * p + p**3 / 3
     if rows == "ridge":
@@ -81,7 +80,7 @@ def fit_operations(size: Size, rows: str) -> float:
 
 
 def forecast_operations(size: Size, rows: str) -> float:
-    """Additions and multiplications of the free runs (docs/scaling.md)."""
+    """Additions and multiplications of the free runs (benchmarks/README.md)."""
     a, b, w, steps = size.extended, size.inputs * (size.z + 1), size.windows, size.steps
     if rows == "exact":
         return 2 * size.states * (a + b) * steps * w
@@ -254,15 +253,13 @@ def exponent(points: list[Point], what: str) -> float:
     return float(np.polyfit(x, np.log([getattr(point, what) for point in upper]), 1)[0])
 
 
-def run(out: Path, figures: Path | None = None, repeats: int = 7) -> str:
+def run(out: Path, repeats: int = 7) -> str:
     """Measure all lengths, write ``scaling.json``, ``scaling.md`` and the figures.
 
     Parameters
     ----------
     out : Path
         Folder of the results.
-    figures : Path, optional
-        Folder of the documentation's figures, which gets copies.
     repeats : int, optional
         Repetitions; the least counts.
 
@@ -290,9 +287,6 @@ def run(out: Path, figures: Path | None = None, repeats: int = 7) -> str:
         ("mebibytes", "held", "peak memory [MiB]"),
     ):
         draw(found, what, model, label, out / f"scaling_{what}")
-    if figures is not None:
-        for name in ("scaling_seconds.svg", "scaling_mebibytes.svg"):
-            shutil.copyfile(out / name, figures / name)
     text = table(found, facts)
     (out / "scaling.md").write_text(text, "utf-8")
     return text
@@ -375,4 +369,4 @@ def draw(
 
 
 if __name__ == "__main__":
-    print(run(Path("benchmarks/results"), Path("docs/figures")))
+    print(run(Path("benchmarks/results")))

@@ -4,11 +4,22 @@ import base64
 import html
 import io
 import re
+import sys
 from importlib import metadata
+from pathlib import Path
 
 from docutils import nodes
 from matplotlib import mathtext, rc_context
 from matplotlib.font_manager import FontProperties
+
+sys.path.insert(0, str(Path(__file__).parent))
+import make_reference
+
+for name, text in make_reference.generated():
+    place = Path(__file__).parent / name
+    place.parent.mkdir(exist_ok=True)
+    if not place.exists() or place.read_text(encoding="utf-8") != text:
+        place.write_text(text, encoding="utf-8")
 
 project = "seakeep"
 author = "The seakeep developers"
@@ -39,7 +50,8 @@ html_title = f"seakeep {release}"
 html_show_sphinx = False
 html_copy_source = False
 exclude_patterns = ["_build"]
-suppress_warnings = ["myst.xref_missing"]  # the examples' pages link to files beside them
+# The examples' pages link to files beside them; members of several classes share names.
+suppress_warnings = ["myst.xref_missing", "ref.python"]
 
 
 def formula(text):

@@ -1,15 +1,20 @@
-"""Write each table and key of the campaign file and of the study file, from the settings' own words.
+"""Write the reference pages: tables and keys of files, commands, and the contents of the API.
 
-python docs/make_reference.py       # docs/campaign_file.md, and the keys in docs/study.md
+python docs/make_reference.py   # campaign_file.md, and the keys in study.md; a build makes the others
 """
 
+import importlib
+import inspect
+import re
 import types
 import typing
 from pathlib import Path
 
+import typer
 from pydantic_core import PydanticUndefined
 
 from seakeep.campaign.settings import CampaignSettings
+from seakeep.cli import app
 from seakeep.study.settings import StudySettings
 from seakeep.toml import Table
 
@@ -158,7 +163,146 @@ def study_page():
     return before + BEGIN + "\n" + "\n".join(keys_of(StudySettings)) + "\n" + END + after
 
 
+COMMANDS = """# Commands
+
+Every command has `--help`. Results go to standard output or to `-o`, messages to standard error. The exit status is 0 if
+all is done, 1 if the run failed, 2 if the request is wrong, and 130 after Ctrl-C. `seakeep --debug COMMAND …` shows the
+traceback of an error. `seakeep --install-completion` completes commands and options with the Tab key in bash, zsh, fish
+and PowerShell; `--show-completion` prints what it would install.
+
+This page is generated from the commands themselves.
+"""
+
+
+def option_row(parameter, hint):
+    """Row of an argument or an option, from its annotation."""
+    kind, info = typing.get_args(hint)[:2]
+    while parts := typing.get_args(kind):  # list[str] | None is text
+        kind = parts[0] if typing.get_origin(kind) is not typing.Literal else str
+    metavar = info.metavar or ("TEXT" if kind is str else kind.__name__.upper())
+    if isinstance(info, typer.models.ArgumentInfo):
+        name = info.metavar or parameter.name.upper()
+    else:
+        named = [each for each in (info.default, *(info.param_decls or ())) if type(each) is str]
+        named = named or ["--" + parameter.name.strip("_").replace("_", "-")]
+        name = ", ".join(named) + ("" if kind is bool else f" {metavar}")
+    default = parameter.default
+    stated = "" if default in (None, False, inspect.Parameter.empty) else f" Default: `{default}`."
+    return f"| `{name}` | {(info.help or '').replace('|', chr(92) + '|')}{stated} |"
+
+
+def commands_of(typer_app, before=""):
+    """Names and functions of all commands, those of groups too."""
+    for group in typer_app.registered_groups:
+        inside = group.typer_instance
+        name = f"{before}{group.name or inside.info.name}"
+        if callback := inside.registered_callback:
+            yield name, inside.info.help, callback.callback
+        yield from commands_of(inside, f"{name} ")
+    for command in typer_app.registered_commands:
+        function = command.callback
+        yield before + (command.name or function.__name__), function.__doc__, function
+
+
+def commands_page():
+    """Each command with its help, its example and its options."""
+    lines = [COMMANDS]
+    for name, words, function in sorted(commands_of(app), key=lambda each: each[0]):
+        lines += [f"## seakeep {name}", ""]
+        for paragraph in inspect.cleandoc(words).split("\n\n"):
+            words = " ".join(paragraph.split())
+            before, mark, example = words.partition(": seakeep ")
+            if mark and len(before) < 40:
+                lines += [f"{before}:", "", "```sh", f"seakeep {example}", "```", ""]
+            else:
+                lines += [words, ""]
+        hints = typing.get_type_hints(function, include_extras=True)
+        rows = [
+            option_row(each, hints[each.name])
+            for each in inspect.signature(function).parameters.values()
+            if typing.get_origin(hints[each.name]) is typing.Annotated
+        ]
+        if rows:
+            lines += ["| argument or option | meaning |", "|---|---|", *rows, ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+ROOMS = (
+    *("seakeep", "seakeep.models", "seakeep.baselines", "seakeep.campaign", "seakeep.quality"),
+    *("seakeep.formats", "seakeep.signals", "seakeep.metrics", "seakeep.statistics"),
+    *("seakeep.study", "seakeep.check", "seakeep.hosts", "seakeep.core"),
+    *("seakeep.waves", "seakeep.conventions", "seakeep.errors"),
+)
+"""Modules of the API, each object in the first that names it."""
+
+API = """# Python API
+
+One page per object. All public functions check their arguments; a user's mistake raises a `RequestError` or a `DataError`
+whose message says what was received and how to fix it. Arrays are `(time, channel)`.
+
+This page is generated from the public names of each module.
+"""
+
+
+def api_objects():
+    """Public functions and classes of each room, in the first room that names them."""
+    known = set()
+    for room in ROOMS:
+        module = importlib.import_module(room)
+        found = {name: getattr(module, name) for name in sorted(module.__all__, key=str.lower)}
+        own = {
+            name: each
+            for name, each in found.items()
+            if (inspect.isclass(each) or inspect.isroutine(each)) and id(each) not in known
+        }
+        known |= {id(each) for each in own.values()}
+        if own:
+            yield module, own
+
+
+def first_line(text):
+    """First paragraph of a docstring in Markdown."""
+    words = " ".join(inspect.cleandoc(text or "").split("\n\n")[0].split())
+    return re.sub(r":(math|class|func|meth):`~?([^`]*)`", r"`\2`", words).replace("``", "`")
+
+
+def api_page():
+    """Contents of the API."""
+    lines = [API]
+    for module, found in api_objects():
+        lines += [f"## {module.__name__}", "", first_line(module.__doc__), ""]
+        for name, each in found.items():
+            lines.append(
+                f"- [`{name}`](api/{module.__name__}.{name}.md): {first_line(each.__doc__)}"
+            )
+        lines.append("")
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def api_pages():
+    """One page per object; outside the navigation, which would hold hundreds of entries."""
+    for module, found in api_objects():
+        for name, each in found.items():
+            whole = f"{module.__name__}.{name}"
+            kind = "exception" if inspect.isclass(each) and issubclass(each, Exception) else "class"
+            kind = kind if inspect.isclass(each) else "function"
+            members = "\n   :members:" * (kind == "class")
+            if kind == "class" and each.__module__.startswith("seakeep.models"):
+                members += "\n   :inherited-members: Enum, Protocol"
+            text = f"---\norphan: true\n---\n\n# {whole}\n\n[API](../api.md)\n\n"
+            body = f"```{{eval-rst}}\n.. auto{kind}:: {whole}{members}\n```\n"
+            yield f"api/{whole}.md", text + body
+
+
 PAGES = {"campaign_file.md": campaign_page, "study.md": study_page}
+
+
+def generated():
+    """Name and text of each page that a build writes."""
+    yield "commands.md", commands_page()
+    yield "api.md", api_page()
+    yield from api_pages()
+
 
 if __name__ == "__main__":
     for name, page in PAGES.items():
