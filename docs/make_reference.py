@@ -230,7 +230,7 @@ def commands_page():
 ROOMS = (
     *("seakeep", "seakeep.models", "seakeep.baselines", "seakeep.campaign", "seakeep.quality"),
     *("seakeep.formats", "seakeep.signals", "seakeep.metrics", "seakeep.statistics"),
-    *("seakeep.study", "seakeep.check", "seakeep.hosts", "seakeep.core"),
+    *("seakeep.study", "seakeep.check", "seakeep.plot", "seakeep.hosts", "seakeep.core"),
     *("seakeep.waves", "seakeep.conventions", "seakeep.errors"),
 )
 """Modules of the API, each object in the first that names it."""
