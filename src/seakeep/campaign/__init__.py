@@ -1,6 +1,7 @@
 """Campaigns: from a TOML file and raw recordings to analysis-ready runs."""
 
 from seakeep.campaign.drafts import draft_campaign
+from seakeep.campaign.live_chain import LiveChain
 from seakeep.campaign.prepare import Campaign, read_campaign
 from seakeep.campaign.readers import read_table
 from seakeep.campaign.settings import ModelSettings, PriorSettings
@@ -8,6 +9,7 @@ from seakeep.campaign.store import load_prepared, write_prepared
 
 __all__ = [
     "Campaign",
+    "LiveChain",
     "ModelSettings",
     "PriorSettings",
     "draft_campaign",

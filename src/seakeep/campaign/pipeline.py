@@ -546,13 +546,13 @@ def _with(data: xr.Dataset, channels: Mapping[str, xr.Variable]) -> xr.Dataset:
     return data.assign(new).assign_coords(flags) if new else data
 
 
-def resampled(run: Run, dt: float) -> Run:
+def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
     """Step 6: all channels on one axis of step `dt` (s), and those that need several loggers.
 
-    The axis holds multiples of the step from the reference's first instant, where every logger
-    recorded; samples that are missing become NaN.
+    The axis, unless `time` is given, holds multiples of the step from the reference's first
+    instant, where every logger recorded; samples that are missing become NaN.
     """
-    time = _axis(run, dt)
+    time = _axis(run, dt) if time is None else time
     out = xr.Dataset(coords={"time": ("time", time, next(iter(run.groups.values()))["time"].attrs)})
     for group in run.groups.values():
         out = out.assign(_on_axis(group, time, dt, run.settings.preparation, run.name))

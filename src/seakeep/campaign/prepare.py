@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import whole_number
+from seakeep.campaign.live_chain import LiveChain, Template
 from seakeep.campaign.pipeline import (
     Run,
     attributes_of,
@@ -476,6 +478,61 @@ class Campaign:
             if progress is not None:
                 progress(done, len(wanted), name)
             yield name, data
+
+    def live_chain(
+        self,
+        run: str,
+        *,
+        delay: float | str = "1 T",
+        window: float | str = "40 T",
+        every: int = 8,
+    ) -> LiveChain:
+        """The chain of preparation for use in service: raw samples in, model samples out.
+
+        Parameters
+        ----------
+        run : str
+            A run whose files have the columns, units and clocks of the loggers in service.
+        delay : float or str, optional
+            Time after a model sample before it is handed out, s or encounter periods: filters look
+            both ways, and a sample is the closer to the offline one the more of what follows it is
+            known.
+        window : float or str, optional
+            Length of the record that the chain works on; it must hold the memory of all filters.
+        every : int, optional
+            Model samples that are made together: the longer, the less work.
+
+        Returns
+        -------
+        LiveChain
+            Without samples yet.
+
+        Raises
+        ------
+        RequestError
+            If there is no such run, a logger sends no instants, or a length is out of range.
+        DataError
+            If a file of the run cannot be read.
+        """
+        self._run(run)
+        reader = _ReadOnce()
+        found, settings, _, dt = self._whole([run], None, reader)
+        paths = self.files_of(run)
+        source = read(run, settings, paths, reader)
+        if dt is None:
+            dt = uniform_step(self._channels(run, found, settings, reader).reference_time, run)
+        late, length = self.seconds(delay), self.seconds(window)
+        if not 0 <= 4 * late <= length:
+            raise RequestError(
+                f"delay is {late:g} s and window {length:g} s; the window must be at least four "
+                "times as long as the delay. Raise window."
+            )
+        columns = {name: each.columns for name, each in source.loggers.items()}
+        whole = settings.runs[run].model_copy(update={"record": None})
+        runs = {**settings.runs, run: whole}
+        settings = settings.model_copy(update={"runs": runs})
+        template = Template(run, settings, paths, columns, found.clocks[run], dt)
+        return LiveChain(template, late, length, whole_number(every, "every"))
 
     def _whole(
         self,

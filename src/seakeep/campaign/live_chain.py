@@ -1,0 +1,221 @@
+"""Raw logger samples in service: the campaign's own chain on a window that moves on.
+
+Offline filters look both ways, so a sample is only as good as what follows it. In service the
+same steps run on the last part of the record, and a sample is handed out once `delay` seconds
+after it are there: it differs from the offline one by what the ends of the window still do to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from seakeep.arrays import FloatArray, as_real
+from seakeep.campaign.pipeline import cleaned, derived, mapped, read, resampled, sync
+from seakeep.campaign.readers import find_column, time_column, time_unit_of
+from seakeep.campaign.settings import CampaignSettings
+from seakeep.conventions import conversion
+from seakeep.errors import RequestError, did_you_mean
+from seakeep.formats import Columns, Options
+from seakeep.signals import Clock
+
+__all__ = ["LiveChain", "Template"]
+
+
+@dataclass(frozen=True)
+class Template:
+    """A run whose files say what loggers send.
+
+    Parameters
+    ----------
+    name : str
+        The run.
+    settings : CampaignSettings
+        The campaign, lengths in seconds.
+    paths : mapping of str to Path
+        Its file by logger.
+    columns : mapping of str to Columns
+        Their columns, which give names and units.
+    clocks : mapping of str to Clock
+        Clock of each logger against the reference's.
+    dt : float
+        Time step of the model, s.
+    """
+
+    name: str
+    settings: CampaignSettings
+    paths: Mapping[str, Path]
+    columns: Mapping[str, Columns]
+    clocks: Mapping[str, Clock]
+    dt: float
+
+
+class LiveChain:
+    """Takes raw samples of loggers and gives model samples; made by ``campaign.live_chain()``.
+
+    Parameters
+    ----------
+    template : Template
+        A run whose files have the columns that the loggers send.
+    delay : float
+        Time that must have passed after a model sample before it is handed out, s.
+    window : float
+        Length of the record that the chain works on, s.
+    every : int
+        Model samples that are handed out together, at least; the chain runs once for them.
+    """
+
+    def __init__(self, template: Template, delay: float, window: float, every: int) -> None:
+        self._template = template
+        self.delay, self.window, self.every = delay, window, every
+        self._time = {key: self._time_column(key) for key in template.columns}
+        self._rows: dict[str, dict[str, FloatArray]] = {
+            key: {name: np.empty(0) for name in columns.values}
+            for key, columns in template.columns.items()
+        }
+        self._origin: float | None = None
+        self._given = 0
+
+    @property
+    def dt(self) -> float:
+        """Time step of the model samples, s."""
+        return self._template.dt
+
+    def _time_column(self, key: str) -> tuple[str, float]:
+        """Name of a logger's time column, and its unit in seconds."""
+        template, columns = self._template, self._template.columns[key]
+        own = template.settings.instruments[key] if key else template.settings.files
+        name = time_column(columns, own.time)
+        if name is None:
+            raise RequestError(
+                f"{template.paths[key]} has no time column, and in service samples need their "
+                "instants. Have the logger send them."
+            )
+        return name, conversion(time_unit_of(columns, name, own.time_unit), "s")
+
+    def push(self, samples: Mapping[str, Mapping[str, npt.ArrayLike]]) -> xr.Dataset:
+        """Take raw samples, and give the model samples that are ready.
+
+        Parameters
+        ----------
+        samples : mapping of str to mapping of str to array_like
+            By logger (``""`` where a run is one file) its new rows: numbers by column, in the units
+            of the template's file, with their instants on the logger's own clock. Loggers need not
+            send together.
+
+        Returns
+        -------
+        Dataset
+            All channels of the campaign over ``time``, the instants on the reference's clock, in
+            steps of :attr:`dt`; often none. NaN where the campaign masks gaps.
+
+        Raises
+        ------
+        RequestError
+            If a logger or a column is unknown, lengths differ, or instants do not increase.
+            Nothing was taken then.
+        DataError
+            If the chain cannot use the samples, such as where the campaign refuses gaps.
+        """
+        new = {key: self._checked(key, table) for key, table in samples.items()}
+        for key, table in new.items():
+            kept = self._rows[key]
+            for name, values in table.items():
+                kept[name] = np.concatenate([kept[name], values])
+        if self._origin is None and all(len(self._instants(key)) for key in self._rows):
+            # As offline: multiples of the step from the first instant of the reference.
+            firsts = [float(self._instants(key)[0]) for key in self._rows]
+            self._origin = firsts[0]
+            self._given = int(np.ceil((max(firsts) - firsts[0] + self.delay) / self.dt - 1e-6))
+        ready = self._ready()
+        if ready - self._given < self.every:
+            return self._none()
+        found = self._made(self._given, ready)
+        self._given = ready
+        self._trim()
+        return found
+
+    def _checked(self, key: str, table: Mapping[str, npt.ArrayLike]) -> dict[str, FloatArray]:
+        if key not in self._rows:
+            raise RequestError(
+                f"there is no logger '{key}'.{did_you_mean(key, self._rows)} Loggers: "
+                f"{', '.join(self._rows)}."
+            )
+        columns, path = self._template.columns[key], self._template.paths[key]
+        arrays = {
+            find_column(path, columns, name): as_real(values, name)
+            for name, values in table.items()
+        }
+        missing = [name for name in self._rows[key] if name not in arrays]
+        sizes = {each.shape for each in arrays.values()}
+        if missing or len(sizes) != 1 or len(next(iter(sizes))) != 1:
+            raise RequestError(
+                f"'{key}' sends {', '.join(arrays) or 'nothing'} of shapes "
+                f"{', '.join(map(str, sorted(sizes)))}; all of {', '.join(self._rows[key])} are "
+                "needed, a number per row each. Send NaN for a value that was lost."
+            )
+        name, factor = self._time[key]
+        before = self._rows[key][name][-1:]
+        times = np.concatenate([before, arrays[name]])
+        if not np.all(np.diff(times) > 0) or not np.all(np.isfinite(times)):
+            raise RequestError(
+                f"the instants of '{key}' do not increase: "
+                f"{', '.join(f'{each * factor:g}' for each in times[:4])} … s. Send each row once, "
+                "in order."
+            )
+        return arrays
+
+    def _instants(self, key: str) -> FloatArray:
+        """Instants of a logger's rows on the reference's clock."""
+        name, factor = self._time[key]
+        clock = self._template.clocks[key]
+        found: FloatArray = clock.reference(self._rows[key][name] * factor)
+        return found
+
+    def _ready(self) -> int:
+        """Number of the model sample up to before which all are ready."""
+        if self._origin is None:
+            return 0
+        newest = min(float(self._instants(key)[-1]) for key in self._rows)
+        return int(np.floor((newest - self.delay - self._origin) / self.dt + 1e-9)) + 1
+
+    def _made(self, first: int, stop: int) -> xr.Dataset:
+        """Model samples of these numbers, by the chain over the whole window."""
+        template, dt, origin = self._template, self.dt, self._origin
+        assert origin is not None
+        columns = {
+            path: replace(template.columns[key], values=self._rows[key])
+            for key, path in template.paths.items()
+        }
+
+        def reader(path: Path, options: Options) -> Columns:
+            return columns[path]
+
+        run = sync(read(template.name, template.settings, template.paths, reader), template.clocks)
+        run = derived(cleaned(mapped(run)))
+        ends = [each["time"].to_numpy()[[0, -1]] for each in run.groups.values()]
+        low = int(np.ceil((max(each[0] for each in ends) - origin) / dt - 1e-9))
+        high = int(np.floor((min(each[1] for each in ends) - origin) / dt + 1e-9))
+        axis: FloatArray = origin + dt * np.arange(low, high + 1, dtype=float)
+        data = resampled(run, dt, axis).data
+        assert data is not None
+        names = list(self._template.settings.channel_names)
+        return data[names].reset_coords(drop=True).isel(time=slice(max(first - low, 0), stop - low))
+
+    def _none(self) -> xr.Dataset:
+        names: Sequence[str] = self._template.settings.channel_names
+        empty = {name: ("time", np.empty(0)) for name in names}
+        return xr.Dataset(empty, coords={"time": np.empty(0)})
+
+    def _trim(self) -> None:
+        """Forget rows that have left the window."""
+        assert self._origin is not None
+        oldest = self._origin + self._given * self.dt + self.delay - self.window
+        for key, table in self._rows.items():
+            first = int(np.searchsorted(self._instants(key), oldest))
+            self._rows[key] = {name: values[first:] for name, values in table.items()}

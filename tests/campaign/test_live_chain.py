@@ -1,0 +1,87 @@
+"""Raw samples in service: the chain on a window that moves gives what it gives offline."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import seakeep
+from seakeep import RequestError
+from seakeep.formats import read_columns
+
+TUTORIAL = Path(__file__).parents[2] / "docs/tutorial"
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    return seakeep.read_campaign(TUTORIAL / "campaign.toml")
+
+
+@pytest.fixture(scope="module")
+def rows():
+    """The raw file, as a logger would send it."""
+    return read_columns(TUTORIAL / "run3.csv").values
+
+
+@pytest.fixture(scope="module")
+def offline(campaign):
+    return campaign.prepare(["unseen"])["unseen"]
+
+
+def sent(chain, rows, stop=60.0, step=4.0):
+    """What the chain gives of the rows up to an instant, sent a few seconds at a time."""
+    time, given, at = rows["t"], [], 0
+    for until in np.arange(step, stop + step / 2, step):
+        upto = int(np.searchsorted(time, until))
+        given.append(chain.push({"": {name: each[at:upto] for name, each in rows.items()}}))
+        at = upto
+    return xr.concat([each for each in given if each.sizes["time"]], "time")
+
+
+def test_it_gives_what_preparation_gives_but_for_the_ends_of_its_window(campaign, rows, offline):
+    errors = {}
+    for delay in ("0.1 T", "1 T"):
+        found = sent(campaign.live_chain("unseen", delay=delay, window="20 T"), rows)
+        time = found["time"].values
+        np.testing.assert_allclose(np.diff(time), float(offline.attrs["dt"]), rtol=1e-9)
+        expected = offline.sel(time=time, method="nearest")
+        np.testing.assert_allclose(expected["time"], time, atol=1e-9)
+        assert time[-1] <= 60.0 - campaign.seconds(delay)
+        errors[delay] = {
+            name: float(np.std(found[name].values - expected[name].values) / expected[name].std())
+            for name in offline.data_vars
+        }
+    # Filters look both ways: what follows a sample within a period decides most of it.
+    assert max(errors["1 T"].values()) < 0.02
+    assert np.mean(list(errors["1 T"].values())) < np.mean(list(errors["0.1 T"].values()))
+
+
+def test_how_rows_are_cut_up_does_not_matter(campaign, rows):
+    settings = {"delay": "1 T", "window": "60 T", "every": 8}
+    small = sent(campaign.live_chain("unseen", **settings), rows, 30.0, 0.5)
+    whole = campaign.live_chain("unseen", **settings)
+    upto = int(np.searchsorted(rows["t"], 30.0))
+    large = whole.push({"": {name: each[:upto] for name, each in rows.items()}})
+    assert small["time"].values[0] == large["time"].values[0]
+    assert abs(small.sizes["time"] - large.sizes["time"]) < 8
+    assert whole.push({}).sizes["time"] == 0
+
+
+def test_bad_samples_are_refused_and_not_taken(campaign, rows):
+    chain = campaign.live_chain("unseen")
+    first = {name: each[:50] for name, each in rows.items()}
+    chain.push({"": first})
+    with pytest.raises(RequestError, match="the instants of '' do not increase"):
+        chain.push({"": first})
+    with pytest.raises(RequestError, match="there is no logger 'mru'"):
+        chain.push({"mru": first})
+    with pytest.raises(RequestError, match="Send NaN for a value that was lost"):
+        chain.push({"": {"t": rows["t"][50:60]}})
+    with pytest.raises(RequestError, match="has no column 'bogus'"):
+        chain.push({"": {"bogus": rows["t"][50:60]}})
+    chain.push({"": {name: each[50:60] for name, each in rows.items()}})
+    with pytest.raises(RequestError, match="at least four times as long as the delay"):
+        campaign.live_chain("unseen", delay=10.0, window=20.0)
+    with pytest.raises(RequestError, match="has no run 'nowhere'"):
+        campaign.live_chain("nowhere")
