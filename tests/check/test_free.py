@@ -91,5 +91,5 @@ def test_what_cannot_be_judged_says_why(model):
         input_delay=Fixed(0.1), ridge=Fixed(1.0), n_members=2, seed=0,
     )  # fmt: skip
     ensemble = spec.fit(run, ["heave"], ["eta"])
-    with pytest.raises(RequestError, match=r"Of an ensemble, check a member"):
+    with pytest.raises(RequestError, match=r"For an ensemble, check a member"):
         check.modes(ensemble)

@@ -301,7 +301,7 @@ def test_what_cannot_be_is_refused(models, run):
         live.forecast(5)
     with pytest.raises(RequestError, match="Start with at least 4 samples of u"):
         live.step()
-    with pytest.raises(RequestError, match="noise names 'roll', which is no state"):
+    with pytest.raises(RequestError, match="noise names 'roll', which is not a state"):
         model.live(noise={"roll": 1.0})
     live = started(model, run, 20)
     with pytest.raises(RequestError, match="future holds values that are not finite"):

@@ -134,7 +134,7 @@ class Run:
     data : Dataset or None
         All channels on one axis.
     findings : tuple of Finding
-        What the checks found.
+        Results of the checks.
     """
 
     name: str

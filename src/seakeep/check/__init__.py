@@ -1,4 +1,4 @@
-"""What a model is worth: response, coherence, modes, decay, residuals, statistics and validity."""
+"""Checks of a model: response, coherence, modes, decay, residuals, statistics and validity."""
 
 from seakeep.check.coherence import coherence
 from seakeep.check.every import CHECKS, Checked, check_model

@@ -1,4 +1,4 @@
-"""What the inputs can tell of each state at all, linearly, beside what the model makes of them."""
+"""Coherence of inputs and states, and the error that no linear model of the inputs goes below."""
 
 from __future__ import annotations
 

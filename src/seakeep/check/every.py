@@ -1,4 +1,4 @@
-"""All checks of a model on the runs of a campaign; what cannot be judged says why."""
+"""All checks of a model on the runs of a campaign, with reasons for what cannot be judged."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ CHECKS: dict[str, Check] = {
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """What the checks found.
+    """Results of the checks.
 
     Parameters
     ----------

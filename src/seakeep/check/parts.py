@@ -1,4 +1,4 @@
-"""What every check reads of runs: their test parts, without gaps, and free runs over them."""
+"""Data of the checks: test parts of runs without gaps, and free runs over them."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class FreeRun(NamedTuple):
         Instant of the last measured state, s.
     time : ndarray, shape (time,)
     forecast, measured : ndarray, shape (time, N)
-        Of an ensemble the mean of its members.
+        For an ensemble the mean of its members.
     """
 
     start: float
@@ -184,7 +184,7 @@ def _free_run(model: Model, run: xr.Dataset, name: str) -> FreeRun:
 
 
 def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) -> FloatArray:
-    """Free runs from several starts, (window, steps, N); of an ensemble the members' mean."""
+    """Free runs from several starts, (window, steps, N); for an ensemble the members' mean."""
     found = model.forecast_windows(run, starts.tolist(), steps)
     values = np.stack([found[name].values for name in model.states], axis=-1)
     result: FloatArray = values.mean(axis=0) if "member" in found.dims else values
@@ -194,7 +194,7 @@ def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) 
 def one_step(model: Model, run: xr.Dataset, first: int, last: int) -> FloatArray:
     """States one step after each sample from `first` to before `last`, (sample, N).
 
-    Regressors of the run are made once; of an ensemble the members' mean.
+    Regressors of the run are made once; for an ensemble the members' mean.
     """
     signature, name = model.signature, str(run.attrs.get("run", "the run"))
     z, s, count = signature.input_delays, signature.state_delays, last - first
@@ -296,7 +296,7 @@ def single_model(model: Model) -> HankelDMDcModel:
     if not isinstance(model, HankelDMDcModel):
         raise RequestError(
             "free motion and second order are those of one Hankel or ARX model; received one of "
-            f"kind '{model.kind}'. Of an ensemble, check a member: "
+            f"kind '{model.kind}'. For an ensemble, check a member: "
             "seakeep.check.modes(ensemble.member(0))."
         )
     return model

@@ -1,4 +1,4 @@
-"""What is left unexplained: whiteness, past inputs, spectrum, bands, and age of the forecast."""
+"""Residuals: whiteness, past inputs, spectrum, bands, and age of the forecast."""
 
 from __future__ import annotations
 

@@ -126,7 +126,7 @@ def _probed(model: HankelDMDcModel, step: float) -> IntArray:
 
 
 def _wave(samples: int, cycles: int, turns: FloatArray, amplitude: float) -> FloatArray:
-    """A wave at each input, (samples, input); inputs that are no elevation are still."""
+    """A wave at each input, (samples, input); inputs that are not elevations are zero."""
     turn = 2 * np.pi * cycles * np.arange(samples) / samples
     result: FloatArray = amplitude * np.nan_to_num(np.cos(turn[:, None] - turns))
     return result

@@ -44,7 +44,7 @@ def export(
     ] = None,
     member: Annotated[
         int | None,
-        typer.Option("--member", help="Of an ensemble: the member to export, from 0.", min=0),
+        typer.Option("--member", help="For an ensemble: the member to export, from 0.", min=0),
     ] = None,
 ) -> None:
     """Write a model for another host: C, FMU, ONNX, MATLAB.

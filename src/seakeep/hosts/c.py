@@ -147,7 +147,7 @@ def _numbers(values: FloatArray) -> str:
 
 
 def _text(value: str) -> str:
-    """Literal of C, whatever the text holds."""
+    """Literal of C for any text."""
     plain = (chr(byte) if chr(byte).isalnum() or byte in b" _/^.-" else f"\\{byte:03o}"
              for byte in value.encode())  # fmt: skip
     return '"' + "".join(plain) + '"'

@@ -168,7 +168,7 @@ def _description(program: Program) -> dict[str, Any]:
 
 
 def _part(name: str) -> str:
-    """Part of a structured name of FMI; what is no identifier stands between quotes."""
+    """Part of a structured name of FMI; what is not an identifier stands between quotes."""
     if name.isascii() and name.isidentifier():
         return name
     escaped = name.replace("\\", "\\\\").replace("'", "\\'")

@@ -1,4 +1,4 @@
-"""How errors grow with the time after a start: what training tells of a model's own errors."""
+"""Growth of a model's errors with the time after a start, found in its training runs."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ Judge = Callable[[int, FloatArray], None]
 
 
 class Servable(Protocol):
-    """What goes into service."""
+    """A model that can go into service."""
 
     @property
     def signature(self) -> Signature: ...
@@ -618,14 +618,14 @@ class Live:
         return store.write(dataset, path, "live", "live state")
 
     def _fingerprint(self) -> str:
-        """What tells the model apart from others."""
+        """Identity of the model."""
         parts = {"a": self._a, "b": self._b, "d": self._d, "offset": self._offset[None]}
         named = {name: ((f"{name}_row", f"{name}_column"), each) for name, each in parts.items()}
         words = {"signature": store.as_json(store.signature_json(self.signature))}
         return store.checksum(xr.Dataset(named, attrs=words))
 
     def _restore(self, dataset: xr.Dataset) -> None:
-        """Take over what :meth:`save` wrote."""
+        """Restore what :meth:`save` wrote."""
         for name, values in self._kept.items():
             values[:] = dataset[name].values
         self._gains[:] = dataset["gains"].values
@@ -640,7 +640,7 @@ class Live:
 
 
 def load_live(model: Servable, path: str | Path) -> Live:
-    """Go on from a state that :meth:`Live.save` wrote, as if the process had never stopped.
+    """Continue from a state that :meth:`Live.save` wrote, as if the process had never stopped.
 
     Parameters
     ----------
@@ -746,7 +746,7 @@ def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArra
     for name, value in (noise or {}).items():
         if name not in names:
             raise RequestError(
-                f"noise names '{name}', which is no state.{did_you_mean(name, names)} States: "
+                f"noise names '{name}', which is not a state.{did_you_mean(name, names)} States: "
                 f"{', '.join(names)}."
             )
         place = names.index(name)

@@ -66,7 +66,7 @@ def write_nowcasts(found: Mapping[str, xr.Dataset], path: Path) -> Path:
 
 
 def nowcast_figure(found: Mapping[str, xr.Dataset], run: str) -> Figure:
-    """Error and what the model says of it against lead time, a panel per channel."""
+    """Error, and the model's own estimate of it, against lead time, a panel per channel."""
     with figure_style():
         first = next(iter(found.values()))
         names = [str(each) for each in first["channel"].values]
