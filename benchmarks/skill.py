@@ -43,8 +43,8 @@ EXAMPLES = {
     "sjtu_semisub": {"heave": {"paper": "paper", "recommended": None}},
 }
 """Campaigns of measured sets, and their models by what they forecast."""
-SEEDS, QTF = (0, 23), (23,)
-"""Seeds by the law of the drift force; no choice was made with 23, nor with the second."""
+SEEDS, QTF = (0, 23, 71), (23,)
+"""Seeds by the law of the drift force; no choice was made with 23 and 71, nor with the second."""
 REGULAR = {"regular_1_5": "1.5", "regular_2": "2", "regular_3": "3"}
 CHANNELS = {
     "surge": "surge",
@@ -72,6 +72,12 @@ alignment = {{ mode = "effective", surge = "measured" }}
 [models.ensemble]
 kind = "bayesian_hankel_dmdc"
 n_members = 12
+
+[models.windows]
+kind = "bayesian_hankel_dmdc"
+n_members = 12
+train_length = {{ uniform = [60, 120] }}
+train_on = "windows"
 
 {baselines}
 {tests}
@@ -218,9 +224,11 @@ def goals(found: Mapping[str, Results]) -> list[str]:
     ]
 
 
-def bands(results: Results, test: str, band: str = "calibrated") -> dict[str, float]:
+def bands(
+    results: Results, test: str, band: str = "calibrated", model: str = "ensemble"
+) -> dict[str, float]:
     """Coverage averaged over the channels, of all instants and of the worst thirds; width in SD."""
-    at = results[test].groups[f"statistics/bands/{test}"].sel(model="ensemble", band=band)
+    at = results[test].groups[f"statistics/bands/{test}"].sel(model=model, band=band)
     inside = {str(part): float(at["inside"].sel(part=part).mean()) for part in at["part"].values}
     waves = [inside[part] for part in inside if "waves" in part]
     horizon = [inside[part] for part in inside if "third" in part]
@@ -237,42 +245,54 @@ def bands(results: Results, test: str, band: str = "calibrated") -> dict[str, fl
     }
 
 
+ENSEMBLES = {"ensemble": "all runs", "windows": "windows of 60 to 120 T̂"}
+"""Ensembles by what each of their members learns from."""
+
+
 def coverage(found: Mapping[str, Results]) -> list[str]:
     """Goals of the bands, and the bands of members and as calibrated in every test set."""
-    irregular = [bands(each, "irregular") for each in found.values()]
-    steep = [bands(each, "regular_1_5")["all"] for each in found.values()]
-    off = [abs(each["all"] - 0.95) for each in irregular]
-    rows = [
-        goal((WINDOWS, "off 0.95 by"), off, 0.02, 0.01),
-        *(
-            goal((WINDOWS, key), [each[key] for each in irregular], 0.90, 0.92, most=True)
-            for key in ("least wave third", "least horizon third")
-        ),
-        goal((WINDOWS, "width/SD"), [each["width/SD"] for each in irregular], 0.80, 0.50),
-        goal(("regular λ/L 1.5, 5 T̂", "all"), steep, 0.85, 0.93, most=True),
-    ]
-    every = []
+    rows, every = [], []
+    for model, words in ENSEMBLES.items():
+        irregular = [bands(each, "irregular", model=model) for each in found.values()]
+        steep = [bands(each, "regular_1_5", model=model)["all"] for each in found.values()]
+        off = [abs(each["all"] - 0.95) for each in irregular]
+        made = [
+            goal((WINDOWS, "off 0.95 by"), off, 0.02, 0.01),
+            *(
+                goal((WINDOWS, key), [each[key] for each in irregular], 0.90, 0.92, most=True)
+                for key in ("least wave third", "least horizon third")
+            ),
+            goal((WINDOWS, "width/SD"), [each["width/SD"] for each in irregular], 0.80, 0.50),
+            goal(("regular λ/L 1.5, 5 T̂", "all"), steep, 0.85, 0.93, most=True),
+        ]
+        rows += [[words, *row] for row in made]
     for test, name in SETS.items():
         for campaign, each in found.items():
-            for band in ("members", "calibrated"):
-                numbers = bands(each, name, band).values()
-                every.append([test, campaign, band, *(f"{value:.2f}" for value in numbers)])
-    heads = list(next(iter(irregular)))
+            for model, band in (
+                ("ensemble", "members"),
+                *((model, "calibrated") for model in ENSEMBLES),
+            ):
+                numbers = bands(each, name, band, model)
+                cells = (f"{value:.2f}" for value in numbers.values())
+                every.append([test, campaign, f"{band}, {ENSEMBLES[model]}", *cells])
     return [
         "## Goals: the 95 % band of the ensemble of `recommended`, calibrated",
         "",
-        "Coverage averaged over the channels.",
+        "Coverage averaged over the channels, by what each member learns from: all training runs, "
+        "or a window of one of them. Members of windows differ more where the sea is another one.",
         "",
-        *markdown(("test", "coverage", "good", "stretch", *found, "reached"), rows),
+        *markdown(
+            ("members learn from", "test", "coverage", "good", "stretch", *found, "reached"), rows
+        ),
         "## Bands in every test",
         "",
-        *markdown(("test", "campaign", "band", *heads), every),
+        *markdown(("test", "campaign", "band", *numbers), every),
     ]
 
 
 def side_by_side(found: Mapping[str, Results]) -> list[str]:
     """Errors of all models, averages over the campaigns; in SD of the window and the training."""
-    models = ["paper", "recommended", "ensemble", *BASELINES]
+    models = ["paper", "recommended", *ENSEMBLES, *BASELINES]
     rows = []
     for test, name in SETS.items():
         for channel, short in WORDS.items():
