@@ -116,6 +116,7 @@ runs = {runs}
 preset = "paper"
 
 [models.recommended]
+input_delays = "5 T"
 
 [tests.unseen]
 length = 15
