@@ -920,25 +920,10 @@ class HeldEnsemble(_Forecasts):
     def live(
         self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
     ) -> Live:
-        """Put the members into service; see :meth:`HankelDMDcModel.live`.
+        """Put the members into service; arguments and errors as :meth:`HankelDMDcModel.live`.
 
         The filter predicts with the mean of the members, whose errors on what they learnt from
         are found here; a forecast runs all of them.
-
-        Parameters
-        ----------
-        like, noise
-            As in :class:`seakeep.models.Live`.
-
-        Returns
-        -------
-        Live
-            Without samples yet.
-
-        Raises
-        ------
-        RequestError
-            If a noise is out of range.
         """
         return Live(self, self.members, self.errors, like=like, noise=noise)
 
