@@ -25,10 +25,10 @@ __all__ = [
     "MARK",
     "check_output",
     "check_place",
-    "check_seal",
     "existing_file",
     "make_folder",
     "read_bytes",
+    "read_sealed",
     "reading",
     "replacing",
     "sha256_of",
@@ -90,12 +90,20 @@ def existing_file(path: Path | str) -> Path:
     # Names with NUL raise ValueError, `~` without a home RuntimeError.
     except (OSError, ValueError, RuntimeError) as error:
         raise _unreadable(path, error) from None
-    for is_kind, what, mend in _KINDS:
-        if is_kind(mode):
-            raise MissingFileError(
-                f"{_shown(path)} is {what}, and only regular files are read. {mend}"
-            )
+    if (found := _kind_of(mode)) is not None:
+        raise MissingFileError(
+            f"{_shown(path)} is {found[0]}, and only regular files are read. {found[1]}"
+        )
     return place
+
+
+def _kind_of(mode: int) -> tuple[str, str] | None:
+    """What stands in the place of a regular file, and what to do about it."""
+    return next(((what, mend) for is_kind, what, mend in _KINDS if is_kind(mode)), None)
+
+
+def _reason(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
 @contextmanager
@@ -167,8 +175,7 @@ def _shown(path: Path | str) -> str:
 
 
 def _unreadable(path: Path | str, error: Exception) -> MissingFileError:
-    reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-    mend = "Correct the path."
+    reason, mend = _reason(error), "Correct the path."
     if isinstance(error, PermissionError):
         mend = "Change its permissions, or copy it to a place that you may read."
     elif isinstance(error, OSError) and error.errno == errno.EIO:
@@ -249,7 +256,7 @@ def write_netcdf(
     packing: Callable[[xr.Dataset], Mapping[Any, Mapping[str, Any]]] | None = None,
     onto: Path | None = None,
 ) -> None:
-    """Write a NetCDF file with a checksum at its end, which :func:`check_seal` compares.
+    """Write a NetCDF file with a checksum at its end, which :func:`read_sealed` compares.
 
     HDF5 does not survive a write that fails: it raises errors of many kinds, keeps the file open,
     and takes the process with it at its end. The file is therefore made in memory first.
@@ -287,23 +294,37 @@ def write_netcdf(
         whole.write(SEAL + hashlib.sha256(content).hexdigest().encode())
 
 
-def check_seal(path: Path) -> None:
-    """Refuse a file of :func:`write_netcdf` that was altered or cut since it was written.
+def read_sealed(path: Path | str) -> io.BytesIO:
+    """Content of a file of :func:`write_netcdf`, once its checksum was compared.
+
+    HDF5 does not survive all damage: a flipped byte may bring it to a crash, or to a loop that
+    Ctrl-C does not end. It must therefore read nothing but what was written.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file.
+
+    Returns
+    -------
+    BytesIO
+        A NetCDF file in memory.
 
     Raises
     ------
+    MissingFileError
+        If there is no such file, or it cannot be read.
     DataError
         If its checksum is missing or another one.
-    OSError
-        If the file cannot be read.
     """
-    content, stated = _content(path.read_bytes())
+    content, stated = _content(read_bytes(path))
     if hashlib.sha256(content).hexdigest() != stated:
         why = "its checksum is another one" if stated else "it has no checksum at its end"
         raise DataError(
-            f"{path} was altered, damaged, or written by another version of seakeep: {why}. Remove "
-            "it and make it again."
+            f"{path} was cut off, altered or damaged, or seakeep did not write it: {why}. Copy it "
+            "again, or remove it and make it anew."
         )
+    return io.BytesIO(content)
 
 
 def _content(file: bytes) -> tuple[bytes, str]:
@@ -329,9 +350,22 @@ def check_place(path: Path, suffix: str | None = None) -> None:
     RequestError
         If it is a folder, its own folder does not exist, or its name says another kind.
     """
-    if path.is_dir():
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        mode = stat.S_IFREG
+    except (OSError, ValueError) as error:
+        raise RequestError(
+            f"cannot write {_shown(path)}: {_reason(error)}. Choose another name."
+        ) from None
+    if stat.S_ISDIR(mode):
         raise RequestError(
             f"cannot write {path}: it is a folder. Name a file in it, such as {path / 'model.nc'}."
+        )
+    if (what := _kind_of(mode)) is not None:
+        raise RequestError(
+            f"cannot write {path}: it is {what[0]}, and only regular files are replaced. Choose "
+            "another name."
         )
     if path.parent.exists() and not path.parent.is_dir():
         raise RequestError(
@@ -410,9 +444,9 @@ def _mark_of_netcdf(path: Path) -> str | None:
     import h5netcdf
 
     try:
-        with h5netcdf.File(path, "r") as file:
+        with h5netcdf.File(read_sealed(path), "r") as file:
             return str(file.attrs.get(MARK))
-    except OSError:  # a NetCDF 3 file, or none: not ours
+    except (DataError, OSError):  # not ours
         return None
 
 
@@ -436,8 +470,8 @@ def make_folder(path: Path) -> Path:
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise RequestError(
-            f"cannot make the folder {path}: {error.strerror or error}. Choose another place."
+            f"cannot make the folder {_shown(path)}: {_reason(error)}. Choose another place."
         ) from error
     return path

@@ -335,7 +335,7 @@ def test_names_that_no_file_or_variable_can_hold(edited):
     """Names with '/', control characters, or of 300 characters failed after all the work."""
     for name in ("a/b", "a\\u0000b", "x" * 300):
         message = refusal(edited(("[channels.acc]", f'[channels."{name}"]')))
-        assert "a name has 1 to 100 characters and holds no '/' and no control" in message
+        assert "a name has 1 to 100 characters, not dots alone, and holds no '/'" in message
         message = refusal(edited(("[runs.second]", f'[runs."{name}"]')))
         assert "because files are named after it" in message
     for name in ("time", "heave_flags"):

@@ -340,7 +340,7 @@ def test_a_result_of_another_format_is_told(finished, monkeypatch):
 
 def test_a_damaged_result_is_told(tmp_path):
     (tmp_path / "study.nc").write_bytes(b"no NetCDF")
-    with pytest.raises(DataError, match=r"study.nc was altered, damaged.* it has no checksum"):
+    with pytest.raises(DataError, match=r"study.nc was cut off, altered.* it has no checksum"):
         read_result(tmp_path)
 
 
@@ -350,7 +350,7 @@ def test_an_altered_result_is_refused(finished, part):
     content = bytearray(path.read_bytes())
     content[int(part * len(content))] ^= 1
     path.write_bytes(content)
-    with pytest.raises(DataError, match=r"study\.nc was altered, damaged, or written by another"):
+    with pytest.raises(DataError, match=r"study\.nc was cut off, altered or damaged"):
         read_result(finished.folder)
 
 

@@ -178,10 +178,10 @@ def _channel_name(name: str) -> str:
             "a channel is not called 'time', nor does its name end in '_flags': a run's instants "
             "and its quality flags are called so; rename it"
         )
-    if not 0 < len(name) <= LONGEST_NAME or "/" in name or not name.isprintable():
+    if not name.strip(". ") or len(name) > LONGEST_NAME or "/" in name or not name.isprintable():
         raise ValueError(
-            f"a name has 1 to {LONGEST_NAME} characters and holds no '/' and no control "
-            "characters, because variables of files are named after it; rename it"
+            f"a name has 1 to {LONGEST_NAME} characters, not dots alone, and holds no '/' and no "
+            "control characters, because variables of files are named after it; rename it"
         )
     return name
 
@@ -449,8 +449,9 @@ class PreparationSettings(Table):
     @model_validator(mode="before")
     @classmethod
     def _with_preset(cls, received: Any) -> Any:
-        if isinstance(received, dict) and received.get("preset") in _FILTERS:
-            chain: dict[str, Any] = dict(_FILTERS[received["preset"]])
+        preset = received.get("preset") if isinstance(received, dict) else None
+        if isinstance(preset, str) and preset in _FILTERS:
+            chain: dict[str, Any] = dict(_FILTERS[preset])
             if not {"sampling_rate", "dt", "steps_per_period"} & set(received):
                 chain["steps_per_period"] = 32
             return {**chain, **received}

@@ -17,8 +17,8 @@ from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.files import (
     MARK,
     check_output,
-    check_seal,
     make_folder,
+    read_sealed,
     replacing,
     write_netcdf,
 )
@@ -155,9 +155,7 @@ def _fresh(campaign: Campaign, name: str, file: Path) -> xr.Dataset | None:
     if not file.exists():
         return None
     try:
-        check_seal(file)
-        with xr.open_dataset(file, engine="h5netcdf", decode_times=False) as opened:
-            run = opened.load()
+        run = xr.load_dataset(read_sealed(file), engine="h5netcdf", decode_times=False)
     except (SeakeepError, OSError, ValueError, KeyError, RuntimeError):
         warnings.warn(
             f"{file} was altered since it was written, or cannot be read; the run is prepared "

@@ -81,7 +81,16 @@ def needed_channels(settings: CampaignSettings, wanted: Collection[str]) -> set[
     return needed
 
 
+MOST_CHANNELS = 1000
+"""Channels of a campaign: each is checked, drawn and written, some hundredths of a second long."""
+
+
 def _cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
+    if (count := len(settings.channel_names)) > MOST_CHANNELS:
+        largest = "derived" if len(settings.derived) > len(settings.channels) else "channels"
+        words = f"{count} channels in all, and {MOST_CHANNELS} at most. State those that are used."
+        yield Mistake((largest,), words)
+        return
     yield from _channel_mistakes(settings)
     yield from _derived_mistakes(settings)
     yield from _name_mistakes(settings)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import sys
 import traceback
 from importlib import metadata
@@ -26,6 +27,11 @@ from seakeep.cli.console import messages, tell_warnings
 from seakeep.errors import SeakeepError
 
 __all__ = ["app", "main"]
+
+# One thread of BLAS: sums are split by the number of threads, and the last digits with them. Set
+# before numpy is loaded, which reads them once; commands import what computes when they run.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS"):
+    os.environ[_name] = "1"
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as shells count it."""

@@ -18,7 +18,7 @@ import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
-from typing import Any, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 import xarray as xr
@@ -28,7 +28,7 @@ from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice, check_integer, settings_of
-from seakeep.models.interface import Drive, InputMap, Json, Regressors, Span, plain
+from seakeep.models.interface import Drive, InputMap, Json, Regressors, Span, plain, typed
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.observables import Observed
 from seakeep.signals.propagation import (
@@ -149,7 +149,7 @@ class Lead:
     @classmethod
     def from_json(cls, content: Json) -> Self:
         """Rebuild from :meth:`to_json`."""
-        return cls(int(content["samples"]))
+        return typed(cls, content)
 
 
 @dataclass(frozen=True, eq=False)
@@ -528,13 +528,12 @@ class FittedAlignment:
     @classmethod
     def from_json(cls, content: Json) -> Self:
         """Rebuild from :meth:`to_json`."""
-        known: dict[str, Any] = {
-            key: tuple(value) if isinstance(value, list) else value
-            for key, value in content.items()
-        }
-        settings = ProbeAlignment.of(content["settings"])
-        assert settings is not None
-        return cls(**known | {"settings": settings})
+        made = typed(cls, content)
+        counts = {len(made.inputs), len(made.carried), len(made.positions)}
+        positive = (made.celerity, made.period, made.water_depth, made.highest_frequency)
+        if len(counts) > 1 or any(each is not None and each <= 0 for each in positive):
+            raise ValueError("the alignment of the inputs is not one of a vessel in waves")
+        return made
 
     def offsets(self, run: xr.Dataset) -> FloatArray:
         """Constant distance by which each input of a run is carried, m."""

@@ -63,6 +63,9 @@ STATE_PERIODS, INPUT_PERIODS, LEAD_PERIODS = 1.0, 3.0, 0.75
 ALIGNMENT = ProbeAlignment(mode="dispersion", surge="predicted", passes=3, optional=True)
 """Of what we recommend. The third pass takes a tenth off the error on the virtual tank."""
 
+MOST_MEMBERS = 1_000_000
+"""Members of an ensemble; beyond it the list of draws alone fills the memory."""
+
 
 @dataclass(frozen=True)
 class HankelDMDc(HankelSettings):
@@ -448,6 +451,11 @@ class BayesianHankelDMDc:
             if (name, value) not in (("train_length", None), ("ridge", "rollout")):
                 check_prior(name, value)
         check_integer("n_members", self.n_members, 1)
+        if self.n_members > MOST_MEMBERS:
+            raise RequestError(
+                f"n_members = {self.n_members} is more than {MOST_MEMBERS}, which no machine fits "
+                "in days. A hundred show a band, ten thousand its tails."
+            )
         period = self.encounter_period
         # Without dt any step shorter than the period will do; the runs' own is checked at fit.
         periods_to_samples(1, period, 0.5 * period if self.dt is None else self.dt)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
@@ -13,9 +12,9 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
-from seakeep.errors import DataError, RequestError
-from seakeep.files import MARK, check_output, replacing, write_netcdf
+from seakeep.arrays import GREATEST, FloatArray
+from seakeep.errors import DataError, MissingFileError, RequestError
+from seakeep.files import MARK, check_output, read_sealed, replacing, write_netcdf
 from seakeep.models.inputs import Chain
 from seakeep.models.interface import Json, Scale, Signature
 from seakeep.models.labelled import ChannelLabel
@@ -25,7 +24,6 @@ __all__ = [
     "FORMAT_VERSION",
     "Saved",
     "as_json",
-    "checksum",
     "content",
     "labels",
     "numbers",
@@ -139,10 +137,22 @@ def labels(dataset: xr.Dataset, group: str) -> tuple[ChannelLabel, ...]:
 
 def content(dataset: xr.Dataset, name: str) -> Json:
     """JSON table that a file keeps in an attribute."""
-    found = json.loads(dataset.attrs[name])
+    found = json.loads(dataset.attrs[name], parse_constant=_constant, parse_float=_bounded)
     if not isinstance(found, dict):
         raise ValueError(f"{name} is no table")
     return found
+
+
+def _constant(text: str) -> float:
+    if text == "NaN":
+        raise ValueError("a number is NaN")
+    return float(text)
+
+
+def _bounded(text: str) -> float:
+    if abs(value := float(text)) > GREATEST:
+        raise ValueError(f"a number is {text}, which nothing measures")
+    return value
 
 
 def numbers(dataset: xr.Dataset, name: str, shape: Sequence[int | None]) -> FloatArray:
@@ -154,8 +164,8 @@ def numbers(dataset: xr.Dataset, name: str, shape: Sequence[int | None]) -> Floa
     if not fits:
         expected = tuple("any" if each is None else each for each in shape)
         raise ValueError(f"{name} has shape {values.shape}, not {expected}")
-    if not np.all(np.isfinite(values)):
-        raise ValueError(f"{name} holds values that are not finite")
+    if not np.all(np.abs(values) <= GREATEST):
+        raise ValueError(f"{name} holds values that are not finite, or beyond {GREATEST:g}")
     values.flags.writeable = False
     return values
 
@@ -216,7 +226,6 @@ def write(dataset: xr.Dataset, path: str | Path, kind: str, what: str = "model")
         seakeep_format=FORMAT_VERSION,
         seakeep_version=metadata.version("seakeep"),
     )
-    labelled.attrs["checksum"] = checksum(labelled)
     with replacing(target) as temporary:
         write_netcdf(temporary, labelled)
     return target
@@ -243,24 +252,19 @@ def read(path: str | Path) -> xr.Dataset:
         If it is damaged, not a model, or of a newer layout.
     """
     source = Path(path)
-    if source.is_dir():
-        raise RequestError(f"{source} is a folder. Name the model file in it.")
     if source.suffix.lower() == ".toml":
         raise RequestError(
             f"{source} is a campaign file, and a model file is expected here. The model comes "
             "first: seakeep compare MODEL.nc CAMPAIGN.toml."
         )
-    if not source.is_file():
-        raise RequestError(
-            f"there is no model file {source}. Make one with `seakeep fit` or model.save(...)."
-        )
     try:
-        dataset = xr.load_dataset(source, engine="h5netcdf")
-    except Exception as error:
-        raise DataError(
-            f"{source} cannot be read as NetCDF ({source.stat().st_size} bytes): it is truncated, "
-            "damaged or of another format. Copy it again, or save the model again."
-        ) from error
+        content = read_sealed(source)
+    except MissingFileError as error:
+        raise MissingFileError(
+            f"{error} A model file is expected here: make one with `seakeep fit` or "
+            "model.save(...)."
+        ) from None
+    dataset = xr.load_dataset(content, engine="h5netcdf")
     if "seakeep_kind" not in dataset.attrs:
         raise DataError(
             f"{source} is a NetCDF file and not a seakeep model (variables: "
@@ -281,37 +285,8 @@ def read(path: str | Path) -> xr.Dataset:
             f"({metadata.version('seakeep')}) reads layout {FORMAT_VERSION}. Update seakeep, or "
             "fit the model again with this version."
         )
-    if 0 < version < FORMAT_VERSION:
+    if version < FORMAT_VERSION:
         raise DataError(
             f"{source} has the old layout {version}, which is no longer read. Fit the model again."
         )
-    if version < 1 or dataset.attrs.get("checksum") != checksum(dataset):
-        raise DataError(
-            f"{source} does not hold what was written into it (its checksum differs): it was "
-            "damaged or altered. Copy it again, or fit the model again."
-        )
     return dataset
-
-
-def checksum(dataset: xr.Dataset) -> str:
-    """SHA-256 over all that a model file holds, the checksum itself aside.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        What is written, or was read.
-
-    Returns
-    -------
-    str
-        Hexadecimal digits.
-    """
-    found = hashlib.sha256()
-    told = {key: value for key, value in dataset.attrs.items() if key != "checksum"}
-    found.update(json.dumps(told, default=_plain, sort_keys=True).encode())
-    for name in sorted(map(str, dataset.variables)):
-        variable = dataset.variables[name]
-        kind = [name, variable.dims, variable.shape, variable.dtype.str, variable.attrs]
-        found.update(json.dumps(kind, default=_plain, sort_keys=True).encode())
-        found.update(np.ascontiguousarray(variable.values).tobytes())
-    return found.hexdigest()

@@ -6,7 +6,7 @@ import reprlib
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Self, cast, get_args
+from typing import Any, Self, cast
 
 import numpy as np
 import xarray as xr
@@ -17,7 +17,7 @@ from seakeep.core.solve import Method, Solution, identify
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.inputs import Chain, Measured
-from seakeep.models.interface import Json, Regressors, Scale, Signature, Span
+from seakeep.models.interface import Json, Regressors, Scale, Signature, Span, typed
 from seakeep.models.labelled import ChannelLabel, Stop
 from seakeep.models.settings import HankelSettings
 
@@ -75,18 +75,9 @@ class Training:
     @classmethod
     def from_json(cls, content: Json) -> Self:
         """Rebuild from :meth:`to_json`."""
-        made = cls(
-            runs=tuple(str(each) for each in content["runs"]),
-            first=tuple(float(each) for each in content["first"]),
-            stop=tuple(float(each) for each in content["stop"]),
-            columns=tuple(int(each) for each in content["columns"]),
-            method=content["method"],
-            ridge=float(content["ridge"]),
-            rank=int(content["rank"]),
-            clipped=tuple(float(each) for each in content["clipped"]),
-        )
+        made = typed(cls, content)
         lengths = {len(made.runs), len(made.first), len(made.stop), len(made.columns)}
-        if len(lengths) != 1 or made.method not in get_args(Method):
+        if len(lengths) != 1:
             raise ValueError("training names runs, instants and columns of unequal number")
         return made
 

@@ -36,6 +36,9 @@ __all__ = [
 SHEET = "data-quality sheet"
 """Kind of the files of a sheet, which sets them apart from the user's."""
 
+DRAWN = 50
+"""Channels that a picture shows at most, each in a row of its own; the table lists all."""
+
 _MARKS = {
     "missing": ("#D55E00", "x"),
     "bridged": ("#E69F00", "+"),
@@ -122,7 +125,7 @@ def _flags(run: xr.Dataset, name: str) -> Any:
 
 def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figure:
     """Draw every channel of a run, flagged samples marked; lags of redundant sensors below."""
-    names = [str(name) for name in run.data_vars]
+    names = [str(name) for name in run.data_vars][:DRAWN]
     lagging = [name for name in agreements if agreements[name].lags.size]
     rows = len(names) + len(lagging)
     found = {each.channel for each in findings_of(run)}
@@ -152,7 +155,8 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
             at.margins(x=0.005)
             at.tick_params(axis="x", labelbottom=True, labelsize=7)
         figure.align_ylabels(axes)
-        axes[-1].set_xlabel("time [s]")
+        left_out = len(run.data_vars) - len(names)
+        axes[-1].set_xlabel("time [s]" + f" ({left_out} more channels)" * bool(left_out))
     return figure
 
 

@@ -564,7 +564,7 @@ def match_pulses(
     reach = 0.02 * spacing + largest_drift * float(np.ptp(reference))
     candidates = np.unique(np.round((own[:, None] - reference[None, :]).ravel(), 6))
     counts = np.array([_pairs(own - shift, reference, reach)[0].size for shift in candidates])
-    near = candidates[counts >= max(counts.max() - 1, 1)]
+    near = candidates[counts >= min(max(counts.max() - 1, 1), counts.max())]
     best = float(near[np.argmin(np.abs(near - expected_offset))])
     rivals = near[np.abs(near - best) > 4 * reach]
     modulus = float(np.abs(rivals - best).min()) if rivals.size else float("inf")

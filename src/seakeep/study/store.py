@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import tempfile
+import warnings
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -20,8 +21,8 @@ import numpy.typing as npt
 import xarray as xr
 from filelock import FileLock, Timeout
 
-from seakeep.errors import DataError, RequestError, SeakeepError
-from seakeep.files import check_output, check_seal, replacing, write_netcdf
+from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
+from seakeep.files import check_output, read_sealed, replacing, write_netcdf
 
 __all__ = [
     "RESULT",
@@ -163,12 +164,25 @@ class UnitFolder:
         except (OSError, NotImplementedError):  # without locks in the file system all may work
             yield
             return
+        self._clear_litter()
         try:
             yield
         finally:
             with suppress(OSError):  # Windows does not remove a file that is open
                 path.unlink()
             lock.release()
+
+    def _clear_litter(self) -> None:
+        """Remove files that a killed process had begun; nobody else works in the folder."""
+        litter = [each for each in self.folder.rglob(".*.tmp") if each.is_file()]
+        for each in litter:
+            each.unlink(missing_ok=True)
+        if litter:
+            warnings.warn(
+                f"{self.folder}: removed {len(litter)} unfinished file(s) of a killed run.",
+                SeakeepWarning,
+                stacklevel=2,
+            )
 
     def _header(self) -> dict[str, Any]:
         return {"digest": self.digest, "versions": versions()}
@@ -392,8 +406,8 @@ def read_result(folder: Path | str) -> StudyResult:
             )
         )
     try:
-        check_seal(path)  # before HDF5 reads it, which altered bytes may bring to a crash
-        with xr.open_dataset(path, engine="h5netcdf") as root:
+        content = read_sealed(path)
+        with xr.open_dataset(content, engine="h5netcdf") as root:
             attrs = {key: _plain(value) for key, value in root.attrs.items()}
         if attrs["format"] != FORMAT:
             raise RequestError(
@@ -402,7 +416,9 @@ def read_result(folder: Path | str) -> StudyResult:
             )
         groups = {}
         for name in json.loads(attrs["groups"]):
-            with xr.open_dataset(path, engine="h5netcdf", group=name, decode_times=False) as opened:
+            with xr.open_dataset(
+                content, engine="h5netcdf", group=name, decode_times=False
+            ) as opened:
                 groups[name] = opened.load()
     except SeakeepError:
         raise

@@ -18,8 +18,8 @@ import scipy
 import xarray as xr
 
 from seakeep.arrays import ComplexArray, FloatArray
-from seakeep.errors import RequestError
-from seakeep.files import replacing, write_netcdf
+from seakeep.errors import RequestError, SeakeepError
+from seakeep.files import read_sealed, replacing, write_netcdf
 
 __all__ = [
     "CONVENTIONS",
@@ -132,19 +132,13 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
         under another convention.
     """
     source = Path(path) if path else shipped_hydrodynamics()
-    if not source.is_file():
-        raise RequestError(
-            f"the hydrodynamics file {source} does not exist. Correct vessel.hydrodynamics, or "
-            "build one: python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
-        )
     try:
-        with xr.open_dataset(source, engine="h5netcdf") as opened:
-            data = opened.load()
-    except (OSError, ValueError) as error:
+        data = xr.load_dataset(read_sealed(source), engine="h5netcdf")
+    except SeakeepError as error:
         raise RequestError(
-            f"{source} is not a readable NetCDF file ({error}). Build the file again: "
-            "python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
-        ) from error
+            f"{error} A file of hydrodynamics is expected here: correct vessel.hydrodynamics, or "
+            "build one: python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
+        ) from None
     for key, expected in CONVENTIONS.items():
         if data.attrs.get(key) != expected:
             raise RequestError(

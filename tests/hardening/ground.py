@@ -1,0 +1,265 @@
+"""What is attacked: a small campaign of two loggers, a study, tank settings, and models of it."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import shutil
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+CAMPAIGN = """
+[campaign]
+name = "Attacked"
+scale_factor = 50.0
+period_channel = "eta_fwd"
+
+[rig]
+water_depth = 3.0
+wave_direction = 0.0
+
+[rig.positions]
+eta_fwd = -1.0
+eta_mid = 0.0
+
+[files]
+time = "t [s]"
+time_unit = "s"
+
+[channels.eta_fwd]
+column = "p1"
+unit = "cm"
+
+[channels.eta_mid]
+column = "p2"
+unit = "cm"
+
+[channels.heave]
+unit = "m"
+
+[channels.pitch]
+unit = "deg"
+
+[channels.surge]
+unit = "m"
+
+[derived.heave_rate]
+from = "heave"
+step = "differentiate"
+
+[derived.eta_low]
+from = "eta_fwd"
+step = "low_pass"
+passband = 2.0
+stopband = 3.0
+
+[derived.sum]
+expression = "heave + 2*eta_mid"
+unit = "m"
+
+[derived.twice]
+from = "heave"
+step = "integrate"
+times = 1
+band = [0.2, 2.0]
+
+[redundant.wave]
+channels = ["eta_fwd", "eta_mid"]
+window = 10.0
+
+[instruments]
+reference = "probes"
+
+[instruments.probes]
+sampling_rate = 10.0
+trigger = "trigger"
+
+[instruments.mru]
+sampling_rate = 20.0
+trigger = "trigger"
+window = 20.0
+largest_lag = 5.0
+
+[runs.one]
+sea_state = "sea"
+waves = "irregular"
+train = [2.0, 40.0]
+test = [40.5, 58.0]
+
+[runs.one.files]
+probes = "one_probes.csv"
+mru = "one_mru.csv"
+
+[preparation]
+sampling_rate = 8.0
+gaps = "bridge"
+longest_gap = 0.3
+attenuation = 60.0
+
+[model]
+states = ["heave", "pitch"]
+inputs = ["eta_fwd", "eta_mid"]
+state_delays = 2
+input_delays = "1 T"
+lead = 0
+ridge = 0.1
+window = "inf T"
+observables = [{ kind = "expression", name = "square", expression = "eta_fwd**2" }]
+
+[model.alignment]
+mode = "effective"
+surge = "measured"
+
+[models.ensemble]
+kind = "bayesian_hankel_dmdc"
+states = ["heave", "pitch"]
+inputs = ["eta_fwd"]
+n_members = 3
+train_length = { uniform = [10, 20] }
+state_delay = { uniform = [0.3, 0.6] }
+input_delay = 1.0
+ridge = { log_uniform = [0.05, 0.5] }
+seed = 1
+
+[models.arx]
+kind = "arx"
+states = ["heave", "pitch"]
+inputs = ["eta_fwd"]
+
+[models.subspace]
+kind = "subspace"
+order = 6
+state_delays = 8
+input_delays = 8
+future = 9
+states = ["heave", "pitch"]
+inputs = ["eta_fwd"]
+
+[models.hold]
+kind = "hold_last"
+states = ["heave", "pitch"]
+inputs = ["eta_fwd"]
+"""
+
+STUDY = """
+[study]
+campaign = "campaign.toml"
+name = "Attacked"
+preset = "recommended"
+seed = 3
+states = ["heave", "pitch"]
+inputs = ["eta_fwd"]
+
+[training]
+scheme = "halves"
+windows = 1
+
+[models.one]
+ridge = 0.15
+state_delays = 2
+input_delays = 4
+observables = []
+readouts = {}
+
+[models.several]
+kind = "bayesian_hankel_dmdc"
+n_members = 2
+ridge = { log_uniform = [0.05, 0.5] }
+observables = []
+readouts = {}
+train_length = { uniform = [10, 20] }
+
+[tests.same]
+windows = 2
+length = 3.0
+
+[statistics]
+n_series = 8
+level = 0.9
+
+[output]
+shown_windows = 1
+"""
+
+TANK = """
+seed = 1
+
+[runs.one]
+duration = 12.0
+startup = 8.0
+
+[runs.one.spectrum]
+height = 0.1
+period = 1.6
+components = 20
+"""
+
+
+def _write_raw(folder: Path, run: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    frequency, phase = rng.uniform(0.4, 0.9, 12), rng.uniform(0, 2 * np.pi, 12)
+
+    def sea(t: np.ndarray, lag: float = 0.0) -> np.ndarray:
+        return np.cos(2 * np.pi * np.outer(t - lag, frequency) + phase).sum(axis=1)
+
+    def rows(path: Path, header: str, *columns: np.ndarray) -> None:
+        np.savetxt(path, np.column_stack(columns), "%.5f", ",", header=header, comments="")
+
+    def pulses(t: np.ndarray) -> np.ndarray:
+        return 5.0 * (np.mod(t - 3.0, 10.0) < 0.55)
+
+    t = np.arange(0.0, 60.0, 0.1)
+    noise = rng.standard_normal((6, 2 * t.size)) * 0.02
+    rows(folder / f"{run}_probes.csv", "t [s],p1,p2,trigger", t, sea(t) + noise[0, : t.size],
+         sea(t, 0.6) + noise[1, : t.size], pulses(t))  # fmt: skip
+    t = np.arange(0.0, 60.0, 0.05)
+    rows(folder / f"{run}_mru.csv", "t [s],heave,pitch,surge,trigger", t,
+         0.3 * sea(t, 0.9) + noise[2], sea(t, 0.5) + noise[3], 0.1 * sea(t, 1.0) + noise[4],
+         pulses(t))  # fmt: skip
+
+
+def read(what: str) -> dict[str, Any]:
+    """Settings as TOML gives them: campaign, study or tank."""
+    return tomllib.loads({"campaign": CAMPAIGN, "study": STUDY, "tank": TANK}[what])
+
+
+def prepare(folder: Path, whole: bool = True) -> Path:
+    """Write it into a folder, and import what the commands import; a part of it in seconds."""
+    import seakeep.cli.console
+    import seakeep.report.comparison
+    import seakeep.report.page
+    import seakeep.study
+    import seakeep.tuning  # noqa: F401
+    from seakeep.cli import main
+
+    place = folder / "ground"
+    place.mkdir()
+    for name, text in (("campaign", CAMPAIGN), ("study", STUDY), ("tank", TANK)):
+        (place / f"{name}.toml").write_text(text, encoding="utf-8")
+    _write_raw(place, "one", 1)
+    models = ("ensemble", "arx", "subspace", "hold") if whole else ("arx",)
+    calls: list[tuple[str, ...]] = [
+        ("prepare", "campaign.toml"),
+        ("fit", "campaign.toml", "-o", "model.nc"),
+        *(("fit", "campaign.toml", "--model", each, "-o", f"{each}.nc") for each in models),
+    ]
+    if whole:
+        calls += [
+            ("calibrate", "ensemble.nc", "campaign.toml", "--steps", "2 T", "-o", "calibrated.nc"),
+            ("study", "study.toml", "-o", "results", "--workers", "1"),
+        ]
+    said = io.StringIO()
+    with (
+        contextlib.chdir(place),
+        contextlib.redirect_stdout(said),
+        contextlib.redirect_stderr(said),
+    ):
+        for arguments in calls:
+            if main(list(arguments)):
+                raise RuntimeError(f"{arguments}: {said.getvalue()[-2000:]}")
+    for each in ("figures", "tables", "histories"):
+        shutil.rmtree(place / "results" / each, ignore_errors=True)
+    return place

@@ -1,0 +1,93 @@
+"""What the attack found, cause by cause, where no case of it shows the cause."""
+
+import os
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.files import check_place, make_folder, read_sealed, write_netcdf
+from seakeep.formats import limits, read_columns
+from seakeep.study.store import UnitFolder
+
+
+@pytest.fixture
+def hdf5(tmp_path):
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file["t"], file["heave"] = np.arange(50) * 0.1, np.sin(np.arange(50) * 0.1)
+    return path
+
+
+@pytest.mark.parametrize("fate", ["import time; time.sleep(60)", "import os; os.abort()"])
+def test_a_file_on_which_hdf5_never_returns_is_refused_and_the_next_one_is_read(
+    hdf5, monkeypatch, fate
+):
+    monkeypatch.setattr(limits, "PATIENCE", 0.5)
+    monkeypatch.setattr(limits, "_WALK", fate)
+    limits._walker.cache_clear()
+    with pytest.raises(DataError, match=r"run\.h5 is damaged: HDF5 crashes on it, or has not"):
+        read_columns(hdf5)
+    monkeypatch.undo()
+    assert set(read_columns(hdf5).names) == {"t", "heave"}
+
+
+def test_bytes_are_compared_before_hdf5_reads_them(tmp_path, make_dataset):
+    path = tmp_path / "kept.nc"
+    write_netcdf(path, make_dataset(np.arange(3.0), heave=np.arange(3.0)))
+    with h5py.File(read_sealed(path), "r") as file:
+        assert list(file["heave"]) == [0.0, 1.0, 2.0]
+    content = bytearray(path.read_bytes())
+    content[200] ^= 4
+    path.write_bytes(content)
+    with pytest.raises(DataError, match="its checksum is another one"):
+        read_sealed(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with names are POSIX")
+def test_nothing_but_a_regular_file_is_replaced(tmp_path):
+    os.mkfifo(tmp_path / "pipe.nc")
+    for name, said in (
+        ("pipe.nc", "it is a pipe, and only regular files"),
+        ("n" * 300, "File name too long"),
+        ("a\0b", "null byte"),
+    ):
+        with pytest.raises(RequestError, match=rf"cannot write .*{said}"):
+            check_place(tmp_path / name)
+    with pytest.raises(RequestError, match=r"cannot make the folder .*null byte"):
+        make_folder(tmp_path / "a\0b")
+
+
+def test_a_study_clears_what_a_killed_run_left_and_says_so(tmp_path):
+    (tmp_path / "units").mkdir()
+    (tmp_path / "units" / ".cell.npz.12.ab.tmp").touch()
+    (tmp_path / "notes.tmp").touch()
+    with (
+        pytest.warns(SeakeepWarning, match=r"removed 1 unfinished file\(s\) of a killed run"),
+        UnitFolder(tmp_path, "digest").alone(),
+    ):
+        assert not list(tmp_path.glob("units/*"))
+    assert (tmp_path / "notes.tmp").exists()
+
+
+def test_a_command_keeps_blas_to_one_thread_and_prints_in_any_encoding(tmp_path):
+    code = (
+        "import seakeep.cli, sys, os\n"
+        "assert 'numpy' not in sys.modules\n"
+        "assert seakeep.cli.main(['info']) == 0\n"
+        "import threadpoolctl, scipy.linalg\n"
+        "assert {each['num_threads'] for each in threadpoolctl.threadpool_info()} == {1}\n"
+        "sys.exit(seakeep.cli.main(['fit', 'no such \\u03c0.toml', '-o', 'm.nc']))\n"
+    )
+    posix = {"LC_ALL": "POSIX", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    environment = {**os.environ, **posix, "OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, env=environment, check=False,
+        cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert b"Error: no such ?" in done.stderr
+    assert b"Traceback" not in done.stderr
