@@ -871,7 +871,7 @@ SIZES: dict[str, Callable[[], object]] = {
                                     stopband=2.000001),
     "band of 1e-12": lambda: _call("signals", "band_pass", dt=0.05, band=(1e-12, 2.0)),
     "integrate from 1e-300": lambda: _call("signals", "integrate", dt=0.05, band=(1e-300, 2.0)),
-    "predict 10^12": lambda: _call("signals", "predict_waves", ahead=10**12),
+    "predict 10^12": lambda: _call("signals", "predict_waves", count=10**12),
     "step of 1e-300": lambda: _call("signals", "wave_spectrum", dt=1e-300),
     "step of 1e300": lambda: _call("signals", "wave_statistics", dt=1e300),
     "distance of 1e12": lambda: _call("signals", "delay_by_celerity", dt=0.05,

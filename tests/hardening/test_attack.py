@@ -10,7 +10,7 @@ from areas import AREAS
 from attack import judged, sample
 
 SAMPLED = {
-    "settings": 900, "texts": 25, "names": 90, "paths": 100, "options": 150, "contents": 900,
+    "settings": 1400, "texts": 25, "names": 90, "paths": 150, "options": 150, "contents": 900,
     "flips": 400, "arrays": 500, "sizes": 9,
 }  # fmt: skip
 """One case of so many in the default run: some ten per area, in half a minute."""

@@ -80,7 +80,7 @@ def test_a_command_keeps_blas_to_one_thread_and_prints_in_any_encoding(tmp_path)
         "assert seakeep.cli.main(['info']) == 0\n"
         "import threadpoolctl, scipy.linalg\n"
         "assert {each['num_threads'] for each in threadpoolctl.threadpool_info()} == {1}\n"
-        "sys.exit(seakeep.cli.main(['fit', 'no such \\u03c0.toml', '-o', 'm.nc']))\n"
+        "sys.exit(seakeep.cli.main(['compare', 'm.nc', 'c.toml', '--format', '\\u03c0']))\n"
     )
     posix = {"LC_ALL": "POSIX", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     environment = {**os.environ, **posix, "OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"}
@@ -89,5 +89,5 @@ def test_a_command_keeps_blas_to_one_thread_and_prints_in_any_encoding(tmp_path)
         cwd=tmp_path,
     )  # fmt: skip
     assert done.returncode == 2
-    assert b"Error: no such ?" in done.stderr
+    assert b"received '?'" in done.stderr
     assert b"Traceback" not in done.stderr

@@ -143,6 +143,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system knows no SIGKILL")
+@pytest.mark.filterwarnings("ignore:.*unfinished file")
 def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished):
     out = study_folder / "killed"
     (study_folder / "go.py").write_text(HALF_A_UNIT, "utf-8")

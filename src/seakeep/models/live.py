@@ -7,6 +7,7 @@ was not measured (:mod:`seakeep.core.kalman`); a forecast starts from its estima
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -619,10 +620,10 @@ class Live:
 
     def _fingerprint(self) -> str:
         """Identity of the model."""
-        parts = {"a": self._a, "b": self._b, "d": self._d, "offset": self._offset[None]}
-        named = {name: ((f"{name}_row", f"{name}_column"), each) for name, each in parts.items()}
-        words = {"signature": store.as_json(store.signature_json(self.signature))}
-        return store.checksum(xr.Dataset(named, attrs=words))
+        found = hashlib.sha256(store.as_json(store.signature_json(self.signature)).encode())
+        for each in (self._a, self._b, self._d, self._offset):
+            found.update(np.ascontiguousarray(each).tobytes())
+        return found.hexdigest()
 
     def _restore(self, dataset: xr.Dataset) -> None:
         """Restore what :meth:`save` wrote."""

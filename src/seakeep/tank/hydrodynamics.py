@@ -19,7 +19,8 @@ import xarray as xr
 
 from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import RequestError, SeakeepError
-from seakeep.files import read_sealed, replacing, write_netcdf
+from seakeep.files import reading, replacing, write_netcdf
+from seakeep.formats.limits import open_hdf5
 
 __all__ = [
     "CONVENTIONS",
@@ -133,11 +134,12 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
     """
     source = Path(path) if path else shipped_hydrodynamics()
     try:
-        data = xr.load_dataset(read_sealed(source), engine="h5netcdf")
-    except SeakeepError as error:
+        with reading(source) as place, open_hdf5(place):
+            data = xr.load_dataset(place, engine="h5netcdf")
+    except (SeakeepError, OSError, ValueError) as error:
         raise RequestError(
-            f"{error} A file of hydrodynamics is expected here: correct vessel.hydrodynamics, or "
-            "build one: python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
+            f"{source} is not a readable NetCDF file ({error}). Correct vessel.hydrodynamics, or "
+            "build a file: python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
         ) from None
     for key, expected in CONVENTIONS.items():
         if data.attrs.get(key) != expected:
