@@ -6,6 +6,7 @@
     python docs/figures/make_figures.py tutorial    # docs/figures/unseen.png and band.png
     python docs/figures/make_figures.py study       # the tutorial's study report; needs Chromium
     python docs/figures/make_figures.py tank        # the virtual tank's; extras tank and video
+    python docs/figures/make_figures.py check       # docs/figures/check_*.png; extra tank
     python docs/figures/make_figures.py chain       # docs/figures/quality_sheet.png; extra tank
     python docs/figures/make_figures.py ntnu sjtu   # examples/*/figures; need SEAKEEP_DATA_DIR
 
@@ -338,9 +339,48 @@ def chain():
         quality_figure(shown, agreements).savefig(HERE / "quality_sheet.png", dpi=90)
 
 
+CHECKED = """
+[models.checked]
+preset = "recommended"
+states = [
+    "surge", "heave", "pitch", "surge_rate", "heave_rate", "pitch_rate", "mooring_bow",
+    "mooring_stern",
+]
+inputs = ["eta_fwd", "eta_cog"]
+"""
+
+
+def check():
+    """What a recommended model of the virtual tank is worth; seed 0."""
+    from seakeep.tank.play import play
+    from seakeep.tank.settings import default_settings
+
+    with tempfile.TemporaryDirectory() as folder:
+        play(default_settings(), Path(folder) / "virtual")
+        file = Path(folder) / "virtual" / "campaign.toml"
+        file.write_text(file.read_text(encoding="utf-8") + CHECKED, encoding="utf-8")
+        campaign = seakeep.read_campaign(file)
+        draw_checks(fit_campaign(campaign, "checked"), campaign.prepare())
+
+
+def draw_checks(model, runs):
+    """Pictures of the page on checks."""
+    measured = seakeep.check.measured_response(model, runs)
+    motions = ["surge", "heave", "pitch"]
+    plots, checks = seakeep.plot, seakeep.check
+    figures = {
+        "response": plots.response(checks.response(model, None, runs), measured, states=motions),
+        "coherence": plots.coherence(checks.coherence(model, runs), states=motions),
+        "exceedance": plots.exceedance(checks.statistics(model, runs), states=motions),
+        "drift": plots.drift(checks.drift(model, runs), states=[*motions[:1], "mooring_bow"]),
+    }
+    for name, figure in figures.items():
+        save(figure, HERE / f"check_{name}.png")
+
+
 DRAWINGS = {
     each.__name__: each
-    for each in (indices, instants, in_service, tutorial, study, ntnu, sjtu, tank, chain)
+    for each in (indices, instants, in_service, tutorial, study, ntnu, sjtu, tank, check, chain)
 }
 
 if __name__ == "__main__":

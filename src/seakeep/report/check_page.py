@@ -223,7 +223,8 @@ def decay_section(checked: Checked) -> Section | None:
         )
     if (modes := checked.found.get("modes")) is not None:
         caption = "Modes that decay slowest: states that take part in each (parts of one)."
-        figures.append(Drawing("modes", caption, partial(checks.modes, modes)))
+        if modes.sizes["state"] > 1:
+            figures.append(Drawing("modes", caption, partial(checks.modes, modes)))
         tables.append(_modes_table(modes))
     if not figures:
         return None

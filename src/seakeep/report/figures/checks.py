@@ -101,7 +101,7 @@ def response(
     entry = "wave" if "wave" in found["input"] else str(found.attrs["reference"])
     at = found.sel(input=entry)
     with figure_style():
-        figure, places = panels(axes, 2 * len(chosen), 4, (2.9, 1.75))
+        figure, places = panels(axes, 2 * len(chosen), 2 + 2 * (len(chosen) % 2 == 0), (2.9, 1.75))
         for name, gain, turn in zip(chosen, places[::2], places[1::2], strict=True):
             own = at.sel(state=name)
             factor, units = displayed(str(own["units"].values))
@@ -161,7 +161,10 @@ def _points(gain: Any, turn: Any, measured: xr.Dataset, factor: float) -> None:
 def legend_below(figure: Any, place: Any) -> None:
     handles, labels = place.get_legend_handles_labels()
     unique = dict(zip(labels, handles, strict=True))
-    figure.legend(unique.values(), unique, loc="outside lower center", ncols=min(len(unique), 5))
+    across = max(1, int(13 * figure.get_figwidth() / (6 + max(map(len, unique)))))  # letters
+    figure.legend(
+        unique.values(), unique, loc="outside lower center", ncols=min(len(unique), across)
+    )
 
 
 def coherence(
