@@ -68,11 +68,14 @@ Scales = tuple[
 Settings = TypeVar("Settings", bound=HankelSettings)
 Chosen = TypeVar("Chosen")
 ALIKE = 0.03
-"""Part of the lowest error by which the chosen λ, and fewer observables, may be worse.
+"""Part of the lowest error by which the chosen λ may be worse.
 
 On the virtual tank the error falls by that much over the last decade of λ: less than from one
-seed to the next. Free runs of a larger λ decay sooner. On measured loads, observables that gained
-less than that in the seas of the training doubled the error in others."""
+seed to the next. Free runs of a larger λ decay sooner."""
+LITTLE = 0.01
+"""The same for fewer observables.
+
+On measured loads, powers that gained 0.4 % in the seas of the training doubled the error in others."""
 FALLBACK = 1e-3
 """λ per snapshot pair where nothing can be held out."""
 RANKS = tuple(round(2 ** (exponent / 2)) for exponent in range(18, 7, -1))
@@ -492,7 +495,7 @@ def search(
 def _best_of(trials: Mapping[Candidate, Trial]) -> Candidate:
     """The candidate of the lowest score; of those that are alike, one of the fewest observables."""
     scores = {candidate: float(trial.means.min()) for candidate, trial in trials.items()}
-    enough = (1.0 + ALIKE) * min(scores.values())
+    enough = (1.0 + LITTLE) * min(scores.values())
     alike = [candidate for candidate, score in scores.items() if score <= enough]
     return min(alike, key=lambda each: (len(each.observables), scores[each]))
 
