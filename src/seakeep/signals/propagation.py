@@ -734,6 +734,10 @@ encounter periods is 0.53 SD with one half of a period, 0.43 with one, 0.38 with
 four."""
 
 
+MOST_AHEAD = 1_000_000
+"""Samples that are predicted at most: the prediction fades within some periods."""
+
+
 def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     """Continue elevations by linear prediction, each from its own record.
 
@@ -772,6 +776,11 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     """
     array = as_series(series, minimum=4, channels=True)
     number_of = whole_number(count, "count")
+    if number_of > MOST_AHEAD:
+        raise RequestError(
+            f"count = {number_of} samples ahead; waves are predicted over some periods, and "
+            f"{MOST_AHEAD} samples at most. Give fewer."
+        )
     flat = array.reshape(array.shape[0], -1)
     out = np.empty((number_of, flat.shape[1]))
     for column, values in enumerate(flat.T):
