@@ -53,8 +53,8 @@ class HankelDMDcModel(SingleModel, store.Saved):
         Waves that it was trained in.
     selection : str
         How free runs chose what the settings left open; empty where they stated all.
-    errors : LeadErrors or None
-        Its errors in training, which :meth:`live` weighs; None in files that do not hold them.
+    learnt : LeadErrors, (TrainingData, mapping of str to Dataset) or None
+        Its errors in training, or what they are found in when they are first asked for.
     """
 
     kind: ClassVar[str] = "hankel_dmdc"
@@ -64,7 +64,9 @@ class HankelDMDcModel(SingleModel, store.Saved):
     training: Training
     coverage: Coverage = field(repr=False)
     selection: str = ""
-    errors: LeadErrors | None = field(default=None, repr=False)
+    learnt: LeadErrors | tuple[TrainingData, Mapping[str, xr.Dataset]] | None = field(
+        default=None, repr=False
+    )
 
     @classmethod
     def fitted(
@@ -77,14 +79,14 @@ class HankelDMDcModel(SingleModel, store.Saved):
     ) -> Self:
         """The model that a regression on data of these runs found."""
         signature = replace(data.signature(settings), readouts=readouts)
-        model = cls(
+        return cls(
             settings=settings,
             coefficients=solution.coefficients,
             signature=signature,
             training=data.training(solution),
             coverage=Coverage.of(signature.inputs, data.inputs, data.dt),
+            learnt=(data, runs),
         )
-        return replace(model, errors=training_errors(model.dynamics, data, signature, runs))
 
     def __post_init__(self) -> None:
         self.coefficients.flags.writeable = False
@@ -95,6 +97,14 @@ class HankelDMDcModel(SingleModel, store.Saved):
             f"state_delays={self.state_delays}, input_delays={self.input_delays}, "
             f"dt={self.dt:g}; print(model.summary()) says more)"
         )
+
+    @cached_property
+    def errors(self) -> LeadErrors | None:
+        """Its errors in training, which :meth:`live` weighs; None where its file holds none."""
+        if isinstance(self.learnt, tuple):
+            data, runs = self.learnt
+            return training_errors(self.dynamics, data, self.signature, runs)
+        return self.learnt
 
     @property
     def alignment(self) -> FittedAlignment | None:
@@ -495,7 +505,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
             training=Training.from_json(store.content(dataset, "training")),
             coverage=Coverage.from_dataset(dataset),
             selection=str(dataset.attrs["selection"]),
-            errors=LeadErrors.from_dataset(dataset, len(signature.states)),
+            learnt=LeadErrors.from_dataset(dataset, len(signature.states)),
         )
 
 

@@ -75,7 +75,8 @@ seed to the next. Free runs of a larger λ decay sooner."""
 LITTLE = 0.01
 """The same for fewer observables.
 
-On measured loads, powers that gained 0.4 % in the seas of the training doubled the error in others."""
+On measured loads, powers that gained 0.4 % in the seas of the training doubled the error in other
+seas."""
 FALLBACK = 1e-3
 """λ per snapshot pair where nothing can be held out."""
 RANKS = tuple(round(2 ** (exponent / 2)) for exponent in range(18, 7, -1))
