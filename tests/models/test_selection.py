@@ -11,7 +11,7 @@ from drifting import STATES as DRIFTING
 from drifting import drifting_run
 
 from seakeep import HankelDMDc, ProbeAlignment, RequestError, SlowSquares, load_model, metrics
-from seakeep.models.selection import RIDGES, WORST, Candidate, Trial, _best_of, select
+from seakeep.models.selection import RIDGES, WORST, select
 
 DT, PERIOD = 0.1, 10  # s, samples
 STATES, INPUTS = ["heave", "drift"], ["eta"]
@@ -242,13 +242,3 @@ def test_read_outs_leave_no_choice_of_the_rank():
 def test_a_word_for_the_ridge_is_refused():
     with pytest.raises(RequestError, match="or the word rollout; received 'evidence'"):
         HankelDMDc(2, 2, "evidence")
-
-
-@pytest.mark.parametrize(("more", "taken"), [(0.563, (0,)), (0.50, (0, 1))])
-def test_observables_that_gain_next_to_nothing_are_not_taken(more, taken):
-    def trial(score):
-        return Trial((1e-3,), np.array([[score]]), np.array([1.0]))
-
-    scores = {(): 0.82, (0,): 0.565, (1,): 0.594, (0, 1): more}
-    trials = {Candidate(25, 75, 19, each): trial(score) for each, score in scores.items()}
-    assert _best_of(trials).observables == taken

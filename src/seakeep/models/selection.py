@@ -72,11 +72,6 @@ ALIKE = 0.03
 
 On the virtual tank the error falls by that much over the last decade of λ: less than from one
 seed to the next. Free runs of a larger λ decay sooner."""
-LITTLE = 0.01
-"""The same for fewer observables.
-
-On measured loads, powers that gained 0.4 % in the seas of the training doubled the error in other
-seas."""
 FALLBACK = 1e-3
 """λ per snapshot pair where nothing can be held out."""
 RANKS = tuple(round(2 ** (exponent / 2)) for exponent in range(18, 7, -1))
@@ -468,8 +463,7 @@ def search(
     Returns
     -------
     Choice
-        The best columns (the fewest observables of those that are as good), and the largest λ (or
-        the smallest rank) that is as good as the best.
+        The best columns, and the largest λ (or the smallest rank) that is as good as the best.
         Where that model grows, the best of all that were tried and do not.
     """
     known = {} if known is None else known
@@ -479,7 +473,7 @@ def search(
         tried = [replace(best, **{key: value}) if key else best for value in values]
         for candidate, trial in _judged(problems, tried, ridges, executor, progress, known):
             trials.setdefault(candidate, trial)
-        best = _best_of(trials)
+        best = min(trials, key=lambda each: float(trials[each].means.min()))
     means = trials[best].means
     alike = int(np.flatnonzero(means <= (1.0 + ALIKE) * means.min())[-1])
     every = [
@@ -491,14 +485,6 @@ def search(
     wanted += [each[1:] for each in sorted(every, key=lambda each: each[0])]
     still = (each for each in wanted if problems[each[0].alignment].radius(*each) < 1.0)
     return Choice(*next(still, wanted[0]), tuple(trials.items()))
-
-
-def _best_of(trials: Mapping[Candidate, Trial]) -> Candidate:
-    """The candidate of the lowest score; of those that are alike, one of the fewest observables."""
-    scores = {candidate: float(trial.means.min()) for candidate, trial in trials.items()}
-    enough = (1.0 + LITTLE) * min(scores.values())
-    alike = [candidate for candidate, score in scores.items() if score <= enough]
-    return min(alike, key=lambda each: (len(each.observables), scores[each]))
 
 
 def _judged(
