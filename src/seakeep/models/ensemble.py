@@ -46,7 +46,7 @@ from seakeep.models.html import text_html
 from seakeep.models.inputs import Chain, FittedAlignment
 from seakeep.models.interface import Json, Signature
 from seakeep.models.labelled import Runs
-from seakeep.models.linear import HankelDMDcModel
+from seakeep.models.linear import HankelDMDcModel, Kept
 from seakeep.models.live import Live
 from seakeep.models.members import (
     TrainingArrays,
@@ -488,7 +488,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
                 rank=found.solution.rank,
                 clipped=found.solution.clipped,
             ),
-            coverage=self.coverage,
+            learnt=Kept(self.coverage),
         )
 
     def spectral_radii(

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +35,20 @@ if TYPE_CHECKING:
 __all__ = ["HankelDMDcModel", "modes"]
 
 
+class Lesson(NamedTuple):
+    """What a model was fitted to; coverage and errors are computed on first use."""
+
+    data: TrainingData
+    runs: Mapping[str, xr.Dataset]
+
+
+class Kept(NamedTuple):
+    """What its file keeps of that."""
+
+    coverage: Coverage
+    errors: LeadErrors | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class HankelDMDcModel(SingleModel, store.Saved):
     """An identified model; made by :meth:`HankelDMDc.fit` or :func:`seakeep.load_model`.
@@ -49,12 +63,10 @@ class HankelDMDcModel(SingleModel, store.Saved):
         Time step, names and units, delays, moments, and how inputs drive the model.
     training : Training
         Runs, windows and form of the regression.
-    coverage : Coverage
-        Waves that it was trained in.
+    learnt : Lesson or Kept
+        What it was fitted to, or what its file keeps of that.
     selection : str
         How free runs chose what the settings left open; empty where they stated all.
-    learnt : LeadErrors, (TrainingData, mapping of str to Dataset) or None
-        Its errors in training, or what they are found in when they are first asked for.
     """
 
     kind: ClassVar[str] = "hankel_dmdc"
@@ -62,11 +74,8 @@ class HankelDMDcModel(SingleModel, store.Saved):
     coefficients: FloatArray = field(repr=False)
     signature: Signature = field(repr=False)
     training: Training
-    coverage: Coverage = field(repr=False)
+    learnt: Lesson | Kept = field(repr=False)
     selection: str = ""
-    learnt: LeadErrors | tuple[TrainingData, Mapping[str, xr.Dataset]] | None = field(
-        default=None, repr=False
-    )
 
     @classmethod
     def fitted(
@@ -84,8 +93,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
             coefficients=solution.coefficients,
             signature=signature,
             training=data.training(solution),
-            coverage=Coverage.of(signature.inputs, data.inputs, data.dt),
-            learnt=(data, runs),
+            learnt=Lesson(data, runs),
         )
 
     def __post_init__(self) -> None:
@@ -99,12 +107,19 @@ class HankelDMDcModel(SingleModel, store.Saved):
         )
 
     @cached_property
+    def coverage(self) -> Coverage:
+        """Waves that it was trained in."""
+        if isinstance(self.learnt, Kept):
+            return self.learnt.coverage
+        data = self.learnt.data
+        return Coverage.of(self.signature.inputs, data.inputs, data.dt)
+
+    @cached_property
     def errors(self) -> LeadErrors | None:
         """Its errors in training, which :meth:`live` weighs; None where its file holds none."""
-        if isinstance(self.learnt, tuple):
-            data, runs = self.learnt
-            return training_errors(self.dynamics, data, self.signature, runs)
-        return self.learnt
+        if isinstance(self.learnt, Kept):
+            return self.learnt.errors
+        return training_errors(self.dynamics, self.learnt.data, self.signature, self.learnt.runs)
 
     @property
     def alignment(self) -> FittedAlignment | None:
@@ -503,9 +518,11 @@ class HankelDMDcModel(SingleModel, store.Saved):
             coefficients=store.numbers(dataset, "coefficients", shape),
             signature=signature,
             training=Training.from_json(store.content(dataset, "training")),
-            coverage=Coverage.from_dataset(dataset),
             selection=str(dataset.attrs["selection"]),
-            learnt=LeadErrors.from_dataset(dataset, len(signature.states)),
+            learnt=Kept(
+                Coverage.from_dataset(dataset),
+                LeadErrors.from_dataset(dataset, len(signature.states)),
+            ),
         )
 
 
