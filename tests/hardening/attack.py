@@ -157,6 +157,7 @@ def main() -> int:
     fell = Counter[str]()
     with tempfile.TemporaryDirectory() as folder:
         place = ground.prepare(Path(folder))
+        print(f"{'area':<12}{'cases':>7}{'stand':>7}{'faults':>8}{'hangs':>7}{'memory':>8}")
         for area in asked.area or AREAS:
             found = Counter[str]()
             for case in sample(AREAS[area](place), asked.every):
@@ -166,7 +167,8 @@ def main() -> int:
                 kind = "stand" if verdict.stands else verdict.kind
                 found[kind if kind in ("stand", "hang", "memory") else "fault"] += 1
                 if asked.show and not verdict.stands:
-                    verdict.words.strip().splitlines()[-1:] or [""]
+                    last = verdict.words.strip().splitlines()[-1:] or [""]
+                    print(f"  {area}: {case.name}: {verdict.kind}: {last[0][:300]}", flush=True)
             fell += found
             _row(area, found)
     _row("all", fell)
@@ -174,7 +176,10 @@ def main() -> int:
 
 
 def _row(name: str, found: Counter[str]) -> None:
-    (found.total(), found["stand"], found["fault"], found["hang"], found["memory"])
+    counts = (found.total(), found["stand"], found["fault"], found["hang"], found["memory"])
+    widths = (7, 7, 8, 7, 8)
+    shown = (f"{count:>{width}}" for count, width in zip(counts, widths, strict=True))
+    print(f"{name:<12}" + "".join(shown), flush=True)
 
 
 if __name__ == "__main__":
