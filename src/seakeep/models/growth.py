@@ -146,8 +146,9 @@ def lead_errors(
         for each, starts in _places(longest_first[: CARRIED if carried else None], steps, WINDOWS)
     ]
     errors = np.concatenate(parts)
-    with np.errstate(over="ignore", invalid="ignore"):
-        square = np.nanmean(np.where(np.isfinite(errors), errors**2, np.nan), axis=0)
+    known = np.isfinite(errors)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # where all have diverged
+        square = np.where(known, errors**2, 0.0).sum(axis=0) / known.sum(axis=0)
     square = square[np.isfinite(square).all(axis=1)]
     grown = np.stack([isotonic_regression(each).x for each in square.T], axis=1)
     factor = _unseen(members, stretches)

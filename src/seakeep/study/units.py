@@ -20,7 +20,7 @@ from seakeep.arrays import FloatArray
 from seakeep.core import metrics
 from seakeep.core.bands import band_error_over_time
 from seakeep.errors import DataError, SeakeepError
-from seakeep.files import read_sealed
+from seakeep.formats.limits import open_hdf5
 from seakeep.models.calibration import Judged, envelope_of, found_margin, held_out
 from seakeep.models.engine import group_series, read_groups
 from seakeep.models.interface import Json
@@ -500,7 +500,8 @@ def true_channels(study: Study, plan: Plan, runs: Runs, test: str) -> FloatArray
                 f"the study names the folder {folder} of true channels, and {path.name} is not in "
                 "it. Play the tank again, or leave study.truth out."
             )
-        true = xr.load_dataset(read_sealed(path), engine="h5netcdf", decode_times=False)
+        with open_hdf5(path):  # whoever wrote it
+            true = xr.load_dataset(path, engine="h5netcdf", decode_times=False)
         known = [name for name in plan.states if name in true]
         time = window.start + plan.dt * np.arange(1, window.steps + 1)
         out.append(
