@@ -25,7 +25,7 @@ def test_a_file_changes_what_it_states_and_keeps_the_rest(tmp_path):
 def test_hydrodynamics_file_is_found_beside_the_settings(tmp_path):
     settings = read(tmp_path, '[vessel]\nhydrodynamics = "mine.nc"\n')
     assert settings.vessel.hydrodynamics == str(tmp_path / "mine.nc")
-    with pytest.raises(RequestError, match=r"mine\.nc does not exist\..* Correct vessel"):
+    with pytest.raises(RequestError, match=r"mine\.nc does not exist\..*Correct vessel"):
         load_hydrodynamics(settings.vessel.hydrodynamics)
 
 

@@ -18,7 +18,7 @@ import scipy
 import xarray as xr
 
 from seakeep.arrays import ComplexArray, FloatArray
-from seakeep.errors import MissingFileError, RequestError, SeakeepError
+from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import reading, replacing, write_netcdf
 from seakeep.formats.limits import open_hdf5
 
@@ -136,11 +136,6 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
     try:
         with reading(source) as place, open_hdf5(place):
             data = xr.load_dataset(place, engine="h5netcdf")
-    except MissingFileError as error:
-        raise MissingFileError(
-            f"{error} Correct vessel.hydrodynamics, or build a file: python -m seakeep.tank.build "
-            "SETTINGS.toml -o FILE.nc"
-        ) from None
     except (SeakeepError, OSError, ValueError) as error:
         raise RequestError(
             f"{source} is not a readable NetCDF file ({error}). Correct vessel.hydrodynamics, or "
