@@ -116,7 +116,6 @@ runs = {runs}
 preset = "paper"
 
 [models.recommended]
-input_delays = "5 T"
 
 [tests.unseen]
 length = 15
