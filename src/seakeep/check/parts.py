@@ -12,7 +12,7 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
-from seakeep.models import HankelDMDcModel, HankelEnsemble, InputMap, Model, SlowSquares
+from seakeep.models import HankelDMDcModel, InputMap, Model, SlowSquares, is_ensemble
 from seakeep.models.engine import Windows
 from seakeep.models.inputs import Chain, Lead, Measured
 from seakeep.models.interface import Span
@@ -174,7 +174,7 @@ def _free_run(model: Model, run: xr.Dataset, name: str) -> FreeRun:
     at, last = window_of(model, run)
     time = np.asarray(run["time"].values, dtype=float)
     start = float(time[at])
-    if isinstance(model, HankelEnsemble):
+    if is_ensemble(model):
         found = model.forecast_summary(run, start, last - at).sel(statistic="mean")
     else:
         found = model.forecast(run, start, last - at)
@@ -264,8 +264,7 @@ def regressors(model: Model, part: Part) -> FloatArray:
     ndarray, shape (time, column)
         NaN where a row reads what is not there.
     """
-    input_map = model.signature.input_map
-    maps = input_map.maps if isinstance(input_map, Chain) else (input_map,)
+    maps = Chain.of(model.signature.input_map).maps
     chain = Chain(tuple(_at_once(each) for each in maps if not isinstance(each, Lead)))
     run = part.run.sel(time=slice(part.time[0] - 1e-6, part.time[-1] + 1e-6))
     size, reach = run.sizes["time"], chain.reads(Span(0, 0, 1))

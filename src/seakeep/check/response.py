@@ -126,8 +126,7 @@ def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> Complex
 
 
 def _lead(model: Model) -> int:
-    input_map = model.signature.input_map
-    maps = input_map.maps if isinstance(input_map, Chain) else (input_map,)
+    maps = Chain.of(model.signature.input_map).maps
     return sum(each.samples for each in maps if isinstance(each, Lead))
 
 

@@ -134,8 +134,7 @@ def _wave(samples: int, cycles: int, turns: FloatArray, amplitude: float) -> Flo
 
 def _columns(model: HankelDMDcModel, inputs: FloatArray) -> FloatArray:
     """Regressors over one repetition of inputs that repeat, (samples, n + m)."""
-    input_map = model.signature.input_map
-    chain = input_map if isinstance(input_map, Chain) else Chain((input_map,))
+    chain = Chain.of(model.signature.input_map)
     size, reach = len(inputs), chain.reads(Span(0, 0, 1))
     before, after = -(-max(-reach.first, 0) // size), -(-max(reach.stop, 1) // size)
     first = before * size

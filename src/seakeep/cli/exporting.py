@@ -83,12 +83,12 @@ def export(
 
 def _single(file: Path, member: int | None) -> Model:
     """The model of a file, or a member of the ensemble that it holds."""
-    from seakeep.models import HankelEnsemble, load_model
+    from seakeep.models import is_ensemble, load_model
 
     loaded = load_model(file)
     if member is None:
         return loaded
-    if not isinstance(loaded, HankelEnsemble):
+    if not is_ensemble(loaded):
         raise RequestError(
             f"--member is for ensembles, and {file} holds a single model. Leave it out."
         )

@@ -14,7 +14,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError
-from seakeep.models import FittedAlignment, HankelDMDcModel, HankelEnsemble, Model, labelled
+from seakeep.models import FittedAlignment, HankelDMDcModel, Model, is_ensemble, labelled
 from seakeep.models.inputs import Chain, Lead
 from seakeep.models.interface import Scale
 from seakeep.models.observables import Bound, Observed, Term
@@ -111,7 +111,7 @@ def program_of(model: Model) -> Program:
         If the model is an ensemble or another kind, or has an observable or an input map that was
         added from outside.
     """
-    if isinstance(model, HankelEnsemble):
+    if is_ensemble(model):
         raise RequestError(
             f"an ensemble of {model.n_members} members cannot be exported as one model. Export one "
             "of them: --member 0, or ensemble.member(0)."
@@ -121,9 +121,8 @@ def program_of(model: Model) -> Program:
             f"a model of kind '{model.kind}' cannot be exported; those of delayed states and "
             "inputs can: hankel_dmdc, arx, fir."
         )
-    chain = model.signature.input_map
     lead, observed = 0, None
-    for each in chain.maps if isinstance(chain, Chain) else (chain,):
+    for each in Chain.of(model.signature.input_map).maps:
         if isinstance(each, Lead):
             lead = each.samples
         elif isinstance(each, Observed):

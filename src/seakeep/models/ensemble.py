@@ -418,8 +418,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
     @property
     def alignment(self) -> FittedAlignment | None:
         """How the wave input is aligned to the vessel; the training arrays are aligned."""
-        input_map = self.signature.input_map
-        return input_map.alignment if isinstance(input_map, Chain) else None
+        return Chain.of(self.signature.input_map).alignment
 
     def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
         """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""

@@ -694,6 +694,11 @@ class Chain:
     kind: ClassVar[str] = "chain"
     maps: tuple[InputMap, ...] = ()
 
+    @classmethod
+    def of(cls, input_map: InputMap) -> Chain:
+        """An input map as a chain: itself, or of it alone."""
+        return input_map if isinstance(input_map, Chain) else cls((input_map,))
+
     @property
     def lead_samples(self) -> int:
         """Samples of input after instant j that row j reads."""

@@ -124,8 +124,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
     @property
     def alignment(self) -> FittedAlignment | None:
         """How the wave input is aligned to the vessel, as completed from the training runs."""
-        input_map = self.signature.input_map
-        return input_map.alignment if isinstance(input_map, Chain) else None
+        return Chain.of(self.signature.input_map).alignment
 
     @property
     def state_scale(self) -> Scale:

@@ -26,7 +26,7 @@ from seakeep.models import engine, store
 from seakeep.models.engine import Dynamics, Windows
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import LeadErrors
-from seakeep.models.inputs import Chain, FittedAlignment, Measured
+from seakeep.models.inputs import Chain, Measured
 from seakeep.models.interface import Regressors, Signature, Span
 from seakeep.models.summaries import statistic_coordinate
 from seakeep.signals.propagation import draw_waves, predict_waves
@@ -114,7 +114,7 @@ class Live:
         signature = self.signature
         self._rig = _rig(signature, like)
         self._noise = _noise(signature, noise)
-        self._alignment = _alignment(signature)
+        self._alignment = Chain.of(signature.input_map).alignment
         self._offset, self._a, self._b, self._d = _mean_predictor(members, signature)
         count, s = len(signature.states), signature.state_delays
         size, variances = count * (s + 1), self._noise**2
@@ -721,11 +721,6 @@ def _mean_predictor(
     number = len(members)
     flat = a.reshape(count, -1) / number, b.reshape(count, -1) / number
     return offset / number, *flat, d / number
-
-
-def _alignment(signature: Signature) -> FittedAlignment | None:
-    input_map = signature.input_map
-    return input_map.alignment if isinstance(input_map, Chain) else None
 
 
 def _rig(signature: Signature, like: xr.Dataset | None) -> dict[str, dict[str, float]]:

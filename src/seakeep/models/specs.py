@@ -221,11 +221,6 @@ class HankelDMDc(HankelSettings):
             select=Select(observables=True, period=encounter_period),
         )
 
-    @property
-    def is_open(self) -> bool:
-        """Whether something is left to be chosen by free runs."""
-        return isinstance(self.ridge, str) or self.select is not None
-
     def central(self, dt: float) -> HankelDMDc:
         """Itself: the single model at the middle of what is fitted."""
         return self
@@ -312,7 +307,7 @@ class HankelDMDc(HankelSettings):
             grows.
         """
         named = as_runs(runs)
-        if self.is_open:
+        if left_open(self):
             found = selected or self.settled(
                 named, states, inputs, stop, executor=executor, progress=progress
             )
@@ -492,11 +487,6 @@ class BayesianHankelDMDc:
             readouts=self.readouts,
             stable=self.stable,
         )
-
-    @property
-    def is_open(self) -> bool:
-        """Whether something is left to be chosen by free runs."""
-        return isinstance(self.ridge, str) or self.select is not None
 
     def central(self, dt: float) -> HankelDMDc:
         """The single model at the medians of the priors."""
@@ -737,7 +727,7 @@ class BayesianHankelDMDc:
         """
         named = as_runs(runs)
         check_names(states, inputs)
-        if self.is_open:
+        if left_open(self):
             found = (
                 self.settled(named, states, inputs, stop, executor=executor, progress=progress)
                 if selected is None
@@ -810,9 +800,9 @@ class BayesianHankelDMDc:
 
 def left_open(spec: Spec) -> HankelDMDc | BayesianHankelDMDc | None:
     """The spec, where it leaves something to be chosen by free runs."""
-    if isinstance(spec, HankelDMDc | BayesianHankelDMDc) and spec.is_open:
-        return spec
-    return None
+    if not isinstance(spec, HankelDMDc | BayesianHankelDMDc):
+        return None
+    return spec if isinstance(spec.ridge, str) or spec.select is not None else None
 
 
 def _described(prior: Prior | str | None) -> dict[str, Any] | str | None:

@@ -297,6 +297,11 @@ def _band_of(comparison: Comparison, name: str) -> tuple[xr.DataArray, xr.DataAr
     return lower, upper, f"{100 * float(attrs['level']):g} % {kind}band"
 
 
+def _fill(styles: Sequence[Any], style: Mapping[str, Any]) -> dict[str, Any]:
+    """How a band is filled: in the colour of its line where there are several."""
+    return BAND if len(styles) == 1 else {**BAND, "color": style["color"], "alpha": 0.2}
+
+
 def _draw_state(axes: Any, compared: Mapping[str, Comparison], name: str) -> None:
     styles = _styles(compared)
     measured = styles[0][0].measured[name]
@@ -304,7 +309,7 @@ def _draw_state(axes: Any, compared: Mapping[str, Comparison], name: str) -> Non
     for each, _, style in styles:
         if (band := _band_of(each, name)) is not None:
             solid = THIN
-            fill = BAND if len(styles) == 1 else {**BAND, "color": style["color"], "alpha": 0.2}
+            fill = _fill(styles, style)
             axes.fill_between(each.forecast["time"], band[0], band[1], label=band[2], **fill)
     axes.plot(measured["time"], measured, label="measured", **solid)
     for each, label, style in styles:
@@ -330,7 +335,7 @@ def _draw_envelopes(
     axes.stairs(high, edges, baseline=low, fill=True, label="measured, envelope", **measured)
     for each, _, style in styles:
         if (band := _band_of(each, name)) is not None:
-            fill = BAND if len(styles) == 1 else {**BAND, "color": style["color"], "alpha": 0.2}
+            fill = _fill(styles, style)
             (_, low, high), (_, lifted, topmost) = (_envelope(edge, period) for edge in band[:2])
             for bottom, top in ((low, lifted), (high, topmost)):
                 axes.stairs(top, edges, baseline=bottom, fill=True, **fill)

@@ -11,7 +11,7 @@ import xarray as xr
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
-from seakeep.models import HankelEnsemble, Model
+from seakeep.models import Model, is_ensemble
 from seakeep.models.labelled import channel_matrix
 from seakeep.models.live import Servable
 from seakeep.study.comparison import samples_of
@@ -151,7 +151,7 @@ def nowcast(
 
 
 def _servable(name: str, model: Model) -> Servable:
-    if isinstance(model, HankelEnsemble):
+    if is_ensemble(model):
         return model.hold()
     if not hasattr(model, "live"):
         raise RequestError(

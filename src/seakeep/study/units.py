@@ -492,16 +492,19 @@ def true_channels(study: Study, plan: Plan, runs: Runs, test: str) -> FloatArray
     folder = study.truth_folder
     if folder is None:
         return None
-    out = []
-    for window in plan.tests[test]:
-        path = folder / f"{window.run}.nc"
+    truths = {}
+    for run in dict.fromkeys(window.run for window in plan.tests[test]):
+        path = folder / f"{run}.nc"
         if not path.exists():
             raise DataError(
                 f"the study names the folder {folder} of true channels, and {path.name} is not in "
                 "it. Play the tank again, or leave study.truth out."
             )
         with open_hdf5(path):  # whoever wrote it
-            true = xr.load_dataset(path, engine="h5netcdf", decode_times=False)
+            truths[run] = xr.load_dataset(path, engine="h5netcdf", decode_times=False)
+    out = []
+    for window in plan.tests[test]:
+        true = truths[window.run]
         known = [name for name in plan.states if name in true]
         time = window.start + plan.dt * np.arange(1, window.steps + 1)
         out.append(
