@@ -23,28 +23,28 @@ BEGIN, END = "<!-- keys: written by make_reference.py -->\n", "<!-- end of the k
 
 INTRODUCTION = """# The campaign file
 
-A campaign file (TOML) says once what stands in your files and what is to become of it. This page lists
-every table and key. `seakeep init FILE…` drafts one; an unknown key is answered with the nearest known
+A campaign file (TOML) describes your files, how to prepare them, and the models to identify. This page lists
+every table and key. `seakeep init FILE…` drafts a campaign file. For an unknown key, a message proposes the nearest known
 one. Paths are relative to the file; `${SEAKEEP_DATA_DIR}` and `~` are expanded.
 
-## Which part of a record serves for what
+## Parts of a record
 
-| key of `[runs.NAME]` | what it does |
+| key of `[runs.NAME]` | effect |
 |---|---|
-| `record = [a, b]` | reads this part of the file and nothing else: the way around a gap or a bad end. Filters and derived channels see this part. |
-| `span = [a, b]` | is applied last: filters and derived channels have seen the whole record, then the run is cut. Nothing outside is kept, delay history neither. |
-| `role` | `"train"`, `"test"` or `"unused"`: what the run, or its span, serves for. |
-| `train = [a, b]`, `test = [a, b]` | two parts of one run, instead of `role`. The run is not cut: the delay history of a forecast in the test part may come from before it. |
+| `record = [a, b]` | Only this part of the file is read, for example to avoid a gap or a bad end. Filters and derived channels see this part. |
+| `span = [a, b]` | The run is cut to this part last, after filters and derived channels. Nothing outside is kept, not even delay history. |
+| `role` | `"train"`, `"test"` or `"unused"`: the use of the run, or of its span. |
+| `train = [a, b]`, `test = [a, b]` | Two parts of one run, instead of `role`. The run is not cut: the delay history of a forecast in the test part may come from before it. |
 
-Times are seconds of the reference's clock; `inf` stands for the end of the record. A channel is
+Times are in seconds on the reference clock; `inf` stands for the end of the record. A channel is
 `sign * (reading + offset)`, converted to SI units and radians. Derived channels are computed at the
 file's own rate, before the runs are resampled to the common step.
 
 (encounter-periods)=
 ## Lengths in encounter periods
 
-A number is in seconds, samples or hertz, as the tables below say. Delays, windows and instants may be stated
-as a text that counts in encounter periods T̂ instead: `"1.5 T"`. So this campaign trains on sixty periods after
+A number is in seconds, samples or hertz, as the tables below say. Delays, windows and instants may instead be stated
+in encounter periods T̂, as text: `"1.5 T"`. For example, this campaign trains on sixty periods after
 the tenth and delays the input by five periods:
 
 ```toml
@@ -64,15 +64,15 @@ state_delays = "1 T"
 input_delays = "5 T"
 ```
 
-T̂ is `encounter_period` of `[campaign]`, or measured: the mean zero-up-crossing period of the wave channel over
-the irregular runs, in the part of each run that is used. What that measurement rests on (spans of those runs,
-windows of clocks) can count in periods only where `encounter_period` is stated; a message says so. Lengths of
-models become samples by rounding to the nearest integer. Priors of ensembles count in periods anyway.
+T̂ is `encounter_period` of `[campaign]`. If that is not stated, T̂ is measured: the mean zero-up-crossing period of the wave
+channel over the irregular runs, in the used part of each run. The keys on which this measurement depends (spans of those
+runs, windows of clocks) can be in periods only if `encounter_period` is stated; a message says so. Lengths of
+models are rounded to the nearest number of samples. Priors of ensembles are always in periods.
 
 ## Loads of lines that fall slack
 
 A linear model cannot follow a load that stops at a floor. A read-out replaces the forecast of such a channel by a
-function of what the model forecasts, with hinges max(0, x − q) at six knots q of each of the states that bend it:
+function of the forecast states, with hinges max(0, x − q) at six knots q of each state in `of`:
 
 ```toml
 [model.readouts.mooring_stern]
@@ -84,19 +84,23 @@ kind = "auto"
 |---|---|---|
 | `"hinge"` | the states in `of` and their hinges | measured states of the training runs |
 | `"stacked"` | all forecast states and the hinges of those in `of` | forecasts of each training run by the model of the others, in free runs of 15 T̂ |
-| `"auto"` | what held-out runs choose: one of these where it beats no read-out by two standard errors, else none | – |
+| `"auto"` | the better of these on held-out runs if it beats no read-out by two standard errors, else none | – |
 
-Neither reads a measurement after the start of a forecast. A load that rests on a floor in the training runs never falls
-below their 0.002 quantile; a line that is never slack gets no floor, since the least load of the training says nothing
-about higher waves. `readouts = "auto"` asks for this of every channel in newtons, read off the motions among the
-states. `seakeep fit` prints the choice, `seakeep tune --vary readouts` writes it into the file. An ensemble
-fits its read-outs once, with the medians of its priors, and passes every member through them. A model with read-outs
+Neither reads a measurement after the start of a forecast. If the load rests on a floor in the training runs, its forecast
+does not fall below their 0.002 quantile. A line that is never slack in training gets no floor, since it may fall slack in
+higher waves. `readouts = "auto"` applies `"auto"` to every channel in newtons, as a function of the motions among the
+states. `seakeep fit` prints the choice, and `seakeep tune --vary readouts` writes it into the file. An ensemble
+fits its read-outs once, with the medians of its priors, and applies them to every member. A model with read-outs
 cannot be exported as a linear system.
 
 ## Tables and keys
 
 This part is generated from the settings themselves.
 """
+
+
+CONSTRUCTOR = "as in [`HankelDMDc`](api/seakeep.HankelDMDc.md)"
+"""Of a key without a description."""
 
 
 def tables_of(annotation):
@@ -121,7 +125,7 @@ def shown(field):
 def rows(table):
     """Rows of the keys of a table."""
     for name, field in table.model_fields.items():
-        words = (field.description or "as in the constructor").replace("|", "\\|")
+        words = (field.description or CONSTRUCTOR).replace("|", "\\|")
         yield f"| `{field.alias or name}` | {shown(field)} | {words} |"
 
 
@@ -165,7 +169,7 @@ def study_page():
 
 COMMANDS = """# Commands
 
-Every command has `--help`. Results go to standard output or to `-o`, messages to standard error. The exit status is 0 if
+This page lists all commands with their options; `--help` of a command prints the same. Results go to standard output or to `-o`, messages to standard error. The exit status is 0 if
 all is done, 1 if the run failed, 2 if the request is wrong, and 130 after Ctrl-C. `seakeep --debug COMMAND …` shows the
 traceback of an error. `seakeep --install-completion` completes commands and options with the Tab key in bash, zsh, fish
 and PowerShell; `--show-completion` prints what it would install.
@@ -237,8 +241,9 @@ ROOMS = (
 
 API = """# Python API
 
-One page per object. All public functions check their arguments; a user's mistake raises a `RequestError` or a `DataError`
-whose message says what was received and how to fix it. Arrays are `(time, channel)`.
+This page lists the public functions and classes, with one page each. All of them check their arguments: a wrong request
+raises a `RequestError`, wrong data a `DataError`, with a message that says what was received and how to fix it. Arrays are
+`(time, channel)`.
 
 This page is generated from the public names of each module.
 """
