@@ -470,7 +470,7 @@ def test_an_open_quotation_mark(tmp_path):
 
 
 def test_a_gzip_that_unpacks_without_end(tmp_path, monkeypatch):
-    monkeypatch.setattr("seakeep.formats.limits.FREE", 2**20)
+    monkeypatch.setattr("seakeep.sizes.FREE", 2**20)
     path = write(tmp_path, gzip.compress(bytes(2**24), mtime=0), "run.csv.gz")
     with pytest.raises(DataError, match=r"unpacks to more than 2 MiB, over 100 times its size"):
         read_table(path)

@@ -80,6 +80,7 @@ from seakeep.signals.quality import (
 )
 from seakeep.signals.synchronisation import ASSUMED
 from seakeep.signals.time_axis import instant_text, span_text, stretches
+from seakeep.sizes import LONG_NUMBERS, check_numbers
 from seakeep.toml import Length, number
 
 __all__ = ["Run", "checked", "cleaned", "cropped", "derived", "mapped", "read", "resampled", "sync"]
@@ -592,6 +593,17 @@ def _axis(run: Run, dt: float) -> FloatArray:
             f"run '{run.name}' of {end - begin:g} s is shorter than two steps of {dt:g} s. Correct "
             "[preparation]."
         )
+    stated = run.settings.preparation
+    keys = ("sampling_rate", "dt", "steps_per_period")
+    key = next((key for key in keys if getattr(stated, key) is not None), "dt")
+    channels = len(run.settings.channel_names)
+    check_numbers(
+        f"preparation.{key} = {getattr(stated, key) or dt:g}: {last - first} samples of run "
+        f"'{run.name}' in {channels} channels take",
+        (last - first) * channels,
+        f"Take a larger step, or a part of the run (record in [runs.{run.name}]).",
+        LONG_NUMBERS,
+    )
     instants: FloatArray = origin + dt * np.arange(first, last + 1, dtype=float)
     return instants
 

@@ -10,6 +10,7 @@ from seakeep.campaign.settings import CampaignSettings, ChannelSettings, Derived
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.signals.expressions import parse
+from seakeep.sizes import MOST_CHANNELS, too_large
 from seakeep.toml import Mistake, lengths, read_toml, validated
 
 __all__ = [
@@ -81,14 +82,10 @@ def needed_channels(settings: CampaignSettings, wanted: Collection[str]) -> set[
     return needed
 
 
-MOST_CHANNELS = 1000
-"""Channels of a campaign: each is checked, drawn and written, some hundredths of a second long."""
-
-
 def _cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
-    if (count := len(settings.channel_names)) > MOST_CHANNELS:
+    mend = "State those that are used."
+    if words := too_large("received", len(settings.channel_names), MOST_CHANNELS, "channels", mend):
         largest = "derived" if len(settings.derived) > len(settings.channels) else "channels"
-        words = f"{count} channels in all, and {MOST_CHANNELS} at most. State those that are used."
         yield Mistake((largest,), words)
         return
     yield from _channel_mistakes(settings)

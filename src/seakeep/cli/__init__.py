@@ -93,6 +93,18 @@ def _kept(leaving: BaseException) -> str:
     return "Finished files are kept: run the same command again to continue."
 
 
+def _unforeseen(error: Exception) -> str:
+    if isinstance(error, MemoryError):
+        return (
+            f"there is not enough memory ({error}). Ask for fewer samples, channels, members or "
+            "workers, or take a machine with more."
+        )
+    return (
+        f"{type(error).__name__}: {error}. This is a fault of seakeep; run the command again with "
+        "--debug and report what it prints together with `seakeep info`."
+    )
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; the entry point of ``seakeep``.
 
@@ -131,10 +143,6 @@ def main(arguments: list[str] | None = None) -> int:
     except Exception as error:
         if debug:
             traceback.print_exc()
-        messages().print(
-            f"Error: {type(error).__name__}: {error}. This is a fault of seakeep; run the command "
-            "again with --debug and report what it prints together with `seakeep info`.",
-            style="red",
-        )
+        messages().print(f"Error: {_unforeseen(error)}", style="red")
         return 1
     return 0

@@ -24,6 +24,7 @@ from seakeep.arrays import (
     whole_number,
 )
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+from seakeep.sizes import check_numbers
 
 __all__ = [
     "BlockChoice",
@@ -43,8 +44,6 @@ BlockRule = Literal["carlstein", "politis_white", "encounter_periods"]
 RULES = ("carlstein", "politis_white", "encounter_periods")
 QUIET_LAGS = 5
 """K of Politis & White: max(5, √log₁₀ T), which is five below 10²⁵ samples."""
-MOST_DRAWN = 250_000_000
-"""Samples of all redrawn series together: 2 GB of positions."""
 FEWEST_SAMPLES = 8
 """A shorter series has no block length: its quarter holds one sample."""
 
@@ -315,12 +314,8 @@ def bootstrap_indices(
     whole_number(n_series, "n_series")
     whole_number(block_length, "block_length")
     as_generator(rng)
-    if n_series * n_samples > MOST_DRAWN:
-        raise RequestError(
-            f"n_series = {n_series} series of {n_samples} samples take "
-            f"{8e-9 * n_series * n_samples:.3g} GB; at most {8e-9 * MOST_DRAWN:g} GB are allowed. "
-            "Draw fewer."
-        )
+    asked = f"n_series = {n_series} series of {n_samples} samples take"
+    check_numbers(asked, n_series * n_samples, "Draw fewer.")
     lengths = _as_segments(segments, n_samples)
     shortest = int(lengths.min())
     if block_length > shortest:

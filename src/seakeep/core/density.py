@@ -18,6 +18,7 @@ from scipy import fft
 from seakeep.arrays import FloatArray, IntArray, as_bundle, as_real, fraction, whole_number
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+from seakeep.sizes import MOST_BINS, check_numbers, check_size
 
 __all__ = [
     "Bandwidth",
@@ -36,8 +37,6 @@ BINS_PER_BANDWIDTH = 64
 """Linear binning then errs by at most 1/(8·64²) = 3.1e-5 of the peak of one kernel."""
 REACH = 8.5
 """Bandwidths beyond the grid that are kept; the kernel there is 2e-16 of its peak."""
-MOST_BINS = 2**21
-"""Bins of a density, and points of a grid, that fit into 16 MB; finer ones are summed directly."""
 CHUNK = 4096
 """Samples summed at once where a density is not binned: 16 MB on a grid of 512 points."""
 COARSE = 1.5
@@ -192,6 +191,8 @@ def _binned(x: FloatArray, grid: FloatArray, h: float) -> FloatArray:
 
 def _densities(x: FloatArray, grid: FloatArray, h: FloatArray) -> FloatArray:
     even = np.allclose(np.diff(grid), (grid[-1] - grid[0]) / (grid.size - 1), rtol=1e-6, atol=0.0)
+    asked = f"{x.shape[0]} series on a grid of {grid.size} points take"
+    check_numbers(asked, x.shape[0] * grid.size, "Lower n_series or points.")
     out = np.empty((x.shape[0], grid.size))
     for row, (values, width) in enumerate(zip(x, h, strict=True)):
         fast = even and _bins(grid, float(width))[2] <= MOST_BINS
@@ -275,8 +276,8 @@ def density_grid(
     SeakeepWarning
         If its step is over 1.5 bandwidths of a series; a divergence on it is then coarse.
     """
-    if whole_number(points, "points", 2) > MOST_BINS:
-        raise RequestError(f"a grid has at most {MOST_BINS} points; received points = {points}.")
+    count = whole_number(points, "points", 2)
+    check_size("points =", count, MOST_BINS, "points of a grid", "Ask for fewer.")
     if not series or not margin >= 0:
         raise RequestError(
             f"a grid needs at least one series and a margin of zero or more; received "

@@ -16,14 +16,9 @@ from pathlib import Path
 import h5py
 
 from seakeep.errors import DataError
+from seakeep.sizes import most_bytes
 
-__all__ = ["most_bytes", "open_hdf5"]
-
-FREE = 2**28
-"""Bytes that a file may unpack to, for any size of the file."""
-
-EXPANSION = 100
-"""Times its own size that a larger one may unpack to; tables of numbers reach 10, constants 50."""
+__all__ = ["open_hdf5"]
 
 PATIENCE = 30.0
 """Seconds that a walk through a file may take; a thousand sets take less than one."""
@@ -48,11 +43,6 @@ for line in sys.stdin:
     print("walked", flush=True)
 """
 _LOCK = threading.Lock()
-
-
-def most_bytes(stored: int) -> int:
-    """Bytes that so many stored bytes may unpack to."""
-    return max(FREE, EXPANSION * stored)
 
 
 @contextlib.contextmanager

@@ -22,8 +22,8 @@ import pandas as pd
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.formats.columns import Columns, is_unit, unique_names
-from seakeep.formats.limits import EXPANSION, most_bytes
 from seakeep.formats.reader import Options
+from seakeep.sizes import EXPANSION, most_bytes
 
 __all__ = ["read_text"]
 

@@ -54,6 +54,7 @@ from seakeep.models.training import (
     until,
 )
 from seakeep.models.validity import Coverage
+from seakeep.sizes import LONG_MEMBERS, MOST_MEMBERS, check_size
 
 __all__ = ["BayesianHankelDMDc", "HankelDMDc"]
 
@@ -62,9 +63,6 @@ STATE_PERIODS, INPUT_PERIODS, LEAD_PERIODS = 1.0, 3.0, 0.75
 """Delays and look-ahead that we recommend; a search from there gains a twentieth at most."""
 ALIGNMENT = ProbeAlignment(mode="dispersion", surge="predicted", passes=3, optional=True)
 """Of what we recommend. The third pass takes a tenth off the error on the virtual tank."""
-
-MOST_MEMBERS = 1_000_000
-"""Members of an ensemble; beyond it the list of draws alone fills the memory."""
 
 
 @dataclass(frozen=True)
@@ -446,11 +444,8 @@ class BayesianHankelDMDc:
             if (name, value) not in (("train_length", None), ("ridge", "rollout")):
                 check_prior(name, value)
         check_integer("n_members", self.n_members, 1)
-        if self.n_members > MOST_MEMBERS:
-            raise RequestError(
-                f"n_members = {self.n_members} is more than {MOST_MEMBERS}, which no machine fits "
-                "in days. A hundred show a band, ten thousand its tails."
-            )
+        check_size("n_members =", self.n_members, MOST_MEMBERS, "members",
+                   "A hundred show a band, ten thousand its tails.", LONG_MEMBERS)  # fmt: skip
         period = self.encounter_period
         # Without dt any step shorter than the period will do; the runs' own is checked at fit.
         periods_to_samples(1, period, 0.5 * period if self.dt is None else self.dt)

@@ -14,6 +14,7 @@ from scipy import special
 from seakeep.arrays import FloatArray, as_series, number, positive
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import as_seconds, span_text, uniform_step
+from seakeep.sizes import MOST_TAPS, check_size
 
 __all__ = ["low_pass", "lowpass_taps", "resample"]
 
@@ -72,12 +73,8 @@ def lowpass_taps(
 
 
 def _check_length(taps: float, what: str, remedy: str) -> None:
-    """Refuse a filter before it takes memory."""
-    if not taps <= MOST_TAPS:
-        raise RequestError(
-            f"{what} with this attenuation needs about {taps:.3g} taps; at most {MOST_TAPS} are "
-            f"allowed. {remedy}."
-        )
+    asked = f"{what} with this attenuation needs about"
+    check_size(asked, taps, MOST_TAPS, "taps", f"{remedy}.")
 
 
 def _kaiser_taps(edges: tuple[float, float], attenuation: float) -> FloatArray:
@@ -169,9 +166,6 @@ def apply_taps(array: FloatArray, taps: FloatArray) -> FloatArray:
     filtered: FloatArray = scipy.signal.oaconvolve(extended, columns, mode="valid", axes=0)
     return filtered
 
-
-MOST_TAPS = 100_000
-"""Forty times the paper's filter; a kernel of this length takes 0.2 GB when it is tabulated."""
 
 PASSBAND = 0.8
 """Part of the lower Nyquist frequency up to which resampling keeps what there is."""

@@ -32,6 +32,7 @@ from seakeep.signals.calculus import linear_prediction, predicted, predicted_ext
 from seakeep.signals.lags import as_pair, correlation_peak, parabola_peak
 from seakeep.signals.leakage import is_regular
 from seakeep.signals.waves import encounter_period, welch_segments
+from seakeep.sizes import MOST_AHEAD, MOST_PADDING, MOST_PLACES, MOST_TERMS, check_size
 from seakeep.waves import group_speed, phase_speed, wavenumber
 
 __all__ = [
@@ -248,8 +249,6 @@ ENERGY = 0.01
 """Frequencies with less than this part of the greatest cross-spectrum are noise."""
 PLACES, FINER = 16, 20
 """Places tried in a shortest wavelength, and again between two of them around the best."""
-MOST_PLACES = 100_000
-"""Places tried at most: some 6,000 of the shortest wavelengths."""
 LEAST_WAVES = 20
 """Fewer waves in a record cover too few of the sea's frequencies."""
 LEAST_CORRELATION = 0.8
@@ -544,12 +543,6 @@ def _highest(places: FloatArray, values: FloatArray) -> float:
 WAVE_SHARE = 0.999
 """Waves are what lies below the frequency that holds this part of a record's variance."""
 
-MOST_TERMS = 4000
-"""Polynomials in the distance: each takes as much memory as the record."""
-
-MOST_SAMPLES = 10_000_000
-"""Samples by which a record is continued at either end: 80 MB each."""
-
 
 @dataclass(frozen=True, eq=False)
 class CarriedElevation:
@@ -734,10 +727,6 @@ encounter periods is 0.53 SD with one half of a period, 0.43 with one, 0.38 with
 four."""
 
 
-MOST_AHEAD = 1_000_000
-"""Samples that are predicted at most: the prediction fades within some periods."""
-
-
 def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     """Continue elevations by linear prediction, each from its own record.
 
@@ -776,11 +765,8 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     """
     array = as_series(series, minimum=4, channels=True)
     number_of = whole_number(count, "count")
-    if number_of > MOST_AHEAD:
-        raise RequestError(
-            f"count = {number_of} samples ahead; waves are predicted over some periods, and "
-            f"{MOST_AHEAD} samples at most. Give fewer."
-        )
+    check_size("waves are predicted over some periods, and count =", number_of, MOST_AHEAD,
+               "samples", "Give fewer.")  # fmt: skip
     flat = array.reshape(array.shape[0], -1)
     out = np.empty((number_of, flat.shape[1]))
     for column, values in enumerate(flat.T):
@@ -912,11 +898,8 @@ def _carried(
 
 def _continued(deviations: FloatArray, delay: float, period: float) -> tuple[FloatArray, int]:
     """Lengthen at both ends by predicted waves that fade out once no delay reaches them."""
-    if not delay + period < MOST_SAMPLES:
-        raise RequestError(
-            f"the slowest waves take {delay:.3g} samples over the distance; at most "
-            f"{MOST_SAMPLES} are allowed. Correct the distance (m), or resample to a larger step."
-        )
+    check_size("the slowest waves take, over the distance,", delay + period, MOST_PADDING,
+               "samples", "Correct the distance (m), or resample to a larger step.")  # fmt: skip
     kept, fading = int(np.ceil(delay + period)), int(np.ceil(4.0 * period))
     order = min(int(np.ceil(2.0 * period)), 500)
     padding = kept + fading

@@ -13,6 +13,7 @@ import scipy
 from seakeep.arrays import FloatArray, IntArray, as_series, positive
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import parabola_peak
+from seakeep.sizes import MOST_TRANSFORM, check_size
 
 __all__ = [
     "WaveStatistics",
@@ -51,9 +52,6 @@ class WaveStatistics:
     zero_crossing_period: float
     moment_period: float
 
-
-LONGEST_TRANSFORM = 2**24
-"""Points of a padded transform: 0.3 GB; the paper takes 2**16."""
 
 STILL = 0.2
 """Running standard deviation, as a part of the waves', below which water counts as still."""
@@ -375,11 +373,7 @@ def wave_spectrum(
             f"the transform must be at least as long as a segment ({length} samples); received "
             f"{padded}. Lengthen it, or leave it out."
         )
-    if padded is not None and padded > LONGEST_TRANSFORM:
-        raise RequestError(
-            f"a transform of padded = {padded} points takes too much memory; at most "
-            f"{LONGEST_TRANSFORM} are allowed."
-        )
+    check_size("padded =", padded or 0, MOST_TRANSFORM, "points", "Pad less.")
     frequency, density = scipy.signal.welch(
         x, rate, window=window, nperseg=length, noverlap=shared, nfft=padded
     )

@@ -13,6 +13,7 @@ import xarray as xr
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models.executor import WorkerLostError, as_finished
+from seakeep.sizes import LONG_CELLS, MOST_CELLS, check_size
 from seakeep.study.describe import describe_study, words_of_repeats
 from seakeep.study.judge import judge, words_of_lost
 from seakeep.study.plan import Plan, make_plan, training_samples, warn_of_slow_study
@@ -93,12 +94,13 @@ def run_study(
         study, lambda done, total, name: report(done, total, f"preparing {name}")
     )
     warn_of_slow_study(plan, runs)
+    taken = _taken(plan)
     folder.open(study.name)
     with folder.alone():
         found = _finished(study, out, report)  # by another process, meanwhile
         if found is None:
             units = units_of(plan)
-            _compute_all(plan, runs, folder, units, executor, report)
+            _compute_all(plan, runs, folder, units, executor, report, taken)
             report(len(units), len(units), "statistics and densities")
             groups = describe_study(study, plan, runs)
             if "repeats" in groups:
@@ -175,6 +177,21 @@ def _conditional(plan: Plan) -> str:
     return ", ".join(dict.fromkeys(read))
 
 
+def _taken(plan: Plan) -> str:
+    """Say how much will be forecast; refuse what ends in no week, and warn of hours."""
+    members = sum(each.n_members for each in plan.models.values())
+    windows = [each for test in plan.tests.values() for each in test]
+    judged = [each.steps for t in plan.training for each in windows if t.may_test(each.run)]
+    check_size(
+        f"{len(plan.models)} models of {members} members in all (models.NAME.n_members), "
+        f"{len(plan.training)} training sets (training.windows) and {len(windows)} windows "
+        "(tests.NAME.windows) make", members * len(judged), MOST_CELLS, "forecasts",
+        "Lower one of the keys in brackets.", LONG_CELLS,
+    )  # fmt: skip
+    mebibytes = 8 * members * sum(judged) * len(plan.states) / 2**20
+    return f"{members * len(judged)} forecasts of {mebibytes:.3g} MiB"
+
+
 def _compute_all(
     plan: Plan,
     runs: Mapping[str, xr.Dataset],
@@ -182,13 +199,14 @@ def _compute_all(
     units: list[Unit],
     executor: Executor | None,
     report: Progress,
+    taken: str,
 ) -> None:
     left = [unit for unit in units if not folder.has(unit.name)]
     choices = {unit: choice_of(plan, unit) for unit in left}
     todo = [each for each in dict.fromkeys(choices.values()) if each is not None]
     todo = [each for each in todo if not folder.has(each.name)]
     done, total = len(units) - len(left), len(units) + len(todo)
-    report(done, total, "fitting and forecasting")
+    report(done, total, f"fitting and forecasting, {taken}")
     # What is chosen serves several models: it comes first, with the units that need no choice.
     first = [*todo, *(unit for unit in left if choices[unit] is None)]
     then = [unit for unit in left if choices[unit] is not None]

@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from seakeep.campaign.settings import ChannelName, RunName
 from seakeep.errors import RequestError
+from seakeep.sizes import MOST_LAGS, MOST_PRODUCTS, MOST_STEPS, too_large
 from seakeep.tank.moorings import LineSettings
 from seakeep.toml import Count, Finite, Mistake, NotNegative, Pair, Positive, Table, validated
 from seakeep.toml import read_toml as read_table
@@ -40,13 +41,6 @@ Logger = Literal["wave_probes", "mru", "loads", "video"]
 Below = Annotated[float, Field(lt=0, ge=-1e4)]
 Panels = Annotated[int, Field(ge=4, le=100)]
 Depth = Annotated[float, Field(ge=0.01, le=1e4, description="a depth of 0.01 to 10 000 m")]
-
-SAMPLES = 10_000_000
-"""Samples per column of a raw file, and steps of a simulated run, at most: 80 MB per column."""
-PRODUCTS = 2e10
-"""Samples times wave components at most: some minutes of work per wave probe."""
-LAGS = 20_000
-"""Steps of the radiation kernel at most."""
 
 
 class PoolGeometry(Table):
@@ -283,34 +277,27 @@ class TankSettings(Table):
 def _too_large(settings: TankSettings) -> Iterator[Mistake]:
     """What would take more memory or time than a virtual campaign should."""
     simulation = settings.simulation
-    if simulation.kernel_length > LAGS * simulation.step:
-        yield Mistake(
-            ("simulation", "kernel_length"),
-            f"{simulation.kernel_length:g} s are more than {LAGS} steps of {simulation.step:g} s. "
-            "Shorten the kernel, or take a larger step.",
-        )
+    step = f"steps of simulation.step = {simulation.step:g} s"
+    mend = "Shorten the kernel, or take a larger step."
+    lags = simulation.kernel_length / simulation.step
+    if words := too_large(f"{simulation.kernel_length:g} s are", lags, MOST_LAGS, step, mend):
+        yield Mistake(("simulation", "kernel_length"), words)
     for name, run in settings.runs.items():
-        if run.length > SAMPLES * simulation.step:
-            yield Mistake(
-                ("runs", name, "duration"),
-                f"{run.length:g} s with the start-up are more than {SAMPLES} steps of "
-                f"simulation.step = {simulation.step:g} s. Shorten the run, or take a larger step.",
-            )
+        asked, mend = f"{run.length:g} s with the start-up are", "Shorten the run, or take a larger"
+        steps = run.length / simulation.step
+        if words := too_large(asked, steps, MOST_STEPS, step, f"{mend} step."):
+            yield Mistake(("runs", name, "duration"), words)
         for logger, clock in settings.instruments.clocks.items():
-            if clock.rate * run.length > SAMPLES:
-                yield Mistake(
-                    ("instruments", "clocks", logger, "rate"),
-                    f"{clock.rate:g} Hz make {clock.rate * run.length:.2g} samples of run {name} "
-                    f"({run.length:g} s); {SAMPLES} at most. Lower the rate, or shorten the run.",
-                )
+            asked, mend = f"{clock.rate:g} Hz make", "Lower the rate, or shorten the run."
+            samples, what = clock.rate * run.length, f"samples of run {name} ({run.length:g} s)"
+            if words := too_large(asked, samples, MOST_STEPS, what, mend):
+                yield Mistake(("instruments", "clocks", logger, "rate"), words)
         count = 3 if run.spectrum is None else run.spectrum.components
         finest = max(settings.instruments.clocks["wave_probes"].rate, 1.0 / simulation.step)
-        if count * finest * run.length > PRODUCTS:
-            yield Mistake(
-                ("runs", name, "spectrum", "components"),
-                f"{count} components at {finest * run.length:.2g} instants are too many. Take "
-                "fewer components, or shorten the run.",
-            )
+        asked, mend = f"{count} components make", "Take fewer components, or shorten the run."
+        products, what = count * finest * run.length, "values of wave components"
+        if words := too_large(asked, products, MOST_PRODUCTS, what, mend):
+            yield Mistake(("runs", name, "spectrum", "components"), words)
 
 
 def validate_tank(table: dict[str, Any], source: Path | str = "the tank settings") -> TankSettings:

@@ -1,0 +1,103 @@
+"""Sizes, judged before the work: what a request would take, and the most that is allowed.
+
+Bounds are of requests that no measurement needs, not of machines: the same file is refused
+everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+from seakeep.errors import RequestError, SeakeepWarning
+
+__all__ = ["check_numbers", "check_size", "most_bytes", "too_large"]
+
+MOST_NUMBERS = 250_000_000
+"""Numbers that a run, or the redrawn series of a bootstrap, hold at once: 1907 MiB."""
+LONG_NUMBERS = 50_000_000
+"""Numbers of a run that take some minutes to prepare."""
+MOST_CHANNELS = 1000
+"""Channels of a campaign: each is checked, drawn and written, some hundredths of a second long."""
+MOST_MEMBERS, LONG_MEMBERS = 1_000_000, 100_000
+"""Members of an ensemble: their list of draws alone fills the memory, or a fit takes an hour."""
+MOST_CELLS, LONG_CELLS = 100_000_000, 1_000_000
+"""Forecasts of a study, each of some milliseconds: a week of work, or hours."""
+MOST_SERIES = 100_000
+"""Redrawn series of a study: 400 MB of densities."""
+MOST_TAPS = 100_000
+"""Forty times the paper's filter; a kernel of this length takes 0.2 GB when it is tabulated."""
+MOST_TRANSFORM = 2**24
+"""Points of a padded transform: 0.3 GB; the paper takes 2**16."""
+MOST_BINS = 2**21
+"""Bins of a density, and points of a grid, that fit into 16 MB; finer ones are summed directly."""
+MOST_PLACES = 100_000
+"""Places at which the distance of two probes is looked for: 6000 of the shortest wavelengths."""
+MOST_TERMS = 4000
+"""Polynomials in the distance of a carried wave: each takes as much memory as the record."""
+MOST_PADDING = 10_000_000
+"""Samples by which a record is continued at either end: 80 MB each."""
+MOST_AHEAD = 1_000_000
+"""Samples of waves that are predicted: the prediction fades within some periods."""
+MOST_STEPS = 10_000_000
+"""Samples per column of a raw file of the tank, and steps of a simulated run: 80 MB per column."""
+MOST_PRODUCTS = 2e10
+"""Samples times wave components of the tank: some minutes of work per wave probe."""
+MOST_LAGS = 20_000
+"""Steps of the tank's radiation kernel."""
+
+FREE = 2**28
+"""Bytes that a file may unpack to, for any size of the file."""
+EXPANSION = 100
+"""Times its own size that a larger file may unpack to; tables of numbers reach 10, constants 50."""
+
+
+def too_large(asked: str, count: float, most: float, what: str, mend: str) -> str | None:
+    """Words for a request beyond its bound; None where it is within, and for NaN it is not."""
+    if count <= most:
+        return None
+    shown = str(count) if isinstance(count, int) and count < 10**9 else f"{float(count):.3g}"
+    return f"{asked} {shown} {what}; at most {most:.12g} are allowed. {mend}"
+
+
+def check_size(
+    asked: str, count: float, most: float, what: str, mend: str, long: float = math.inf
+) -> None:
+    """Refuse what is too large before it takes memory, and warn of what takes long.
+
+    Parameters
+    ----------
+    asked : str
+        The key or argument that asks for it, its value, and a verb: ``"n_members = 9 takes"``.
+    count, most : float
+        How many of them it takes, and how many are allowed.
+    what : str
+        What is counted.
+    mend : str
+        The remedy.
+    long : float, optional
+        The count from which a warning is given.
+
+    Raises
+    ------
+    RequestError
+        If the count is beyond the most that is allowed.
+    """
+    if words := too_large(asked, count, most, what, mend):
+        raise RequestError(words)
+    if count > long:
+        warnings.warn(
+            f"{asked} {count:.3g} {what}, which takes long. {mend}", SeakeepWarning, stacklevel=3
+        )
+
+
+def check_numbers(asked: str, count: float, mend: str, long: float = math.inf) -> None:
+    """Refuse, as :func:`check_size`, numbers that take too much memory; stated in MiB."""
+    mebibytes = 8 / 2**20
+    check_size(asked, mebibytes * count, round(mebibytes * MOST_NUMBERS), "MiB", mend,
+               mebibytes * long)  # fmt: skip
+
+
+def most_bytes(stored: int) -> int:
+    """Bytes that so many stored bytes may unpack to."""
+    return max(FREE, EXPANSION * stored)

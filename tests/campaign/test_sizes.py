@@ -1,0 +1,78 @@
+"""What would take more memory than there is, is refused before it does."""
+
+import numpy as np
+import pytest
+
+from seakeep import BayesianHankelDMDc, Fixed, read_campaign, signals, statistics
+from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.study.settings import StudySettings
+from seakeep.toml import validated
+from seakeep.waves import wavenumber
+
+X = np.sin(np.arange(0, 60, 0.05))
+STUDY = {"study": {"campaign": "c.toml"}, "statistics": {"n_series": 10**8}}
+RNG = np.random.default_rng
+
+
+def ensemble(members):
+    return BayesianHankelDMDc(2.0, *[Fixed(2.0)] * 4, n_members=members)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: signals.low_pass(X, 0.05, 1.0, 1.0 + 1e-9), r"passband|stopband.* taps; at most"),
+        (lambda: signals.lowpass_taps(500.0, 10.0, 10.0001), "Move stopband away from passband"),
+        (lambda: signals.lowpass_taps(20.0, 1.0, 2.0, 1e9), "taps; at most 100000 are allowed"),
+        (
+            lambda: signals.resample(
+                X, np.arange(1200), np.arange(10, 900, 1.5), passband=1 - 1e-9
+            ),
+            "taps; at most .* or lower passband",
+        ),
+        (
+            lambda: signals.resample(X, np.arange(1200), np.arange(9, 90, 1.5), passband=2),
+            "fraction of",
+        ),
+        (lambda: signals.integrate(X, 0.05, (1e-9, 1.0)), r"lower edge .*1e-09 Hz.* period of"),
+        (lambda: signals.complementary_filter(X, X, 0.05, 1e-9), r"the crossover \(1e-09 Hz\)"),
+        (lambda: signals.delay_by_celerity(X, 0.05, 1e6, 1e-3), "Correct the distance"),
+        (lambda: signals.delay_by_dispersion(X, 0.05, 1e9, 3.6), "Correct the distance"),
+        (
+            lambda: signals.wave_spectrum(X, 0.05, padded=10**12),
+            r"padded = 1e\+12 points; at",
+        ),
+        (
+            lambda: statistics.moving_block_bootstrap(X, 10**8, 9, RNG(0)),
+            r"n_series = 100000000 series of 1200 samples take 9.16e\+05 MiB; at most 1907",
+        ),
+        (
+            lambda: statistics.density_grid(X, points=10**9),
+            r"points = 1e\+09 points of a",
+        ),
+        (
+            lambda: ensemble(10**8),
+            "n_members = 100000000 members; at most",
+        ),
+        (lambda: validated(StudySettings, STUDY, "s", "study"), "n_series: received 100000000"),
+        (lambda: signals.predict_waves(X, 10**12), r"count = 1e\+12 samples; at most"),
+        (lambda: wavenumber(2.0, 1e100), "depth must be .* between 1e-09 and 1e"),
+        (lambda: wavenumber(2.0, 1e-308), "depth must be .* between 1e-09 and 1e"),
+    ],
+)
+def test_sizes_are_judged_first(call, message):
+    with pytest.raises(RequestError, match=message):
+        call()
+
+
+@pytest.mark.parametrize("key", ["sampling_rate", "steps_per_period"])
+def test_a_rate_that_fills_the_memory_is_refused_by_its_key(edited, key):
+    path = edited(("sampling_rate = 10", f"{key} = 10000000"))
+    message = rf"preparation\.{key} = 1e\+07: .* samples of run 'first' .* MiB; at most 1907"
+    with pytest.raises(RequestError, match=message):
+        read_campaign(path).prepare(["first"])
+
+
+def test_what_takes_long_is_said_before():
+    with pytest.warns(SeakeepWarning, match=r"n_members = 2e\+05 members, which takes long"):
+        ensemble(200_000)
