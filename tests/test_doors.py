@@ -151,7 +151,7 @@ def test_a_model_a_figure_and_a_section_in_the_report_of_a_study(add, run, tmp_p
 
 
 def test_the_page_names_the_rooms_of_the_house():
-    table = PAGE[PAGE.index("| room, from the top |") : PAGE.index("Where this differs")]
+    table = PAGE[PAGE.index("| room, from the top |") : PAGE.index("Reasons for this order")]
     rows = [line.split("|")[1] for line in table.splitlines()[2:] if line.startswith("|")]
     named = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
     source = ROOT / "src/seakeep"
