@@ -1,6 +1,6 @@
 """Data-driven models of vessels in waves: Hankel dynamic mode decomposition with control.
 
-The public names are listed in ``__init__.pyi``; each room is imported when a name of it is used.
+``__init__.pyi`` lists the public names. A module is imported when one of its names is first used.
 """
 
 from importlib import metadata

@@ -1,4 +1,4 @@
-"""Arrays and numbers of the public functions: their types, and the door that checks them.
+"""Types and checks of the arrays and numbers that public functions take.
 
 Every public function passes its arrays through :func:`as_real` or :func:`as_series`, which refuse
 what is not an array of real numbers: masked values, complex numbers, dates, text, Datasets and rows

@@ -1,6 +1,6 @@
-"""Vocabulary: canonical channels with their units and symbols, and the units we understand.
+"""Canonical channels with their units and symbols, and the units that seakeep knows.
 
-Inside seakeep everything is in SI units and radians; :func:`conversion` is the door.
+Inside seakeep everything is in SI units and radians; :func:`conversion` converts to them.
 Frame: x along the direction in which the waves run, z up, angles right-handed about the axes
 (a positive pitch lifts the bow, which points against the waves).
 """

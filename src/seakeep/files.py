@@ -1,4 +1,4 @@
-"""Files: only regular ones are read, and they are written whole or not at all."""
+"""Reading of regular files, and writing of files that appear whole or not at all."""
 
 from __future__ import annotations
 

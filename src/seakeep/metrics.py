@@ -2,8 +2,8 @@
 
 All take ``predicted=`` and ``measured=`` by keyword, in the same units. Arrays are
 ``(…, time, channel)``. With Datasets the channels of `predicted` are judged at its instants, each
-against the variable of the same name in `measured`; words, such as the status of an ensemble's
-members, are not channels. Per-channel measures come back as a Dataset of numbers. A channel whose
+against the variable of the same name in `measured`; text, such as the status of an ensemble's
+members, is not judged. Measures per channel return a Dataset of numbers. A channel whose
 measured standard deviation in the window is below 1 % of its training standard deviation (a slack
 line), or more than half of whose variance is noise, is NaN and left out of averages; forecasts
 carry the training standard deviation in the attribute ``training_std`` of each channel, prepared
@@ -12,12 +12,10 @@ runs that of the noise in ``noise_std``.
 With ``interval=0.95`` a measure gives the bounds of its interval instead of its value, along a
 first axis (lower, upper; of Datasets the dimension ``bound``). Predicted and measured samples are
 redrawn together in blocks as long as the errors depend on one another (Politis and White), with the
-same draws for the same call; quantiles are taken further out for few blocks. It is how sure the
-value is in a longer record of this run and this model, not over runs or training sets:
-:func:`seakeep.statistics.two_way_interval`. Extremes (NAMMAE) are redrawn from what was seen, so
-that their bounds are rough.
-
-A measure is one function of arrays in :mod:`seakeep.core.metrics`, and one line here.
+same draws for the same call; quantiles are taken further out for few blocks. The interval states
+the uncertainty of the value for a longer record of this run and this model. For the uncertainty
+over runs and training sets see :func:`seakeep.statistics.two_way_interval`. Extremes (NAMMAE) are
+redrawn from the measured ones, so that their bounds are rough.
 """
 
 from __future__ import annotations

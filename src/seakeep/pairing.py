@@ -1,4 +1,4 @@
-"""Datasets side by side: the channels of the first, each against that of its name in the others."""
+"""Pairs of channels: those of one Dataset, each with that of the same name in others."""
 
 from __future__ import annotations
 

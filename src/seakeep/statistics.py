@@ -2,8 +2,8 @@
 
 Series are arrays or one-dimensional DataArrays of uniform samples without gaps.
 :func:`moving_block_bootstrap`, :func:`jsd_interval` and :func:`coverage` take Datasets too, channel
-by channel; words, such as the status of an ensemble's members, are not channels. Every draw comes
-from the `numpy.random.Generator` that is passed.
+by channel; text, such as the status of an ensemble's members, is left out. All draws come from the
+`numpy.random.Generator` that is passed.
 """
 
 from __future__ import annotations

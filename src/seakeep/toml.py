@@ -1,7 +1,7 @@
-"""Read our TOML files (campaign, study, tank), with one set of messages about what is wrong.
+"""Reader of TOML files (campaign, study, tank), with one set of messages for mistakes.
 
-A file is described by pydantic tables derived from :class:`Table`. The description of each field
-is the remedy that a message proposes. Lengths in encounter periods are :class:`Length`.
+Pydantic tables derived from :class:`Table` describe a file. The description of a field
+is the remedy in a message. Lengths in encounter periods are :class:`Length`.
 """
 
 from __future__ import annotations

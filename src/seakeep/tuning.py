@@ -1,4 +1,4 @@
-"""``seakeep.tune``: settings chosen by free runs on training runs that are held out."""
+"""``seakeep.tune``: choice of settings by free runs on held-out training runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Campaigns: from a TOML file and raw recordings to analysis-ready runs."""
+"""Campaigns: a TOML file and raw recordings become analysis-ready runs."""
 
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.live_chain import LiveChain

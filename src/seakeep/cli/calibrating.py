@@ -73,8 +73,8 @@ def calibrate(
         str,
         typer.Option(
             "--scale",
-            help="What the half-width follows: 'spread', a factor times that of the members with a "
-            "floor, 'constant', the members' band moved outwards by as much everywhere, or "
+            help="Half-width of the band: 'spread', a factor times that of the members with a "
+            "floor, 'constant', the members' band moved outwards by the same amount everywhere, or "
             "'learnt' from spread, horizon and waves.",
         ),
     ] = "spread",
@@ -82,8 +82,8 @@ def calibrate(
         str | None,
         typer.Option(
             "--folds",
-            help="'run': each run that trains is forecast by the members as they learn from the "
-            "other runs; by default only windows that no member has read count.",
+            help="'run': members trained on the other runs forecast each training run; by default "
+            "only windows that no member has read count.",
         ),
     ] = None,
     workers: Workers = None,
@@ -91,10 +91,9 @@ def calibrate(
 ) -> None:
     """Calibrate the band of an ensemble on measured windows.
 
-    Makes a band that holds the stated share of the measurement, in the sea of these runs.
+    The calibrated band holds the stated share of the measurement, in the sea of these runs.
     The ensemble forecasts windows, end to end, that no member has read; a quantile of its errors
-    there makes the band (split-conformal prediction). Leave out what the ensemble is to be judged
-    on.
+    there gives the band (split-conformal prediction). Judge the band on other windows.
 
     Example: seakeep calibrate ensemble.nc docs/tutorial/campaign.toml --run unseen --stop 60
     --steps 200 -o calibrated.nc

@@ -86,8 +86,8 @@ def prepare(
         typer.Option(
             "-o",
             "--out",
-            help="Folder; by default 'prepared' beside the campaign, the only one in which fit, "
-            "forecast and compare look.",
+            help="Folder; by default 'prepared' beside the campaign, the only folder that fit, "
+            "forecast and compare read.",
         ),
     ] = None,
     anew: Annotated[
@@ -101,11 +101,11 @@ def prepare(
 
     Raw files become analysis-ready runs, one NetCDF file each.
 
-    Each run is written as soon as it is done: after an interruption, the same command continues.
-    A run that cannot be read is reported at the end, with exit status 1, after all others.
+    Each run is written when it is finished: after an interruption, the same command continues.
+    A run that cannot be read is reported at the end, with exit status 1.
 
-    fit, forecast and compare use these files while they are fresh (same settings, same raw
-    files), and prepare in memory what is missing.
+    fit, forecast and compare use these files while settings and raw files are unchanged, and
+    prepare missing runs in memory.
 
     Example: seakeep prepare docs/tutorial/campaign.toml
     """

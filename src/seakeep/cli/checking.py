@@ -19,16 +19,19 @@ def check(
     campaign: CampaignFile,
     run: Annotated[
         list[str] | None,
-        typer.Option("--run", help="Name of a run (repeatable); by default all that serve."),
+        typer.Option(
+            "--run", help="Name of a run (repeatable); by default all that a check can use."
+        ),
     ] = None,
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Folder for the page, its figures and tables.")
     ] = Path("check"),
 ) -> None:
-    """Say what a model is worth: a page with figures and tables.
+    """Compare a model with the measured vessel, on one page.
 
-    Its response to waves beside the measured one, with uncertainties, and what its inputs can tell
-    of each state at all. What the runs cannot tell is named, with the reason.
+    The page shows the model's response to waves beside the measured one, with uncertainties, its
+    error beside the least error that its inputs allow, and its modes, residuals and statistics.
+    It names the checks that these runs do not allow, with the reason.
 
     Example: seakeep check model.nc docs/tutorial/campaign.toml -o check
     """

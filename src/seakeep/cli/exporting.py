@@ -49,9 +49,9 @@ def export(
 ) -> None:
     """Write a model for another host: C, FMU, ONNX, MATLAB.
 
-    All of them take waves that are aligned already, if the model aligns them, and compute what
-    forecast_arrays does. The FMU holds its C sources, and a binary for this platform where a C
-    compiler is found.
+    The exported model computes the same as forecast_arrays. If the model has an alignment, pass
+    aligned waves. The FMU holds its C sources, and a binary for this platform if a C compiler is
+    found.
 
     Example: seakeep export model.nc --c library --fmu model.fmu
     """

@@ -50,9 +50,9 @@ def fit(
 ) -> None:
     """Identify a model, or an ensemble, from a campaign.
 
-    Reads the runs that train. The table [model] sets the kind of model and its settings:
+    The table [model] of the campaign file states the kind of model and its settings;
     kind = 'bayesian_hankel_dmdc' is an ensemble. A table with states and inputs alone takes the
-    preset recommended: what is tried on training runs that are held out is printed with the choice.
+    preset recommended, which chooses settings on held-out training runs and prints what it tried.
 
     Example: seakeep fit docs/tutorial/campaign.toml -o model.nc
 
@@ -112,8 +112,8 @@ def forecast(
 ) -> None:
     """Forecast a run from START, driven by measured waves.
 
-    The model runs freely after START; no measured state is read there.
-    For an ensemble, mean, standard deviation and band of its members are written.
+    The model runs freely after START and reads no measured state there.
+    For an ensemble, the result is mean, standard deviation and band of its members.
 
     Example: seakeep forecast model.nc docs/tutorial/campaign.toml --run unseen --start 20
     --steps 400 -o forecast.csv
@@ -234,17 +234,17 @@ def compare(
         bool,
         typer.Option(
             "--nowcast",
-            help="Play the runs to the models sample by sample, without waves to come, and judge "
-            "skill against lead time (--steps: the longest).",
+            help="Follow the runs sample by sample, without future waves, and judge the error "
+            "against lead time (--steps: the longest).",
         ),
     ] = False,
 ) -> None:
     """Judge forecasts of test runs against the measurement.
 
-    Prints a table per run and writes it as CSV, with an overlay figure per run. For an ensemble the
-    members' mean is judged, and how much of the measurement their band holds. Several models are
-    judged over the same instants, with the change of the error from the first one, its interval,
-    and a figure of the errors by wave period.
+    Prints tables per run and writes them as CSV, with an overlay figure per run. Of an ensemble,
+    the mean and the coverage of the band are judged. Several models are judged over the same
+    instants, with the change of the error from the first one, its interval, and a figure of the
+    errors by wave period.
 
     Example: seakeep compare model.nc docs/tutorial/campaign.toml -o comparison
 

@@ -77,7 +77,7 @@ Scheduler = Annotated[
     str | None,
     typer.Option(
         "--scheduler",
-        help="Scheduler of a running Dask cluster that does the work instead: tcp://HOST:8786.",
+        help="Scheduler of a running Dask cluster to use instead: tcp://HOST:8786.",
         metavar="ADDRESS",
     ),
 ]

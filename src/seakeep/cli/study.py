@@ -45,9 +45,8 @@ def study(
 ) -> None:
     """Run a study and write its report.
 
-    Each model is fitted on each training set and judged in each test window.
-
-    A study that was stopped continues where it stopped: run the same command again.
+    Each model is fitted on each training set and judged in each test window. After an
+    interruption, the same command continues the study.
 
     Example: seakeep study examples/ntnu_ship_section/study.toml -o ship-study
     """
@@ -79,7 +78,7 @@ def _write_study(_: Path, found: StudyResult) -> Path:
 def reproduce(
     out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("reproduction"),
     quick: Annotated[
-        bool, typer.Option("--quick", help="All stages with small counts, in a minute.")
+        bool, typer.Option("--quick", help="All stages with small counts, in about a minute.")
     ] = False,
     preset: Annotated[
         str | None,
@@ -94,8 +93,9 @@ def reproduce(
 ) -> None:
     """Reproduce the paper's study on the virtual tank, in three acts.
 
-    Needs no data. The paper's procedure, the same on channels with their slow drift, and the
-    recommended model, all on the same six runs; statistics, figures, tables and a report.
+    Simulates six runs, and runs three studies of them: the paper's procedure, the same on channels
+    with their slow drift, and the recommended model. Writes statistics, figures, tables and a
+    report.
 
     Example: seakeep reproduce --quick --out quick
     """

@@ -57,8 +57,8 @@ def tank(
 ) -> None:
     """Play a virtual campaign: raw files and campaign.toml.
 
-    Raw files look like those of a towing tank. The folder truth holds the true motions; no command
-    that identifies models reads it.
+    Raw files are like those of a towing tank. The folder truth holds the true motions; no command
+    reads it to identify a model.
 
     Example: seakeep tank --out virtual --seed 0
     """

@@ -34,7 +34,7 @@ def track(
     ] = None,
     sheet: Annotated[
         Path | None,
-        typer.Option("--contact-sheet", help="PNG: frames with what was tracked, the worst too."),
+        typer.Option("--contact-sheet", help="PNG of tracked frames, including the worst."),
     ] = None,
     metres_per_pixel: Annotated[
         float | None,
@@ -116,9 +116,9 @@ def track(
 ) -> None:
     """Track surge, heave and pitch of a vessel in a video.
 
-    A white panel on the vessel is found in each frame, with a quality per frame.
+    Finds a white panel on the vessel in each frame, and states the quality of each frame.
     x points downstream, z up, pitch is positive bow up. Flagged frames (occluded, overexposed,
-    lost …) give no motion unless --bridge is asked for. Needs the extra 'video'.
+    lost …) give no motion unless --bridge is given. Needs the extra 'video'.
 
     Example: seakeep track side_view.mp4 -o track.csv --contact-sheet sheet.png
     """

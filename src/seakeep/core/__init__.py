@@ -1,4 +1,4 @@
-"""The mathematics of the method: arrays in, arrays out, numpy and scipy only."""
+"""Mathematics of the method, on arrays, with NumPy and SciPy only."""
 
 import numpy as np
 

@@ -1,7 +1,7 @@
-"""Files in, columns out: one reader per kind of file, chosen by its first bytes, then its suffix.
+"""Readers of measured files, one per format, chosen by the first bytes of a file, then its suffix.
 
-A reader takes a path and :class:`Options` and returns :class:`Columns`. One line in :data:`READERS`
-makes it known.
+A reader takes a path and :class:`Options` and returns :class:`Columns`. :data:`READERS` lists the
+readers.
 """
 
 from __future__ import annotations

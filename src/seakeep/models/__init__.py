@@ -1,4 +1,4 @@
-"""Models: what is identified from prepared runs, and what it forecasts."""
+"""Models identified from prepared runs, ensembles of them, and their forecasts."""
 
 from seakeep.models.ensemble import BandForecast, HankelEnsemble, HeldEnsemble
 from seakeep.models.executor import processes

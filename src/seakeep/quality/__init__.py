@@ -1,4 +1,4 @@
-"""Checks of runs: they report findings and change no value."""
+"""Checks of the channels of a run, which report findings and change no value."""
 
 from collections.abc import Callable, Collection, Iterable
 

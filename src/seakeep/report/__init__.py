@@ -1,1 +1,1 @@
-"""Figures and tables; the only rooms that know matplotlib."""
+"""Figures, tables and pages; the only package that imports matplotlib."""

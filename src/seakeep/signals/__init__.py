@@ -1,4 +1,4 @@
-"""The measurement chain: functions on sampled series, each usable alone.
+"""The measurement chain: independent functions on sampled series.
 
 Series are arrays with time along the first axis; instants and steps are in seconds, frequencies
 in hertz. Only the tracking of a video reads a file.

@@ -1,6 +1,6 @@
-"""Studies, from campaign to judgement: settings, plan, run (one file per unit), judge.
+"""Studies: every model, trained on every training set, judged in every test window.
 
-The public names are listed in ``__init__.pyi``; a module is imported when a name of it is used.
+``__init__.pyi`` lists the public names. A module is imported when one of its names is first used.
 """
 
 import lazy_loader
