@@ -86,7 +86,7 @@ def test_waves_outside_the_training_are_named(model, train):
     found = check.validity(model, runs)
     told = dict(zip(found.run.values, found.outside.values, strict=True))
     assert told["train"] == told["alike"] == ""
-    assert "height 0.08 m, trained up to 0.04 m" in told["steep"]
+    assert "a height of 0.08" in told["steep"]
     assert "outside the periods that trained the model" in told["short"]
     assert "steepness" in told["short"]
     assert found.height.sel(run="train", part="train") == pytest.approx(0.04, rel=0.01)

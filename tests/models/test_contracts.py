@@ -12,7 +12,15 @@ from drifting import INPUTS, STATES, drifting_run
 
 import seakeep
 from seakeep import BayesianHankelDMDc, DataError, HankelDMDc, RequestError, SeakeepWarning, Uniform
-from seakeep.models import KINDS, HankelDMDcModel, HankelEnsemble, compare_waves, inputs, load_model
+from seakeep.models import (
+    KINDS,
+    HankelDMDcModel,
+    HankelEnsemble,
+    compare_waves,
+    inputs,
+    load_model,
+    outside_training,
+)
 from seakeep.models.engine import group_series, read_groups
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.observables import OBSERVABLES, Bound
@@ -350,6 +358,20 @@ class TestWaves:
         fitted = ensemble().fit(sea(), ["heave"], ["eta"])
         (waves,) = compare_waves(fitted, sea(seed=3), 20.0, 300)
         assert not waves.is_untrained
+        assert outside_training(fitted, sea(seed=3), 20.0, 300) == []
+
+    def test_higher_waves_and_a_drift_are_outside(self, tmp_path):
+        run = self.regular(2.0).rename(heave="surge")
+        model = HankelDMDc(2, 8, 1.0).fit(run, ["surge"], ["eta"])
+        model = load_model(model.save(tmp_path / "m.nc"))
+        # A regular wave is two amplitudes high; g T²/2π is 6.25 m.
+        assert outside_training(model, 1.5 * run, 20.0, 600) == [
+            "eta: a height of 3, trained up to 2",
+            "eta: a steepness in deep water of 0.48, trained up to 0.32",
+        ]
+        (told,) = outside_training(model, run.assign(surge=run.surge - 3), 20.0, 600)
+        assert told == "a mean surge of -3 m, upstream of the trained -1 to 1 m"
+        assert outside_training(model, 1.5 * run, 20.0, 90) == []  # four waves are no sea
 
 
 class TestUnitsAndNumbers:

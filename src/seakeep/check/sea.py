@@ -10,14 +10,11 @@ import xarray as xr
 from seakeep.check.parts import is_regular, reference_probe, used_parts
 from seakeep.core.harmonics import dominant_frequency
 from seakeep.errors import DataError
-from seakeep.models import Model, compare_waves
+from seakeep.models import Model, outside_training
 from seakeep.signals import encounter_period
 from seakeep.waves import wavenumber
 
 __all__ = ["validity"]
-
-MARGIN = 1.1
-"""Times the highest or steepest training waves from which on a test lies outside."""
 
 
 def validity(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
@@ -49,7 +46,7 @@ def validity(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     reference = reference_probe(model, runs)
     surge = model.states.index("surge") if "surge" in model.states else None
     keys = ("height", "period", "steepness", "drift")
-    rows, reach = {}, []
+    rows = {}
     for name, part in used_parts(model, runs).items():
         trained = model.training_spans.get(name)
         tested = part.run.attrs.get("test_span")
@@ -66,21 +63,11 @@ def validity(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
             values[number, :3] = _sea(wave, model.dt, part.run)
             if surge is not None:
                 values[number, 3] = part.states[inside, surge].mean()
-                if number == 0:
-                    x = part.states[inside, surge]
-                    reach += [float(x.min()), float(x.max())]
         rows[name] = (part.run, values)
     if not rows:
         raise DataError("no run has all channels of the model: there are no waves to compare.")
     table = np.stack([values for _, values in rows.values()])
-    highest = {
-        key: float(np.nanmax(table[:, 0, column], initial=-np.inf))
-        for column, key in enumerate(keys)
-    }
-    outside = [
-        _outside(model, run, dict(zip(keys, values[1], strict=True)), highest, reach)
-        for run, values in rows.values()
-    ]
+    outside = [_outside(model, run, np.isfinite(values[1, 1])) for run, values in rows.values()]
     return xr.Dataset(
         {key: (("run", "part"), table[:, :, column]) for column, key in enumerate(keys)}
         | {
@@ -107,27 +94,10 @@ def _sea(wave: np.ndarray, dt: float, run: xr.Dataset) -> tuple[float, float, fl
     return height, period, steepness
 
 
-def _outside(
-    model: Model,
-    run: xr.Dataset,
-    test: Mapping[str, float],
-    highest: Mapping[str, float],
-    reach: list[float],
-) -> str:
-    told = []
-    for key, unit in (("height", " m"), ("steepness", "")):
-        if test[key] > MARGIN * highest[key] and np.isfinite(highest[key]):
-            told.append(f"{key} {test[key]:.3g}{unit}, trained up to {highest[key]:.3g}{unit}")
-    if np.isfinite(test["period"]):
-        time = run["time"].values
-        begin, end = run.attrs.get("test_span", (time[0], time[-1]))
-        steps = round((float(end) - float(begin)) / model.dt)
-        found = compare_waves(model, run, float(begin), steps)
-        told += [each.text for each in found if each.text]
-    if reach and np.isfinite(test["drift"]) and not min(reach) <= test["drift"] <= max(reach):
-        side = "downstream" if test["drift"] > max(reach) else "upstream"
-        told.append(
-            f"mean surge {test['drift']:.3g} m, {side} of the trained {min(reach):.3g} to "
-            f"{max(reach):.3g} m"
-        )
-    return "; ".join(told)
+def _outside(model: Model, run: xr.Dataset, is_test: bool) -> str:
+    if not is_test:
+        return ""
+    time = run["time"].values
+    begin, end = run.attrs.get("test_span", (time[0], time[-1]))
+    steps = round((float(end) - float(begin)) / model.dt)
+    return "; ".join(outside_training(model, run, float(begin), steps))

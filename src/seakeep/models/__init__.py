@@ -15,7 +15,7 @@ from seakeep.models.registry import KINDS, is_ensemble, load_model
 from seakeep.models.settings import Select
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
 from seakeep.models.summaries import summarize
-from seakeep.models.validity import Waves, compare_waves
+from seakeep.models.validity import Waves, compare_waves, outside_training
 
 __all__ = [
     "KINDS",
@@ -52,6 +52,7 @@ __all__ = [
     "is_ensemble",
     "load_live",
     "load_model",
+    "outside_training",
     "processes",
     "summarize",
 ]

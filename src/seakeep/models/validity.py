@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy import fft
 
 from seakeep.arrays import BoolArray, FloatArray
 from seakeep.core.wave_bands import PER_OCTAVE, band_edges, band_energy
 from seakeep.models import labelled, store
 from seakeep.models.interface import Model
+from seakeep.waves import GRAVITY
 
-__all__ = ["Coverage", "Waves", "compare_waves"]
+__all__ = ["Coverage", "Waves", "compare_waves", "outside_training"]
 
 TRAINED = 0.01
 """Part of the training energy from which a band, or a neighbour of it, counts as trained: the
 leakage of a taper stays below it, and the tail of a sea above twice its peak frequency too."""
+CYCLES = 5.0
+"""Periods from which on a spectrum shows which waves it holds."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,13 @@ class Waves:
         Fraction of its energy in bands that were not trained, 0 to 1.
     is_gap : bool
         Whether `period` lies between trained periods without being one of them.
+    height, steepness : float
+        Four SDs, of regular waves 2√2, and that over the length in deep water of a wave of the
+        mean period; NaN of an input that is no wave elevation.
+    highest, steepest : float
+        Largest ones of a training run; NaN where the model's file does not hold them.
+    units : str
+        Of the height.
     """
 
     channel: str
@@ -44,6 +55,11 @@ class Waves:
     trained: tuple[float, float]
     outside: float
     is_gap: bool
+    height: float
+    highest: float
+    steepness: float
+    steepest: float
+    units: str = ""
 
     @property
     def is_untrained(self) -> bool:
@@ -63,6 +79,27 @@ class Waves:
             "the energy is at periods it has not seen"
         )
 
+    def reasons(self, duration: float) -> tuple[str, str, str]:
+        """Sentences on period, height and steepness over a time (s); empty where trained.
+
+        The height of n irregular waves scatters by about 0.85/√n (one SD): two of that, and a
+        tenth, are no reason.
+        """
+        margin = 1.1 + 1.7 * np.sqrt(self.period / duration)
+        height = steepness = ""
+        unit = f" {self.units}" if self.units else ""
+        if self.height > margin * self.highest:
+            height = (
+                f"{self.channel}: a height of {self.height:.3g}{unit}, trained "
+                f"up to {self.highest:.3g}{unit}"
+            )
+        if self.steepness > margin * self.steepest:
+            steepness = (
+                f"{self.channel}: a steepness in deep water of {self.steepness:.3g}, trained up to "
+                f"{self.steepest:.3g}"
+            )
+        return self.text, height, steepness
+
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
@@ -76,11 +113,15 @@ class Coverage:
         Number of the first band.
     shares : ndarray, shape (channel, band)
         Fraction of the energy in each band.
+    heights, steepnesses : ndarray, shape (channel,)
+        Largest ones of a window; see :class:`Waves`.
     """
 
     channels: tuple[str, ...]
     first: int
     shares: FloatArray
+    heights: FloatArray
+    steepnesses: FloatArray
 
     @classmethod
     def of(cls, channels: Sequence[str], series: Sequence[FloatArray], dt: float) -> Coverage:
@@ -92,7 +133,8 @@ class Coverage:
             (band_energy(each, dt, first, count) for each in series),
             np.zeros((len(channels), count)),
         )
-        return cls(tuple(channels), first, _shares(energy))
+        most = np.max([_heights(each, dt) for each in series], axis=0)
+        return cls(tuple(channels), first, _shares(energy), *most)
 
     def is_trained(self, frequency: FloatArray) -> BoolArray:
         """Whether frequencies (Hz) lie in bands that were trained, or beside one.
@@ -111,6 +153,7 @@ class Coverage:
     def compare(self, inputs: FloatArray, dt: float) -> list[Waves]:
         """Compare the inputs (time, channel) of a forecast with those of training."""
         found = _shares(band_energy(inputs, dt, self.first, self.shares.shape[1]))
+        heights, steep = _heights(inputs, dt)
         edges = band_edges(self.first, self.shares.shape[1])
         periods = 1.0 / np.sqrt(edges[:-1] * edges[1:])
         out = []
@@ -128,6 +171,10 @@ class Coverage:
                     trained=(float(periods[inside[-1]]), float(periods[inside[0]])),
                     outside=float(found[column][~known].sum()),
                     is_gap=bool(inside[0] < peak < inside[-1] and not known[peak]),
+                    height=float(heights[column]),
+                    highest=float(self.heights[column]),
+                    steepness=float(steep[column]) if channel.startswith("eta") else np.nan,
+                    steepest=float(self.steepnesses[column]),
                 )
             )
         return out
@@ -135,14 +182,24 @@ class Coverage:
     def to_variables(self) -> dict[str, Any]:
         """Variables of a file."""
         label = {"long_name": "part of the training energy", "units": "1", "first": self.first}
-        return {"wave_shares": (("channel", "band"), self.shares, label)}
+        out: dict[str, Any] = {"wave_shares": (("channel", "band"), self.shares, label)}
+        if np.isfinite(self.heights).all():
+            label = {"long_name": "wave height, most of a training run"}
+            out["wave_heights"] = ("channel", self.heights, label)
+            label = {"long_name": "wave steepness, most of a training run", "units": "1"}
+            out["wave_steepnesses"] = ("channel", self.steepnesses, label)
+        return out
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> Coverage:
         """Rebuild from :meth:`to_variables`."""
         channels = tuple(label.name for label in store.labels(dataset, "inputs"))
         shares = store.numbers(dataset, "wave_shares", (len(channels), None))
-        return cls(channels, int(dataset["wave_shares"].attrs["first"]), shares)
+        most = [np.full(len(channels), np.nan)] * 2  # a file of an earlier version
+        if "wave_heights" in dataset:
+            keys = ("wave_heights", "wave_steepnesses")
+            most = [store.numbers(dataset, key, (len(channels),)) for key in keys]
+        return cls(channels, int(dataset["wave_shares"].attrs["first"]), shares, *most)
 
 
 def compare_waves(model: Model, run: xr.Dataset, start: float, steps: int) -> list[Waves]:
@@ -174,7 +231,40 @@ def compare_waves(model: Model, run: xr.Dataset, start: float, steps: int) -> li
     values = labelled.channel_matrix(run, model.inputs, name, slice(first, at + steps))
     if len(values) < 2 or not np.all(np.isfinite(values)):
         return []
-    return coverage.compare(values, model.dt)
+    units = {label.name: label.units for label in model.signature.input_labels}
+    found = coverage.compare(values, model.dt)
+    return [replace(each, units=units[each.channel]) for each in found]
+
+
+def outside_training(model: Model, run: xr.Dataset, start: float, steps: int) -> list[str]:
+    """Say in what a forecast lies outside the training: period, height, steepness, mean surge.
+
+    Parameters
+    ----------
+    model, run, start, steps
+        As for :func:`compare_waves`.
+
+    Returns
+    -------
+    list of str
+        A sentence for each reason; none where the forecast is shorter than five periods.
+    """
+    duration = steps * model.dt
+    waves = [w for w in compare_waves(model, run, start, steps) if duration > CYCLES * w.period]
+    reasons = [each.reasons(duration) for each in waves]
+    told = ["; ".join(filter(None, of)) for of in zip(*reasons, strict=True)]
+    if waves and "surge" in model.states and "surge" in run:
+        time = run["time"].values
+        surge = run["surge"].values[(time > start) & (time <= start + duration + 1e-6)]
+        scale, at = model.signature.state_scale, model.states.index("surge")
+        low, high = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
+        mean = float(np.mean(surge[np.isfinite(surge)])) if np.isfinite(surge).any() else low
+        if not low <= mean <= high:
+            side = "downstream" if mean > high else "upstream"
+            told.append(
+                f"a mean surge of {mean:.3g} m, {side} of the trained {low:.3g} to {high:.3g} m"
+            )
+    return [each for each in told if each]
 
 
 def _with_neighbours(is_trained: BoolArray) -> BoolArray:
@@ -189,3 +279,17 @@ def _shares(energy: FloatArray) -> FloatArray:
     total = energy.sum(axis=1, keepdims=True)
     out: FloatArray = np.divide(energy, total, out=np.zeros_like(energy), where=total > 0)
     return out
+
+
+def _heights(inputs: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
+    """Heights of inputs (time, channel), and over the length of waves of their mean period.
+
+    The fourth moment tells irregular waves, four SDs high, from regular ones of 2√2 SDs.
+    """
+    deviations = inputs - inputs.mean(axis=0)
+    square = np.maximum(np.mean(deviations**2, axis=0), np.finfo(float).tiny)
+    height = 4 * np.sqrt(np.mean(deviations**4, axis=0) / (3 * square))
+    power = np.abs(fft.rfft(np.hanning(len(inputs))[:, None] * deviations, axis=0)) ** 2
+    total = np.maximum(power.sum(axis=0), np.finfo(float).tiny)
+    frequency = fft.rfftfreq(len(inputs), dt) @ power / total
+    return height, 2 * np.pi / GRAVITY * height * frequency**2

@@ -396,7 +396,7 @@ def validity_section(checked: Checked) -> Section | None:
         for run, text in zip(found["run"].values, found["outside"].values, strict=True)
         if text
     ]
-    caption = "Height and period of the waves that trained the model, and of each test."
+    caption = "Waves (and mean surge) that trained the model, and those of each test."
     return Section(
         "validity",
         "Validity",

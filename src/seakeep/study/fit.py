@@ -14,7 +14,7 @@ from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepError, SeakeepWarning
-from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, compare_waves
+from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, outside_training
 from seakeep.models.slow import warn_of_slow_motions
 from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, find_leakage
@@ -33,8 +33,6 @@ __all__ = [
 ]
 
 BASELINES = ("hold_last", "mean", "fir", "arx", "subspace")
-CYCLES = 5.0
-"""Periods of a test from which on its spectrum shows which waves it holds."""
 NOTHING_TRAINS = (
     "no run of the campaign trains a model. Give one role = 'train', or a span "
     "train = [start, end]."
@@ -116,8 +114,9 @@ def fit_campaign(
     SeakeepWarning
         If the test part of a training run repeats the model's training input, or the training
         windows (for an ensemble the longest) hold fewer than five periods of a slow motion; of what
-        the quality checks found in the model's channels; of test waves whose periods were not
-        trained; and where the model reads waves after the instant that it forecasts.
+        the quality checks found in the model's channels; of tests outside the training (periods,
+        heights and steepness of the waves, mean surge); and where the model reads waves after the
+        instant that it forecasts.
     """
     settings = campaign.model(model)
     spec, prepared, runs, stop = read_training(campaign, model, progress)
@@ -241,13 +240,10 @@ def _prepared_tests(campaign: Campaign, known: Collection[str]) -> dict[str, xr.
 
 
 def warn_of_waves(model: Model, run: xr.Dataset, name: str, start: float, steps: int) -> None:
-    """Warn where the waves of a test have periods in which the model was not trained."""
-    found = compare_waves(model, run, start, steps)
-    length = steps * model.dt
-    told = [each.text for each in found if each.text and length > CYCLES * each.period]
-    if told:
+    """Warn of each respect in which a test lies outside what trained the model."""
+    for text in outside_training(model, run, start, steps):
         warnings.warn(
-            f"{name}: {'; '.join(told)}. Train in such waves too: errors may be large.",
+            f"{name}: {text}. Train in such waves too: errors may be large.",
             SeakeepWarning,
             stacklevel=3,
         )

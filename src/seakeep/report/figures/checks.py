@@ -151,6 +151,8 @@ def _points(gain: Any, turn: Any, measured: xr.Dataset, factor: float) -> None:
         at = measured.isel(point=np.flatnonzero(measured["kind"].values == kind))
         sure = at["amplitude_uncertainty"].values < at["amplitude"].values
         at = at.isel(point=np.flatnonzero(sure))  # the rest is noise
+        if not at.sizes["point"]:
+            continue
         style = {**mark, "linestyle": "none", "elinewidth": 0.8, "label": f"measured, {kind} waves"}
         for place, key, scale in ((gain, "amplitude", factor), (turn, "phase", 1.0)):
             place.errorbar(
@@ -415,42 +417,45 @@ def exceedance(
 
 
 def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Figure:
-    """Draw height against period of the waves, those that trained and those of each test.
+    """Draw height against period of the waves, and steepness against mean surge where it is known.
 
     Parameters
     ----------
     found : Dataset
         From :func:`seakeep.check.validity`.
-    axes : Axes, optional
-        One; by default that of a new figure.
+    axes : Axes or sequence of Axes, optional
+        One, or two with surge; by default those of a new figure.
 
     Returns
     -------
     Figure
     """
+    maps = [("period", "mean zero-crossing period [s]", "height", "wave height [m]")]
+    if (found["drift"].notnull() & found["steepness"].notnull()).any():
+        maps.append(("drift", "mean surge [m]", "steepness", "wave steepness [1]"))
+    outside = found["outside"].values != ""
+    train, test = (found.sel(part=each) for each in ("train", "test"))
+    kinds = (
+        (train, "trained", {"marker": "o", "markersize": 11, "color": "#BBBBBB"}),
+        (test.isel(run=~outside), "test, inside", {"marker": "s", "color": COLOURS["ensemble"]}),
+        (test.isel(run=outside), "test, outside", {"marker": "X", "color": COLOURS["forecast"]}),
+    )
     with figure_style():
-        figure, (place,) = panels(axes, 1, 1, (6.0, 3.2))
-        train, test = (found.sel(part=each) for each in ("train", "test"))
-        style = {"linestyle": "none", "marker": "o", "markersize": 11, "color": "#BBBBBB"}
-        place.plot(train["period"], train["height"], **style, label="trained")
-        outside = test["outside"].values != ""
-        for chosen, label, mark, colour in (
-            (~outside, "test, inside", "s", COLOURS["ensemble"]),
-            (outside, "test, outside", "X", COLOURS["forecast"]),
-        ):
-            at = test.isel(run=np.flatnonzero(chosen))
-            style = {"linestyle": "none", "marker": mark, "markersize": 6, "color": colour}
-            place.plot(at["period"], at["height"], **style, label=label)
-        for run in test["run"].values[outside]:
-            at = test.sel(run=run)
-            place.annotate(
-                str(run), (float(at["period"]), float(at["height"])), (6, 4),
-                textcoords="offset points", fontsize=7,
-            )  # fmt: skip
-        place.set(xlabel="mean zero-crossing period [s]", ylabel="wave height [m]")
-        place.margins(x=0.12, y=0.15)
-        place.set_ylim(bottom=0)
-        place.legend(loc="lower right")
+        figure, places = panels(axes, len(maps), 2, (3.75, 2.8))
+        for place, (x, across, y, up) in zip(places, maps, strict=True):
+            for at, label, style in kinds:
+                if at[y].notnull().any():
+                    place.plot(at[x], at[y], linestyle="none", label=label, **style)
+            for run in test["run"].values[outside]:
+                spot = tuple(float(test[key].sel(run=run)) for key in (x, y))
+                if np.isfinite(spot).all():
+                    style = {"textcoords": "offset points", "fontsize": 7}
+                    place.annotate(str(run), spot, (6, 4), **style)
+            place.set(xlabel=across, ylabel=up)
+            place.margins(x=0.15)
+            place.set_ylim(0, 1.2 * float(found[y].max()))
+        if axes is None:
+            legend_below(figure, places[0])
     return figure
 
 
