@@ -109,7 +109,7 @@ def error_figure(table: xr.Dataset) -> Figure:
 
 
 def _draw(several: Mapping[str, Comparison]) -> Figure:
-    tables = [comparison_table([each]).isel(run=0) for each in several.values()]
+    tables = [comparison_table([e], intervals=False).isel(run=0) for e in several.values()]
     compared = dict(zip(several, _with_prefixes(list(several.values())), strict=True))
     comparison = next(iter(compared.values()))
     states = [str(name) for name in comparison.measured.data_vars]

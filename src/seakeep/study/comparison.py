@@ -459,13 +459,15 @@ def _warn_of_dead(run: xr.Dataset, name: str) -> None:
         )
 
 
-def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
+def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = True) -> xr.Dataset:
     """Judge forecasts channel by channel.
 
     Parameters
     ----------
     comparisons : sequence of Comparison
         From :func:`compare`.
+    intervals : bool, optional
+        Whether to compute the bounds below, which takes most of the time.
 
     Returns
     -------
@@ -486,7 +488,7 @@ def comparison_table(comparisons: Sequence[Comparison]) -> xr.Dataset:
         ``level`` and ``band`` ("members" or "calibrated"). At full scale ``scale`` ("full") and
         ``scale_factor`` over ``run``.
     """
-    rows = [_row(comparison) for comparison in comparisons]
+    rows = [_row(comparison, intervals) for comparison in comparisons]
     table = xr.concat(rows, dim="run")
     for name, (units, label) in _COLUMNS.items():
         if name not in table:
@@ -556,7 +558,7 @@ _COLUMNS = {
 }
 
 
-def _row(comparison: Comparison) -> xr.Dataset:
+def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
     p, m = comparison.forecast, comparison.measured
     names = [str(name) for name in p.data_vars]
     slack = metrics.is_slack(predicted=p, measured=m)
@@ -579,7 +581,7 @@ def _row(comparison: Comparison) -> xr.Dataset:
             name: ("channel", np.array([float(values[channel]) for channel in names]))
             for name, values in each.items()
         }
-        | _interval_entries(p, m, names)
+        | (_interval_entries(p, m, names) if intervals else {})
         | _band_entries(comparison, slack)
         | _scale_entries(comparison)
         | {
