@@ -11,7 +11,7 @@ __all__ = ["settings_html", "text_html"]
 
 def text_html(text: str) -> str:
     """Text as it stands: what ``_repr_html_`` of a model gives."""
-    return f"<pre>{escape(text)}</pre>"
+    return f'<pre style="white-space: pre-wrap">{escape(text)}</pre>'
 
 
 def settings_html(name: str, settings: Mapping[str, Any]) -> str:
