@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import difflib
 import errno
+import glob
 import hashlib
 import io
 import os
 import re
 import secrets
+import shutil
 import stat
+import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -32,6 +35,7 @@ __all__ = [
     "reading",
     "replacing",
     "sha256_of",
+    "working_folder",
     "write_netcdf",
 ]
 
@@ -226,6 +230,7 @@ def replacing(path: Path) -> Iterator[Path]:
     check_place(path)
     try:
         target = path.resolve()  # a link stays one
+        _clear_dead(target.parent.glob(f".{glob.escape(target.name)}.*.tmp"))
         # Opened and not made by tempfile, so that the file gets the permissions the user's umask
         # gives to any other.
         temporary = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
@@ -247,6 +252,43 @@ def replacing(path: Path) -> Iterator[Path]:
             f"cannot write {path}: {error.strerror or error}. The file that was there before, if "
             f"any, is untouched. {mend}"
         ) from error
+
+
+@contextmanager
+def working_folder(parent: Path | None = None) -> Iterator[Path]:
+    """Yield a folder that is gone afterwards, and remove those of processes that were killed.
+
+    Parameters
+    ----------
+    parent : Path, optional
+        Where it is made; the default is the system's folder for temporary files.
+
+    Yields
+    ------
+    Path
+        An empty folder ``.seakeep.PID.….tmp``.
+    """
+    place = Path(tempfile.gettempdir() if parent is None else parent)
+    _clear_dead(place.glob(".seakeep.*.tmp"))
+    prefix = f".seakeep.{os.getpid()}."
+    with tempfile.TemporaryDirectory(prefix=prefix, suffix=".tmp", dir=place) as folder:
+        yield Path(folder)
+
+
+def _clear_dead(litter: Iterable[Path]) -> None:
+    """Remove temporary files and folders, whose names end in ``.PID.….tmp``, of dead processes."""
+    if os.name == "nt":  # has no way to ask for a process that does not end it
+        return
+    for each in litter:
+        try:
+            os.kill(int(each.name.split(".")[-3]), 0)
+        except ProcessLookupError:
+            if each.is_dir():
+                shutil.rmtree(each, ignore_errors=True)
+            else:
+                each.unlink(missing_ok=True)
+        except (OSError, ValueError, OverflowError, IndexError):
+            continue  # somebody else's
 
 
 def write_netcdf(

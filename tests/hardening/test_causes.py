@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from seakeep.errors import DataError, RequestError, SeakeepWarning
-from seakeep.files import check_place, make_folder, read_sealed, write_netcdf
+from seakeep.files import (
+    check_place,
+    make_folder,
+    read_sealed,
+    replacing,
+    working_folder,
+    write_netcdf,
+)
 from seakeep.formats import limits, read_columns
 from seakeep.study.store import UnitFolder
 
@@ -71,6 +78,22 @@ def test_a_study_clears_what_a_killed_run_left_and_says_so(tmp_path):
     ):
         assert not list(tmp_path.glob("units/*"))
     assert (tmp_path / "notes.tmp").exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a process cannot be asked for without ending it")
+def test_the_next_run_clears_what_a_dead_one_left(tmp_path):
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    names = {pid: f".m.nc.{pid}.0a1b2c3d.tmp" for pid in (gone.pid, os.getpid(), "x")}
+    for name in names.values():
+        (tmp_path / name).touch()
+    (tmp_path / f".seakeep.{gone.pid}.abcd.tmp" / "inner").mkdir(parents=True)
+    with replacing(tmp_path / "m.nc") as path:
+        path.write_text("whole", encoding="utf-8")
+    with working_folder(tmp_path) as folder:
+        assert folder.name.startswith(f".seakeep.{os.getpid()}.")
+    found = {each.name for each in tmp_path.iterdir()}
+    assert found == {"m.nc", names[os.getpid()], names["x"]}
 
 
 def test_a_command_keeps_blas_to_one_thread_and_prints_in_any_encoding(tmp_path):

@@ -21,6 +21,7 @@ from seakeep.statistics import band_error_over_time
 from seakeep.study import StorageError, read_result, read_study, run, run_study, store
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
+from seakeep.study.schema import check_contents
 from seakeep.study.store import LOCK, UNITS, UnitFolder
 from seakeep.study.units import choice_of, choose, compute, units_of
 
@@ -336,6 +337,24 @@ def test_a_result_of_another_format_is_told(finished, monkeypatch):
     with pytest.raises(
         RequestError, match=rf"written in format {store.FORMAT - 1}.*another folder"
     ):
+        read_result(finished.folder)
+
+
+def test_contents_that_no_study_writes_are_told(finished):
+    attrs, groups = finished.attrs, finished.groups
+    for key, value in {"settings": "5", "preparation": 7, "models": "{}", "dt": -1.0}.items():
+        with pytest.raises(ValueError, match=key):
+            check_contents(attrs | {key: value}, groups)
+    for name, group in groups.items():
+        for each in group.variables:
+            others = {key: value for key, value in group.variables.items() if key != each}
+            spoilt = xr.Dataset({**others, each: ("elsewhere", [1j])}, attrs=group.attrs)
+            with pytest.raises(ValueError, match=str(each)):
+                check_contents(attrs, {**groups, name: spoilt})
+    others = {key: each for key, each in groups.items() if key != "statistics/densities"}
+    store.write_result(finished.folder, attrs | {"groups": json.dumps(list(others))}, others)
+    message = "does not hold what a study writes.*the group statistics/densities is missing"
+    with pytest.raises(DataError, match=message):
         read_result(finished.folder)
 
 

@@ -8,7 +8,6 @@ import platform
 import shlex
 import shutil
 import subprocess
-import tempfile
 import uuid
 import zipfile
 from importlib import metadata
@@ -16,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from seakeep.errors import RequestError
-from seakeep.files import MARK, check_output, replacing
+from seakeep.files import MARK, check_output, replacing, working_folder
 from seakeep.hosts.c import identifier, rendered, sources
 from seakeep.hosts.program import Program, program_of
 from seakeep.models import Model
@@ -74,17 +73,17 @@ def write_fmu(model: Model, path: str | Path) -> Path:
     files["fmi2.c"] = rendered("fmi2.c", **content)
     description = rendered("modelDescription.xml", **content, **_description(program))
     with (
-        tempfile.TemporaryDirectory() as folder,
+        working_folder() as folder,
         replacing(target) as temporary,
         zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
     ):
         archive.writestr("modelDescription.xml", description, zipfile.ZIP_STORED)
         for file, text in files.items():
-            (Path(folder) / file).write_text(text, encoding="utf-8")
+            (folder / file).write_text(text, encoding="utf-8")
             archive.writestr(f"sources/{file}", text)
         if (found := compiler()) is not None:
             place, suffix = PLATFORMS[platform.system(), platform.machine()]
-            made = _compiled(found, Path(folder), name, suffix)
+            made = _compiled(found, folder, name, suffix)
             archive.write(made, f"binaries/{place}/{made.name}")
     return target
 

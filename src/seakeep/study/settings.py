@@ -21,7 +21,6 @@ from seakeep.campaign.settings import ModelSettings
 from seakeep.errors import did_you_mean
 from seakeep.files import sha256_of
 from seakeep.sizes import MOST_SERIES
-from seakeep.study.store import FORMAT
 from seakeep.toml import Count, Mistake, Names, Positive, Table, read_toml, refusal, validated
 
 __all__ = [
@@ -32,6 +31,9 @@ __all__ = [
     "TrainingSettings",
     "read_study",
 ]
+
+FORMAT = 6
+"""Goes into digest and result: raise it when the same settings give other arrays than before."""
 
 Preset = Literal["paper", "recommended"]
 Placement = Literal["random", "apart"]

@@ -23,6 +23,8 @@ from filelock import FileLock, Timeout
 
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
 from seakeep.files import check_output, read_sealed, replacing, write_netcdf
+from seakeep.study.schema import check_contents
+from seakeep.study.settings import FORMAT
 
 __all__ = [
     "RESULT",
@@ -35,9 +37,6 @@ __all__ = [
     "versions",
     "write_result",
 ]
-
-FORMAT = 6
-"""Goes into digest and result: raise it when the same settings give other arrays than before."""
 
 RESULT = "study.nc"
 PAGE = "report.html"
@@ -405,27 +404,29 @@ def read_result(folder: Path | str) -> StudyResult:
                 else "Give the folder that 'seakeep study' or 'seakeep reproduce' wrote."
             )
         )
+    # Here, so that commands that read no result start without HDF5.
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
     try:
-        content = read_sealed(path)
-        with xr.open_dataset(content, engine="h5netcdf") as root:
-            attrs = {key: _plain(value) for key, value in root.attrs.items()}
-        if attrs["format"] != FORMAT:
-            raise RequestError(
-                f"{path} was written in format {attrs['format']}, and this version of seakeep "
-                f"reads format {FORMAT}. Run the study again in another folder."
-            )
-        groups = {}
-        for name in json.loads(attrs["groups"]):
-            with xr.open_dataset(
-                content, engine="h5netcdf", group=name, decode_times=False
-            ) as opened:
-                groups[name] = opened.load()
+        with h5netcdf.File(read_sealed(path), "r") as file:
+            attrs = {key: _plain(value) for key, value in file.attrs.items()}
+            if attrs["format"] != FORMAT:
+                raise RequestError(
+                    f"{path} was written in format {attrs['format']}, and this version of seakeep "
+                    f"reads format {FORMAT}. Run the study again in another folder."
+                )
+            groups = {
+                name: xr.open_dataset(H5NetCDFStore(file, group=name), decode_times=False).load()
+                for name in json.loads(attrs["groups"])
+            }
+        check_contents(attrs, groups)
     except SeakeepError:
         raise
-    except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
+    except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError) as error:
         raise DataError(
-            f"{path} is damaged or not a NetCDF file: {type(error).__name__} while reading it. "
-            "Remove it and run the study again."
+            f"{path} does not hold what a study writes: {type(error).__name__}: {error}. Remove it "
+            "and run the study again."
         ) from error
     return StudyResult(folder, attrs, groups)
 
