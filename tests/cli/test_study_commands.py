@@ -48,7 +48,9 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_a_study_ends_with_its_table_and_the_place_of_its_report(folder, capfd):
+def test_a_study_ends_with_its_table_and_the_place_of_its_report(folder, capfd, monkeypatch):
+    # Figures of reports are looked at in tests/report/test_page.py, of such a study.
+    monkeypatch.setattr("seakeep.report.page._drawn", lambda drawing, folder: None)
     out = folder / "out"
     assert cli.main(["study", str(folder / "study.toml"), "-o", str(out), "--workers", "1"]) == 0
     told = capfd.readouterr()

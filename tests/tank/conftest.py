@@ -1,7 +1,10 @@
+import os
+import pickle
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from filelock import FileLock
 
 from seakeep.campaign import load_prepared, write_prepared
 from seakeep.tank.dynamics import assemble_rig
@@ -51,17 +54,29 @@ def ideal_rig(linear_rig):
 
 @pytest.fixture(scope="session")
 def delivered(tmp_path_factory):
-    """The irregular runs as the tank delivers them; the truth was read and then deleted."""
+    """The irregular runs as the tank delivers them; the truth was read and then deleted.
+
+    They are prepared and written where the commands look for them, once for all processes of
+    pytest-xdist.
+    """
     import chain_on_tank
 
-    return chain_on_tank.deliver(tmp_path_factory.mktemp("delivered"))
+    place = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        place = place.parent
+    kept = place / "delivered.pickle"
+    with FileLock(place / "delivered.lock"):
+        if not kept.exists():
+            found = chain_on_tank.deliver(place / "delivered")
+            assert not (place / "delivered" / "truth").exists()
+            write_prepared(found.campaign)
+            kept.write_bytes(pickle.dumps(found))
+    return pickle.loads(kept.read_bytes())
 
 
 @pytest.fixture(scope="session")
 def prepared(delivered):
-    """Those runs prepared, and written where the commands look for them."""
-    assert not (delivered.campaign.path.parent / "truth").exists()
-    write_prepared(delivered.campaign)
+    """Those runs, prepared."""
     return load_prepared(delivered.campaign)
 
 
