@@ -259,7 +259,7 @@ def jsd_interval(
     numbers = [
         field.name
         for field in fields(_divergence.JsdInterval)
-        if field.name not in ("draws", "noise")
+        if field.name not in ("draws", "noise", "grid", "predicted", "measured")
     ]
     return xr.Dataset(
         {

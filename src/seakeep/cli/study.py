@@ -68,7 +68,7 @@ def study(
     results().print(f"\nReport: {page}", soft_wrap=True)
 
 
-def _write_study(_: Path, found: StudyResult) -> Path:
+def _write_study(_: Path, found: StudyResult, __: Executor | None = None) -> Path:
     from seakeep.report.page import write_report
 
     with _Progress("Report") as tell:
@@ -144,16 +144,33 @@ def report(
     typer.echo(str(page))
 
 
-def _write_reproduction(folder: Path, found: dict[str, StudyResult]) -> Path:
-    """Write the page of each act, and the one over them."""
+def _write_reproduction(
+    folder: Path, found: dict[str, StudyResult], executor: Executor | None = None
+) -> Path:
+    """Write the page of each act, side by side where workers are near, and the one over them."""
+    from seakeep.models.executor import as_finished, on_this_machine
     from seakeep.report.acts import write_reproduction
     from seakeep.report.page import write_report
 
-    for name, each in found.items():  # all acts have the same runs
-        with _Progress(f"Report of {each.attrs['study']}") as tell:
-            write_report(each, tell, pictures=name == next(reversed(found)))
+    last = next(reversed(found))  # all acts have the same runs, which are drawn once
+    items = [(found[name], name == last) for name in reversed(found)]
+    if (near := on_this_machine(executor)) is None:
+        for result, pictures in items:
+            with _Progress(f"Report of {result.attrs['study']}") as tell:
+                write_report(result, tell, pictures=pictures)
+    else:
+        with _Progress("Reports") as tell:
+            tell(0, len(items), "drawing")
+            for done, _ in enumerate(as_finished(_write_act, None, items, near), 1):
+                tell(done, len(items), "written")
     with _Progress("Report") as tell:
         return write_reproduction(folder, found, tell)
+
+
+def _write_act(_: None, item: tuple[StudyResult, bool]) -> None:
+    from seakeep.report.page import write_report
+
+    write_report(item[0], pictures=item[1])
 
 
 class _Progress:
@@ -192,15 +209,16 @@ def _run(
     workers: int,
     scheduler: str | None,
     work: Callable[[Executor | None, Report], Found],
-    write: Callable[[Path, Found], Path],
+    write: Callable[[Path, Found, Executor | None], Path],
 ) -> tuple[Found, Path]:
     """Do the work and write its report; interrupted work is kept."""
     from seakeep.models.executor import make_executor
 
     try:
-        with make_executor(workers, scheduler) as executor, _Progress("Study") as tell:
-            found = work(executor, tell)
-        return found, write(folder, found)
+        with make_executor(workers, scheduler) as executor:
+            with _Progress("Study") as tell:
+                found = work(executor, tell)
+            return found, write(folder, found, executor)
     except KeyboardInterrupt as stop:
         stop.add_note(
             f"What was finished is kept in {folder}; the same command continues where it stopped."

@@ -36,6 +36,12 @@ class JsdInterval:
         The measurement against itself under two independent bootstraps.
     block_length : int
         Samples of a block.
+    grid : ndarray, shape (grid,)
+        Values at which the densities are given.
+    predicted : ndarray, shape (predicted series, draw, grid)
+        Densities of the redrawn predictions.
+    measured : ndarray, shape (draw, grid)
+        Densities of the redrawn measurements.
     """
 
     mean: float
@@ -48,6 +54,9 @@ class JsdInterval:
     draws: FloatArray
     noise: FloatArray
     block_length: int
+    grid: FloatArray
+    predicted: FloatArray
+    measured: FloatArray
 
     @property
     def uncertainty(self) -> float:
@@ -169,9 +178,8 @@ def jsd_interval(
     positions, others = (bootstrap_indices(m.size, n_series, block, rng, segments) for _ in "ab")
     truth = bootstrapped_densities(m, positions, points, bandwidth)
     again = bootstrapped_densities(m, others, points, bandwidth)
-    draws = np.stack(
-        [jensen_shannon(bootstrapped_densities(x, positions, points, bandwidth), truth) for x in p]
-    )
+    drawn = np.stack([bootstrapped_densities(x, positions, points, bandwidth) for x in p])
+    draws = jensen_shannon(drawn, np.broadcast_to(truth, drawn.shape))
     own = jensen_shannon(kernel_density(p, points, bandwidth), kernel_density(m, points, bandwidth))
     noise = jensen_shannon(truth, again)
     low, high = np.quantile(draws, [0.025, 0.975])
@@ -187,4 +195,7 @@ def jsd_interval(
         draws=draws,
         noise=noise,
         block_length=block,
+        grid=points,
+        predicted=drawn,
+        measured=truth,
     )

@@ -24,6 +24,7 @@ A long run is taken in pieces, so that what is held beside the result does not g
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,7 +34,7 @@ from scipy.linalg import blas
 from seakeep.arrays import BoolArray, FloatArray, as_real
 from seakeep.errors import RequestError
 
-__all__ = ["rollout"]
+__all__ = ["rollout", "rollouts"]
 
 Arrays = tuple[FloatArray, ...]
 
@@ -106,10 +107,78 @@ def rollout(
     >>> rollout([[0.5]], [[1.0]], [[1.0]], [[[0.0], [1.0], [0.0]]])[0, :, 0]
     array([0.5  , 1.25 , 0.625])
     """
+    return rollouts(A, B, [(histories, inputs, direct)], n_states=n_states)[0]
+
+
+Batch = tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike | None]
+"""Histories, inputs and direct inputs of windows of one length."""
+
+
+def rollouts(
+    A: npt.ArrayLike, B: npt.ArrayLike, batches: Sequence[Batch], *, n_states: int | None = None
+) -> list[FloatArray]:
+    """Free runs of one model over batches of windows, each batch of a length of its own.
+
+    What makes several steps one product is prepared once for all batches.
+
+    Parameters
+    ----------
+    A, B, n_states
+        As for :func:`rollout`.
+    batches : sequence of (array_like, array_like, array_like or None)
+        Histories, inputs and direct inputs of each batch, as for :func:`rollout`; the last are
+        given in all batches or in none.
+
+    Returns
+    -------
+    list of ndarray, each of shape (window, steps, N)
+        One per batch.
+
+    Raises
+    ------
+    RequestError
+        If shapes do not fit together.
+    """
     # A free run may overflow: it is cut off where it does.
-    given = {"A": A, "B": B, "histories": histories, "inputs": inputs}
-    arrays = [as_real(each, name, greatest=np.inf) for name, each in given.items()]
-    a, b, start, driving = np.atleast_2d(arrays[0]), *arrays[1:]
+    a = np.atleast_2d(as_real(A, "A", greatest=np.inf))
+    b = as_real(B, "B", greatest=np.inf)
+    read = [_read(a, b, *batch, n_states) for batch in batches]
+    matrices, count = read[0].matrices, read[0].count
+    channels = tuple(values.shape[2] for values in read[0].series)
+    windows, steps = sum(len(each.start) for each in read), max(each.steps for each in read)
+    out = [np.empty((0, each.steps, count)) for each in read]
+    if not windows:
+        return out
+    with np.errstate(over="ignore", invalid="ignore"):
+        propagator = _propagator(a, matrices, count, channels, windows, steps)
+        for number, each in enumerate(read):
+            if len(each.start):
+                out[number] = _run(propagator, each.start, each.series, each.steps)
+                _cut_lost(out[number])
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Read:
+    """A checked batch: extended histories, series of inputs and their columns of B̂, N."""
+
+    start: FloatArray
+    matrices: Arrays
+    series: Arrays
+    steps: int
+    count: int
+
+
+def _read(
+    a: FloatArray,
+    b: FloatArray,
+    histories: npt.ArrayLike,
+    inputs: npt.ArrayLike,
+    direct: npt.ArrayLike | None,
+    n_states: int | None,
+) -> _Read:
+    start = as_real(histories, "histories", greatest=np.inf)
+    driving = as_real(inputs, "inputs", greatest=np.inf)
     if (
         a.ndim != 2
         or start.ndim not in (2, 3)
@@ -148,16 +217,9 @@ def rollout(
             f"direct inputs of shape {further} do not stand beside {len(start)} window(s) of "
             f"{steps} steps: one row per window and step is needed."
         )
-    if not len(start):
-        return np.empty((0, steps, count))
     groups = [groups[0], *(group for group in groups[1:] if group[1].shape[2])]
     matrices, series = zip(*groups, strict=True)
-    channels = tuple(values.shape[2] for values in series)
-    with np.errstate(over="ignore", invalid="ignore"):
-        propagator = _propagator(a, matrices, count, channels, len(start), steps)
-        out = _run(propagator, start, series, steps)
-    _cut_lost(out)
-    return out
+    return _Read(start, matrices, series, steps, count)
 
 
 def _count_states(a: FloatArray, start: FloatArray, given: int | None) -> int:
@@ -243,6 +305,7 @@ class _Propagator:
     state: FloatArray | None = None
     state_input: Arrays = ()
     is_mirrored: bool = False
+    is_transposed: bool = False
 
 
 def _propagator(
@@ -267,7 +330,8 @@ def _propagator(
         half[: len(a) - count, : len(a)] = a[count:]
         return replace(propagator, state=half, is_mirrored=True)
     if windows > 1 and propagator.state is not None:
-        return replace(propagator, state=np.ascontiguousarray(propagator.state.T))
+        state = np.ascontiguousarray(propagator.state.T)
+        return replace(propagator, state=state, is_transposed=True)
     return propagator
 
 
@@ -453,7 +517,7 @@ def _run_square(
     states = np.empty((number + 1, windows, size))
     states[number] = start
     states[:number] = _forced(rows, propagator.state_input).reshape(number, windows, size)
-    if windows == 1:
+    if not propagator.is_transposed:
         line = states[:, 0]
         for block in range(number - 1, -1, -1):
             line[block] += propagator.state @ line[block + 1]

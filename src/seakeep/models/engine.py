@@ -21,7 +21,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, whole_number
-from seakeep.core.rollout import rollout
+from seakeep.core.rollout import rollouts
 from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice
@@ -419,52 +419,53 @@ def linear_runs(
 
     Read-outs see each member's series when its last pass is done.
     """
-    found = []
-    for windows in groups:
-        each = [read_out(readouts, _runs(member, windows)) for member in members]
-        found.append(each[0][None] if len(each) == 1 else np.stack(each))  # one needs no copy
+    found = [[read_out(readouts, values) for values in _runs(member, groups)] for member in members]
+    # One member needs no copy.
+    return [
+        each[0][None] if len(each) == 1 else np.stack(each) for each in zip(*found, strict=True)
+    ]
+
+
+def _runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
+    """Free runs in passes: each one is driven by what the states of the one before make of it."""
+    found = _open_runs(member, groups)
+    for _ in range(max(windows.passes for windows in groups) - 1):
+        followed = [_following(*each) for each in zip(groups, found, strict=True)]
+        found = _open_runs(member, followed)
     return found
 
 
-def _runs(member: Dynamics, windows: Windows) -> FloatArray:
-    """Free runs in passes: each one is driven by what the states of the one before make of it."""
-    values = _open_runs(member, windows)
+def _following(windows: Windows, found: FloatArray) -> Windows:
+    """Windows driven by what the states of a pass make of their inputs."""
     delays = windows.delayed.shape[1] - windows.steps
-    for _ in range(windows.passes - 1):
-        rows = [
-            drive.rows(span.first, span.stop, span.known, states)
-            for drive, span, states in zip(windows.drives, windows.spans, values, strict=True)
-        ]
-        followed = replace(
-            windows,
-            delayed=np.stack([each.delayed for each in rows]),
-            direct=np.stack([each.direct[delays:] for each in rows]),
-        )
-        values = _open_runs(member, followed)
-    return values
-
-
-def _open_runs(member: Dynamics, windows: Windows) -> FloatArray:
-    """Free runs over all windows as products of matrices."""
-    histories, steps = windows.histories, windows.steps
-    driving = windows.delayed[:, windows.delayed.shape[1] - member.input_delays - steps :]
-    if not driving.shape[2]:
-        driving = np.zeros((len(driving), steps, 0))
-    a, b = member.matrices
-    more = {}
-    if windows.direct.shape[2]:
-        more = {"direct": member.direct_scale.deviations(windows.direct)}
-    deviations = rollout(
-        a,
-        b,
-        member.state_scale.deviations(histories[:, -1 - member.state_delays :]),
-        member.input_scale.deviations(driving),
-        n_states=histories.shape[2],
-        **more,
+    rows = [
+        drive.rows(span.first, span.stop, span.known, states)
+        for drive, span, states in zip(windows.drives, windows.spans, found, strict=True)
+    ]
+    return replace(
+        windows,
+        delayed=np.stack([each.delayed for each in rows]),
+        direct=np.stack([each.direct[delays:] for each in rows]),
     )
+
+
+def _open_runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
+    """Free runs over all windows as products of matrices."""
+    batches = []
+    for windows in groups:
+        steps = windows.steps
+        driving = windows.delayed[:, windows.delayed.shape[1] - member.input_delays - steps :]
+        if not driving.shape[2]:
+            driving = np.zeros((len(driving), steps, 0))
+        history = member.state_scale.deviations(windows.histories[:, -1 - member.state_delays :])
+        direct = member.direct_scale.deviations(windows.direct) if windows.direct.shape[2] else None
+        batches.append((history, member.input_scale.deviations(driving), direct))
+    a, b = member.matrices
+    found = rollouts(a, b, batches, n_states=len(member.state_scale.mean))
     with np.errstate(over="ignore"):  # a run that is lost is cut just below
-        values = member.state_scale.physical(deviations, out=deviations)
-    return cut_lost(values, member, windows)
+        for windows, values in zip(groups, found, strict=True):
+            cut_lost(member.state_scale.physical(values, out=values), member, windows)
+    return found
 
 
 def _excess(scales: Dynamics | Signature, windows: Windows) -> FloatArray:

@@ -36,6 +36,7 @@ __all__ = [
     "as_finished",
     "in_order",
     "make_executor",
+    "on_this_machine",
     "one_blas_thread",
     "processes",
 ]
@@ -186,6 +187,11 @@ def _start_worker() -> None:
     if parent is not None:  # a parent that was killed leaves no worker behind
         sentinel = parent.sentinel
         threading.Thread(target=lambda: (wait_for([sentinel]), os._exit(1)), daemon=True).start()
+
+
+def on_this_machine(executor: Executor | None) -> Executor | None:
+    """The executor if its workers share this machine's disk, else None."""
+    return executor if isinstance(executor, Pool) else None
 
 
 def make_executor(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from typing import Any, Literal
 
 import numpy as np
@@ -21,6 +22,7 @@ from seakeep.arrays import FloatArray
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.coverage import CoverageTable
 from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.models.executor import in_order
 from seakeep.models.summaries import STATISTICS
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
@@ -68,9 +70,12 @@ NEAR = 0.1
 
 
 def judge(
-    groups: Mapping[str, xr.Dataset], settings: StudySettings, channels: Sequence[str]
+    groups: Mapping[str, xr.Dataset],
+    settings: StudySettings,
+    channels: Sequence[str],
+    executor: Executor | None = None,
 ) -> dict[str, xr.Dataset]:
-    """All statistics of a study, as groups ``statistics/…``."""
+    """All statistics of a study, as groups ``statistics/…``; the densities side by side."""
     models = list(settings.models)
     kinds = {name: each.kind for name, each in settings.models.items()}
     out: dict[str, xr.Dataset] = {}
@@ -98,7 +103,7 @@ def judge(
             out[f"statistics/response/{name}"] = regular_response(groups, name, models)
     name = settings.statistics.densities_of or next(iter(settings.tests))
     test = groups[f"tests/{name}"]
-    found = [_divergences(test, model, channels, settings, name) for model in models]
+    found = [_divergences(test, model, channels, settings, name, executor) for model in models]
     divergence, densities = (
         xr.concat([pair[k] for pair in found], dim=xr.Variable("model", models)) for k in (0, 1)
     )
@@ -469,29 +474,36 @@ DIVERGENCE = (
 
 
 def _divergences(
-    test: xr.Dataset, model: str, channels: Sequence[str], settings: StudySettings, name: str
+    test: xr.Dataset,
+    model: str,
+    channels: Sequence[str],
+    settings: StudySettings,
+    name: str,
+    executor: Executor | None,
 ) -> tuple[xr.Dataset, xr.Dataset]:
     predicted, measured, diverged = joined(test, model)
     segments = [test.sizes["time"]] * test.sizes["window"]
     table = np.full((len(DIVERGENCE), len(VARIANTS), len(channels)), np.nan)
     curves = np.full((7, len(channels), 512), np.nan)
-    for c, channel in enumerate(channels):
-        p, m = predicted[:, :, c], measured[:, c]
-        inside = p.reshape(len(p), test.sizes["window"], test.sizes["time"])
-        if not len(p) or np.ptp(m) == 0 or np.any(np.ptp(inside, axis=2).max(axis=1) == 0):
-            continue  # what stands still has no density
-        try:
-            for v, variant in enumerate(VARIANTS):
-                stream = f"jsd.{name}.{variant}.{channel}"
-                table[:, v, c] = _divergence(p, m, segments, variant, settings, stream)
-            curves[:, c] = _densities(p, m, settings, f"densities.{name}.{channel}")
-        except (DataError, RequestError) as error:  # a series that stands still has no density
+    inside = predicted.reshape(
+        len(predicted), test.sizes["window"], test.sizes["time"], len(channels)
+    )
+    moves = (np.ptp(inside, axis=2).max(axis=1) > 0).all(axis=0) & (np.ptp(measured, axis=0) > 0)
+    # What stands still has no density.
+    judged = np.flatnonzero(moves if len(predicted) else []).tolist()
+    # Contiguous, as they are in a worker: sums are then the same to the last bit.
+    items = [(channels[c], predicted[:, :, c].copy("C"), measured[:, c].copy()) for c in judged]
+    found = in_order(_channel_densities, (settings, name, segments), items, executor)
+    for c, each in zip(judged, found, strict=True):
+        if isinstance(each, str):  # a series that stands still has no density
             warnings.warn(
-                f"the densities of {channel} as forecast by '{model}' and as measured, over the "
-                f"windows of '{name}', cannot be compared and are left out: {error}",
+                f"the densities of {channels[c]} as forecast by '{model}' and as measured, over "
+                f"the windows of '{name}', cannot be compared and are left out: {each}",
                 SeakeepWarning,
                 stacklevel=4,
             )
+        else:
+            table[:, :, c], curves[:, c] = each
     divergence = xr.Dataset(
         {n: (("variant", "channel"), table[i]) for i, n in enumerate(DIVERGENCE)},
         coords={"variant": list(VARIANTS), "channel": list(channels)},
@@ -506,49 +518,35 @@ def _divergences(
     return divergence, densities
 
 
-def _divergence(
-    p: FloatArray,
-    m: FloatArray,
-    segments: Sequence[int],
-    variant: str,
-    settings: StudySettings,
-    stream: str,
-) -> list[float]:
-    """Divergence between forecast and measurement, in the order of ``DIVERGENCE``."""
-    choice = VARIANTS[variant]
-    with warnings.catch_warnings():
-        # Caps of the block length and coarse grids: the table prints the length.
-        warnings.simplefilter("ignore", SeakeepWarning)
-        found = statistics.jsd_interval(
-            p,
-            m,
-            block_length=choice["block_length"],
-            bandwidth=choice["bandwidth"],
-            segments=None if choice["joins"] else segments,
-            rng=random_stream(settings.study.seed, stream),
-            n_series=settings.statistics.n_series,
-        )
-    return [getattr(found, number) for number in DIVERGENCE]
-
-
-def _densities(p: FloatArray, m: FloatArray, settings: StudySettings, stream: str) -> FloatArray:
-    """Grid, and densities with their bands of measurement and forecast (paper's settings)."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SeakeepWarning)  # as above
-        grid = statistics.density_grid(p, m, bandwidth="paper")
-        rows = [grid]
-        for series in (m, p):
-            band = statistics.density_interval(
-                series,
-                block_length="carlstein",
-                rng=random_stream(settings.study.seed, stream),
-                n_series=settings.statistics.n_series,
-                grid=grid,
-                bandwidth="paper",
-                level=settings.statistics.level,
-            )
-            rows += [band.mean, band.lower, band.upper]
-    return np.stack(rows)
+def _channel_densities(
+    data: tuple[StudySettings, str, Sequence[int]], item: tuple[str, FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray] | str:
+    """Divergences and densities of one channel of one model, or why there are none."""
+    settings, name, segments = data
+    channel, p, m = item
+    found = {}
+    try:
+        with warnings.catch_warnings():
+            # Caps of the block length and coarse grids: the table prints the length.
+            warnings.simplefilter("ignore", SeakeepWarning)
+            for variant, choice in VARIANTS.items():
+                found[variant] = statistics.jsd_interval(
+                    p,
+                    m,
+                    block_length=choice["block_length"],
+                    bandwidth=choice["bandwidth"],
+                    segments=None if choice["joins"] else segments,
+                    rng=random_stream(settings.study.seed, f"jsd.{name}.{variant}.{channel}"),
+                    n_series=settings.statistics.n_series,
+                )
+    except (DataError, RequestError) as error:
+        return str(error)
+    paper, beyond = found["paper"], (1 - settings.statistics.level) / 2
+    curves = [paper.grid]
+    for drawn in (paper.measured, paper.predicted.reshape(-1, paper.grid.size)):
+        curves += [drawn.mean(axis=0), *np.quantile(drawn, [beyond, 1 - beyond], axis=0)]
+    table = [[getattr(each, number) for each in found.values()] for number in DIVERGENCE]
+    return np.array(table), np.stack(curves)
 
 
 def wave_frequency(elevation: npt.ArrayLike, dt: float) -> float:

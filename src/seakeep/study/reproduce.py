@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,7 @@ from seakeep.campaign import read_campaign, write_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing
+from seakeep.models.executor import as_finished, on_this_machine
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
 from seakeep.study.store import StudyResult, read_result, storing, versions
@@ -166,11 +168,14 @@ def reproduce(
             (out / act.name).mkdir(parents=True, exist_ok=True)
         check_output(out / act.name / "study.toml", STUDY_FILE)
     nominal = _play(out / "campaign", seed, progress)
-    detrended = out / "campaign" / "detrended.toml"
-    text = (out / "campaign" / "campaign.toml").read_text(encoding="utf-8")
-    _write(detrended, detrended_text(text), CAMPAIGN_FILE)
-    raw = read_campaign(out / "campaign" / "campaign.toml")
-    write_prepared(raw, progress=_named(progress, "preparing "))  # for two acts
+    campaigns = [out / "campaign" / "campaign.toml"]
+    if any(act.without_drift for act in acts):
+        campaigns.append(out / "campaign" / "detrended" / "campaign.toml")
+        with storing(out):
+            campaigns[1].parent.mkdir(exist_ok=True)
+        text = campaigns[0].read_text(encoding="utf-8")
+        _write(campaigns[1], detrended_text(text), CAMPAIGN_FILE)
+    _prepare_all(campaigns, executor, progress)
     found = {}
     for act in acts:
         path = out / act.name / "study.toml"
@@ -251,6 +256,25 @@ def _play(folder: Path, seed: int, progress: Progress | None) -> xr.Dataset:
     )
 
 
+def _prepare_all(
+    campaigns: Sequence[Path], executor: Executor | None, progress: Progress | None
+) -> None:
+    """Write the prepared runs of campaigns, which lie side by side where workers are near."""
+    near = on_this_machine(executor)
+    if near is None:
+        for path in campaigns:
+            write_prepared(read_campaign(path), progress=_named(progress, "preparing "))
+        return
+    tell = progress or (lambda done, total, what: None)
+    tell(0, len(campaigns), "preparing campaigns")
+    for done, _ in enumerate(as_finished(_prepare, None, campaigns, near), 1):
+        tell(done, len(campaigns), "campaigns prepared")
+
+
+def _prepare(_: None, path: Path) -> None:
+    write_prepared(read_campaign(path))
+
+
 def _named(progress: Progress | None, words: str) -> Progress | None:
     if progress is None:
         return None
@@ -264,7 +288,7 @@ def detrended_text(campaign: str) -> str:
     What was measured keeps a name of its own, ``NAME_with_drift``: the waves are still carried to
     where the vessel is.
     """
-    text = campaign
+    text = campaign.replace('"raw/', '"../raw/')
     for name in SLOW:
         text = re.sub(
             rf"^\[(channels|derived)\.{name}\]", rf"[\1.{name}_with_drift]", text, flags=re.M
@@ -295,7 +319,7 @@ def study_text(act: Act, size: Size, seed: int) -> str:
         f'name = "Virtual CK-14e, {act.title}"',
         'description = "HDMDc and BHDMDc of a moored vessel with a moon pool in head seas; data '
         'of the virtual towing tank"',
-        f'campaign = "../campaign/{"detrended" if act.without_drift else "campaign"}.toml"',
+        f'campaign = "../campaign/{"detrended/" if act.without_drift else ""}campaign.toml"',
         *([] if act.without_drift else ['truth = "../campaign/truth"']),
         f'preset = "{act.preset}"',
         f"seed = {seed}",

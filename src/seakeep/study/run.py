@@ -106,7 +106,7 @@ def run_study(
             if "repeats" in groups:
                 warnings.warn(words_of_repeats(groups["repeats"]), SeakeepWarning, stacklevel=2)
             groups |= collect(study, plan, runs, lambda unit: _arrays(folder, unit))
-            groups |= judge(groups, study.settings, list(plan.states))
+            groups |= judge(groups, study.settings, list(plan.states), executor)
             if "statistics/lost" in groups:
                 words = words_of_lost(groups["statistics/lost"])
                 warnings.warn(words, SeakeepWarning, stacklevel=2)
