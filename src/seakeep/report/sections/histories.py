@@ -150,8 +150,7 @@ def _test(result: StudyResult, name: str) -> dict[str, Any]:
 
 def _cell(result: StudyResult, test: str, training: int, window: int) -> dict[str, Any]:
     """Waves, measurement, forecasts and errors of a cell, packed."""
-    data = result.tests[test]
-    cell = data.isel(training=training, window=window)
+    data, factors = result.tests[test], _factors(result)
     shown = data["shown"].values.tolist() if "shown" in data else []
     first = int(np.argmax(data["judged"].values[:, window]))
     row = shown.index(window) if window in shown and training == first else None
@@ -159,30 +158,36 @@ def _cell(result: StudyResult, test: str, training: int, window: int) -> dict[st
     for model in judged_models(result):
         keys = ("mean", "lower", "upper") if result.is_ensemble(model) else ("mean",)
         entry: dict[str, Any] = {
-            key: _packed(result, cell[f"{model}_{key}"].values) for key in keys
+            key: _packed(factors, data[f"{model}_{key}"].values[training, window]) for key in keys
         }
         if row is not None and f"{model}_members" in data:
             members = data[f"{model}_members"].values[row, :MOST_MEMBERS]
-            entry["members"] = _packed(result, members.astype(float))
-        errors = cell[f"{model}_nrmse"].values
+            entry["members"] = _packed(factors, members.astype(float))
+        errors = data[f"{model}_nrmse"].values[training, window]
         models[model] = entry | {"nrmse": [round(float(e), 3) if e == e else None for e in errors]}
     return {
-        "measured": _packed(result, cell["measured"].values),
-        "waves": _waves(result, cell),
+        "measured": _packed(factors, data["measured"].values[window]),
+        "waves": _waves(result, data, window),
         "models": models,
     }
 
 
-def _packed(result: StudyResult, values: npt.NDArray[Any]) -> list[dict[str, Any]]:
+def _factors(result: StudyResult) -> list[float]:
+    """What takes each channel to the unit in which it is shown."""
+    channels = result.groups["channels"]
+    units = dict(zip(channels["name"].values, channels["units"].values, strict=True))
+    return [displayed(str(units[name]))[0] for name in result.channels]
+
+
+def _packed(factors: list[float], values: npt.NDArray[Any]) -> list[dict[str, Any]]:
     """Values (…, channel) in the units that are shown, packed channel by channel."""
-    units = result.groups["channels"]["units"].sel(name=result.channels).values
-    factors = [displayed(str(unit))[0] for unit in units]
     return [pack(factor * values[..., k]) for k, factor in enumerate(factors)]
 
 
-def _waves(result: StudyResult, cell: xr.Dataset) -> list[dict[str, Any]]:
-    """Measured elevations at the instants of a cell."""
-    run = result.prepared[str(cell["run"].values)]
-    at = int(np.argmin(np.abs(run["time"].values - float(cell["start"])))) + 1
-    part = slice(at, at + int(cell.sizes["time"]))
+def _waves(result: StudyResult, data: xr.Dataset, window: int) -> list[dict[str, Any]]:
+    """Measured elevations at the instants of a window."""
+    run = result.prepared[str(data["run"].values[window])]
+    start = float(data["start"].values[window])
+    at = int(np.argmin(np.abs(run["time"].values - start))) + 1
+    part = slice(at, at + data.sizes["time"])
     return [pack(run[name].values[part]) for name in _elevations(result)]
