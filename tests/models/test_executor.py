@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -67,11 +68,20 @@ def test_results_come_in_order_and_progress_is_reported(pool):
 
 
 def test_large_pieces_come_as_they_are_finished(pool):
-    found = dict(as_finished(side_work.square, 3, range(20), pool))
+    found = dict(as_finished(side_work.square, 3, deque(range(20)), pool))
     assert {number: value for number, (_, value) in found.items()} == {
         number: 3 * number**2 for number in range(20)
     }
     assert len({pid for pid, _ in found.values()}) == 2
+
+
+def test_pieces_that_wait_for_others_follow_them(pool):
+    for executor in (None, pool):
+        items, seen = deque([0]), []
+        for item, (_, value) in as_finished(side_work.square, 3, items, executor):
+            seen.append(value)
+            items.extend([item + 1] if item < 4 else [])
+        assert seen == [3 * k**2 for k in range(5)]
 
 
 def test_arrays_do_not_depend_on_the_executor(ensemble_and_run, pool):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
@@ -161,7 +162,7 @@ def _write_reproduction(
     else:
         with _Progress("Reports") as tell:
             tell(0, len(items), "drawing")
-            for done, _ in enumerate(as_finished(_write_act, None, items, near), 1):
+            for done, _ in enumerate(as_finished(_write_act, None, deque(items), near), 1):
                 tell(done, len(items), "written")
     with _Progress("Report") as tell:
         return write_reproduction(folder, found, tell)

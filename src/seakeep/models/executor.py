@@ -104,17 +104,27 @@ def _in_order(
 def as_finished(
     function: Function[Data, Item, Result],
     data: Data,
-    items: Sequence[Item],
+    items: deque[Item],
     executor: Executor | None = None,
-) -> Iterator[tuple[int, Result]]:
-    """Yield the number of an item and ``function(data, item)`` as they finish: large pieces."""
+) -> Iterator[tuple[Item, Result]]:
+    """Yield each item and ``function(data, item)`` as they finish: large pieces.
+
+    Items are taken from the left of `items`. Whoever iterates may append more: those that need a
+    result which has just been yielded.
+    """
     if executor is None:
-        yield from enumerate(_in_order(function, data, items, None))
+        while items:
+            item = items.popleft()
+            with one_blas_thread():
+                result = function(data, item)
+            yield item, result
         return
+    pending: dict[Future[list[Result]], Item] = {}
     with _submitting(function, data, executor) as submit:
-        waiting = enumerate(items)
-        pending = {submit([item]): number for number, item in islice(waiting, AHEAD)}
-        while pending:
+        while items or pending:
+            while items and len(pending) < AHEAD:
+                item = items.popleft()
+                pending[submit([item])] = item
             finished = _wait_for_any(pending, executor)
             errors = [error for each in finished if (error := each.exception()) is not None]
             sound = [each for each in finished if each.exception() is None]
@@ -122,8 +132,6 @@ def as_finished(
             # A result that is still referred to would be computed again if its worker were lost.
             finished.clear()
             sound.clear()
-            for number, item in islice(waiting, len(results)):
-                pending[submit([item])] = number
             yield from results  # what is done is handed on before an error is
             if errors:
                 raise errors[0]

@@ -171,6 +171,8 @@ class Problem:
         Passes of a predicted surge; 0 where no predicted state drives the input.
     is_per_snapshot : bool
         Whether λ counts per snapshot pair.
+    seas : tuple of str
+        Runs of one name here repeat each other: none of them teaches what is judged on another.
     """
 
     data: TrainingData
@@ -181,7 +183,8 @@ class Problem:
     direct_owners: tuple[int, ...]
     horizons: tuple[int, ...]
     passes: int
-    is_per_snapshot: bool = True
+    is_per_snapshot: bool
+    seas: tuple[str, ...]
     moments: tuple[Moments, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -246,6 +249,11 @@ class Problem:
         square = np.concatenate([top, np.eye(size - len(top), size)])
         return float(np.abs(np.linalg.eigvals(square)).max())
 
+    def others(self, run: int) -> list[int]:
+        """Runs that teach what is judged on a run: those of other seas, if there are any."""
+        rest = [other for other in range(len(self.seas)) if other != run]
+        return [other for other in rest if self.seas[other] != self.seas[run]] or rest
+
     def folds(self) -> list[int]:
         """Runs in which a window of some horizon fits: each is held out once."""
         return [
@@ -293,8 +301,8 @@ class Problem:
         return np.stack([states[at + 1 : at + 1 + steps] for at in starts])
 
     def _without(self, candidate: Candidate, levels: Sequence[float], fold: int) -> _Regression:
-        """Models of all runs but one, at each level."""
-        others = [run for run in range(len(self.data.names)) if run != fold]
+        """Models of the runs that do not repeat one of them, at each level."""
+        others = self.others(fold)
         scales, gram, right, count = self._system(candidate, others)
         return _Regression(fold, scales, self._path(candidate, levels, gram, right, count))
 
@@ -1004,7 +1012,14 @@ def _problem(
         horizons=horizons,
         passes=chain.passes if chain.reads_states == "predicted" else 0,
         is_per_snapshot=settings.ridge_scale == "per_snapshot",
+        seas=tuple(_sea(run, name) for name, run in pieces.items()),
     )
+
+
+def _sea(run: xr.Dataset, name: str) -> str:
+    """Sea state of a run in regular waves, whose repetitions are the same waves; else its name."""
+    stated = str(run.attrs.get("sea_state", ""))
+    return stated if stated and run.attrs.get("waves") == "regular" else name
 
 
 def _rows_of(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -267,7 +268,7 @@ def _prepare_all(
         return
     tell = progress or (lambda done, total, what: None)
     tell(0, len(campaigns), "preparing campaigns")
-    for done, _ in enumerate(as_finished(_prepare, None, campaigns, near), 1):
+    for done, _ in enumerate(as_finished(_prepare, None, deque(campaigns), near), 1):
         tell(done, len(campaigns), "campaigns prepared")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from collections import deque
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from pathlib import Path
@@ -207,26 +208,25 @@ def _compute_all(
     todo = [each for each in todo if not folder.has(each.name)]
     done, total = len(units) - len(left), len(units) + len(todo)
     report(done, total, f"fitting and forecasting, {taken}")
-    # What is chosen serves several models: it comes first, with the units that need no choice.
-    first = [*todo, *(unit for unit in left if choices[unit] is None)]
-    then = [unit for unit in left if choices[unit] is not None]
-    for batch in filter(None, (first, then)):
-        items = [
-            (unit, None if (choice := choices.get(unit)) is None else _arrays(folder, choice))
-            for unit in batch
-        ]
-        try:
-            for number, arrays in as_finished(_work, (plan, dict(runs)), items, executor):
-                unit = batch[number]
-                folder.write(unit.name, arrays)
-                done += 1
-                what = "settings chosen" if unit.chooses else unit.model
-                name = plan.training[unit.training].name
-                report(done, total, f"{what}, training set {name}")
-        except WorkerLostError as error:
-            raise WorkerLostError(
-                f"{error} What was finished is kept: the same command continues where it stopped."
-            ) from None
+    # What is chosen serves several models: they wait for it.
+    ready = [unit for unit in left if (choice := choices[unit]) is None or choice not in todo]
+    items = deque((unit, _choice(folder, choices.get(unit))) for unit in [*todo, *ready])
+    try:
+        for (unit, _), arrays in as_finished(_work, (plan, dict(runs)), items, executor):
+            folder.write(unit.name, arrays)
+            items.extend((each, arrays) for each in left if choices[each] == unit)
+            done += 1
+            what = "settings chosen" if unit.chooses else unit.model
+            report(done, total, f"{what}, training set {plan.training[unit.training].name}")
+    except WorkerLostError as error:
+        raise WorkerLostError(
+            f"{error} What was finished is kept: the same command continues where it stopped."
+        ) from None
+
+
+def _choice(folder: UnitFolder, choice: Unit | None) -> Arrays | None:
+    """What an earlier run of the study has chosen for a unit."""
+    return None if choice is None else _arrays(folder, choice)
 
 
 def _work(data: tuple[Plan, dict[str, xr.Dataset]], item: tuple[Unit, Arrays | None]) -> Arrays:
