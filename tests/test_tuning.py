@@ -34,19 +34,24 @@ def test_the_choice_is_in_the_spec_the_table_and_the_text():
     assert model.settings.ridge == result.spec.ridge
 
 
-def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts():
-    given, powers = runs(), seakeep.Powers("eta", (2,))
+@pytest.mark.parametrize("folds", ["run", "sea_state"])
+def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds):
+    seas = ("calm", "rough", "calm")
+    named = zip(runs().items(), seas, strict=True)
+    given = {name: run.assign_attrs(sea_state=sea) for (name, run), sea in named}
+    powers = seakeep.Powers("eta", (2,))
     spec = replace(SPEC, lead=4, observables=(powers,))
-    table = seakeep.tune(spec, given, STATES, INPUTS, horizon=(15,)).table
+    table = seakeep.tune(spec, given, STATES, INPUTS, horizon=(15,), folds=folds).table
     assert set(table["observables"].values.tolist()) == {"none", "powers"}
     steps, first = 15 * PERIOD, spec.input_delays
     for trial in range(0, table.sizes["trial"], 4):
-        row, folds = table.isel(trial=trial), []
+        row, found = table.isel(trial=trial), []
         chosen = (powers,) if row["observables"] == "powers" else ()
         settings = {"ridge": float(row["ridge"]), "ridge_scale": "per_snapshot"}
         plain = replace(spec, observables=chosen, **settings)
-        for held, run in given.items():
-            model = plain.fit([r for name, r in given.items() if name != held], STATES, INPUTS)
+        for run in given.values():
+            key = (lambda r: r.attrs["sea_state"]) if folds == "sea_state" else id
+            model = plain.fit([r for r in given.values() if key(r) != key(run)], STATES, INPUTS)
             scores = []
             for at in range(first, run.sizes["time"] - model.lead_samples - steps + 1, steps):
                 forecast = model.forecast(run, at * DT, steps)
@@ -54,9 +59,9 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts():
                 errors = metrics.nrmse(predicted=forecast, measured=measured)
                 counted = [min(float(errors[state]), WORST) for state in STATES]
                 scores.append(np.mean(counted))
-            folds.append(np.mean(scores))
+            found.append(np.mean(scores))
         # The house rule for results: sums in another order, and an eigendecomposition of them.
-        assert float(row["score"]) == pytest.approx(np.mean(folds), abs=1e-10)
+        assert float(row["score"]) == pytest.approx(np.mean(found), abs=1e-10)
 
 
 def test_the_result_is_the_same_for_any_number_of_workers():
@@ -96,7 +101,9 @@ def test_a_search_that_was_interrupted_goes_on(tmp_path):
 
 
 def test_folds_that_are_no_number_of_parts_are_refused():
-    with pytest.raises(RequestError, match=r"folds must be 'run' or an integer of at least 2"):
+    with pytest.raises(
+        RequestError, match=r"folds must be 'run', 'sea_state' or an integer of at least 2"
+    ):
         seakeep.tune(SPEC, runs(), STATES, INPUTS, folds=1)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -82,7 +82,7 @@ def tune(
     inputs: Sequence[str],
     vary: Sequence[str] = ("ridge", "observables"),
     horizon: Sequence[float] = (15.0, 45.0),
-    folds: str | int = "run",
+    folds: Literal["run", "sea_state"] | int = "run",
     *,
     stop: Stop = None,
     executor: Executor | None = None,
@@ -108,9 +108,9 @@ def tune(
         stacked, for those of the spec or for every load).
     horizon : sequence of float, optional
         Lengths of the free runs, encounter periods.
-    folds : "run" or int, optional
-        Whether whole runs are held out, or parts of each run: their number. A single run is held
-        out in three parts.
+    folds : {"run", "sea_state"} or int, optional
+        What is held out in turn: a run, with all others of its sea state or without, or a part of
+        a run: their number. A single run is held out in three parts.
     stop : float, sequence or mapping of float, optional
         Last instant of the training window of the runs, s.
     executor : concurrent.futures.Executor, optional
@@ -135,8 +135,11 @@ def tune(
     DataError
         As :meth:`HankelDMDc.fit`.
     """
-    if folds != "run" and (isinstance(folds, bool) or not isinstance(folds, int) or folds < 2):
-        raise RequestError(f"folds must be 'run' or an integer of at least 2; received {folds!r}.")
+    number = isinstance(folds, int) and not isinstance(folds, bool) and folds >= 2
+    if not number and folds not in ("run", "sea_state"):
+        raise RequestError(
+            f"folds must be 'run', 'sea_state' or an integer of at least 2; received {folds!r}."
+        )
     check_names(states, inputs)
     named = until(as_runs(runs), stop)
     known: MutableMapping[str, Any] = {}
@@ -155,7 +158,7 @@ def tune(
         list(inputs),
         vary=vary,
         horizon=horizon,
-        parts=None if folds == "run" else int(folds),
+        folds=folds,
         executor=executor,
         progress=progress,
         known=known,

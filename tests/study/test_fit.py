@@ -12,7 +12,7 @@ from scipy import stats
 import seakeep
 from seakeep import BayesianHankelDMDc, Fixed, LogUniform, ProbeAlignment, Uniform
 from seakeep.campaign import ModelSettings
-from seakeep.campaign.settings import AlignmentSettings
+from seakeep.campaign.settings import AlignmentSettings, SelectSettings
 from seakeep.campaign.store import write_prepared
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.study import (
@@ -425,6 +425,18 @@ def test_a_preset_fills_in_what_is_not_stated_key_by_key_and_says_so():
     assert sources["alignment.mode"] == sources["select.observables"] == "preset"
     assert sources["rank"] == sources["stable"] == "default"
     assert sources["ridge"] == "stated"
+
+
+def test_a_study_that_leaves_sea_states_out_chooses_so_too():
+    settings = ModelSettings(states=("heave",), inputs=("eta_fwd",))
+    found = resolve_model(settings, 2.0, 0.1, preset="recommended", folds="sea_state")
+    assert (found.spec.select.folds, found.sources["select.folds"]) == ("sea_state", "study")
+    assert found.spec.select.observables
+    stated = settings.model_copy(update={"select": SelectSettings(folds="run")})
+    found = resolve_model(stated, 2.0, 0.1, preset="recommended", folds="sea_state")
+    assert (found.spec.select.folds, found.sources["select.folds"]) == ("run", "stated")
+    numbers = ModelSettings(states=("heave",), inputs=("eta_fwd",), kind="mean")
+    assert not hasattr(resolve_model(numbers, 2.0, 0.1, folds="sea_state").spec, "select")
 
 
 def test_the_paper_s_alignment_is_taken_where_the_campaign_can_align():

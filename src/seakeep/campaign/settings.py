@@ -527,6 +527,11 @@ class SelectSettings(Table):
         default=(15.0, 45.0),
         description="a length of free runs in encounter periods, such as '15 T', or a list of them",
     )
+    folds: Literal["run", "sea_state"] = Field(
+        default="run",
+        description="'run', or 'sea_state': what is held out at a time, a run or all runs of its "
+        "sea state",
+    )
 
 
 class RunSettings(Table):

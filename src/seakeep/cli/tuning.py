@@ -86,6 +86,7 @@ def tune(
             list(settings.states),
             list(settings.inputs),
             vary=varied,
+            folds=spec.select.folds if spec.select else "run",
             stop=stop,
             executor=executor,
             progress=progress,

@@ -13,7 +13,7 @@ import json
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import astuple, dataclass, field, replace
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -171,8 +171,8 @@ class Problem:
         Passes of a predicted surge; 0 where no predicted state drives the input.
     is_per_snapshot : bool
         Whether λ counts per snapshot pair.
-    seas : tuple of str
-        Runs of one name here repeat each other: none of them teaches what is judged on another.
+    groups : tuple of str
+        One per run: runs of one group do not teach what is judged on another of it.
     """
 
     data: TrainingData
@@ -184,7 +184,7 @@ class Problem:
     horizons: tuple[int, ...]
     passes: int
     is_per_snapshot: bool
-    seas: tuple[str, ...]
+    groups: tuple[str, ...]
     moments: tuple[Moments, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -250,9 +250,9 @@ class Problem:
         return float(np.abs(np.linalg.eigvals(square)).max())
 
     def others(self, run: int) -> list[int]:
-        """Runs that teach what is judged on a run: those of other seas, if there are any."""
-        rest = [other for other in range(len(self.seas)) if other != run]
-        return [other for other in rest if self.seas[other] != self.seas[run]] or rest
+        """Runs that teach what is judged on a run: those of other groups, if there are any."""
+        rest = [other for other in range(len(self.groups)) if other != run]
+        return [other for other in rest if self.groups[other] != self.groups[run]] or rest
 
     def folds(self) -> list[int]:
         """Runs in which a window of some horizon fits: each is held out once."""
@@ -301,7 +301,7 @@ class Problem:
         return np.stack([states[at + 1 : at + 1 + steps] for at in starts])
 
     def _without(self, candidate: Candidate, levels: Sequence[float], fold: int) -> _Regression:
-        """Models of the runs that do not repeat one of them, at each level."""
+        """Models of the other runs, at each level."""
         others = self.others(fold)
         scales, gram, right, count = self._system(candidate, others)
         return _Regression(fold, scales, self._path(candidate, levels, gram, right, count))
@@ -639,6 +639,7 @@ def settle(
         vary=vary,
         ridges=(float(settings.ridge),) if stated else None,
         horizon=asked.horizon,
+        folds=asked.folds,
         period=asked.period,
         executor=executor,
         progress=progress,
@@ -655,7 +656,7 @@ def select(
     vary: Sequence[str] = ("ridge",),
     ridges: Sequence[float] | None = None,
     horizon: Sequence[float] = (15.0, 45.0),
-    parts: int | None = None,
+    folds: Literal["run", "sea_state"] | int = "run",
     period: float | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
@@ -678,9 +679,9 @@ def select(
         λ to try, as the settings count it; by default ``RIDGES`` per snapshot pair.
     horizon : sequence of float
         Lengths of the windows that are judged, encounter periods.
-    parts : int, optional
-        Number of parts into which each run is cut, to hold out one part in turn; by default runs
-        are held out whole, and a single run in three parts.
+    folds : {"run", "sea_state"} or int, optional
+        What is held out in turn: a run, with all others of its sea state or without, or a part of
+        a run: their number. A single run is held out in three parts.
     period : float, optional
         Encounter period, s; by default that of the runs.
     executor, progress, known
@@ -699,7 +700,8 @@ def select(
         If `vary` names something else, or the delay rows are not exact.
     """
     _check_asked(settings, vary)
-    parts = 3 if parts is None and len(runs) == 1 else parts
+    if isinstance(folds, str) and len(runs) == 1:
+        folds = 3
     step = labelled.common_step(runs)
     samples = mean_period(runs, list(inputs)) if period is None else period / step
     labels = labelled.common_labels(runs, states)
@@ -735,7 +737,7 @@ def select(
                 base,
                 options,
                 tuple(round(each * samples) for each in horizon),
-                parts,
+                folds,
             )
             for alignment in alignments
         ]
@@ -869,8 +871,9 @@ def readouts_for(
     if len(runs) == 1 and settings.window is not None:  # whose parts are shorter
         runs = {name: run.isel(time=slice(-settings.window, None)) for name, run in runs.items()}
         settings = replace(settings, window=None)
-    parts = 3 if len(runs) == 1 else None
-    problem = _problem(settings, runs, states, inputs, base, {}, (steps,), parts)
+    problem = _problem(
+        settings, runs, states, inputs, base, {}, (steps,), 3 if len(runs) == 1 else "run"
+    )
     if problem is None:
         return fit_readouts(readouts, _measured(settings, runs, states, inputs), ())
     return fit_readouts(readouts, problem.data, list(problem.held(base, ridge, steps)))
@@ -962,7 +965,7 @@ def _problem(
     base: Candidate,
     options: Mapping[str, Sequence[Any]],
     horizons: tuple[int, ...],
-    parts: int | None,
+    folds: Literal["run", "sea_state"] | int,
 ) -> Problem | None:
     """The columns of all candidates; None where the runs are too short for them."""
     leads = [base.lead, *options.get("lead", ())]
@@ -986,7 +989,7 @@ def _problem(
     chain = Chain(tuple(made))
     before = max(widest.state_delays, chain.history(delays))
     after = max(chain.lead_samples - 1, 0)
-    pieces = dict(runs) if parts is None else split(runs, parts, before, after)
+    pieces = dict(runs) if isinstance(folds, str) else split(runs, folds, before, after)
     if any(run.sizes["time"] < before + 2 + after for run in pieces.values()):
         return None
     data = gather(pieces, states, inputs, None, wide)
@@ -1012,14 +1015,11 @@ def _problem(
         horizons=horizons,
         passes=chain.passes if chain.reads_states == "predicted" else 0,
         is_per_snapshot=settings.ridge_scale == "per_snapshot",
-        seas=tuple(_sea(run, name) for name, run in pieces.items()),
+        groups=tuple(
+            str(run.attrs.get("sea_state") or name) if folds == "sea_state" else name
+            for name, run in pieces.items()
+        ),
     )
-
-
-def _sea(run: xr.Dataset, name: str) -> str:
-    """Sea state of a run in regular waves, whose repetitions are the same waves; else its name."""
-    stated = str(run.attrs.get("sea_state", ""))
-    return stated if stated and run.attrs.get("waves") == "regular" else name
 
 
 def _rows_of(

@@ -108,6 +108,9 @@ class Select:
         Lengths of the free runs, encounter periods.
     period : float, optional
         Encounter period, s; by default that of the training runs.
+    folds : {"run", "sea_state"}, optional
+        What is held out at a time: a run, or all runs of its sea state, for a model that must
+        forecast seas that no training run holds.
 
     Raises
     ------
@@ -118,8 +121,13 @@ class Select:
     observables: bool = False
     horizon: tuple[float, ...] = (15.0, 45.0)
     period: float | None = None
+    folds: Literal["run", "sea_state"] = "run"
 
     def __post_init__(self) -> None:
+        if self.folds not in ("run", "sea_state"):
+            raise RequestError(
+                f"select: folds must be 'run' or 'sea_state'; received {self.folds!r}."
+            )
         if not isinstance(self.observables, bool):
             raise RequestError(
                 f"select: observables must be True or False; received {self.observables!r}."

@@ -404,16 +404,23 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
     period = settings.study.encounter_period or campaign.encounter_period()
     general = settings.study
     aligned = can_align(campaign.settings, study.inputs)
+    left_out = settings.training.scheme == "leave_out"
     models = {
         name: resolve_model(
-            each, period, dt, preset=general.preset, seed=general.seed, aligned=aligned
+            each,
+            period,
+            dt,
+            preset=general.preset,
+            seed=general.seed,
+            aligned=aligned,
+            folds=settings.training.leave_out if left_out else "run",
         )
         for name, each in settings.models.items()
     }
     specs = [each.spec for each in models.values()]
     needs = needs_of(specs, dt)
     training = choose_training(settings, runs, training_names, needs)
-    default = "whole" if settings.training.scheme == "leave_out" else "test"
+    default = "whole" if left_out else "test"
     tests = {
         name: choose_tests(
             name,

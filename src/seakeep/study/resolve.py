@@ -18,6 +18,7 @@ from seakeep.models import KINDS, ProbeAlignment, Select, Spec
 from seakeep.models.observables import Observable, SlowSquares, observables_of
 from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform
 from seakeep.models.settings import periods_to_samples
+from seakeep.models.specs import left_open
 from seakeep.toml import Length, lengths, parse_length
 
 __all__ = ["ResolvedModel", "Spec", "build_spec", "can_align", "counts_in_periods", "resolve_model"]
@@ -151,6 +152,7 @@ def resolve_model(
     preset: str | None = None,
     seed: int | None = None,
     aligned: bool = False,
+    folds: Literal["run", "sea_state"] = "run",
 ) -> ResolvedModel:
     """Fill in, key by key, what the table of a model does not state."""
     kind = _kind_of(settings)
@@ -188,12 +190,18 @@ def resolve_model(
     stated = {
         key: _converted(key, value, ensemble, encounter_period, dt) for key, value in stated.items()
     }
-    from_study = {"seed": seed} if ensemble and seed is not None and "seed" not in stated else {}
+    from_study: dict[str, Any] = (
+        {"seed": seed} if ensemble and seed is not None and "seed" not in stated else {}
+    )
     filled: Spec | None = None
     if preset is not None and encounter_period is not None:
         filled = _filled(kind, preset, encounter_period, dt, alignment)
     data = {"encounter_period": encounter_period, "dt": dt}
     spec = _made(kind, filled, {**from_study, **stated}, data)
+    open_spec = left_open(spec)
+    if open_spec and folds != "run" and "folds" not in (stated.get("select") or {}):
+        spec = replace(open_spec, select=replace(open_spec.select or Select(), folds=folds))
+        from_study["select.folds"] = folds
     return ResolvedModel(settings.kind, preset, spec, _sources(spec, filled, stated, from_study))
 
 
