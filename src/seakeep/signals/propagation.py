@@ -509,13 +509,20 @@ def _spectra(
 
 
 def _scores(cross: ComplexArray, norm: float, k: FloatArray, distances: FloatArray) -> FloatArray:
-    """Parts of the correlation that the groups of frequencies make, shape (group, distance)."""
+    """Parts of the correlation that the groups of frequencies make, shape (group, distance).
+
+    Distances are equally spaced: each is a start and an offset, whose phases multiply.
+    """
     group = (np.arange(k.size) // NEIGHBOURS) % GROUPS
+    length = int(np.sqrt(distances.size))
+    starts = distances[::length]
+    offsets = distances[:length] - distances[0]
     out = np.zeros((GROUPS, distances.size))
     for each in range(GROUPS):
         own = group == each
-        turned = np.exp(1j * np.outer(distances, k[own]))
-        out[each] = (turned @ cross[own]).real / norm
+        turned = cross[own] * np.exp(1j * np.outer(starts, k[own]))
+        found = turned @ np.exp(1j * np.outer(k[own], offsets))
+        out[each] = found.real.ravel()[: distances.size] / norm
     return out
 
 
