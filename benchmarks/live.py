@@ -1,7 +1,7 @@
 """What a model in service costs, and what it gives up: steps, bands, and the chain of raw samples.
 
 python benchmarks/live.py steps [COUNT]                  # time and memory of COUNT steps
-python benchmarks/live.py bands MODEL.nc CAMPAIGN.toml RUN    # coverage at one step and 5 T
+python benchmarks/live.py bands CAMPAIGN.toml [KIND [STARTS]]     # errors and bands; KIND of SPECS
 python benchmarks/live.py chain MODEL.nc CAMPAIGN.toml RUN    # live chain against the offline one
 """
 
@@ -18,6 +18,15 @@ from seakeep.campaign import load_prepared
 from seakeep.formats import read_columns
 
 TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorial" / "campaign.toml"
+LEADS = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0)
+"""Leads of the table in encounter periods; the first is one step."""
+SPECS = {
+    "plain": lambda period, dt: seakeep.HankelDMDc(
+        round(period / dt), round(3 * period / dt), ridge=30.0
+    ),
+    "recommended": seakeep.HankelDMDc.recommended,
+    "ensemble": lambda period, dt: seakeep.BayesianHankelDMDc.recommended(period, dt),
+}
 DELAYS = ("0.25 T", "1 T", "4 T")
 
 
@@ -44,31 +53,58 @@ def steps(count=1_000_000):
             )
 
 
-def bands(model, campaign, name):
-    """Part of the measurement in the 95 % bands, averaged over channels; waves known or not."""
-    fitted, read = seakeep.load_model(model), seakeep.read_campaign(campaign)
-    run = load_prepared(read, names=[name])[name]
-    lead = round(read.seconds("5 T") / fitted.dt)
-    u = np.stack([run[each].values for each in fitted.inputs], axis=1)
-    y = np.stack([run[each].values for each in fitted.states], axis=1)
-    live, inside = fitted.live(like=run), {"known": [], "not known": []}
-    last = len(y) - lead - fitted.lead_samples - 60
-    starts = set(np.linspace(fitted.history_samples + 50, last, 40).astype(int).tolist())
+def bands(campaign, kind="plain", starts=40):
+    """Errors of forecasts and what 95 % bands hold: each training run held out once, and played.
+
+    The waves after a start are known; or predicted, with what the probe up-wave has seen; or
+    predicted from each probe's own record.
+    """
+    read = seakeep.read_campaign(campaign)
+    names, channels = read.training_runs, read.model()
+    runs = load_prepared(read, names=names)
+    dt = float(runs[names[0]].attrs["dt"])
+    period = read.seconds("1 T")
+    leads = [max(round(each * period / dt), 1) - 1 for each in LEADS]
+    found = {}
+    for name in names:
+        others = [runs[each] for each in names if each != name]
+        fitted = SPECS[kind](period, dt).fit(others, list(channels.states), list(channels.inputs))
+        model = fitted.hold() if hasattr(fitted, "hold") else fitted
+        for words, each in _served(model, runs[name], leads[-1] + 1, int(starts)).items():
+            found.setdefault(words, []).append(each)
+    print("lead, T:", *LEADS)
+    for words, each in found.items():
+        error, inside = np.mean(each, axis=0)
+        print(f"{words}: error, training SD:", *(f"{error[lead]:.2f}" for lead in leads))
+        covered = " ".join(f"{100 * inside[lead]:.1f}" for lead in leads)
+        apart = ", ".join(f"{100 * run[1].mean():.1f}" for run in each)
+        print(f"  in the band, %: {covered}; all {100 * inside.mean():.1f}, of runs {apart}")
+
+
+def _served(model, run, steps, starts):
+    """Mean over channels of the error and of what the band holds, by lead, shape (2, steps)."""
+    u = np.stack([run[each].values for each in model.signature.inputs], axis=1)
+    y = np.stack([run[each].values for each in model.signature.states], axis=1)
+    placed, alone = model.live(like=run), model.live(like=run)
+    alone._places = np.full(u.shape[1], np.nan)  # as if no position were known
+    lives = {"known": placed, "probe up-wave": placed, "each probe alone": alone}
+    sums = {words: np.zeros((2, steps, y.shape[1])) for words in lives}
+    last = len(y) - steps - model.signature.lead_samples - 60
+    begins = np.linspace(model.signature.history_samples + 50, last, starts).astype(int)
     for at in range(last + 1):
-        live.step(u[at], y[at])
-        if at in starts:
-            truth = y[at + 1 : at + lead + 1]
-            for words, future in (("known", u[at + 1 :]), ("not known", None)):
-                found = live.forecast(lead, future)
-                low, high = (
-                    np.stack([found[s].sel(statistic=each) for s in fitted.states], axis=1)
-                    for each in ("lower", "upper")
-                )
-                inside[words].append((low <= truth) & (truth <= high))
-    for words, each in inside.items():
-        over = 100 * np.mean(each, axis=(0, 2))
-        parts = f"one step {over[0]:.1f} %, 5 T {over[-1]:.1f} %, all {over.mean():.1f} %"
-        print(f"waves {words}: {parts}")
+        for live in set(lives.values()):
+            live.step(u[at], y[at])
+        for words, live in lives.items() if at in begins else ():
+            made = live.forecast(steps, u[at + 1 :] if words == "known" else None)
+            values = np.stack([made[each].values for each in model.signature.states], axis=-1)
+            truth = y[at + 1 : at + steps + 1]
+            sums[words][0] += (values[0] - truth) ** 2
+            sums[words][1] += (values[2] <= truth) & (truth <= values[3])
+    spread = model.signature.state_scale.spread
+    return {
+        words: (np.mean(np.sqrt(error / starts) / spread, axis=1), np.mean(inside / starts, axis=1))
+        for words, (error, inside) in sums.items()
+    }
 
 
 def chain(model, campaign, name, until=120.0):

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 from drifting import INPUTS, STATES, drifting_run
+from scipy import signal
 
 import seakeep
 from seakeep import DataError, HankelDMDc, ProbeAlignment, RequestError, load_live
+from seakeep.waves import group_speed
 
 START, STEPS = 500, 60  # the record that is kept holds all samples up to there
 SQUARES = seakeep.SlowSquares("eta_fwd", orders=(0,), lags=(0, 1))
@@ -209,9 +211,60 @@ def test_what_follows_is_predicted_as_the_forecast_predicts_it(models, run):
     model = models["lead"]
     cut = run.isel(time=slice(0, START))
     expected = model.forecast(cut, float(cut.time[-1]), STEPS, ahead="predict")
-    found = started(model, cut).forecast(STEPS)
+    live = model.live()  # of another rig: each probe from its own record
+    play(live, cut, 0, START)
     # Futures lie in pairs about the predicted one, and the model is linear in them.
-    np.testing.assert_allclose(mean(found), matrix(expected, STATES), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(mean(live.forecast(STEPS)), matrix(expected, STATES), atol=1e-9)
+
+
+def test_what_the_probe_up_wave_has_seen_is_foreseen_down_wave(models, run):
+    rough, rng = run.copy(deep=True), np.random.default_rng(6)
+    for name in INPUTS:
+        rough[name].values += 5e-4 * rng.standard_normal(run.sizes["time"])
+    apart, known = {}, matrix(run, INPUTS)[START:]
+    for words, like in (("alone", None), ("up-wave", run)):
+        live = models["lead"].live(like=like)
+        play(live, rough, 0, START)
+        apart[words] = np.square(mean(live.forecast(10)) - mean(live.forecast(10, known))).mean(
+            axis=0
+        )
+        found = live.forecast(2).attrs["predictable"]
+        # 3.67 m at the group speed of 0.38 Hz, below which a twentieth of the waves lies; of
+        # forty frequencies, each holds as much as that.
+        expected = 3.67 / group_speed(2 * np.pi * 0.384, 3.6) if words == "up-wave" else 0.0
+        assert found == pytest.approx(expected, rel=0.15)
+    assert apart["up-wave"][1] < 0.1 * apart["alone"][1]  # heave: surge answers no wave
+
+
+def test_bands_hold_what_they_say_on_a_vessel_that_is_known(make_dataset):
+    """x(k+1) = 1.6 x(k) - 0.8 x(k-1) + 0.3 u(k) + w: the variance after j steps is that of w times
+    the sum of the squared impulse response."""
+    rng, count, dt = np.random.default_rng(5), 6500, 0.1
+    names, sizes = [f"x{each}" for each in range(4)], np.array([0.2, 0.1, 0.3, 0.2])
+    u = signal.lfilter([1.0], [1.0, -1.7, 0.9], rng.standard_normal(count))
+    noise = sizes * rng.standard_normal((count, 4))
+    x = signal.lfilter([0.0, 1.0], [1.0, -1.6, 0.8], 0.3 * u[:, None] + noise, axis=0)
+    run = make_dataset(dt * np.arange(count), u=u, **dict(zip(names, x.T, strict=True)))
+    train, test = run.isel(time=slice(4000)), slice(4000, None)
+    model = HankelDMDc(1, 0, 1e-9, delay_rows="exact").fit(train, names, ["u"])
+    impulse = signal.lfilter([1.0], [1.0, -1.6, 0.8], np.eye(1, 40)[0])
+    truth = np.sqrt(np.cumsum(impulse**2))[:, None] * sizes
+    live, inside, steps = model.live(), [], 40
+    for at, (given, measured) in enumerate(zip(u[test, None], x[test], strict=True)):
+        live.step(given, measured)
+        if at % 12 == 11 and at < 2450:
+            found = live.forecast(steps, u[4000:, None][at + 1 : at + 1 + steps])
+            low, high = (matrix(found.sel(statistic=each), names) for each in ("lower", "upper"))
+            later = x[test][at + 1 : at + 1 + steps]
+            inside.append((low <= later) & (later <= high))
+    covered = 100 * np.mean(inside, axis=(0, 2))
+    # 800 samples at each lead, and deviations from 48 free runs, known to a tenth.
+    assert abs(covered[0] - 95) < 2
+    assert abs(covered[-20:].mean() - 95) < 2
+    claimed = matrix(found.sel(statistic="std"), names)
+    np.testing.assert_allclose(claimed, truth, rtol=0.3)
+    # Covariance of 1024 residuals: three of sqrt(2 / 1024).
+    np.testing.assert_allclose(np.diagonal(model.errors.residual), sizes**2, rtol=0.13)
 
 
 def test_a_lost_sample_takes_predicted_inputs(models, run):
@@ -294,8 +347,10 @@ def test_a_bad_sample_leaves_the_state_as_it_was(models, run, message):
     assert live.consistency == untouched.consistency
 
 
-def test_what_cannot_be_is_refused(models, run):
+def test_what_cannot_be_is_refused(models, ensemble, run):
     model = models["plain"]
+    with pytest.raises(RequestError, match=r"it is a member .* Use ensemble.hold\(\).live\(\)"):
+        ensemble.member(1).live()
     live = model.live()
     with pytest.raises(RequestError, match="there are 0 samples of history and the model needs 13"):
         live.forecast(5)

@@ -5,6 +5,8 @@ import pytest
 
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import predict_waves
+from seakeep.signals.prediction import draw_sea, draw_waves, predictable_time
+from seakeep.waves import wavenumber
 
 
 def test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on():
@@ -42,6 +44,52 @@ def test_columns_are_continued_alone_and_a_still_one_stays():
     found = predict_waves(both, 30)
     np.testing.assert_array_equal(found[:, 0], predict_waves(both[:, 0], 30))
     np.testing.assert_allclose(found[:, 1], 0.7, rtol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def sea():
+    """Elevations at 0, 2 and 4 m, 90 s and the 6 s after them, with 2 % of noise."""
+    rng = np.random.default_rng(4)
+    omega = 2 * np.pi * rng.uniform(0.4, 0.9, 400)
+    turned = np.outer(0.1 * np.arange(960), omega) + rng.uniform(0, 2 * np.pi, 400)
+    k = wavenumber(omega, 3.6)
+    waves = np.stack([np.cos(turned - k * x).sum(axis=1) for x in (0.0, 2.0, 4.0)], axis=1)
+    return waves + 0.02 * waves.std() * rng.standard_normal(waves.shape)
+
+
+def drawn(sea, positions, pairs=8, seed=0):
+    rng = np.random.default_rng(seed)
+    return draw_sea(sea[:900], 60, pairs, rng, dt=0.1, positions=positions, depth=3.6)
+
+
+def test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it(sea):
+    found, alone = drawn(sea, [0.0, 2.0, 4.0]), drawn(sea, [np.nan] * 3)
+    spread = sea.std(axis=0)
+    errors = [(each.mean(axis=0) - sea[900:]) / spread for each in (found, alone)]
+    np.testing.assert_array_equal(errors[0][:, 0], errors[1][:, 0])
+    for column, x in ((1, 2.0), (2, 4.0)):
+        known = int(predictable_time(sea[:900, 0], 0.1, x, 3.6) / 0.1)
+        error, own = (np.sqrt(np.mean(each[:known, column] ** 2)) for each in errors)
+        # Noise of two probes, 0.03, and the twentieth of the variance that is faster.
+        assert error < 0.05
+        assert error < 0.6 * own
+        assert found.std(axis=0)[:known, column].mean() < 0.1 * spread[column]
+
+
+def test_futures_of_a_sea_lie_in_pairs_and_spread_as_its_errors_do(sea):
+    found = drawn(sea, [0.0, 2.0, 4.0], pairs=60)
+    np.testing.assert_allclose(found[:60] + found[60:] - 2 * found.mean(axis=0), 0, atol=1e-9)
+    # Nothing of the last second is known: the futures spread as the sea itself does.
+    np.testing.assert_allclose(found[:, -10:].std(axis=(0, 1)), sea.std(axis=0), rtol=0.25)
+
+
+def test_probes_that_do_not_see_the_same_waves_are_drawn_alone(sea):
+    turned = sea[:900, [2, 1, 0]]  # the waves run the other way
+    expected = draw_waves(turned, 60, 8, np.random.default_rng(0))
+    np.testing.assert_array_equal(drawn(turned, [0.0, 2.0, 4.0]), expected)
+    still = np.stack([np.zeros(900), sea[:900, 0]], axis=1)
+    expected = draw_waves(still, 60, 8, np.random.default_rng(0))
+    np.testing.assert_array_equal(drawn(still, [0.0, 1.0]), expected)
 
 
 def test_what_cannot_be_continued_is_refused():

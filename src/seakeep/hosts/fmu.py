@@ -71,7 +71,8 @@ def write_fmu(model: Model, path: str | Path) -> Path:
         "start": _start(program),
     }
     files["fmi2.c"] = rendered("fmi2.c", **content)
-    description = rendered("modelDescription.xml", **content, **_description(program))
+    described = _description(program, content["start"])
+    description = rendered("modelDescription.xml", **content, **described)
     with (
         working_folder() as folder,
         replacing(target) as temporary,
@@ -136,11 +137,10 @@ def _start(program: Program) -> list[float]:
     return [*inputs.tolist(), *signature.state_scale.centre.tolist()]
 
 
-def _description(program: Program) -> dict[str, Any]:
+def _description(program: Program, start: list[float]) -> dict[str, Any]:
     """What the model description says beside names and numbers."""
     signature = program.model.signature
     inputs, states = signature.input_labels, signature.state_labels
-    start = _start(program)
     lengths = [program.history + signature.lead_samples] * len(inputs)
     lengths += [signature.state_delays + 1] * len(states)
     channels = [

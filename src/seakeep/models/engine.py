@@ -29,7 +29,7 @@ from seakeep.models.executor import Progress, in_order
 from seakeep.models.inputs import Measured
 from seakeep.models.interface import Drive, Scale, Signature, Span
 from seakeep.models.readouts import FittedReadOut, read_out
-from seakeep.signals.propagation import predict_waves
+from seakeep.signals.prediction import predict_waves
 from seakeep.signals.time_axis import instant_text
 
 __all__ = [

@@ -21,7 +21,7 @@ from seakeep.models.html import text_html
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import ChannelLabel, run_name
 from seakeep.models.training import Training
-from seakeep.signals.propagation import predict_waves
+from seakeep.signals.prediction import predict_waves
 from seakeep.signals.time_axis import fixed, instant_text, span_text
 
 __all__ = [

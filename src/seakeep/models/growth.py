@@ -28,6 +28,8 @@ CARRIED = 2
 """Runs, the longest ones, in which the free runs lie where waves are carried to the vessel."""
 REACH = 3
 """Longest delays of the model that the free runs last."""
+LEAST = 64
+"""Steps that they last at least: errors of a lightly damped vessel outgrow short delays."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +134,7 @@ def lead_errors(
     s = max(each.state_delays for each in members)
     z = max(each.input_delays for each in members)
     longest = max(each.last - each.first for each in stretches)
-    steps = max(1, min(REACH * (max(s, z) + 1), longest // 2))
+    steps = max(1, min(max(REACH * (max(s, z) + 1), LEAST), longest // 2))
     residuals = np.concatenate(
         [
             _errors(members, each, starts, s, z, 1, ())[:, 0]
@@ -150,6 +152,10 @@ def lead_errors(
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # where all have diverged
         square = np.where(known, errors**2, 0.0).sum(axis=0) / known.sum(axis=0)
     square = square[np.isfinite(square).all(axis=1)]
+    # One step is what the residuals are, of which there are more.
+    read_off = [each.column for each in readouts if each.function is not None]
+    regressed = np.setdiff1d(np.arange(square.shape[1]), read_off)
+    square[:1, regressed] = np.mean(residuals[:, regressed] ** 2, axis=0)
     grown = np.stack([isotonic_regression(each).x for each in square.T], axis=1)
     factor = _unseen(members, stretches)
     residual = factor * residuals.T @ residuals / len(residuals)

@@ -337,7 +337,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
         Raises
         ------
         RequestError
-            If the model's file holds no errors of its training, or a noise is out of range.
+            If the model holds no errors of its training, or a noise is out of range.
         """
         return Live(self, [self.dynamics], self.errors, like=like, noise=noise)
 

@@ -26,10 +26,10 @@ from seakeep.models import engine, store
 from seakeep.models.engine import Dynamics, Windows
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import LeadErrors
-from seakeep.models.inputs import Chain, Measured
+from seakeep.models.inputs import Chain, FittedAlignment, Measured
 from seakeep.models.interface import Regressors, Signature, Span
 from seakeep.models.summaries import statistic_coordinate
-from seakeep.signals.propagation import draw_waves, predict_waves
+from seakeep.signals.prediction import draw_sea, predict_waves, predictable_time
 
 __all__ = ["Live", "load_live"]
 
@@ -83,8 +83,9 @@ class Live:
         Its errors in training, from which the noises are taken.
     like : Dataset, optional
         A run with the attributes that hold in service (``water_depth``, ``celerity``,
-        ``probe_offset``, and ``x_position`` of the inputs), where a model with an alignment serves
-        in another rig than it was trained in.
+        ``probe_offset``, and ``x_position`` of the inputs): what probes up-wave have seen then
+        tells waves to come, and a model with an alignment may serve in another rig than it was
+        trained in.
     noise : mapping of str to float, optional
         Standard deviations of the measurement noise of some states, in their units. Without them
         all residuals of training are process noise, which is what least squares makes of them:
@@ -93,7 +94,7 @@ class Live:
     Raises
     ------
     RequestError
-        If the model's file holds no errors, or a noise is out of range.
+        If the model holds no errors, or a noise is out of range.
     """
 
     def __init__(
@@ -107,14 +108,17 @@ class Live:
     ) -> None:
         if errors is None:
             raise RequestError(
-                "the model's file holds no errors of its training, from which a live model takes "
-                "its noises: an older seakeep wrote it. Fit the model again."
+                "the model holds no errors of its training, from which a live model takes its "
+                "noises: it is a member of an ensemble, which keeps them for all of its members, "
+                "or its file was written before they were kept. Use ensemble.hold().live(), or fit "
+                "the model again."
             )
         self.model, self.signature, self.errors = model, model.signature, errors
         signature = self.signature
         self._rig = _rig(signature, like)
         self._noise = _noise(signature, noise)
         self._alignment = Chain.of(signature.input_map).alignment
+        self._places, self._depth = _places(signature, self._alignment, self._rig)
         self._offset, self._a, self._b, self._d = _mean_predictor(members, signature)
         count, s = len(signature.states), signature.state_delays
         size, variances = count * (s + 1), self._noise**2
@@ -474,7 +478,9 @@ class Live:
         future : array_like, shape (rows, Q), optional
             Inputs at the instants after :attr:`time`, if they are known; columns with names are
             taken by name. Where they end before ``steps − 1 + lead_samples`` rows, the waves are
-            predicted from the record, and futures drawn about the prediction widen the band.
+            predicted from the record, and from what probes up-wave have seen where positions and
+            depth are known (`like`, or the model's alignment); futures drawn about the prediction
+            widen the band.
         level : float, optional
             Probability of the band.
         share : float, optional
@@ -487,7 +493,9 @@ class Live:
             Each channel's ``attrs["lead_time"]`` is the time after :attr:`time` up to which its
             ``std`` stays below ``attrs["share"]`` of its SD in training, s. ``std`` holds the
             errors of free runs in training, those of the estimate, the spread of the members and
-            that of the waves that are not known.
+            that of the waves that are not known. ``attrs["predictable"]`` is the time for which
+            the waves at the probe farthest down-wave are known from the one farthest up-wave, s
+            (:func:`seakeep.signals.prediction.predictable_time`); 0 without positions and depth.
 
         Raises
         ------
@@ -507,20 +515,20 @@ class Live:
         kept = values[engine.first_lost(values).max(axis=1) < 0].reshape(-1, *values.shape[2:])
         table = np.full((4, count, len(signature.states)), np.nan)
         if len(kept):
-            spread = kept.var(axis=0, ddof=1) if len(kept) > 1 else 0.0
+            spread = kept.var(axis=0, ddof=1) if len(kept) > 1 else np.zeros(table.shape[1:])
             table[0] = kept.mean(axis=0) if len(kept) > 1 else kept[0]
             table[1] = np.sqrt(spread + self._error_variances(count))
-            half = float(special.ndtri(0.5 + 0.5 * level)) * table[1]
+            half = _quantile(level, spread, table[1] ** 2, len(futures) > 1) * table[1]
             table[2:] = table[0] - half, table[0] + half
         variables = label_channels(signature, table, ("statistic", "time"))
         inside = table[1] <= share * signature.state_scale.spread
-        for column, label in enumerate(signature.state_labels):
-            held = int(np.argmin(np.append(inside[:, column], False)))
-            variables[label.name][2]["lead_time"] = held * signature.dt
-        words = "the mean minus and plus a normal quantile times std"
+        for label, samples in zip(signature.state_labels, held_samples(inside), strict=True):
+            variables[label.name][2]["lead_time"] = int(samples) * signature.dt
+        words = "the mean minus and plus a quantile times std"
         time = self._time + signature.dt * np.arange(1, count + 1)
         attrs = {"start": self._time, "level": level, "share": share, "known_input": known}
         attrs |= {"diverged": len(values) - len(kept) // values.shape[1]}
+        attrs |= {"predictable": self._predictable()}
         return xr.Dataset(
             variables,
             coords={
@@ -529,6 +537,14 @@ class Live:
             },
             attrs=attrs,
         )
+
+    def _predictable(self) -> float:
+        """Time for which the waves at the last probe are known from the first one, s."""
+        order = [place for place in np.argsort(self._places) if np.isfinite(self._places[place])]
+        if not order or not np.ptp(record := self._known_inputs()[:, order[0]]) > 0:
+            return 0.0
+        apart = float(np.ptp(self._places[order]))
+        return predictable_time(record, self.signature.dt, apart, self._depth)
 
     def _missing(self) -> int:
         return self.signature.history_samples - self._at["filled"]
@@ -551,7 +567,15 @@ class Live:
         if len(given) == wanted:
             return [known], len(given)
         rng = np.random.default_rng(self._at["taken"])
-        drawn = draw_waves(known, wanted - len(given), PAIRS, rng)
+        drawn = draw_sea(
+            known,
+            wanted - len(given),
+            PAIRS,
+            rng,
+            dt=self.signature.dt,
+            positions=self._places,
+            depth=self._depth,
+        )
         return [np.concatenate([known, each]) for each in drawn], len(given)
 
     def _windows(self, steps: int, futures: Sequence[FloatArray]) -> Windows:
@@ -692,6 +716,29 @@ def _restored(model: Servable, dataset: xr.Dataset) -> Live | None:
     return live
 
 
+def held_samples(inside: BoolArray) -> npt.NDArray[np.intp]:
+    """Leads that are all `inside` from the first on: how many of (steps, N), shape (N,)."""
+    ended = np.concatenate([inside, np.zeros((1, inside.shape[1]), bool)])
+    found: npt.NDArray[np.intp] = np.argmin(ended, axis=0)
+    return found
+
+
+def _quantile(
+    level: float, spread: FloatArray, variance: FloatArray, drawn: bool
+) -> FloatArray | float:
+    """Half-width of the band in standard deviations.
+
+    Normal; Student's where part of the variance is the `spread` of few futures that were `drawn`,
+    with the degrees of freedom of Satterthwaite (1946).
+    """
+    part = 0.5 + 0.5 * level
+    if not drawn:
+        return float(special.ndtri(part))
+    share = np.maximum(spread / np.maximum(variance, np.finfo(float).tiny), 1e-3)
+    found: FloatArray = special.stdtrit(PAIRS / share**2, part)
+    return found
+
+
 def _mean_predictor(
     members: Sequence[Dynamics], signature: Signature
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -734,6 +781,23 @@ def _rig(signature: Signature, like: xr.Dataset | None) -> dict[str, dict[str, f
     }
     found = {key: float(like.attrs[key]) for key in RIG if key in like.attrs}
     return {"run": found, "positions": positions}
+
+
+def _places(
+    signature: Signature,
+    alignment: FittedAlignment | None,
+    rig: Mapping[str, Mapping[str, float]],
+) -> tuple[FloatArray, float]:
+    """Positions of the inputs that are elevations, NaN where none is known, and the depth."""
+    stated: dict[str, float | None] = {}
+    depth = rig["run"].get("water_depth")
+    if alignment is not None:
+        stated |= zip(alignment.inputs, alignment.positions, strict=True)
+        depth = alignment.water_depth if depth is None else depth
+    stated |= rig["positions"]
+    found = [None if depth is None else stated.get(name) for name in signature.inputs]
+    places = np.array([math.nan if each is None else each for each in found])
+    return places, math.nan if depth is None else depth
 
 
 def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArray:

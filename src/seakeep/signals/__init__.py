@@ -21,13 +21,13 @@ from seakeep.signals.lags import (
     windowed_lags,
 )
 from seakeep.signals.leakage import find_leakage
+from seakeep.signals.prediction import predict_waves
 from seakeep.signals.propagation import (
     delay_by_celerity,
     delay_by_dispersion,
     effective_celerity,
     misplaced_probes,
     phase_celerity,
-    predict_waves,
     probe_separation,
 )
 from seakeep.signals.rigid_body import (

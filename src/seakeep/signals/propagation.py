@@ -25,14 +25,13 @@ from seakeep.arrays import (
     as_series,
     number,
     positive,
-    whole_number,
 )
 from seakeep.errors import DataError, RequestError
-from seakeep.signals.calculus import linear_prediction, predicted, predicted_extension
+from seakeep.signals.calculus import predicted_extension
 from seakeep.signals.lags import as_pair, correlation_peak, parabola_peak
 from seakeep.signals.leakage import is_regular
 from seakeep.signals.waves import encounter_period, welch_segments
-from seakeep.sizes import MOST_AHEAD, MOST_PADDING, MOST_PLACES, MOST_TERMS, check_size
+from seakeep.sizes import MOST_PADDING, MOST_PLACES, MOST_TERMS, check_size
 from seakeep.waves import group_speed, phase_speed, wavenumber
 
 __all__ = [
@@ -46,11 +45,9 @@ __all__ = [
     "carry_by_dispersion",
     "delay_by_celerity",
     "delay_by_dispersion",
-    "draw_waves",
     "effective_celerity",
     "misplaced_probes",
     "phase_celerity",
-    "predict_waves",
     "probe_separation",
 ]
 
@@ -726,116 +723,6 @@ def delay_by_celerity(
     places = _distances(distance, array.shape[0])
     span = (float(places.min()), float(places.max()))
     return carry_by_celerity(array, dt, span, celerity).at(places).reshape(array.shape)
-
-
-MEMORY = 4.0
-"""Wave periods that a linear prediction looks back. On the virtual tank the error over 0.75
-encounter periods is 0.53 SD with one half of a period, 0.43 with one, 0.38 with two, 0.32 with
-four."""
-
-
-def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
-    """Continue elevations by linear prediction, each from its own record.
-
-    Parameters
-    ----------
-    series : array_like, shape (time,) or (time, channel)
-        Elevations, uniformly sampled, without gaps; tens of wave periods are best.
-    count : int
-        Number of samples to predict.
-
-    Returns
-    -------
-    ndarray, shape (count,) or (count, channel)
-        The samples after the record: what an autoregressive model of its last four periods
-        expects. They tend to the mean, as waves cannot be foreseen for long.
-
-    Raises
-    ------
-    RequestError
-        If `count` is not a positive integer.
-    DataError
-        If a record has gaps.
-
-    Notes
-    -----
-    The coefficients are found by Burg's method (Maximum entropy spectral analysis, 1975), which
-    makes a stable model of any record.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> t = np.arange(0, 60, 0.05)
-    >>> tone = np.cos(2 * np.pi * t / 1.6)
-    >>> bool(np.max(np.abs(predict_waves(tone[:1000], 32) - tone[1000:1032])) < 0.02)
-    True
-    """
-    array = as_series(series, minimum=4, channels=True)
-    number_of = whole_number(count, "count")
-    check_size("waves are predicted over some periods, and count =", number_of, MOST_AHEAD,
-               "samples", "Give fewer.")  # fmt: skip
-    flat = array.reshape(array.shape[0], -1)
-    out = np.empty((number_of, flat.shape[1]))
-    for column, values in enumerate(flat.T):
-        mean = values.mean()
-        deviations = values - mean
-        out[:, column] = mean + predicted(deviations, number_of, _memory(deviations))
-    return out.reshape((-1, *array.shape[1:]))
-
-
-def draw_waves(
-    series: npt.ArrayLike, count: int, pairs: int, rng: np.random.Generator
-) -> FloatArray:
-    """Draw what may follow elevations, each from its own record: futures about the predicted one.
-
-    Parameters
-    ----------
-    series, count
-        As in :func:`predict_waves`.
-    pairs : int
-        Number of pairs of futures; those of a pair lie opposite each other about the prediction,
-        so that their mean is the prediction.
-    rng : Generator
-        Source of the Gaussian innovations.
-
-    Returns
-    -------
-    ndarray, shape (2 * pairs, count) or (2 * pairs, count, channel)
-        Innovations of the power that the autoregressive model leaves of the record.
-
-    Raises
-    ------
-    RequestError, DataError
-        As :func:`predict_waves`.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> rng = np.random.default_rng(0)
-    >>> futures = draw_waves(rng.standard_normal(400), 5, 3, rng)
-    >>> futures.shape, bool(np.ptp(futures[:3] + futures[3:], axis=0).max() < 1e-12)
-    ((6, 5), True)
-    """
-    array = as_series(series, minimum=4, channels=True)
-    expected = predict_waves(array, count)
-    flat = array.reshape(array.shape[0], -1)
-    errors = np.empty((pairs, int(count), flat.shape[1]))
-    for column, values in enumerate(flat.T):
-        deviations = values - values.mean()
-        order = max(1, min(_memory(deviations), deviations.size // 3))
-        whitening = np.concatenate([[1.0], -linear_prediction(deviations, order)])
-        left = scipy.signal.lfilter(whitening, [1.0], deviations)[order:]
-        innovations = left.std() * rng.standard_normal((pairs, int(count)))
-        errors[..., column] = scipy.signal.lfilter([1.0], whitening, innovations, axis=1)
-    errors = errors.reshape(pairs, *expected.shape)
-    return np.concatenate([expected + errors, expected - errors])
-
-
-def _memory(deviations: FloatArray) -> int:
-    """Order of the autoregressive model of a record: some of its wave periods."""
-    if not np.ptp(deviations) > 0:
-        return 1
-    return round(MEMORY / max(band_limit(deviations, 1.0, 0.5), 1.0 / deviations.size))
 
 
 def _distances(distance: npt.ArrayLike, samples: int) -> FloatArray:

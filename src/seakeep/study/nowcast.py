@@ -13,7 +13,7 @@ from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.models import Model, is_ensemble
 from seakeep.models.labelled import channel_matrix
-from seakeep.models.live import Servable
+from seakeep.models.live import Servable, held_samples
 from seakeep.study.comparison import samples_of
 
 __all__ = ["nowcast", "nowcasts"]
@@ -133,14 +133,13 @@ def nowcast(
             claimed += (std / spread) ** 2
             inside += (lower <= truth) & (truth <= upper)
     error = np.sqrt(squares / len(starts))
-    held = [int(np.argmin(np.append(each <= share, False))) for each in error.T]
     lead = signature.dt * np.arange(1, steps + 1)
     return xr.Dataset(
         {
             "error": (("lead", "channel"), error, {"units": "training SD"}),
             "claimed": (("lead", "channel"), np.sqrt(claimed / len(starts))),
             "coverage": (("lead", "channel"), 100.0 * inside / len(starts), {"units": "%"}),
-            "lead_time": ("channel", signature.dt * np.array(held), {"units": "s"}),
+            "lead_time": ("channel", signature.dt * held_samples(error <= share), {"units": "s"}),
         },
         coords={
             "lead": ("lead", lead, {"units": "s", "long_name": "lead time"}),
