@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
@@ -16,11 +17,14 @@ from seakeep.models.labelled import channel_matrix
 from seakeep.models.live import Servable, held_samples
 from seakeep.study.comparison import samples_of
 
-__all__ = ["nowcast", "nowcasts"]
+__all__ = ["PERIODS", "SHARE", "labelled_skill", "nowcast", "nowcasts"]
 
 STARTS = 24
 """Forecasts of a run: enough for a root mean square known to a seventh."""
-HORIZON = "5 T"
+PERIODS = 5
+"""Longest lead where none is stated, in encounter periods."""
+SHARE = 0.5
+"""Part of the training SD below which the error is to stay, where none is stated."""
 
 
 def nowcasts(
@@ -29,7 +33,7 @@ def nowcasts(
     runs: Sequence[str] = (),
     steps: int | str | None = None,
     *,
-    share: float = 0.5,
+    share: float = SHARE,
     level: float = 0.95,
     progress: Progress | None = None,
 ) -> dict[str, xr.Dataset]:
@@ -68,7 +72,7 @@ def nowcasts(
     total, done = len(models) * len(prepared), 0
     for name, model in served.items():
         dt = model.signature.dt
-        count = samples_of(steps or HORIZON, campaign, list(prepared.values()), dt, "steps")
+        count = samples_of(steps or f"{PERIODS} T", campaign, list(prepared.values()), dt, "steps")
         for key, run in prepared.items():
             found = nowcast(model, run, count, share=share, level=level)
             out[name].append(found.assign_coords(run=key))
@@ -79,7 +83,7 @@ def nowcasts(
 
 
 def nowcast(
-    model: Servable, run: xr.Dataset, steps: int, *, share: float = 0.5, level: float = 0.95
+    model: Servable, run: xr.Dataset, steps: int, *, share: float = SHARE, level: float = 0.95
 ) -> xr.Dataset:
     """Play a run to a model in service, sample by sample, and judge its forecasts.
 
@@ -133,19 +137,33 @@ def nowcast(
             claimed += (std / spread) ** 2
             inside += (lower <= truth) & (truth <= upper)
     error = np.sqrt(squares / len(starts))
-    lead = signature.dt * np.arange(1, steps + 1)
+    skill = {
+        "error": error,
+        "claimed": np.sqrt(claimed / len(starts)),
+        "coverage": 100.0 * inside / len(starts),
+        "lead_time": signature.dt * held_samples(error <= share),
+    }
+    attrs = {"share": share, "level": level, "starts": len(starts)}
+    return labelled_skill(skill, signature.dt, signature.states).assign_attrs(attrs)
+
+
+def labelled_skill(
+    values: Mapping[str, FloatArray],
+    dt: float,
+    states: Sequence[str],
+    before: tuple[str, ...] = (),
+) -> xr.Dataset:
+    """Skill against lead time as a Dataset; `before` are dimensions before lead and channel."""
+    units = {"error": "training SD", "claimed": "training SD", "coverage": "%", "lead_time": "s"}
+    dims = dict.fromkeys(units, (*before, "lead", "channel"))
+    dims["lead_time"] = (*before, "channel")
+    leads = dt * np.arange(1, values["error"].shape[-2] + 1)
     return xr.Dataset(
-        {
-            "error": (("lead", "channel"), error, {"units": "training SD"}),
-            "claimed": (("lead", "channel"), np.sqrt(claimed / len(starts))),
-            "coverage": (("lead", "channel"), 100.0 * inside / len(starts), {"units": "%"}),
-            "lead_time": ("channel", signature.dt * held_samples(error <= share), {"units": "s"}),
-        },
+        {key: (dims[key], values[key], {"units": unit}) for key, unit in units.items()},
         coords={
-            "lead": ("lead", lead, {"units": "s", "long_name": "lead time"}),
-            "channel": signature.states,
+            "lead": ("lead", leads, {"units": "s", "long_name": "lead time"}),
+            "channel": list(states),
         },
-        attrs={"share": share, "level": level, "starts": len(starts)},
     )
 
 

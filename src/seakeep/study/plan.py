@@ -352,6 +352,8 @@ class Plan:
         What the half-width of calibrated bands follows.
     eigenvalues : bool
         Whether those of every model are kept.
+    nowcast : bool
+        Whether models are judged in service too.
     """
 
     digest: str
@@ -368,6 +370,7 @@ class Plan:
     calibrated_on: tuple[str, ...] = ()
     scale: BandScale = "spread"
     eigenvalues: bool = True
+    nowcast: bool = False
 
     @property
     def specs(self) -> dict[str, Spec]:
@@ -449,6 +452,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
         calibrated_on=tuple(training_names) if settings.calibrates else (),
         scale=settings.statistics.scale,
         eigenvalues=settings.output.eigenvalues,
+        nowcast=settings.output.nowcast,
     )
     _check_pairs(plan)
     return plan, runs

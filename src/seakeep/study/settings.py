@@ -171,6 +171,11 @@ class OutputSettings(Table):
         default=2, description="windows of the first test set whose members are kept for figures"
     )
     eigenvalues: bool = Field(default=True, description="true or false")
+    nowcast: bool = Field(
+        default=False,
+        description="whether the models of the first training set are judged in service too, "
+        "where waves to come are not known, against lead time (as `compare --nowcast` does)",
+    )
     paper: bool = Field(
         default=False,
         description="whether the report puts the paper's published divergences beside those of "
@@ -273,6 +278,8 @@ class Study:
         for each in content["tests"].values():
             del each["label"]
         del content["output"]["paper"]
+        if not content["output"]["nowcast"]:  # results from before there was the key still hold
+            del content["output"]["nowcast"]
         content["channels"] = [list(self.states), list(self.inputs)]
         content["campaign"] = self.campaign.digest
         content["files"] = {n: self.campaign.checksum_of(n) for n in self.campaign.runs}

@@ -25,11 +25,13 @@ from seakeep.models.calibration import Judged, envelope_of, found_margin, held_o
 from seakeep.models.engine import group_series, read_groups
 from seakeep.models.interface import Json
 from seakeep.models.readouts import FittedReadOut
+from seakeep.models.registry import is_ensemble
 from seakeep.models.selection import Selected
 from seakeep.models.specs import HankelDMDc, left_open
 from seakeep.models.summaries import STATISTICS, reduce_members
 from seakeep.signals import envelope_squared
 from seakeep.study.judge import BAND_ERRORS, MEASURES
+from seakeep.study.nowcast import PERIODS, SHARE, labelled_skill, nowcast
 from seakeep.study.plan import Plan, TestWindow, TrainingSet, between
 from seakeep.study.settings import Study
 
@@ -169,10 +171,41 @@ def compute(plan: Plan, runs: Runs, unit: Unit, choice: Arrays | None = None) ->
     if plan.calibrated_on and plan.models[unit.model].is_ensemble:
         margins = band_margins(plan, runs, unit, fitted)
         out |= {f"calibration/{key}": np.asarray(value) for key, value in margins.items()}
-    if plan.eigenvalues and unit.training == units_of(plan)[0].training:
+    is_first = unit.training == units_of(plan)[0].training
+    if plan.eigenvalues and is_first:
         values = _eigenvalues(fitted)
         out |= {"eigenvalues/real": values.real, "eigenvalues/imag": values.imag}
+    if plan.nowcast and is_first and (is_ensemble(fitted) or hasattr(fitted, "live")):
+        with _named_after(plan, unit):
+            out |= _in_service(plan, runs, fitted, tested)
     return out
+
+
+def _in_service(
+    plan: Plan, runs: Runs, fitted: Any, tested: Mapping[str, tuple[int, ...]]
+) -> Arrays:
+    """Skill of a model in service against lead time, in the runs of the first test set."""
+    test, numbers = next(iter(tested.items()))
+    names = list(dict.fromkeys(plan.tests[test][k].run for k in numbers))
+    steps = round(PERIODS * plan.encounter_period / plan.dt)
+    model = fitted.hold() if is_ensemble(fitted) else fitted
+    found = [nowcast(model, runs[name], steps, level=plan.level) for name in names]
+    keys = ("error", "claimed", "coverage", "lead_time")
+    out = {f"nowcast/{key}": np.stack([each[key].values for each in found]) for key in keys}
+    starts = min(each.attrs["starts"] for each in found)
+    return out | {"nowcast/run": np.array(names), "nowcast/starts": np.array(starts)}
+
+
+def _collect_nowcast(plan: Plan, arrays: Arrays) -> xr.Dataset:
+    kept = {
+        key.removeprefix("nowcast/"): each
+        for key, each in arrays.items()
+        if key.startswith("nowcast/")
+    }
+    attrs = {"share": SHARE, "level": plan.level, "starts": int(kept.pop("starts"))}
+    names = kept.pop("run").astype(object)
+    found = labelled_skill(kept, plan.dt, plan.states, ("run",))
+    return found.assign_coords(run=names).assign_attrs(attrs)
 
 
 def _series(
@@ -335,8 +368,10 @@ def collect(study: Study, plan: Plan, runs: Runs, read: Read) -> dict[str, xr.Da
             groups[f"draws/{model}"] = draws_of(plan, runs, model, origin)
             if plan.calibrated_on:
                 groups[f"calibration/{model}"] = _collect_calibration(plan, mine)
+        first = units[0].training
+        if "nowcast/error" in mine.get(first, {}):
+            groups[f"nowcast/{model}"] = _collect_nowcast(plan, mine[first])
         if plan.eigenvalues:
-            first = units[0].training
             groups[f"eigenvalues/{model}"] = xr.Dataset(
                 {
                     part: (("member", "mode"), mine[first][f"eigenvalues/{part}"])

@@ -14,6 +14,7 @@ from seakeep.report.sections import (
     judgements,
     regular,
     scales,
+    service,
     settings,
     summary,
 )
@@ -31,6 +32,7 @@ SECTIONS: list[Callable[[StudyResult], Section | None]] = [
     judgements.age,
     judgements.coverage,
     bands.bands,
+    service.service,
     judgements.densities,
     judgements.members,
     data.waves,

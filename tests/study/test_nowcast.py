@@ -1,0 +1,64 @@
+"""Skill against lead time of a study's models in service."""
+
+import numpy as np
+import pytest
+from tutorial_study import put_tutorial
+
+from seakeep.study import read_study, run_study
+from seakeep.study.nowcast import nowcast
+from seakeep.study.plan import make_plan
+from seakeep.study.units import fit_training
+
+STUDY = """
+[study]
+campaign = "campaign.toml"
+states = ["heave"]
+inputs = ["eta_fwd", "eta_cog"]
+[training]
+windows = 1
+[models.single]
+[tests.unseen]
+runs = ["unseen"]
+windows = 1
+[statistics]
+n_series = 2
+[output]
+nowcast = true
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("nowcast")
+    put_tutorial(folder, STUDY)
+    return read_study(folder / "study.toml")
+
+
+@pytest.fixture(scope="module")
+def result(study, tmp_path_factory):
+    return run_study(study, tmp_path_factory.mktemp("results"))
+
+
+def test_a_study_judges_its_models_in_service(study, result):
+    found = result.groups["nowcast/single"].sel(run="unseen")
+    plan, runs = make_plan(study)
+    model = fit_training(plan, runs, "single", plan.training[0])
+    expected = nowcast(model, runs["unseen"], found.sizes["lead"])
+    for name, values in expected.data_vars.items():
+        np.testing.assert_array_equal(found[name], values)
+    assert found["lead"][-1] == pytest.approx(5 * plan.encounter_period, abs=plan.dt)
+
+
+def test_the_report_shows_it_and_the_key_leaves_other_studies_as_they_were(study, result):
+    pytest.importorskip("matplotlib")
+    from seakeep.report.sections.service import service
+
+    section = service(result)
+    assert [each.name for each in section.figures] == ["nowcast_unseen"]
+    assert len(section.figures[0].draw().axes) == 1
+    assert section.tables[0].title == "unseen: single in service"
+    other = study.path.with_name("other.toml")
+    other.write_text(STUDY.replace("nowcast = true", ""), "utf-8")
+    stated = study.path.with_name("stated.toml")
+    stated.write_text(STUDY.replace("nowcast = true", "nowcast = false"), "utf-8")
+    assert read_study(other).digest == read_study(stated).digest != study.digest
