@@ -13,7 +13,7 @@ STUDY = """
 [study]
 campaign = "campaign.toml"
 states = ["heave"]
-inputs = ["eta_fwd", "eta_cog"]
+inputs = ["eta_fwd", "eta_mid"]
 [training]
 windows = 1
 [models.single]
