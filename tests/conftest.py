@@ -141,6 +141,15 @@ def patient_cluster(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def empty_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sheets with empty pictures: tests/report looks at these, and each takes a second or two."""
+    pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
+    from seakeep.report import quality_sheet as sheet
+
+    monkeypatch.setattr(sheet, "quality_figure", lambda run, agreements: sheet.new_figure(1, 1))
+
+
+@pytest.fixture
 def ctrl_c() -> Iterator[None]:
     """SIGINT as at a terminal, where the tests may have been started with it ignored.
 

@@ -72,9 +72,9 @@ class TestPeriod:
         ]
 
 
+@pytest.mark.usefixtures("empty_sheet")
 def test_the_commands(edited, tank, capsys):
     """prepare keeps what it can and ends with the error; fit and forecast of others run."""
-    pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
     path = edited(POOLED)
     damage(tank, "cut")
     assert cli.main(["prepare", str(path)]) == 1

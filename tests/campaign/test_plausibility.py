@@ -286,8 +286,8 @@ def kinds(run):
     return {each.kind.word for each in findings_of(run)}
 
 
+@pytest.mark.usefixtures("empty_sheet")
 def test_the_commands_show_step_and_period(edited, tank, capsys):
-    pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
     path = edited(("sampling_rate = 10", "steps_per_period = 20"))
     assert cli.main(["prepare", str(path)]) == 0
     period = read_campaign(path).encounter_period()
@@ -297,8 +297,8 @@ def test_the_commands_show_step_and_period(edited, tank, capsys):
     assert page.count(words) == 2
 
 
+@pytest.mark.usefixtures("empty_sheet")
 def test_the_command_tells_what_was_found(loggers, tmp_path, capsys):
-    pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
     loggers()
     path = tmp_path / "mru.csv"
     columns = {**tank_columns(), "Pitch (deg)": np.full(1001, 3.2)}

@@ -20,9 +20,9 @@ from seakeep.campaign.settings import (
 PAGE = (Path(__file__).parents[2] / "docs/measurement_chain.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("empty_sheet")
 def test_the_page_runs_and_prints_what_it_shows(tmp_path, monkeypatch):
     pytest.importorskip("numba", reason="the page plays the tank")
-    pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
     monkeypatch.chdir(tmp_path)
     play(PAGE, "measurement_chain.md")
     sheet = (tmp_path / "virtual/prepared/quality.html").read_text(encoding="utf-8")
