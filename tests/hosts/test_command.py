@@ -1,8 +1,10 @@
 """``seakeep export``: what it writes, what it says, and what it refuses."""
 
 import pytest
+from drifting import INPUTS, STATES, drifting_run
 
-from seakeep import cli
+from seakeep import HankelDMDc, ProbeAlignment, cli
+from seakeep.hosts.program import program_of
 
 
 @pytest.fixture
@@ -23,6 +25,16 @@ def test_sources_take_the_name_of_the_model_and_the_instants_are_told(run, tmp_p
     assert {path.name for path in (tmp_path / "library").iterdir()} == {"my_model.c", "my_model.h"}
     lead = "A step of 0.1 s takes the inputs 16 samples (1.6 s) after the instant that it starts"
     assert lead in said
+
+
+def test_what_an_alignment_leaves_to_the_host_is_told(make_run, channels):
+    spec = HankelDMDc(2, 2, 1.0, alignment=ProbeAlignment(surge="none", celerity=2.0))
+    model = spec.fit(make_run(), **channels)
+    assert program_of(model).timing.endswith("as model.aligned_inputs(run) makes them.")
+    predicted = ProbeAlignment(mode="dispersion", surge="predicted")
+    model = HankelDMDc(2, 2, 1.0, alignment=predicted).fit(drifting_run(), STATES, INPUTS)
+    said = program_of(model).timing
+    assert said.endswith("reads the whole forecast at once, and stays in Python.")
 
 
 def test_an_fmu_without_a_compiler_is_announced(run, monkeypatch, tmp_path):

@@ -88,8 +88,15 @@ class Program:
                 f"A step of {model.dt:g} s takes the inputs {ahead} samples ({ahead * model.dt:g} "
                 "s) after the instant that it starts from."
             )
-        if self.is_aligned:
-            said += " They are waves carried to the vessel, as in its training."
+        if (alignment := model.alignment) is not None:
+            said += (
+                " They are waves carried to the vessel, as model.aligned_inputs(run) makes them."
+            )
+            if alignment.settings.surge == "predicted":
+                said += (
+                    " The loop in which the predicted surge moves them reads the whole forecast at "
+                    "once, and stays in Python."
+                )
         return said
 
 
