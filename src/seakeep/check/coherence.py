@@ -28,7 +28,9 @@ AVERAGES = 10
 """Independent segments per input, and one more, that are kept where the records are long enough."""
 
 
-def coherence(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def coherence(
+    model: Model, runs: Mapping[str, xr.Dataset], free: dict[str, FreeRun] | None = None
+) -> xr.Dataset:
     r"""Coherence of inputs and states, and the NRMSE that no linear map of the inputs goes below.
 
     Parameters
@@ -37,6 +39,8 @@ def coherence(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
         Names the channels, aligns the waves, and is judged beside the bound.
     runs : mapping of str to Dataset
         Prepared runs; those in irregular waves are taken, what trains or tests of them.
+    free : dict of str to FreeRun, optional
+        Free runs that other checks of the same model and runs made; this one adds its own.
 
     Returns
     -------
@@ -89,7 +93,7 @@ def coherence(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
         "multiple": (over, spectra.multiple().T),
         "spectrum": (over, spectra.outputs.T),
         "linear_bound": ("state", spectra.bound()),
-        "nrmse": ("state", pooled_nrmse(free_runs(model, waves))),
+        "nrmse": ("state", pooled_nrmse(free_runs(model, waves, free))),
     }
     names = [name for name in model.signature.regressors if name not in model.inputs]
     if names:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import xarray as xr
 
 from seakeep.check.coherence import coherence
 from seakeep.check.free import decay, measured_decay, modes
+from seakeep.check.parts import FreeRun
 from seakeep.check.peaks import statistics
 from seakeep.check.residuals import residuals
 from seakeep.check.response import measured_response, response, validation
@@ -21,7 +23,7 @@ from seakeep.models import Model
 __all__ = ["CHECKS", "Checked", "check_model"]
 
 
-Check = Callable[[Model, Mapping[str, xr.Dataset]], xr.Dataset]
+Check = Callable[..., xr.Dataset]
 
 
 def _response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
@@ -88,16 +90,23 @@ def check_model(
     -------
     Checked
     """
-    found, refused, notes = {}, {}, {}
+    found: dict[str, xr.Dataset] = {}
+    refused, notes = {}, {}
+    free: dict[str, FreeRun] = {}
+    shared: dict[str, dict[str, Any]] = {
+        key: {"free": free} for key in ("coherence", "residuals", "statistics")
+    }
     for number, (name, check) in enumerate(CHECKS.items()):
         if progress is not None:
             progress(number, len(CHECKS), name)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                found[name] = check(model, runs)
+                found[name] = check(model, runs, **shared.get(name, {}))
             except SeakeepError as error:
                 refused[name] = str(error)
+        if name == "measured_response":
+            shared["validation"] = {"measured": found.get(name)}
         ours = [str(each.message) for each in caught if issubclass(each.category, SeakeepWarning)]
         notes[name] = tuple(dict.fromkeys(ours))
     return Checked(found, refused, notes)

@@ -125,18 +125,25 @@ def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
     return found
 
 
-def free_runs(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, FreeRun]:
+def free_runs(
+    model: Model, runs: Mapping[str, xr.Dataset], free: dict[str, FreeRun] | None = None
+) -> dict[str, FreeRun]:
     """Free runs from the first possible instant of each test part to its end.
+
+    Those in `free` are taken from there; the others are put there.
 
     Raises
     ------
     DataError
         If no run can be forecast, with the reason of each.
     """
+    free = {} if free is None else free
     found, reasons = {}, []
     for name, run in runs.items():
         try:
-            found[name] = _free_run(model, run, name)
+            if name not in free:
+                free[name] = _free_run(model, run, name)
+            found[name] = free[name]
         except SeakeepError as error:
             reasons.append(f"{name}: {error}")
     if not found:

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.check.parts import free_runs, irregular
+from seakeep.check.parts import FreeRun, free_runs, irregular
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
 from seakeep.errors import SeakeepError
 from seakeep.models import Model
@@ -21,7 +21,10 @@ KINDS = ("measured", "forecast")
 
 
 def statistics(
-    model: Model, runs: Mapping[str, xr.Dataset], duration: float | None = None
+    model: Model,
+    runs: Mapping[str, xr.Dataset],
+    duration: float | None = None,
+    free: dict[str, FreeRun] | None = None,
 ) -> xr.Dataset:
     r"""Peaks of each state over the test parts in irregular waves, measured and forecast.
 
@@ -36,6 +39,8 @@ def statistics(
     duration : float, optional
         Time of the extreme, s; by default three hours at full scale, by Froude's law with
         ``attrs["scale_factor"]``.
+    free : dict of str to FreeRun, optional
+        Free runs that other checks of the same model and runs made; this one adds its own.
 
     Returns
     -------
@@ -53,7 +58,7 @@ def statistics(
         If no run in irregular waves can be forecast.
     """
     waves = irregular(runs, "a statistic of peaks")
-    free = free_runs(model, waves)
+    known = free_runs(model, waves, free)
     if duration is None:
         scale = float(next(iter(waves.values())).attrs.get("scale_factor", 1.0))
         duration = 3600 * HOURS / np.sqrt(scale)
@@ -61,7 +66,7 @@ def statistics(
     peaks: dict[tuple[str, str], FloatArray] = {}
     for column, state in enumerate(model.states):
         for kind in KINDS:
-            series = [getattr(each, kind)[:, column] for each in free.values()]
+            series = [getattr(each, kind)[:, column] for each in known.values()]
             peaks[state, kind], periods = _peaks(series, model.dt)
             rows[state, kind] = _row(series, peaks[state, kind], periods, duration)
     most = max(each.size for each in peaks.values())

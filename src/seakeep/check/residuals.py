@@ -33,7 +33,9 @@ AGES = 15
 """Encounter periods over which a forecast grows old."""
 
 
-def residuals(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def residuals(
+    model: Model, runs: Mapping[str, xr.Dataset], free: dict[str, FreeRun] | None = None
+) -> xr.Dataset:
     r"""Test the errors of one step, and say where and when those of free runs arise.
 
     Parameters
@@ -42,6 +44,8 @@ def residuals(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
         The model.
     runs : mapping of str to Dataset
         Prepared runs; their test parts are taken.
+    free : dict of str to FreeRun, optional
+        Free runs that other checks of the same model and runs made; this one adds its own.
 
     Returns
     -------
@@ -65,11 +69,11 @@ def residuals(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     SeakeepWarning
         Of each run that is left out, with the reason.
     """
-    free = free_runs(model, runs)
+    known = free_runs(model, runs, free)
     period = encounter_period_of(model, runs)
     lags = round(period / model.dt)
     steps, ages, reasons = [], [], []
-    for name in free:
+    for name in known:
         try:
             steps.append(_one_step(model, runs[name], name))
         except SeakeepError as error:
@@ -97,7 +101,7 @@ def residuals(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
         "ljung_box": ("state", statistic),
         "probability": ("state", probability),
         "one_step": ("state", _ratio(np.sqrt(np.mean(whole**2, axis=0)), spread)),
-        **_of_free_runs(model, free, period),
+        **_of_free_runs(model, known, period),
         **_of_ages(ages, spread),
     }
     if model.inputs:
