@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar, cast
 
@@ -79,7 +79,7 @@ def _write_study(_: Path, found: StudyResult, __: Executor | None = None) -> Pat
 def reproduce(
     out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("reproduction"),
     quick: Annotated[
-        bool, typer.Option("--quick", help="All stages with small counts, in about a minute.")
+        bool, typer.Option("--quick", help="All stages with small counts, in half of the time.")
     ] = False,
     preset: Annotated[
         str | None,
@@ -102,24 +102,33 @@ def reproduce(
     """
     if preset not in (None, "paper", "recommended"):
         raise RequestError(f"--preset must be paper or recommended; received '{preset}'.")
+    from seakeep.models.executor import on_this_machine, submitting
     from seakeep.report.acts import acts_table
     from seakeep.study.reproduce import ACTS, Size
     from seakeep.study.reproduce import reproduce as reproduce_study
 
     chosen = cast("Preset | None", preset)
     size = Size.quick() if quick else Size()
-    # The few units of the quick study are done before another process has started.
-    count = 1 if quick and workers is None else checked_count(workers, scheduler)
+    pictured = _pictured([act.name for act in ACTS if preset in (None, act.preset)])
 
-    found, page = _run(
-        out,
-        count,
-        scheduler,
-        lambda executor, tell: reproduce_study(
-            out, chosen, size=size, seed=seed, executor=executor, progress=tell
-        ),
-        _write_reproduction,
-    )
+    def play(executor: Executor | None, tell: Report) -> dict[str, StudyResult]:
+        play_acts = partial(
+            reproduce_study, out, chosen, size=size, seed=seed, executor=executor, progress=tell
+        )
+        if (near := on_this_machine(executor)) is None:
+            return play_acts()
+        pages = []
+        with submitting(_write_act, None, near) as submit:  # drawn while the next act runs
+            found = play_acts(
+                finished=lambda act, result: pages.append(submit([(result, act.name == pictured)]))
+            )
+            for done, page in enumerate(pages):
+                tell(done, len(pages), "drawing the pages of the acts")
+                page.result()
+        return found
+
+    count = checked_count(workers, scheduler)
+    found, page = _run(out, count, scheduler, play, _write_reproduction)
     print_table(acts_table(found), note=False)
     for act in (act for act in ACTS if act.name in found):
         results().print(f"{act.title}: {act.sentence}", soft_wrap=True)
@@ -148,24 +157,23 @@ def report(
 def _write_reproduction(
     folder: Path, found: dict[str, StudyResult], executor: Executor | None = None
 ) -> Path:
-    """Write the page of each act, side by side where workers are near, and the one over them."""
-    from seakeep.models.executor import as_finished, on_this_machine
+    """Write the page over all acts, and those of the acts where no worker has drawn them."""
+    from seakeep.models.executor import on_this_machine
     from seakeep.report.acts import write_reproduction
     from seakeep.report.page import write_report
 
-    last = next(reversed(found))  # all acts have the same runs, which are drawn once
-    items = [(found[name], name == last) for name in reversed(found)]
-    if (near := on_this_machine(executor)) is None:
-        for result, pictures in items:
-            with _Progress(f"Report of {result.attrs['study']}") as tell:
-                write_report(result, tell, pictures=pictures)
-    else:
-        with _Progress("Reports") as tell:
-            tell(0, len(items), "drawing")
-            for done, _ in enumerate(as_finished(_write_act, None, deque(items), near), 1):
-                tell(done, len(items), "written")
+    for name, each in found.items() if on_this_machine(executor) is None else ():
+        with _Progress(f"Report of {each.attrs['study']}") as tell:
+            write_report(each, tell, pictures=name == _pictured(found))
     with _Progress("Report") as tell:
         return write_reproduction(folder, found, tell)
+
+
+def _pictured(acts: Iterable[str]) -> str:
+    """Act whose page shows the runs, the same in all of them: the first one with their drift."""
+    from seakeep.study.reproduce import ACTS
+
+    return next(act.name for act in ACTS if act.name in acts and not act.without_drift)
 
 
 def _write_act(_: None, item: tuple[StudyResult, bool]) -> None:

@@ -39,6 +39,7 @@ __all__ = [
     "on_this_machine",
     "one_blas_thread",
     "processes",
+    "submitting",
 ]
 
 Data = TypeVar("Data")
@@ -92,7 +93,7 @@ def _in_order(
         return
     size = -(-len(items) // BATCHES)
     batches = (items[first : first + size] for first in range(0, len(items), max(size, 1)))
-    with _submitting(function, data, executor) as submit:
+    with submitting(function, data, executor) as submit:
         pending = deque(submit(batch) for batch in islice(batches, AHEAD))
         while pending:
             _wait_for_any([pending[0]], executor)
@@ -120,7 +121,7 @@ def as_finished(
             yield item, result
         return
     pending: dict[Future[list[Result]], Item] = {}
-    with _submitting(function, data, executor) as submit:
+    with submitting(function, data, executor) as submit:
         while items or pending:
             while items and len(pending) < AHEAD:
                 item = items.popleft()
@@ -277,7 +278,7 @@ def versions() -> dict[str, str]:
 
 
 @contextmanager
-def _submitting(
+def submitting(
     function: Function[Data, Item, Result], data: Data, executor: Executor
 ) -> Iterator[Callable[[Sequence[Item]], Future[list[Result]]]]:
     """Hand out items; what is not done is cancelled when the block is left."""

@@ -10,7 +10,7 @@ import hashlib
 import json
 import re
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -119,7 +119,7 @@ class Size:
 
     @classmethod
     def quick(cls) -> Size:
-        """Counts that show all stages in a minute."""
+        """Counts that show all stages in half of the time."""
         return cls(training=2, tests=2, members=10, series=20)
 
 
@@ -131,6 +131,7 @@ def reproduce(
     seed: int = 0,
     executor: Executor | None = None,
     progress: Progress | None = None,
+    finished: Callable[[Act, StudyResult], None] | None = None,
 ) -> dict[str, StudyResult]:
     """Play the virtual campaign and run the paper's study on it, in three acts.
 
@@ -149,6 +150,8 @@ def reproduce(
         As in :func:`seakeep.study.run_study`.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
+    finished : callable, optional
+        Called with each act and its result before the next act starts.
 
     Returns
     -------
@@ -189,6 +192,8 @@ def reproduce(
             extra={"nominal": nominal},
             notes={"preparation_note": f"{act.sentence} {NOTE}", "waves_note": WAVES},
         )
+        if finished is not None:
+            finished(act, found[act.name])
     return found
 
 
