@@ -25,7 +25,15 @@ SPECS = {
         round(period / dt), round(3 * period / dt), ridge=30.0
     ),
     "recommended": seakeep.HankelDMDc.recommended,
-    "ensemble": lambda period, dt: seakeep.BayesianHankelDMDc.recommended(period, dt),
+    "ensemble": lambda period, dt: seakeep.BayesianHankelDMDc(
+        encounter_period=period,
+        train_length=None,
+        state_delay=seakeep.Uniform(0.5, 1.5),
+        input_delay=seakeep.Uniform(2, 4),
+        ridge=seakeep.Uniform(10, 90),
+        n_members=20,
+        dt=dt,
+    ),
 }
 DELAYS = ("0.25 T", "1 T", "4 T")
 

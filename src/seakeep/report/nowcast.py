@@ -89,12 +89,14 @@ def nowcast_figure(found: Mapping[str, xr.Dataset], run: str) -> Figure:
             handles.append(axes.axhline(share, color="0.4", lw=0.8, ls=(0, (1, 2))))
             handles[-1].set_label(f"{share:g} SD")
             axes.set_title(short_label(name), loc="left", fontsize=8)
-            highest = max(float(each["error"].sel(run=run).max()) for each in found.values())
+            drawn = [
+                each[["error", "claimed"]].sel(run=run, channel=name) for each in found.values()
+            ]
+            highest = max(float(each.to_array().max()) for each in drawn)
             axes.set_ylim(0, 1.05 * max(highest, share))
             axes.set_xlim(0, float(np.max(first["lead"].values)))
-        for axes in panels[-min(4, len(panels)) :]:
             axes.set_xlabel("lead time [s]")
-        for axes in panels[::4]:
-            axes.set_ylabel("error [training SD]")
+            if axes.get_subplotspec().is_first_col():
+                axes.set_ylabel("error [training SD]")
         figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 5))
         return figure
