@@ -145,6 +145,14 @@ def test_every_claim_has_a_figure_and_a_verdict(results):
     assert not [row for row in table.rows if "nan" in row[1] or MISSING in row[1]]
 
 
+def test_an_interval_that_few_cells_do_not_give_is_not_printed(results):
+    from seakeep.report.sections.summary import findings
+
+    said = " ".join(findings(results["raw"]))
+    assert "nan" not in said
+    assert "% with too few cells)" in said
+
+
 def test_the_page_over_the_acts_links_to_theirs(played, results):
     pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
     from seakeep.report.acts import write_reproduction

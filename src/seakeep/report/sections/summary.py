@@ -188,7 +188,8 @@ def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure
         "worse": "the ensemble's mean is worse",
         "cannot tell": "cannot tell whether the ensemble's mean is better",
     }[verdict(low, high)]
-    return f" ({words}: {change:+.0f} % [{low:+.0f}, {high:+.0f}])".replace("-", "−")
+    interval = f"[{low:+.0f}, {high:+.0f}]" if np.isfinite(low) else "with too few cells"
+    return f" ({words}: {change:+.0f} % {interval})".replace("-", "−")
 
 
 def _coverage_findings(result: StudyResult, model: str) -> list[str]:
