@@ -123,6 +123,10 @@ def _flags(run: xr.Dataset, name: str) -> Any:
     return np.zeros(run.sizes["time"], dtype=int)
 
 
+LABELS = -0.06
+"""Where labels of the vertical axes stand, in widths of the axes: beyond six figures."""
+
+
 def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figure:
     """Draw every channel of a run, flagged samples marked; lags of redundant sensors below."""
     names = [str(name) for name in run.data_vars][:DRAWN]
@@ -154,7 +158,7 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
         for at in axes:
             at.margins(x=0.005)
             at.tick_params(axis="x", labelbottom=True, labelsize=7)
-        figure.align_ylabels(axes)
+            at.yaxis.set_label_coords(LABELS, 0.5)  # in line: aligning them takes half of the time
         left_out = len(run.data_vars) - len(names)
         axes[-1].set_xlabel("time [s]" + f" ({left_out} more channels)" * bool(left_out))
     return figure
