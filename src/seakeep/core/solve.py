@@ -314,8 +314,8 @@ class _Delayed:
         system = primal_system(self.pieces, self.delays)
         factor = _factor(system.gram, ridge)
         regressors, targets = self.matrices()
-        found = np.zeros_like(system.right)
-        for _ in range(1 + CORRECTIONS):
+        found = np.asarray(lapack.dpotrs(factor, system.right.T, lower=1)[0]).T
+        for _ in range(CORRECTIONS):
             right = (targets - found @ regressors) @ regressors.T - ridge * found
             found += np.asarray(lapack.dpotrs(factor, right.T, lower=1)[0]).T
         return found
