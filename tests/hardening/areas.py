@@ -359,11 +359,13 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "compare": ("compare", "model.nc", "campaign.toml", "-o", "o"),
     "study": ("study", "study.toml", "-o", "o", "--workers", "1"),
     "tank": ("tank", "--settings", "tank.toml", "--out", "o"),
-    "tune": ("tune", "campaign.toml", "--vary", "ridge=0.1,1", "-o", "o.toml"),
+    "tune": ("tune", "campaign.toml", "--vary", "ridge", "-o", "o.toml"),
     "track": ("track", "video.mp4", "--metres-per-pixel", "0.01", "--panel", "0.3", "0.1", "-o",
               "o.csv"),
     "report": ("report", "results"),
     "reproduce": ("reproduce", "--quick", "-o", "o"),
+    "check": ("check", "model.nc", "campaign.toml", "-o", "o"),
+    "export": ("export", "arx.nc", "--c", "o", "--mat", "o.mat", "--onnx", "o.onnx"),
 }  # fmt: skip
 
 
@@ -389,8 +391,8 @@ def paths(place: Path) -> Iterator[Case]:
             for kind in kinds:
                 yield Case("paths", f"{what} {'.'.join(trail)}: {kind}",
                            functools.partial(path_in_settings, what, trail, kind))  # fmt: skip
-    for function in ("load_model", "read_campaign", "read_study", "read_result", "read_columns",
-                     "read_tank", "save", "read_reproduction", "track_video",
+    for function in ("load_model", "load_live", "read_campaign", "read_study", "read_result",
+                     "read_columns", "read_tank", "save", "read_reproduction", "track_video",
                      "load_hydrodynamics"):  # fmt: skip
         for kind in kinds:
             yield Case("paths", f"{function}({kind})",
@@ -425,6 +427,7 @@ def path_in_function(name: str, kind: str) -> object:
 
     path = odd_paths(Path())[kind]
     calls: dict[str, Callable[[str], object]] = {
+        "load_live": lambda p: seakeep.load_live(seakeep.load_model("arx.nc"), p),
         "load_model": seakeep.load_model, "read_campaign": read_campaign, "read_study": read_study,
         "read_result": read_result, "read_columns": read_columns, "read_tank": read_tank,
         "read_reproduction": read_reproduction, "load_hydrodynamics": load_hydrodynamics,
@@ -460,6 +463,11 @@ def contents(place: Path) -> Iterator[Case]:
         yield from _mutations(
             "contents", name, attrs, variables, functools.partial(spoil_model, name)
         )
+    places = ("filled", "final", "rows", "begins", "taken", "since", "partly", "complete")
+    attrs = {"places": json.dumps(dict.fromkeys(places, 0)), "rig": "{}", "model": "x"}
+    arrays = ["u", "x", "y", "delayed", "direct", "gains", "precisions", "plain", "covariance",
+              "history", "innovation", "running", "noise"]  # fmt: skip
+    yield from _mutations("contents", "live", attrs, arrays, spoil_live)
     if (place / "results").exists():
         yield from _study_contents(place)
     with xr.open_dataset(
@@ -576,6 +584,25 @@ def spoil_model(name: str, **how: Any) -> object:
         model.forecast_summary(
             run, 45.0, 20, band="calibrated" if name == "calibrated" else "members"
         )
+    return "done"
+
+
+def spoil_live(**how: Any) -> object:
+    """Go on from the state of a live model of which one thing is another."""
+    import seakeep
+    from seakeep.models import store
+
+    model = seakeep.load_model("arx.nc")
+    live = model.live()
+    for number in range(30):
+        live.step(np.sin([number] * len(model.inputs)), np.cos([number] * len(model.states)))
+    kept = store.read(live.save("live.nc"))
+    made = spoiled(kept, **how)
+    store.write(made, "spoiled.nc", made.attrs.pop("seakeep_kind", "x"), "live state")
+    again = seakeep.load_live(model, "spoiled.nc")
+    for _ in range(3):
+        again.step(np.zeros(len(model.inputs)), np.zeros(len(model.states)))
+    again.forecast(5)
     return "done"
 
 
@@ -745,7 +772,7 @@ OPTIONS = {
     "--skip-rows": "init", "--delimiter": "init", "--decimal": "init", "--group": "init",
     "--folds": "calibrate", "--stop": "calibrate", "--scale": "calibrate", "--seed": "tank",
     "--vary": "tune", "--format": "compare", "--video": "tank", "--spacing": "tank",
-    "--scheduler": "fit",
+    "--scheduler": "fit", "--member": "export", "--onnx": "export",
 }  # fmt: skip
 WORDS = ("", "0", "-1", "1", "1e300", "1e-320", "inf", "nan", "infT", "-infT", "1e300 T", "1e-9 T",
          "nanT", "9" * 5000, "1e400", "58", "57.9", "59.9", "60", "-1e9", "18446744073709551616",
@@ -878,6 +905,14 @@ SIZES: dict[str, Callable[[], object]] = {
                                      distance=np.full(1200, 1e12), celerity=3.0),
     "celerity of 1e-300": lambda: _call("signals", "delay_by_celerity", dt=0.05,
                                        distance=np.full(1200, 1.0), celerity=1e-300),
+    "rate of 10^7": lambda: with_key("campaign", ("preparation", "sampling_rate"), 1e7),
+    "instants of a period": lambda: with_key(
+        "campaign", ("preparation",), {"steps_per_period": 10**6}),
+    "depth of 1e308": lambda: with_key("campaign", ("rig", "water_depth"), 1e308),
+    "depth of 1e-308": lambda: with_key("campaign", ("rig", "water_depth"), 1e-308),
+    "probe at 10^6 m": lambda: with_key("campaign", ("rig", "positions", "eta_fwd"), -1e6),
+    "lead of 10^6": lambda: with_key("campaign", ("model", "lead"), 10**6),
+    "10^8 redrawn series": lambda: with_key("study", ("statistics", "n_series"), 10**8),
     "gap of 1e300": lambda: _call("signals", "bridge", dt=0.05, longest=1e300),
 }  # fmt: skip
 

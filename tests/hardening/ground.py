@@ -193,7 +193,7 @@ startup = 8.0
 
 [runs.one.spectrum]
 height = 0.1
-period = 1.6
+peak_period = 1.6
 components = 20
 """
 
@@ -226,6 +226,16 @@ def read(what: str) -> dict[str, Any]:
     return tomllib.loads({"campaign": CAMPAIGN, "study": STUDY, "tank": TANK}[what])
 
 
+def write(folder: Path) -> Path:
+    """Write settings and raw files into a folder of its own."""
+    place = folder / "ground"
+    place.mkdir()
+    for name, text in (("campaign", CAMPAIGN), ("study", STUDY), ("tank", TANK)):
+        (place / f"{name}.toml").write_text(text, encoding="utf-8")
+    _write_raw(place, "one", 1)
+    return place
+
+
 def prepare(folder: Path, whole: bool = True) -> Path:
     """Write it into a folder, and import what the commands import; a part of it in seconds."""
     import seakeep.cli.console
@@ -235,11 +245,7 @@ def prepare(folder: Path, whole: bool = True) -> Path:
     import seakeep.tuning  # noqa: F401
     from seakeep.cli import main
 
-    place = folder / "ground"
-    place.mkdir()
-    for name, text in (("campaign", CAMPAIGN), ("study", STUDY), ("tank", TANK)):
-        (place / f"{name}.toml").write_text(text, encoding="utf-8")
-    _write_raw(place, "one", 1)
+    place = write(folder)
     models = ("ensemble", "arx", "subspace", "hold") if whole else ("arx",)
     calls: list[tuple[str, ...]] = [
         ("prepare", "campaign.toml"),

@@ -7,6 +7,7 @@ from scipy import signal
 
 import seakeep
 from seakeep import DataError, HankelDMDc, ProbeAlignment, RequestError, load_live
+from seakeep.models import store
 from seakeep.waves import group_speed
 
 START, STEPS = 500, 60  # the record that is kept holds all samples up to there
@@ -295,7 +296,20 @@ def test_a_state_of_another_model_is_refused(models, run, tmp_path):
         load_live(models["lead"], path)
     with pytest.raises(DataError, match="which this version does not know"):
         seakeep.load_model(path)
-    models["plain"].save(tmp_path / "model.nc")
+    model = models["plain"]
+    kept = store.read(path)
+    for attrs, part in (
+        ({"places": kept.attrs["places"].replace('"filled": ', '"filled": 1')}, "places in its"),
+        ({"places": "{}"}, "filled"),
+        ({}, "covariance is float64 of shape"),
+    ):
+        spoilt = kept.assign_attrs(attrs)
+        if not attrs:
+            spoilt["covariance"] = ("one", [1.0])
+        store.write(spoilt, tmp_path / "spoilt.nc", "live", "live state")
+        with pytest.raises(DataError, match=part):
+            load_live(model, tmp_path / "spoilt.nc")
+    model.save(tmp_path / "model.nc")
     with pytest.raises(RequestError, match="holds a model and no state of a live one"):
         load_live(models["plain"], tmp_path / "model.nc")
 

@@ -27,7 +27,7 @@ from seakeep.models.engine import Dynamics, Windows
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import LeadErrors
 from seakeep.models.inputs import Chain, FittedAlignment, Measured
-from seakeep.models.interface import Regressors, Signature, Span
+from seakeep.models.interface import Regressors, Signature, Span, typed
 from seakeep.models.summaries import statistic_coordinate
 from seakeep.signals.prediction import draw_sea, predict_waves, predictable_time
 
@@ -651,17 +651,40 @@ class Live:
 
     def _restore(self, dataset: xr.Dataset) -> None:
         """Restore what :meth:`save` wrote."""
-        for name, values in self._kept.items():
-            values[:] = dataset[name].values
-        self._gains[:] = dataset["gains"].values
-        self._precisions[:] = dataset["precisions"].values
-        self._plain[:] = dataset["plain"].values.astype(bool)
-        self._filter.covariance[:] = dataset["covariance"].values
-        self._history[:] = dataset["history"].values
-        self._innovation = dataset["innovation"].values.copy()
+        kept = {
+            **self._kept,
+            "gains": self._gains,
+            "precisions": self._precisions,
+            "plain": self._plain,
+            "covariance": self._filter.covariance,
+            "history": self._history,
+            "innovation": self._innovation,
+        }
+        for name, values in kept.items():
+            found = dataset[name].values
+            if found.shape != values.shape or found.dtype.kind != "f":
+                raise ValueError(f"{name} is {found.dtype} of shape {found.shape}")
+            values[:] = found
         self._sum, self._weight, self._time = map(float, dataset["running"].values)
-        places = store.content(dataset, "places")
-        self._at = {key: int(places[key]) for key in self._at}
+        self._at = typed(dict[str, int], store.content(dataset, "places"))
+        if not self._is_placed(**self._at):
+            raise ValueError("the places in its record do not fit together")
+
+    def _is_placed(
+        self, filled: int, final: int, rows: int, begins: int, taken: int, since: int, partly: int,
+        complete: int,
+    ) -> bool:  # fmt: skip
+        """Whether places could be those of a record, which moves on as samples are taken."""
+        first, delays = self.signature.history_samples, self.signature.input_delays
+        return (
+            0 <= filled <= min(2 * self._record, taken)
+            and begins == first - (taken - filled)
+            and filled - len(self._plain) <= final < filled
+            and begins - 1 - delays <= rows <= filled
+            and 0 <= since <= taken
+            and 0 <= complete <= taken
+            and partly in (0, 1)
+        )
 
 
 def load_live(model: Servable, path: str | Path) -> Live:
