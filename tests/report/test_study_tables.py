@@ -11,7 +11,7 @@ from rich.console import Console
 
 from seakeep.report.quality_sheet import clock_rows
 from seakeep.report.sections.settings import setting_text
-from seakeep.report.tables import PAGE, Table, rich_table, write_csv, write_latex
+from seakeep.report.tables import PAGE, Table, rich_tables, write_csv, write_latex
 from seakeep.signals.synchronisation import Clock
 
 
@@ -83,12 +83,29 @@ def test_a_table_for_the_terminal_keeps_its_numbers(width):
     heads = ("test set", "model", "ANRMSE median", "ANRMSE IQR", "NAMMAE median", "NAMMAE IQR")
     row = ("irregular waves of the second day", "deterministic", *["0.123"] * 3, "0.456")
     console = Console(file=io.StringIO(), width=width)
-    console.print(rich_table(Table("t", "T", heads, (row,), numeric=(2, 3, 4, 5))))
+    console.print(*rich_tables(Table("t", "T", heads, (row,), numeric=(2, 3, 4, 5)), width))
     text = console.file.getvalue()
     assert text.count("0.123") == 3
     assert "0.456" in text
     assert "…" not in text
     assert max(map(len, text.splitlines())) <= width
+
+
+def test_columns_that_do_not_fit_a_terminal_stand_in_further_blocks():
+    """The acts of `seakeep reproduce`: ten columns, the last of which went missing."""
+    seas = ("irregular", "λ/L 1.5", "λ/L 2", "λ/L 3")
+    heads = ("act", "model", *(f"{sea}: {part}" for sea in seas for part in ("waves", "slow")))
+    row = ("(a)", "deterministic", *(f"1{k}.25" for k in range(8)))
+    (table,) = rich_tables(made := Table("t", "T", heads, (row,), numeric=range(2, 10)), 138)
+    assert table.row_count == 1
+    console = Console(file=io.StringIO(), width=80)
+    console.print(*rich_tables(made, console.width))
+    lines = console.file.getvalue().splitlines()
+    assert [line.split() for line in lines if "deterministic" in line] == [
+        [*row[:2], *row[2:9]],
+        [*row[:2], row[9]],
+    ]
+    assert max(map(len, lines)) <= 80
 
 
 def test_each_clock_has_a_row_and_none_is_parsed_from_a_sentence():

@@ -44,12 +44,13 @@ def results() -> Console:
 
 def print_table(table: Table, note: bool = True) -> None:
     """Print a table, its title above and its note below."""
-    from seakeep.report.tables import rich_table
+    from seakeep.report.tables import rich_tables
 
-    results().print(table.title, style="bold", soft_wrap=True)
-    results().print(rich_table(table))
+    console = results()
+    console.print(table.title, style="bold", soft_wrap=True)
+    console.print(*rich_tables(table, console.width))
     if note and table.note:
-        results().print(f"{table.note}\n", soft_wrap=True)
+        console.print(f"{table.note}\n", soft_wrap=True)
 
 
 def messages() -> Console:

@@ -15,6 +15,7 @@ import numpy as np
 from seakeep.files import replacing
 
 if TYPE_CHECKING:
+    from rich.console import JustifyMethod
     from rich.table import Table as RichTable
 
 __all__ = [
@@ -24,7 +25,7 @@ __all__ = [
     "number",
     "plain_cell",
     "probability",
-    "rich_table",
+    "rich_tables",
     "shade",
     "signed",
     "small_number",
@@ -160,26 +161,50 @@ def write_csv(table: Table, path: Path) -> Path:
     return path
 
 
-def rich_table(table: Table) -> RichTable:
-    """Body of a table for the terminal: text wraps before numbers are cut."""
+def rich_tables(table: Table, width: int) -> list[RichTable]:
+    """Body of a table for a terminal of `width` characters.
+
+    Text wraps between words, numbers are never cut: columns that do not fit stand in further
+    blocks, with the columns before the first number again.
+    """
+    least = [_least_width(table, k) for k in range(len(table.columns))]
+    first = min(table.numeric, default=len(least))
+    blocks: list[list[int]] = [[*range(first)]]
+    for k in range(first, len(least)):
+        if len(blocks[-1]) > first and _drawn_width(least, [*blocks[-1], k]) > width:
+            blocks.append([*range(first)])
+        blocks[-1].append(k)
+    return [_rich_table(table, block, least, width) for block in blocks]
+
+
+def _drawn_width(widths: Sequence[int], columns: Iterable[int]) -> int:
+    return 1 + sum(widths[k] + 2 for k in columns)  # a space, and two behind each column
+
+
+def _least_width(table: Table, k: int) -> int:
+    """Characters that a column needs: of its longest number, or of its longest word."""
+    whole = k in table.numeric
+    words = [word for row in table.rows for word in ([row[k]] if whole else row[k].split())]
+    longest = max(map(len, [*words, *table.columns[k].split()]), default=0)
+    return longest if whole else min(longest, NAME)
+
+
+def _rich_table(
+    table: Table, columns: Sequence[int], least: Sequence[int], width: int
+) -> RichTable:
     from rich import box
     from rich.table import Table as RichTable
 
     out = RichTable(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for k, heading in enumerate(table.columns):
-        if k in table.numeric:
-            # A heading may wrap between its words; a number stays on one line.
-            longest = max((len(row[k]) for row in table.rows), default=0)
-            width = max(longest, *map(len, heading.split() or [""]))
-            out.add_column(heading, justify="right", min_width=width, overflow="fold")
-        elif k == 0:  # names of channels stay in one piece
-            words = [word for row in (table.columns, *table.rows) for word in row[k].split()]
-            longest = max(map(len, words), default=0)
-            out.add_column(heading, min_width=min(longest, NAME), overflow="fold")
-        else:
-            out.add_column(heading, overflow="fold")
+    room = max(width - _drawn_width(least, columns), 0)
+    for k in columns:
+        longest = max(map(len, [table.columns[k], *(row[k] for row in table.rows)]))
+        more = min(room, max(longest - least[k], 0))
+        room -= more
+        justify: JustifyMethod = "right" if k in table.numeric else "left"
+        out.add_column(table.columns[k], justify=justify, width=least[k] + more, overflow="fold")
     for k, row in enumerate(table.rows):
-        out.add_row(*row, style="bold" if k in table.averages else None)
+        out.add_row(*(row[j] for j in columns), style="bold" if k in table.averages else None)
     return out
 
 
