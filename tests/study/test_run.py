@@ -351,6 +351,10 @@ def test_contents_that_no_study_writes_are_told(finished):
             spoilt = xr.Dataset({**others, each: ("elsewhere", [1j])}, attrs=group.attrs)
             with pytest.raises(ValueError, match=str(each)):
                 check_contents(attrs, {**groups, name: spoilt})
+    older = json.loads(attrs["settings"])
+    del older["output"]["paper"], older["training"]["placement"]
+    filled = check_contents(attrs | {"settings": json.dumps(older)}, groups)["settings"]
+    assert json.loads(filled) == json.loads(attrs["settings"])
     others = {key: each for key, each in groups.items() if key != "statistics/densities"}
     store.write_result(finished.folder, attrs | {"groups": json.dumps(list(others))}, others)
     message = "does not hold what a study writes.*the group statistics/densities is missing"

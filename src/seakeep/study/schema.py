@@ -224,7 +224,7 @@ KINDS: Mapping[str, Callable[[Any], bool]] = {
 }
 
 
-def check_contents(attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]) -> None:
+def check_contents(attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]) -> dict[str, Any]:
     """Compare what a file of a study holds with what a study writes.
 
     Parameters
@@ -233,6 +233,11 @@ def check_contents(attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]) -
         Attributes of the file.
     groups : mapping of str to Dataset
         Its groups.
+
+    Returns
+    -------
+    dict
+        The attributes; settings that came after the file was written have their defaults.
 
     Raises
     ------
@@ -267,6 +272,9 @@ def check_contents(attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]) -
     }
     for name in groups:
         _check_group(name, groups, models, known)
+    if told["settings"] == json.loads(attrs["settings"]):
+        return dict(attrs)
+    return {**attrs, "settings": json.dumps(told["settings"])}
 
 
 def _texts(group: xr.Dataset, name: str) -> list[str]:
@@ -331,12 +339,17 @@ def _rows(
 
 
 def _check_value(kind: Any, value: Any, place: str) -> None:
-    """Compare a value with the type of a key; keys of settings are all there, stated or not."""
+    """Compare a value with the type of a key; keys that are newer than the file are filled in."""
     bare = get_args(kind)[0] if get_origin(kind) is Annotated else kind
     if isinstance(kind, type) and issubclass(kind, BaseModel):
-        if not isinstance(value, dict) or set(value) != set(kind.model_fields):
+        if not isinstance(value, dict) or set(value) - set(kind.model_fields):
             raise ValueError(f"{place} does not have the keys of {kind.__name__}")
         for name, each in kind.model_fields.items():
+            if name not in value and not each.is_required():
+                default = each.get_default(call_default_factory=True)
+                value[name] = _adapter(Any).dump_python(default, mode="json")
+            if name not in value:
+                raise ValueError(f"{place}.{name} is missing")
             inner = Annotated[each.annotation, *each.metadata] if each.metadata else each.annotation
             _check_value(inner, value[name], f"{place}.{name}")
     elif get_origin(bare) is dict and isinstance(value, dict) and value:

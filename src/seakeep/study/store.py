@@ -420,7 +420,7 @@ def read_result(folder: Path | str) -> StudyResult:
                 name: xr.open_dataset(H5NetCDFStore(file, group=name), decode_times=False).load()
                 for name in json.loads(attrs["groups"])
             }
-        check_contents(attrs, groups)
+        attrs = check_contents(attrs, groups)
     except SeakeepError:
         raise
     except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError) as error:
