@@ -189,7 +189,7 @@ ridge_scale = "absolute"
 """
 
 
-def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study):
+def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study, monkeypatch):
     text = put_study(tmp_path)
     path = tmp_path / "study.toml"
     path.write_text(text.replace("length = 6", "length = 20") + WILD, "utf-8")
@@ -203,6 +203,15 @@ def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study):
     assert boxes["count"].sel(model="wild") == 0
     assert boxes["count"].sel(model="deterministic") == 6
     assert np.isfinite(found.groups["statistics/divergence"]["mean"].sel(model="bayesian")).all()
+    # The study ends in a report, whose figures are made here and not written.
+    pytest.importorskip("matplotlib", reason="the report draws figures")
+    from seakeep.report import page
+
+    made = []
+    monkeypatch.setattr(page, "_drawn", lambda drawing, folder: made.append(drawing.draw()))
+    text = page.write_report(found).read_text("utf-8")
+    assert "6 forecast(s) diverged and are left out: model " in text
+    assert made
 
 
 def crossed(rng, models, cells=10):
