@@ -71,6 +71,7 @@ def test_every_check_has_a_figure_with_labelled_axes(run, model):
         seakeep.plot.modes: (check.modes(model),),
         seakeep.plot.residuals: (check.residuals(model, runs),),
         seakeep.plot.exceedance: (check.statistics(model, runs),),
+        seakeep.plot.density: (check.statistics(model, runs),),
         seakeep.plot.validity: (check.validity(model, runs),),
         seakeep.plot.drift: (check.drift(curved, runs),),
     }

@@ -2,12 +2,13 @@
 
 Forecasts: :func:`overlay`, :func:`band`, :func:`errors`. Results of :mod:`seakeep.check`:
 :func:`response`, :func:`coherence`, :func:`decay`, :func:`modes`, :func:`residuals`,
-:func:`exceedance`, :func:`validity`, :func:`drift`.
+:func:`exceedance`, :func:`density`, :func:`validity`, :func:`drift`.
 """
 
 from seakeep.report.figures.checks import (
     coherence,
     decay,
+    density,
     drift,
     exceedance,
     modes,
@@ -21,6 +22,7 @@ __all__ = [
     "band",
     "coherence",
     "decay",
+    "density",
     "drift",
     "errors",
     "exceedance",

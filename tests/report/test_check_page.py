@@ -30,7 +30,16 @@ def checked(tmp_path_factory):
 
 def test_the_page_holds_its_figures_and_tables(checked):
     page = (checked / "report.html").read_text("utf-8")
-    for name in ("response", "coherence", "decay", "modes", "residuals", "exceedance", "validity"):
+    for name in (
+        "response",
+        "coherence",
+        "decay",
+        "modes",
+        "residuals",
+        "exceedance",
+        "density",
+        "validity",
+    ):
         assert (checked / "figures" / f"{name}.png").exists()
         assert f'id="figure-{name}"' in page
     with (checked / "tables" / "possible.csv").open(encoding="utf-8") as file:

@@ -9,6 +9,8 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.check.parts import FreeRun, free_runs, irregular
+from seakeep.core.density import kernel_density
+from seakeep.core.divergence import jensen_shannon
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
 from seakeep.errors import SeakeepError
 from seakeep.models import Model
@@ -18,6 +20,7 @@ __all__ = ["statistics"]
 
 HOURS = 3.0
 KINDS = ("measured", "forecast")
+PLACES = 161
 
 
 def statistics(
@@ -50,7 +53,9 @@ def statistics(
         ``weibull_shape`` and ``weibull_scale`` (maximum likelihood), ``extreme`` (most probable
         in the duration by Weibull's law) with ``extreme_lower`` and ``extreme_upper`` (95 %, what
         the fit does not know); over (state, kind, rank): ``peak`` and ``exceedance``, largest
-        first. ``attrs["duration"]`` (s).
+        first; over (state, kind, place): ``density`` of the deviations at ``deviation`` over
+        (state, place); over state: ``divergence`` (Jensen–Shannon) of the two densities, NaN where
+        one stands still. ``attrs["duration"]`` (s).
 
     Raises
     ------
@@ -77,6 +82,7 @@ def statistics(
             found = np.sort(peaks[state, kind])[::-1]
             sorted_peaks[number, side, : found.size] = found
             exceedance[number, side, : found.size] = np.arange(1, found.size + 1) / (found.size + 1)
+    deviation, density = _densities(list(known.values()), len(model.states))
     names = next(iter(rows.values()))
     units = [label.units for label in model.signature.state_labels]
     return xr.Dataset(
@@ -87,10 +93,36 @@ def statistics(
             },
             "peak": (("state", "kind", "rank"), sorted_peaks),
             "exceedance": (("state", "kind", "rank"), exceedance),
+            "deviation": (("state", "place"), deviation),
+            "density": (("state", "kind", "place"), density),
+            "divergence": ("state", [_divergence(*each) for each in density]),
         },
         coords={"state": model.states, "kind": list(KINDS), "units": ("state", units)},
         attrs={"duration": duration},
     )
+
+
+def _densities(free: list[FreeRun], states: int) -> tuple[FloatArray, FloatArray]:
+    """Densities of the deviations from the mean of each run, on a grid for each state."""
+    grids = np.empty((states, PLACES))
+    found = np.full((states, len(KINDS), PLACES), np.nan)
+    both = np.concatenate(
+        [np.stack([(x := getattr(e, kind)) - x.mean(axis=0) for kind in KINDS]) for e in free],
+        axis=1,
+    )
+    both = both[:, np.isfinite(both).all(axis=(0, 2))]  # a free run that was lost
+    for state in range(states):
+        reach = 1.1 * np.abs(both[:, :, state]).max(initial=0.0) or 1.0
+        grids[state] = np.linspace(-reach, reach, PLACES)
+        for side, values in enumerate(both[:, :, state]):
+            if np.ptp(values) > 0:
+                found[state, side] = kernel_density(values, grids[state])
+    return grids, found
+
+
+def _divergence(measured: FloatArray, forecast: FloatArray) -> float:
+    known = np.isfinite(measured).all() and np.isfinite(forecast).all()
+    return float(jensen_shannon(measured, forecast)) if known else np.nan
 
 
 def _peaks(series: list[FloatArray], dt: float) -> tuple[FloatArray, FloatArray]:

@@ -348,12 +348,13 @@ def statistics_section(checked: Checked) -> Section | None:
                     number(float(own["weibull_shape"]), 2),
                     f"{factor * float(own['extreme']):.4g}" if known else number(np.nan),
                     f"{low:.4g} to {high:.4g}" if known else number(np.nan),
+                    number(float(own["divergence"]) if kind == "forecast" else np.nan, 4),
                 )
             )
     hours = float(found.attrs["duration"]) / 3600
     columns = (
         *("state", "of", "significant double amplitude", "zero-crossing period [s]", "peaks"),
-        *("Weibull shape", "extreme", "95 % of it"),
+        *("Weibull shape", "extreme", "95 % of it", "JSD"),
     )
     table = Table(
         "statistics",
@@ -362,15 +363,19 @@ def statistics_section(checked: Checked) -> Section | None:
         tuple(rows),
         f"Extreme: most probable largest deviation from the mean in {hours:.3g} h of "
         "these records' time (3 h at full scale), by Weibull's law; its interval is what the fit "
-        "does not know. Rayleigh's law has the shape 2.",
+        "does not know. Rayleigh's law has the shape 2. JSD: Jensen–Shannon divergence of the "
+        "densities forecast and measured (0 to 0.69).",
         tuple(range(2, len(columns))),
     )
     caption = (
         "How often a peak exceeds a level, measured and forecast, beside Rayleigh and Weibull."
     )
-    drawing = Drawing("exceedance", caption, partial(checks.exceedance, found))
+    drawings = (
+        Drawing("exceedance", caption, partial(checks.exceedance, found)),
+        Drawing("density", "Densities of the states.", partial(checks.density, found)),
+    )
     title = "Statistics of responses"
-    return Section("statistics", title, figures=(drawing,), tables=(table,))
+    return Section("statistics", title, figures=drawings, tables=(table,))
 
 
 def validity_section(checked: Checked) -> Section | None:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = [
     "coherence",
     "decay",
+    "density",
     "drift",
     "exceedance",
     "modes",
@@ -411,6 +412,45 @@ def exceedance(
             place.set_xlim(0, factor * level[-1])
             place.set_xlabel(f"peak of {short_label(name)} [{shown_unit(units) or '?'}]")
             place.set_ylabel("exceeded by [1]")
+        if axes is None:
+            legend_below(figure, places[0])
+    return figure
+
+
+def density(
+    found: xr.Dataset,
+    *,
+    states: Sequence[str] | None = None,
+    axes: Sequence[Axes] | Axes | None = None,
+) -> Figure:
+    """Draw the densities of states, measured and forecast.
+
+    Parameters
+    ----------
+    found : Dataset
+        From :func:`seakeep.check.statistics`.
+    states : sequence of str, optional
+        States to draw; by default all.
+    axes : Axes or sequence of Axes, optional
+        One for each state; by default those of a new figure.
+
+    Returns
+    -------
+    Figure
+    """
+    chosen = _chosen(found, states)
+    with figure_style():
+        figure, places = panels(axes, len(chosen), 3, (3.0, 1.9))
+        for name, place in zip(chosen, places, strict=True):
+            own = found.sel(state=name)
+            factor, units = displayed(str(own["units"].values))
+            unit = shown_unit(units) or "?"
+            for kind in ("measured", "forecast"):
+                height = own["density"].sel(kind=kind) / factor
+                place.plot(factor * own["deviation"], height, **LINES[kind], label=kind)
+            place.set_ylim(bottom=0)
+            place.set_xlabel(f"{short_label(name)} from its mean [{unit}]")
+            place.set_ylabel(f"density [1/{unit}]")
         if axes is None:
             legend_below(figure, places[0])
     return figure
