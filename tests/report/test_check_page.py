@@ -1,12 +1,15 @@
 """``seakeep check``: the page, its files, and what it says of what cannot be judged."""
 
 import csv
+import re
 
 import numpy as np
 import pytest
+from moored import moored_run
 from tutorial_study import put_tutorial
 
-from seakeep.check import Checked
+from seakeep import HankelDMDc
+from seakeep.check import Checked, check_model
 from seakeep.cli import main
 from seakeep.errors import RequestError
 
@@ -26,6 +29,23 @@ def checked(tmp_path_factory):
     assert main(["fit", campaign, "-o", model]) == 0
     assert main(["check", model, campaign, "-o", str(folder / "out")]) == 0
     return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def judged():
+    """Sections of pages on runs that tell too little."""
+    run = moored_run(seed=2).assign_attrs(encounter_period=1.0, waves="irregular")
+    model = HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, ["surge", "heave"], ["eta"])
+    still, flat = (
+        run.assign({k: (0 * run[k]).assign_attrs(run[k].attrs)}) for k in ("eta", "heave")
+    )
+    runs = {
+        "regular": run.assign_attrs(waves="regular"),
+        "short": run.isel(time=slice(0, 40)),
+        "dead": still,
+        "flat": flat,
+    }
+    return {key: check_sections(check_model(model, {"run": each})) for key, each in runs.items()}
 
 
 def test_the_page_holds_its_figures_and_tables(checked):
@@ -70,6 +90,29 @@ def test_a_page_says_what_cannot_be_judged():
         "run_3 is left out: it is short.",
     )
     assert possible.notices == ("Cannot be judged: all runs are regular.",)
+
+
+@pytest.mark.parametrize(
+    ("change", "section", "words"),
+    [
+        ("regular", "What is possible", r"all runs \(run\) are in regular waves"),
+        ("regular", "Statistics of responses", "takes a run in irregular waves"),
+        ("short", "What is possible", "has 4 s, and spectra take a segment of 16 s"),
+        ("short", "Response", "no run gives a measured response"),
+        ("dead", "What is possible", r"the inputs \(eta\) hold no energy"),
+        ("dead", "Response", "eta holds no energy: it is constant"),
+        ("dead", "Validity", "eta holds no energy: it is constant"),
+    ],
+)
+def test_runs_that_tell_too_little_are_named_on_the_page(judged, change, section, words):
+    found = {each.title: each for each in judged[change]}
+    assert re.search(f"Cannot be judged: .*{words}", " ".join(found[section].notices))
+
+
+def test_a_state_that_stands_still_is_drawn(judged):
+    for each in judged["flat"]:
+        for drawing in each.figures:
+            drawing.draw().canvas.draw()
 
 
 def test_figures_draw_on_axes_that_are_given():

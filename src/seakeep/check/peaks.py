@@ -116,7 +116,9 @@ def _densities(free: list[FreeRun], states: int) -> tuple[FloatArray, FloatArray
         grids[state] = np.linspace(-reach, reach, PLACES)
         for side, values in enumerate(both[:, :, state]):
             if np.ptp(values) > 0:
-                found[state, side] = kernel_density(values, grids[state])
+                density = kernel_density(values, grids[state])
+                if density.sum() * 2 * reach / PLACES > 0.5:  # else the grid is too coarse for it
+                    found[state, side] = density
     return grids, found
 
 

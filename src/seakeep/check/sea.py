@@ -39,7 +39,7 @@ def validity(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     Raises
     ------
     DataError
-        If no run can be read.
+        If no run can be read, or the probe is constant.
     RequestError
         If no input is a wave elevation.
     """
@@ -67,6 +67,10 @@ def validity(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     if not rows:
         raise DataError("no run has all channels of the model: there are no waves to compare.")
     table = np.stack([values for _, values in rows.values()])
+    if np.isnan(table[:, :, 0]).all():
+        raise DataError(
+            f"{model.inputs[reference]} holds no energy: it is constant. Look for a dead probe."
+        )
     outside = [_outside(model, run, np.isfinite(values[1, 1])) for run, values in rows.values()]
     return xr.Dataset(
         {key: (("run", "part"), table[:, :, column]) for column, key in enumerate(keys)}

@@ -388,9 +388,10 @@ def exceedance(
             measured = own.sel(kind="measured")
             largest = float(np.nanmax(own["peak"], initial=0.0))
             level = np.linspace(0, 1.1 * largest or 1.0, 200)
-            rayleigh = np.exp(-0.5 * (level / max(float(measured["rayleigh_scale"]), 1e-300)) ** 2)
             thin = {"color": COLOURS["input"], "linewidth": 0.9}
-            place.semilogy(factor * level, rayleigh, **thin, linestyle=":", label="Rayleigh")
+            if (spread := float(measured["rayleigh_scale"])) > 0:
+                rayleigh = np.exp(-0.5 * (level / spread) ** 2)
+                place.semilogy(factor * level, rayleigh, **thin, linestyle=":", label="Rayleigh")
             k, b = float(measured["weibull_shape"]), float(measured["weibull_scale"])
             if np.isfinite(k):
                 weibull = np.exp(-((level / b) ** k))
