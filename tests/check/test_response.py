@@ -131,13 +131,15 @@ def test_intervals_of_a_harmonic_fit_cover_as_they_say():
     truth = 0.7 * np.exp(0.4j)
     clean = (truth * np.exp(2j * np.pi * 0.5 * time)).real
     many = clean[:, None] + 0.3 * rng.standard_normal((900, 500))
-    harmonics, _ = harmonic_fits(np.column_stack([wave, many]), DT, 0.5)
+    harmonics, means = harmonic_fits(np.column_stack([wave, many]), DT, 0.5)
     found = estimate(harmonics[:, 1:] / harmonics[:, :1], np.zeros(500))
     inside = np.abs(np.abs(found.ratio) - 0.7) < found.amplitude
     turned = np.abs(np.angle(found.ratio / truth)) < found.phase
     # 500 repetitions know a coverage of 95 % to 1 % (one SD).
     assert 0.92 <= inside.mean() <= 0.98
     assert 0.92 <= turned.mean() <= 0.98
+    offset = estimate(means[:, 1:].astype(complex), np.zeros(500))
+    assert 0.92 <= np.mean(np.abs(offset.ratio.real) < offset.amplitude) <= 0.98
 
 
 def test_what_cannot_be_judged_says_why(sea, model):
