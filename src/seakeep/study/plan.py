@@ -403,8 +403,11 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
     runs = load_prepared(campaign, names=list(wanted), progress=progress)
     for name, run in runs.items():
         _check_channels(name, run, [*study.states, *study.inputs])
-    dt = float(next(iter(runs.values())).attrs["dt"])
-    period = settings.study.encounter_period or campaign.encounter_period()
+    shared = next(iter(runs.values())).attrs
+    dt = float(shared["dt"])
+    # Prepared runs hold the period where their preparation counts in it.
+    period = settings.study.encounter_period or shared.get("encounter_period")
+    period = period or campaign.encounter_period()
     general = settings.study
     aligned = can_align(campaign.settings, study.inputs)
     left_out = settings.training.scheme == "leave_out"

@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -151,7 +152,7 @@ def reproduce(
     progress : callable, optional
         Called as ``progress(done, total, what)``.
     finished : callable, optional
-        Called with each act and its result before the next act starts.
+        Called with each act and its result once it is known, before it is written.
 
     Returns
     -------
@@ -191,9 +192,8 @@ def reproduce(
             progress=_named(progress, f"{act.title}: "),
             extra={"nominal": nominal},
             notes={"preparation_note": f"{act.sentence} {NOTE}", "waves_note": WAVES},
+            finished=None if finished is None else partial(finished, act),
         )
-        if finished is not None:
-            finished(act, found[act.name])
     return found
 
 

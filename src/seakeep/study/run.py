@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import warnings
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from pathlib import Path
 
@@ -42,6 +42,7 @@ def run_study(
     progress: Progress | None = None,
     extra: Mapping[str, xr.Dataset] | None = None,
     notes: Mapping[str, str] | None = None,
+    finished: Callable[[StudyResult], None] | None = None,
 ) -> StudyResult:
     """Run a study, or continue one that was stopped.
 
@@ -61,6 +62,8 @@ def run_study(
         Groups to be kept beside the results.
     notes : mapping of str to str, optional
         Attributes to be kept beside them, such as ``preparation_note`` for the report.
+    finished : callable, optional
+        Called with the result once it is known, just before it is written.
 
     Returns
     -------
@@ -90,7 +93,10 @@ def run_study(
     folder = UnitFolder(out, study.digest)
     folder.check()
     if (found := _finished(study, out, report)) is not None:
-        return relabel(found, _labels(study))
+        found = relabel(found, _labels(study))
+        if finished is not None:
+            finished(found)
+        return found
     plan, runs = make_plan(
         study, lambda done, total, name: report(done, total, f"preparing {name}")
     )
@@ -113,7 +119,9 @@ def run_study(
                 warnings.warn(words, SeakeepWarning, stacklevel=2)
             groups |= extra or {}
             attributes = {**_attributes(study, plan, groups), **(notes or {})}
-            found = write_result(out, attributes, groups)
+            found = write_result(out, attributes, groups, finished)
+        elif finished is not None:
+            finished(found)
         folder.clear()
     return found
 

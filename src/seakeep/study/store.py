@@ -7,7 +7,7 @@ import json
 import tempfile
 import warnings
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -344,13 +344,19 @@ class StudyResult:
 
 
 def write_result(
-    folder: Path, attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]
+    folder: Path,
+    attrs: Mapping[str, Any],
+    groups: Mapping[str, xr.Dataset],
+    finished: Callable[[StudyResult], None] | None = None,
 ) -> StudyResult:
     """Write everything into one sealed NetCDF file, renamed into place."""
     kept = {**attrs, "format": FORMAT, "created": datetime.now(UTC).isoformat(timespec="seconds")}
+    found = StudyResult(folder, kept, dict(groups))
+    if finished is not None:
+        finished(found)
     with storing(folder), replacing(folder / RESULT) as temporary:
         write_netcdf(temporary, xr.Dataset(attrs=kept), groups, _packing)
-    return StudyResult(folder, kept, dict(groups))
+    return found
 
 
 def _packing(group: xr.Dataset) -> dict[str, dict[str, object]]:
