@@ -38,6 +38,11 @@ def response_section(checked: Checked) -> Section | None:
         words.append(
             f"{', '.join(read)}: read off other states, so that no linear response stands for it."
         )
+    if measured is not None and (measured["kind"] == "irregular").any():
+        words.append(
+            "Leakage moves points of irregular waves at the edges of their spectrum further than "
+            "the bars show."
+        )
     drawing = Drawing(
         "response",
         "Amplitude and phase of the response (phase positive where the vessel is early). Grey: "
