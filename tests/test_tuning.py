@@ -41,7 +41,9 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds):
     given = {name: run.assign_attrs(sea_state=sea) for (name, run), sea in named}
     powers = seakeep.Powers("eta", (2,))
     spec = replace(SPEC, lead=4, observables=(powers,))
-    table = seakeep.tune(spec, given, STATES, INPUTS, horizon=(15,), folds=folds).table
+    result = seakeep.tune(spec, given, STATES, INPUTS, horizon=(15,), folds=folds)
+    table = result.table
+    assert ("sea state, of which there are 2" in result.describe()) == (folds == "sea_state")
     assert set(table["observables"].values.tolist()) == {"none", "powers"}
     steps, first = 15 * PERIOD, spec.input_delays
     for trial in range(0, table.sizes["trial"], 4):
@@ -98,6 +100,17 @@ def test_a_search_that_was_interrupted_goes_on(tmp_path):
     kept.write_text("[]")
     with pytest.raises(RequestError, match="keeps no scores of a search"):
         seakeep.tune(SPEC, runs(), STATES, INPUTS, **more)
+
+
+@pytest.mark.parametrize(
+    ("sea", "words"), [("calm", "all runs have the same"), (None, "no two runs share a")]
+)
+def test_sea_states_that_hold_nothing_together_are_named(sea, words):
+    given = runs()
+    if sea is not None:
+        given = {name: run.assign_attrs(sea_state=sea) for name, run in given.items()}
+    result = seakeep.tune(SPEC, given, STATES, INPUTS, ["ridge"], (15,), "sea_state")
+    assert f"{words} sea state, so each was held out alone" in result.describe()
 
 
 def test_folds_that_are_no_number_of_parts_are_refused():

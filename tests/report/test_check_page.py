@@ -109,6 +109,17 @@ def test_runs_that_tell_too_little_are_named_on_the_page(judged, change, section
     assert re.search(f"Cannot be judged: .*{words}", " ".join(found[section].notices))
 
 
+def test_several_probes_without_positions_are_not_compared_with_the_vessel():
+    run = moored_run(seed=2).assign_attrs(encounter_period=1.0, waves="irregular")
+    run["eta_aft"] = run["eta"].shift(time=5, fill_value=0.0)
+    model = HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, ["heave"], ["eta", "eta_aft"])
+    response = check_sections(check_model(model, {"run": run}))[0]
+    assert re.search(r"Cannot be judged: .* State both in \[rig\]", " ".join(response.notices))
+    assert response.tables == ()
+    with pytest.raises(RequestError, match="run has no channel 'eta_aft'"):
+        check_model(model, {"run": run.drop_vars("eta_aft")})
+
+
 def test_a_state_that_stands_still_is_drawn(judged):
     for each in judged["flat"]:
         for drawing in each.figures:

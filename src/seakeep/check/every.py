@@ -19,6 +19,7 @@ from seakeep.check.sea import validity
 from seakeep.check.second_order import drift
 from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models import Model
+from seakeep.models.labelled import check_channels
 
 __all__ = ["CHECKS", "Checked", "check_model"]
 
@@ -89,7 +90,14 @@ def check_model(
     Returns
     -------
     Checked
+
+    Raises
+    ------
+    RequestError
+        If a run lacks a channel of the model.
     """
+    for name, run in runs.items():
+        check_channels(run, [*model.states, *model.inputs], name)
     found: dict[str, xr.Dataset] = {}
     refused, notes = {}, {}
     free: dict[str, FreeRun] = {}

@@ -12,6 +12,7 @@ import xarray as xr
 from seakeep.arrays import ComplexArray, FloatArray, as_real
 from seakeep.check.parts import (
     Part,
+    elevations,
     encounter_period_of,
     is_regular,
     reference_probe,
@@ -373,10 +374,21 @@ def validation(
         Over (point, state): ``model``, ``measured``, ``error``, ``uncertainty`` (95 %), in the
         units of the amplitude, and ``within``: whether \|E\| < U_val, so that the error cannot be
         told from the uncertainty.
+
+    Raises
+    ------
+    DataError
+        If the model reads several probes and no run states where they stand.
     """
     measured = measured_response(model, runs) if measured is None else measured
     frequency, place = np.unique(measured["frequency"].values, return_inverse=True)
     found = response(model, frequency, runs)
+    if WAVE not in found["input"] and elevations(model).sum() > 1:
+        raise DataError(
+            "the model answers several probes, of which no run states the positions and the water "
+            "depth: its answer to one of them is not its answer to a wave that passes all. State "
+            "both in [rig] of the campaign file."
+        )
     own = found.sel(input=WAVE if WAVE in found["input"] else found.attrs["reference"])
     amplitude = own["amplitude"].values[:, place].T
     spread = np.zeros_like(amplitude)

@@ -780,6 +780,8 @@ def select(
         f"{level}: out of {count} settings in free runs on {len(problems[0].folds())} parts held "
         f"out in turn, mean NRMSE {score:.3f}"
     )
+    if folds == "sea_state":
+        note += f"; {_words_of_groups(problems[0].groups)}"
     rows = tuple(_rows_of(found, chosen, alignments, seed))
     fitted: tuple[FittedReadOut, ...] = ()
     if readouts:
@@ -1020,6 +1022,15 @@ def _problem(
             for name, run in pieces.items()
         ),
     )
+
+
+def _words_of_groups(groups: Sequence[str]) -> str:
+    """What was held out beside each run."""
+    seas = len(set(groups))
+    if 1 < seas < len(groups):
+        return f"held out with each: the runs of its sea state, of which there are {seas}"
+    shared = "no two runs share a sea state" if seas > 1 else "all runs have the same sea state"
+    return f"{shared}, so each was held out alone"
 
 
 def _rows_of(

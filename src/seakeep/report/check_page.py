@@ -28,6 +28,8 @@ def response_section(checked: Checked) -> Section | None:
         return None
     reference = found.attrs["reference"]
     wave = "wave" in found["input"]
+    if "validation" in checked.refused:  # points beside the answer to something else
+        measured = None
     counted = f"a wave that passes all probes, counted from {reference}" if wave else str(reference)
     read = [str(s) for s in found["state"].values if found["amplitude"].sel(state=s).isnull().all()]
     words = [
@@ -155,11 +157,12 @@ def possible_section(checked: Checked) -> Section | None:
         "possible",
         "What is possible",
         words=(
-            "No linear map of the inputs errs by less than the linear bound, from the coherence of "
-            f"the runs in irregular waves ({found.attrs['averages']:.0f} independent segments of "
-            f"{found.attrs['segment']:.3g} s). Motions slower than a segment are not resolved: "
-            "there the bound is too high, and a model that continues the measured state may lie "
-            "below it.",
+            "The linear bound estimates the least error of a linear map of the inputs, from the "
+            "coherence of all runs in irregular waves, training included "
+            f"({found.attrs['averages']:.0f} independent segments of "
+            f"{found.attrs['segment']:.3g} s). Leakage between the frequencies of a segment raises "
+            "the estimate, and so do motions slower than a segment: a good model of long records "
+            "lies below it. The model's error is that of free runs over the same runs.",
         ),
         points=tuple(advice),
         figures=(
@@ -189,7 +192,7 @@ def _advice(model: float, linear: float, more: float) -> str:
         return "No free run holds over the test."
     least = np.nanmin([linear, more])
     if model < 0.95 * least:
-        return "The model continues slow motion that the segments do not resolve."
+        return "The model is below what these segments resolve: no room is seen."
     if model < 1.15 * linear and not more < 0.85 * linear:
         return "As good as the inputs allow: more probes or less noise would help, not more tuning."
     if more < 0.85 * linear and model > 1.15 * more:
@@ -322,7 +325,7 @@ def residuals_section(checked: Checked) -> Section | None:
     words = (
         "A model that has taken all from the data leaves one-step errors that are white and know "
         "nothing of past inputs. With long records even small errors fail this test: read it with "
-        "the size of the error.",
+        "the size of the error. All runs count, training included.",
     )
     return Section("residuals", "Residuals", words, figures=(drawing,), tables=(table,))
 
@@ -406,7 +409,12 @@ def validity_section(checked: Checked) -> Section | None:
         for run, text in zip(found["run"].values, found["outside"].values, strict=True)
         if text
     ]
-    caption = "Waves (and mean surge) that trained the model, and those of each test."
+    caption = (
+        "Waves (and mean surge) that trained the model, and those of each test. A test is outside "
+        "where most of its energy lies at periods without energy in training, or where its height "
+        "or steepness is beyond the largest of training by a tenth and the scatter of so short a "
+        "record."
+    )
     return Section(
         "validity",
         "Validity",
