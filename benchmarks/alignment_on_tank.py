@@ -30,6 +30,8 @@ STATES = [
 ]
 INPUTS = ["eta_fwd", "eta_cog"]
 PERIODS = 15
+BEFORE, AHEAD = 12, 3
+"""Periods at either end of a run that hold the history and the look-ahead of all models."""
 ALIGNMENTS = {
     f"{surge}, {mode}": seakeep.ProbeAlignment(mode=mode, surge=surge)
     for surge in ("measured", "predicted")
@@ -52,13 +54,13 @@ def window_errors(runs, period, preset, alignment, forecast_runs=None):
     make = getattr(seakeep.HankelDMDc, preset)
     base = make(encounter_period=period, dt=dt)
     spec = replace(base, alignment=alignment)
-    steps = periods_to_samples(PERIODS, period, dt)
+    steps, before, ahead = (periods_to_samples(n, period, dt) for n in (PERIODS, BEFORE, AHEAD))
     rows = []
     for name in runs if forecast_runs is None else forecast_runs:
         run = runs[name]
         model = spec.fit([other for key, other in runs.items() if key != name], STATES, INPUTS)
         time = run["time"].values
-        for at in range(model.history_samples - 1, time.size - steps, steps):
+        for at in range(before, time.size - steps - ahead, steps):
             forecast = model.forecast(run, start=float(time[at]), steps=steps)
             measured = run[STATES].sel(time=forecast["time"])
             each = seakeep.metrics.nrmse(predicted=forecast, measured=measured)
