@@ -116,8 +116,7 @@ def as_finished(
     if executor is None:
         while items:
             item = items.popleft()
-            with one_blas_thread():
-                result = function(data, item)
+            (result,) = _in_order(function, data, [item], None)
             yield item, result
         return
     pending: dict[Future[list[Result]], Item] = {}

@@ -90,12 +90,12 @@ def run_study(
     """
     out = Path(out)
     report = progress or (lambda done, total, what: None)
+    hand_on = finished or (lambda result: None)
     folder = UnitFolder(out, study.digest)
     folder.check()
     if (found := _finished(study, out, report)) is not None:
         found = relabel(found, _labels(study))
-        if finished is not None:
-            finished(found)
+        hand_on(found)
         return found
     plan, runs = make_plan(
         study, lambda done, total, name: report(done, total, f"preparing {name}")
@@ -119,9 +119,9 @@ def run_study(
                 warnings.warn(words, SeakeepWarning, stacklevel=2)
             groups |= extra or {}
             attributes = {**_attributes(study, plan, groups), **(notes or {})}
-            found = write_result(out, attributes, groups, finished)
-        elif finished is not None:
-            finished(found)
+            found = write_result(out, attributes, groups, hand_on)
+        else:
+            hand_on(found)
         folder.clear()
     return found
 
