@@ -250,8 +250,9 @@ def anrmse_differences(
     -------
     Dataset
         Over (model, run): ``anrmse``, ``change`` (relative to the first model, −0.2 for 20 %
-        less) and its bounds ``lower`` and ``upper``; the same over ``model`` for the mean over
-        the runs, as ``all_anrmse``, ``all_change`` and so on. All models are redrawn in the same
+        less) and its bounds ``lower`` and ``upper``; also ``anrmse_lower`` and ``anrmse_upper``.
+        The same over ``model`` for the mean over the runs, as ``all_anrmse``, ``all_change`` and
+        so on. All models are redrawn in the same
         blocks of instants, so that errors that they share cancel. The bounds hold for these runs:
         they do not contain the spread between runs.
 
@@ -272,25 +273,32 @@ def anrmse_differences(
     """
     level = fraction(interval, "interval")
     values, draws, blocks = [], [], 0.0
-    bounds = []
+    bounds, own_bounds = [], []
     for seed, (each, *forecasts) in enumerate(zip(measured, *predicted, strict=True)):
         own, redrawn, held = _anrmse_of_run(forecasts, each, seed)
         values.append(own)
         draws.append(redrawn)
         blocks += held
         bounds.append(_bounds(_change(redrawn), held, level, -1))
+        own_bounds.append(_bounds(redrawn, held, level, -1))
     anrmses, pooled = np.stack(values, axis=-1), np.mean(draws, axis=0)
     means = anrmses.mean(axis=-1)
     lower, upper = np.stack(bounds, axis=-1)
     all_lower, all_upper = _bounds(_change(pooled), blocks, level, -1)
+    own_lower, own_upper = np.stack(own_bounds, axis=-1)
+    all_own = _bounds(pooled, blocks, level, -1)
     grid, single = ("model", "run"), ("model",)
     return xr.Dataset(
         {
             "anrmse": (grid, anrmses),
+            "anrmse_lower": (grid, own_lower),
+            "anrmse_upper": (grid, own_upper),
             "change": (grid, _change(anrmses)),
             "lower": (grid, lower),
             "upper": (grid, upper),
             "all_anrmse": (single, means),
+            "all_anrmse_lower": (single, all_own[0]),
+            "all_anrmse_upper": (single, all_own[1]),
             "all_change": (single, _change(means)),
             "all_lower": (single, all_lower),
             "all_upper": (single, all_upper),

@@ -53,6 +53,46 @@ def test_observables_lower_the_bound(run):
     assert float(found.nrmse[0]) < 0.01
 
 
+def light_run(seed, samples=6000, noise=0.01):
+    """Heave is a lightly damped answer to a wave that comes late, with a little noise."""
+    rng = RNG(seed)
+    wave = scipy.signal.lfilter([1.0], [1.0, -1.6, 0.9], rng.standard_normal(samples))
+    answer = scipy.signal.lfilter([0.0, 0.0, 0.0, 1.0], [1.0, -1.7, 0.98], wave)
+    heave = answer / 160 + noise * rng.standard_normal(samples)
+    return xr.Dataset(
+        {"eta": ("time", wave, {"units": "m"}), "heave": ("time", heave, {"units": "m"})},
+        coords={"time": 0.1 * np.arange(samples)},
+        attrs={"encounter_period": 1.0, "waves": "irregular", "test_span": (0.0, 1e4)},
+    )
+
+
+def test_no_linear_model_lies_below_the_bound_of_a_lightly_damped_vessel():
+    test = {"run": light_run(6)}
+    spec = HankelDMDc(1, 5, 1e-9, delay_rows="exact")
+    exact, blurred = (spec.fit(light_run(5, noise=n), ["heave"], ["eta"]) for n in (0, 0.01))
+    eta, heave = (test["run"][name].values[:, None] for name in ("eta", "heave"))
+    plain = float(np.sqrt(cross_spectra([(eta, heave)], 0.1, 600).share()[0, 0]))
+    found = check.coherence(blurred, test)
+    assert float(found.linear_bound[0]) < float(found.nrmse[0])
+    assert float(found.linear_bound[0]) < 0.6 * plain  # of the resonance, leakage leaves much
+    for each in (check.coherence(exact, test), check.coherence(blurred, test, None, {"a": exact})):
+        low, high = (float(each[f"linear_bound_{end}"][0]) for end in ("lower", "upper"))
+        # The noise; the start of the free run, which has it too, adds some two per cent.
+        assert low / 1.02 < 0.01 / heave.std() < high
+        assert float(each.linear_bound[0]) <= float(each.nrmse[0])
+
+
+def test_the_interval_of_what_is_left_covers_as_it_says():
+    rng = RNG(7)
+    u = rng.standard_normal((2000, 2))
+    noise = scipy.signal.lfilter([1.0, 0.6], [1.0], rng.standard_normal((2000, 500)), axis=0)
+    found = cross_spectra([(u, u @ [[1.0], [0.5]] + noise)], 1.0, 80)
+    power = 1.36 * 2 * (len(found.frequency) - 1)  # of the noise, over one-sided densities
+    _, low, high = found.share() * found.outputs.sum(axis=0)
+    # 500 repetitions know a coverage of 95 % to 1 % (one SD).
+    assert 0.92 <= np.mean((low < power) & (power < high)) <= 0.98
+
+
 def test_coherence_is_that_of_scipy():
     rng = RNG(1)
     u = rng.standard_normal((4000, 2))
@@ -89,7 +129,7 @@ def test_what_cannot_be_judged_says_why(run):
     regular = run.assign_attrs(waves="regular")
     with pytest.raises(DataError, match=r"all runs \(a\) are in regular waves.*coherence takes a"):
         check.coherence(model, {"a": regular})
-    with pytest.raises(DataError, match=r"has 10 s, and spectra take a segment of 16 s"):
+    with pytest.raises(DataError, match=r"has 9.6 s, and spectra take a segment of 16 s"):
         check.coherence(model, {"a": run.isel(time=slice(0, 100))})
     with pytest.raises(DataError, match=r"independent segments, and coherence with 1 input takes"):
         check.coherence(model, {"a": run.isel(time=slice(0, 200))})

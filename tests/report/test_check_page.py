@@ -50,6 +50,7 @@ def judged():
 
 def test_the_page_holds_its_figures_and_tables(checked):
     page = (checked / "report.html").read_text("utf-8")
+    assert page.index('id="worth"') < page.index('id="response"')
     for name in (
         "response",
         "coherence",
@@ -84,7 +85,7 @@ def test_a_forecast_compares_its_waves_with_those_of_training(checked, monkeypat
 def test_a_page_says_what_cannot_be_judged():
     refused = {"coherence": "all runs are regular.", "response": "the model has no input."}
     notes = {"measured_response": ("run_3 is left out: it is short.",)}
-    response, possible, *_ = check_sections(Checked({}, refused, notes))
+    _, response, possible, *_ = check_sections(Checked({}, refused, notes))
     assert response.notices == (
         "Cannot be judged: the model has no input.",
         "run_3 is left out: it is short.",
@@ -97,7 +98,7 @@ def test_a_page_says_what_cannot_be_judged():
     [
         ("regular", "What is possible", r"all runs \(run\) are in regular waves"),
         ("regular", "Statistics of responses", "takes a run in irregular waves"),
-        ("short", "What is possible", "has 4 s, and spectra take a segment of 16 s"),
+        ("short", "What is possible", "has 3.5 s, and spectra take a segment of 16 s"),
         ("short", "Response", "no run gives a measured response"),
         ("dead", "What is possible", r"the inputs \(eta\) hold no energy"),
         ("dead", "Response", "eta holds no energy: it is constant"),
@@ -113,7 +114,7 @@ def test_several_probes_without_positions_are_not_compared_with_the_vessel():
     run = moored_run(seed=2).assign_attrs(encounter_period=1.0, waves="irregular")
     run["eta_aft"] = run["eta"].shift(time=5, fill_value=0.0)
     model = HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, ["heave"], ["eta", "eta_aft"])
-    response = check_sections(check_model(model, {"run": run}))[0]
+    response = check_sections(check_model(model, {"run": run}))[1]
     assert re.search(r"Cannot be judged: .* State both in \[rig\]", " ".join(response.notices))
     assert response.tables == ()
     with pytest.raises(RequestError, match="run has no channel 'eta_aft'"):

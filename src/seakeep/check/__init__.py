@@ -1,4 +1,4 @@
-"""Checks of a model: response, coherence, modes, decay, residuals, statistics and validity."""
+"""Checks of a model: worth, response, coherence, modes, residuals, statistics and validity."""
 
 from seakeep.check.coherence import coherence
 from seakeep.check.every import CHECKS, Checked, check_model
@@ -8,6 +8,7 @@ from seakeep.check.residuals import residuals
 from seakeep.check.response import measured_response, response, validation
 from seakeep.check.sea import validity
 from seakeep.check.second_order import drift
+from seakeep.check.worth import worth
 
 __all__ = [
     "CHECKS",
@@ -24,4 +25,5 @@ __all__ = [
     "statistics",
     "validation",
     "validity",
+    "worth",
 ]

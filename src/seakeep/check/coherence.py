@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -10,13 +11,16 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.check.parts import (
     FreeRun,
+    Known,
+    beside,
     encounter_period_of,
     free_runs,
     irregular,
+    judged,
     regressors,
     used_parts,
 )
-from seakeep.core.spectra import cross_spectra
+from seakeep.core.spectra import Spectra, cross_spectra
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Model
 
@@ -29,7 +33,10 @@ AVERAGES = 10
 
 
 def coherence(
-    model: Model, runs: Mapping[str, xr.Dataset], free: dict[str, FreeRun] | None = None
+    model: Model,
+    runs: Mapping[str, xr.Dataset],
+    free: Known | None = None,
+    baselines: Mapping[str, Model] | None = None,
 ) -> xr.Dataset:
     r"""Coherence of inputs and states, and the NRMSE that no linear map of the inputs goes below.
 
@@ -38,20 +45,22 @@ def coherence(
     model : Model
         Names the channels, aligns the waves, and is judged beside the bound.
     runs : mapping of str to Dataset
-        Prepared runs; those in irregular waves are taken, what trains or tests of them.
-    free : dict of str to FreeRun, optional
+        Prepared runs; tests in irregular waves are taken, or what trains where no run tests.
+    free : dict, optional
         Free runs that other checks of the same model and runs made; this one adds its own.
+    baselines : mapping of str to Model, optional
+        Linear models of the same states, which sharpen the bound (see the notes).
 
     Returns
     -------
     Dataset
         Over (state, input, frequency): ``ordinary`` coherence; over (state, frequency):
         ``multiple`` coherence with all inputs, corrected for what q inputs explain by chance, and
-        ``spectrum`` of the state; over state: ``linear_bound``, :math:`\sqrt{\int (1 - \gamma^2)
-        S_{xx} / \int S_{xx}}`, and ``nrmse`` of the model's free runs over the test parts, pooled.
-        With observables also ``multiple_observables`` and ``observables_bound``, of inputs and
-        observables together. ``attrs``: ``averages`` (independent segments), ``segment`` (s) and
-        ``observables`` (their names).
+        ``spectrum`` of the state; over state: ``linear_bound`` with ``linear_bound_lower`` and
+        ``linear_bound_upper`` (95 %), and ``nrmse`` of the model's free runs, pooled. With
+        observables also ``multiple_observables`` and ``observables_bound`` with its interval, of
+        inputs and observables together. ``attrs``: ``averages`` (independent segments),
+        ``segment`` (s), ``observables`` (their names) and ``of`` ("tests" or "training").
 
     Raises
     ------
@@ -63,23 +72,39 @@ def coherence(
     Notes
     -----
     Segments have 16 to 64 encounter periods, as long as there are ten of them per input and one
-    more. They resolve a lightly damped response, or a long delay between probe and vessel,
-    incompletely: the bound is then an upper one, and a model may lie below it.
-    Slow motions count with all their power.
+    more. A segment resolves a lightly damped response, or a long delay between probe and vessel,
+    incompletely, so that coherence is lost to leakage. What no linear map of the inputs explains
+    of a state x, none explains of :math:`e = x - Lu` either, whatever the linear map L; and little
+    is left in e that could leak. The bound is therefore
+
+    .. math:: \min_L \sqrt{\frac{\operatorname{var} e}{\operatorname{var} x}
+              \frac{\int (1 - \gamma_{ue}^2) S_{ee}}{\int S_{ee}}}
+
+    over L = 0, the baselines, and the model where it is linear: it lies above the error of none of
+    them. The interval is that of the part that is left. Slow motions count with all their power.
     """
     if not model.inputs:
         raise RequestError("the model has no input, with which a state could be coherent.")
+    runs, of = judged(runs)
     waves = irregular(runs, "coherence")
-    parts = used_parts(model, waves)
-    period = encounter_period_of(model, waves) / model.dt
-    samples = sum(len(part.time) for part in parts.values())
-    wanted = 2 * samples / (AVERAGES * (len(model.inputs) + 1))
-    segment = round(np.clip(wanted, SHORTEST * period, LONGEST * period))
+    own = free_runs(model, waves, free)
+    parts = {name: part for name, part in used_parts(model, waves).items() if name in own}
+    names = [name for name in model.signature.regressors if name not in model.inputs]
+    linear = not names and all(each.function is None for each in model.signature.readouts)
+    references = [*beside(baselines, waves, own, free).values(), own]
     pieces = []
-    for part in parts.values():
+    for name, part in parts.items():
         columns = regressors(model, part)
         whole = np.isfinite(columns).all(axis=1)
-        pieces.append((columns[whole], part.states[whole]))
+        ours, theirs = (np.round(t / model.dt) for t in (part.time[whole], own[name].time))
+        _, at, to = np.intersect1d(ours, theirs, return_indices=True)
+        x = part.states[whole][at]
+        left = [x, *(x - each[name].forecast[to] for each in references)]
+        pieces.append((columns[whole][at], np.concatenate(left, axis=1)))
+    period = encounter_period_of(model, waves) / model.dt
+    samples = sum(len(columns) for columns, _ in pieces)
+    wanted = 2 * samples / (AVERAGES * (len(model.inputs) + 1))
+    segment = round(np.clip(wanted, SHORTEST * period, LONGEST * period))
     further = cross_spectra(pieces, model.dt, segment)
     spectra = further.only(range(len(model.inputs)))
     if not spectra.input_power.max() > 0:
@@ -87,18 +112,20 @@ def coherence(
             f"the inputs ({', '.join(model.inputs)}) hold no energy: they are constant. Look for a "
             "dead probe."
         )
-    over = ("state", "frequency")
+    over, size = ("state", "frequency"), len(model.states)
     found = {
-        "ordinary": (("state", "input", "frequency"), spectra.ordinary().transpose(2, 1, 0)),
-        "multiple": (over, spectra.multiple().T),
-        "spectrum": (over, spectra.outputs.T),
-        "linear_bound": ("state", spectra.bound()),
-        "nrmse": ("state", pooled_nrmse(free_runs(model, waves, free))),
+        "ordinary": (("state", "input", "frequency"), spectra.ordinary()[..., :size].T),
+        "spectrum": (over, spectra.outputs[:, :size].T),
+        "nrmse": ("state", pooled_nrmse(own)),
     }
-    names = [name for name in model.signature.regressors if name not in model.inputs]
+    spreads = sum(((x - x.mean(axis=0)) ** 2).sum(axis=0) for _, x in pieces)
+    named = [("linear_bound", "multiple", spectra, len(references) + linear)]
     if names:
-        found["multiple_observables"] = (over, further.multiple().T)
-        found["observables_bound"] = ("state", further.bound())
+        named.append(("observables_bound", "multiple_observables", further, len(references) + 1))
+    for bound, multiple, of_all, count in named:
+        found[bound], found[f"{bound}_lower"], found[f"{bound}_upper"], found[multiple] = _bound(
+            of_all, spreads, size, count
+        )
     return xr.Dataset(
         found,
         coords={
@@ -114,8 +141,27 @@ def coherence(
             "averages": spectra.averages,
             "segment": segment * model.dt,
             "observables": ", ".join(names),
+            "of": of,
         },
     )
+
+
+def _bound(spectra: Spectra, spreads: FloatArray, size: int, count: int) -> list[Any]:
+    """Bound with its interval, over state, and multiple coherence over (state, frequency).
+
+    Outputs are the states and what `count` - 1 references leave of them, one after the other;
+    `spreads` are their squares.
+    """
+    share = spectra.share().reshape(3, -1, size)[:, :count]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        error = np.sqrt(share * spreads.reshape(-1, size)[:count] / spreads[:size])
+    best = np.argmin(np.where(np.isfinite(error[0]), error[0], np.inf), axis=0), np.arange(size)
+    bounds = np.minimum(error[:, *best], 1.0)
+    rest = spectra.unexplained().reshape(len(spectra.frequency), -1, size)[:, *best]
+    power = spectra.outputs[:, :size]
+    alike = 1 - np.divide(rest, power, out=np.ones_like(power), where=power > 0)
+    over = ("state", "frequency")
+    return [("state", each) for each in bounds] + [(over, np.clip(alike, 0, 1).T)]
 
 
 def pooled_nrmse(runs: Mapping[str, FreeRun]) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,12 +12,13 @@ import xarray as xr
 
 from seakeep.check.coherence import coherence
 from seakeep.check.free import decay, measured_decay, modes
-from seakeep.check.parts import FreeRun
+from seakeep.check.parts import Known, of_part
 from seakeep.check.peaks import statistics
 from seakeep.check.residuals import residuals
 from seakeep.check.response import measured_response, response, validation
 from seakeep.check.sea import validity
 from seakeep.check.second_order import drift
+from seakeep.check.worth import worth
 from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models import Model
 from seakeep.models.labelled import check_channels
@@ -37,6 +39,7 @@ def _alone(check: Callable[[Model], xr.Dataset]) -> Check:
 
 
 CHECKS: dict[str, Check] = {
+    "worth": worth,
     "response": _response,
     "measured_response": measured_response,
     "validation": validation,
@@ -59,7 +62,8 @@ class Checked:
     Parameters
     ----------
     found : dict of str to Dataset
-        Result of each check that could judge.
+        Result of each check that could judge; where runs test, also ``training_coherence`` and
+        ``training_residuals``, the same of what trains.
     refused : dict of str to str
         Why each other one could not.
     notes : dict of str to tuple of str
@@ -75,6 +79,7 @@ def check_model(
     model: Model,
     runs: Mapping[str, xr.Dataset],
     progress: Callable[[int, int, str], None] | None = None,
+    baselines: Mapping[str, Model] | None = None,
 ) -> Checked:
     """Check a model on prepared runs.
 
@@ -86,6 +91,8 @@ def check_model(
         Prepared runs by name, as ``campaign.prepare()`` gives them.
     progress : callable, optional
         Called as ``progress(done, total, check)``.
+    baselines : mapping of str to Model, optional
+        Linear models of the same states, from :func:`seakeep.study.fit_baselines`, to compare with.
 
     Returns
     -------
@@ -100,10 +107,11 @@ def check_model(
         check_channels(run, [*model.states, *model.inputs], name)
     found: dict[str, xr.Dataset] = {}
     refused, notes = {}, {}
-    free: dict[str, FreeRun] = {}
+    free: Known = {}
     shared: dict[str, dict[str, Any]] = {
-        key: {"free": free} for key in ("coherence", "residuals", "statistics")
+        key: {"free": free} for key in ("worth", "coherence", "residuals", "statistics")
     }
+    shared["worth"]["baselines"] = shared["coherence"]["baselines"] = baselines
     for number, (name, check) in enumerate(CHECKS.items()):
         if progress is not None:
             progress(number, len(CHECKS), name)
@@ -117,4 +125,12 @@ def check_model(
             shared["validation"] = {"measured": found.get(name)}
         ours = [str(each.message) for each in caught if issubclass(each.category, SeakeepWarning)]
         notes[name] = tuple(dict.fromkeys(ours))
+    trained = of_part(runs, "train")
+    if trained and of_part(runs, "test"):
+        free = {}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SeakeepWarning)
+            for name in ("coherence", "residuals"):
+                with suppress(SeakeepError):
+                    found[f"training_{name}"] = CHECKS[name](model, trained, free=free)
     return Checked(found, refused, notes)

@@ -24,12 +24,16 @@ from seakeep.waves import wavenumber
 
 __all__ = [
     "FreeRun",
+    "Known",
     "Part",
+    "beside",
     "encounter_period_of",
     "free_runs",
     "free_windows",
     "irregular",
     "is_regular",
+    "judged",
+    "of_part",
     "one_step",
     "reference_probe",
     "regressors",
@@ -78,6 +82,10 @@ class FreeRun(NamedTuple):
     measured: FloatArray
 
 
+Known = dict[tuple[str, str], FreeRun]
+"""Free runs that several checks share, by label of a baseline ("" is the model) and run."""
+
+
 def is_regular(run: xr.Dataset) -> bool:
     """Whether a run states that its waves are regular."""
     return bool(run.attrs.get("waves") == "regular")
@@ -92,6 +100,26 @@ def irregular(runs: Mapping[str, xr.Dataset], what: str) -> dict[str, xr.Dataset
             f"{what} takes a run in irregular waves."
         )
     return found
+
+
+def of_part(runs: Mapping[str, xr.Dataset], part: str) -> dict[str, xr.Dataset]:
+    """Runs with a span that trains ("train") or tests ("test"), and with this span alone.
+
+    A run that states neither span tests as a whole.
+    """
+    wanted, other = f"{part}_span", {"train": "test_span", "test": "train_span"}[part]
+    found = {}
+    for name, run in runs.items():
+        if wanted in run.attrs or (part == "test" and other not in run.attrs):
+            found[name] = run.copy(deep=False)
+            found[name].attrs.pop(other, None)
+    return found
+
+
+def judged(runs: Mapping[str, xr.Dataset]) -> tuple[dict[str, xr.Dataset], str]:
+    """Tests, or what trains where there is none, and the word for it."""
+    tests = of_part(runs, "test")
+    return (tests, "tests") if tests else (of_part(runs, "train"), "training")
 
 
 def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
@@ -109,7 +137,7 @@ def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
         except DataError as error:
             warnings.warn(f"{name} is left out: {error}", SeakeepWarning, stacklevel=3)
             continue
-        begin, end = _used_span(run)
+        begin, end = _span(run)
         whole = np.isfinite(states).all(axis=1) & np.isfinite(inputs).all(axis=1)
         inside = whole & (time >= begin - 1e-6) & (time <= end + 1e-6)
         pieces = stretches(inside)
@@ -126,11 +154,16 @@ def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
 
 
 def free_runs(
-    model: Model, runs: Mapping[str, xr.Dataset], free: dict[str, FreeRun] | None = None
+    model: Model,
+    runs: Mapping[str, xr.Dataset],
+    free: Known | None = None,
+    label: str = "",
+    like: Mapping[str, FreeRun] | None = None,
 ) -> dict[str, FreeRun]:
-    """Free runs from the first possible instant of each test part to its end.
+    """Free runs from the first possible instant of each test part to its end, or as others go.
 
-    Those in `free` are taken from there; the others are put there.
+    Those in `free`, by label of the model and name of the run, are taken from there; the others
+    are put there.
 
     Raises
     ------
@@ -139,11 +172,11 @@ def free_runs(
     """
     free = {} if free is None else free
     found, reasons = {}, []
-    for name, run in runs.items():
+    for name in runs if like is None else like:
         try:
-            if name not in free:
-                free[name] = _free_run(model, run, name)
-            found[name] = free[name]
+            if (label, name) not in free:
+                free[label, name] = _free_run(model, runs[name], name, (like or {}).get(name))
+            found[name] = free[label, name]
         except SeakeepError as error:
             reasons.append(f"{name}: {error}")
     if not found:
@@ -151,6 +184,24 @@ def free_runs(
     for reason in reasons:
         warnings.warn(f"left out: {reason}", SeakeepWarning, stacklevel=3)
     return found
+
+
+def beside(
+    baselines: Mapping[str, Model] | None,
+    runs: Mapping[str, xr.Dataset],
+    own: Mapping[str, FreeRun],
+    free: Known | None,
+) -> dict[str, dict[str, FreeRun]]:
+    """Free runs of baselines over those of a model; one that lacks a run is left out."""
+    found = {}
+    for label, each in (baselines or {}).items():
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SeakeepWarning)
+            try:
+                found[label] = free_runs(each, runs, free, label, own)
+            except DataError:
+                continue
+    return {label: of for label, of in found.items() if of.keys() == own.keys()}
 
 
 def window_of(model: Model, run: xr.Dataset) -> tuple[int, int]:
@@ -162,7 +213,7 @@ def window_of(model: Model, run: xr.Dataset) -> tuple[int, int]:
         If the test part ends before.
     """
     time = np.asarray(run["time"].values, dtype=float)
-    begin, end = _test_span(run)
+    begin, end = _span(run)
     if time.size <= model.history_samples:
         raise DataError(
             f"the run has {time.size} samples and a forecast reads {model.history_samples} before "
@@ -177,17 +228,19 @@ def window_of(model: Model, run: xr.Dataset) -> tuple[int, int]:
     return at, last
 
 
-def _free_run(model: Model, run: xr.Dataset, name: str) -> FreeRun:
-    at, last = window_of(model, run)
-    time = np.asarray(run["time"].values, dtype=float)
-    start = float(time[at])
+def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) -> FreeRun:
+    if like is None:
+        at, last = window_of(model, run)
+        time = np.asarray(run["time"].values, dtype=float)
+        measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
+        empty = np.full_like(measured, np.nan)
+        like = FreeRun(float(time[at]), time[at + 1 : last + 1], empty, measured)
+    steps = len(like.time)
     if is_ensemble(model):
-        found = model.forecast_summary(run, start, last - at).sel(statistic="mean")
+        found = model.forecast_summary(run, like.start, steps).sel(statistic="mean")
     else:
-        found = model.forecast(run, start, last - at)
-    measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
-    forecast = channel_matrix(found, model.states, name)
-    return FreeRun(float(time[at]), time[at + 1 : last + 1], forecast, measured)
+        found = model.forecast(run, like.start, steps)
+    return like._replace(forecast=channel_matrix(found, model.states, name))
 
 
 def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) -> FloatArray:
@@ -232,18 +285,11 @@ def _windowed(values: FloatArray, length: int) -> FloatArray:
     return np.lib.stride_tricks.sliding_window_view(values, length, axis=0).swapaxes(1, 2)
 
 
-def _test_span(run: xr.Dataset) -> tuple[float, float]:
-    """Span that tests; all of a run that states none."""
-    time = run["time"].values
-    begin, end = run.attrs.get("test_span", (time[0], time[-1]))
-    return float(begin), float(end)
-
-
-def _used_span(run: xr.Dataset) -> tuple[float, float]:
+def _span(run: xr.Dataset) -> tuple[float, float]:
     """Span that holds what trains and what tests; all of a run that states neither."""
-    spans = [run.attrs[key] for key in ("train_span", "test_span") if key in run.attrs]
-    if not spans:
-        return _test_span(run)
+    time = run["time"].values
+    known = [run.attrs[key] for key in ("train_span", "test_span") if key in run.attrs]
+    spans = known or [(time[0], time[-1])]
     return float(min(each[0] for each in spans)), float(max(each[1] for each in spans))
 
 

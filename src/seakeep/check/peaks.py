@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.check.parts import FreeRun, free_runs, irregular
+from seakeep.check.parts import FreeRun, Known, free_runs, irregular, judged
 from seakeep.core.density import kernel_density
 from seakeep.core.divergence import jensen_shannon
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
@@ -27,7 +27,7 @@ def statistics(
     model: Model,
     runs: Mapping[str, xr.Dataset],
     duration: float | None = None,
-    free: dict[str, FreeRun] | None = None,
+    free: Known | None = None,
 ) -> xr.Dataset:
     r"""Peaks of each state over the test parts in irregular waves, measured and forecast.
 
@@ -38,11 +38,11 @@ def statistics(
     model : Model
         The model.
     runs : mapping of str to Dataset
-        Prepared runs; test parts of those in irregular waves are taken.
+        Prepared runs; tests in irregular waves are taken, or what trains where no run tests.
     duration : float, optional
         Time of the extreme, s; by default three hours at full scale, by Froude's law with
         ``attrs["scale_factor"]``.
-    free : dict of str to FreeRun, optional
+    free : dict, optional
         Free runs that other checks of the same model and runs made; this one adds its own.
 
     Returns
@@ -62,6 +62,7 @@ def statistics(
     DataError
         If no run in irregular waves can be forecast.
     """
+    runs, of = judged(runs)
     waves = irregular(runs, "a statistic of peaks")
     known = free_runs(model, waves, free)
     if duration is None:
@@ -98,7 +99,7 @@ def statistics(
             "divergence": ("state", [_divergence(*each) for each in density]),
         },
         coords={"state": model.states, "kind": list(KINDS), "units": ("state", units)},
-        attrs={"duration": duration},
+        attrs={"duration": duration, "of": of},
     )
 
 

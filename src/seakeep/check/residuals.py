@@ -11,9 +11,11 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.check.parts import (
     FreeRun,
+    Known,
     encounter_period_of,
     free_runs,
     free_windows,
+    judged,
     one_step,
     window_of,
 )
@@ -34,7 +36,7 @@ AGES = 15
 
 
 def residuals(
-    model: Model, runs: Mapping[str, xr.Dataset], free: dict[str, FreeRun] | None = None
+    model: Model, runs: Mapping[str, xr.Dataset], free: Known | None = None
 ) -> xr.Dataset:
     r"""Test the errors of one step, and say where and when those of free runs arise.
 
@@ -43,8 +45,8 @@ def residuals(
     model : Model
         The model.
     runs : mapping of str to Dataset
-        Prepared runs; their test parts are taken.
-    free : dict of str to FreeRun, optional
+        Prepared runs; tests are taken, or what trains where no run tests.
+    free : dict, optional
         Free runs that other checks of the same model and runs made; this one adds its own.
 
     Returns
@@ -69,6 +71,7 @@ def residuals(
     SeakeepWarning
         Of each run that is left out, with the reason.
     """
+    runs, of = judged(runs)
     known = free_runs(model, runs, free)
     period = encounter_period_of(model, runs)
     lags = round(period / model.dt)
@@ -118,7 +121,7 @@ def residuals(
             "age": ("age", model.dt * np.arange(1, AGES * lags + 1), {"units": "s"}),
             "band": list(BANDS),
         },
-        attrs={"instants": count, "encounter_period": period},
+        attrs={"instants": count, "encounter_period": period, "of": of},
     )
 
 

@@ -9,6 +9,7 @@ import typer
 
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.cli.options import CampaignFile, ModelFile, read_files
+from seakeep.errors import SeakeepError
 from seakeep.files import check_output, make_folder
 
 __all__ = ["check"]
@@ -29,7 +30,8 @@ def check(
 ) -> None:
     """Compare a model with the measured vessel, on one page.
 
-    The page shows the model's response to waves beside the measured one, with uncertainties, its
+    The page starts with the error over the tests beside that of baselines, and a verdict on each
+    channel. It shows the model's response to waves beside the measured one, with uncertainties, its
     error beside the least error that its inputs allow, and its modes, residuals and statistics.
     It names the checks that these runs do not allow, with the reason.
 
@@ -39,6 +41,7 @@ def check(
     from seakeep.check import check_model
     from seakeep.models import load_model
     from seakeep.report.check_page import check_sections, write_check
+    from seakeep.study import fit_baselines
 
     make_folder(out)
     identified = load_model(model)
@@ -46,8 +49,14 @@ def check(
     check_output(out / "report.html", "report", read_files(read, model))
     with progress_bar("Preparing") as progress:
         runs = load_prepared(read, names=run or None, progress=progress)
+    try:
+        channels = (identified.states, identified.inputs)
+        baselines = fit_baselines(read, *channels, prepared=None if run else runs)
+    except SeakeepError as error:
+        messages().print(f"Note: no baselines to compare with: {error}")
+        baselines = {}
     with progress_bar("Checking") as progress:
-        checked = check_model(identified, runs, progress)
+        checked = check_model(identified, runs, progress, baselines)
     for section in check_sections(checked):
         for text in (*section.points, *section.notices):
             results().print(f"{section.title}: {text}", soft_wrap=True)

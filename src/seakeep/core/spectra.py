@@ -20,6 +20,9 @@ __all__ = ["Spectra", "cross_spectra"]
 OVERLAP_CORRELATION = 1 / 36
 """Squared correlation of the spectra of two Hann segments that share a half (Welch, 1967)."""
 
+MIXED = 1 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2
+"""Sum of the squared correlations of a frequency with its neighbours, by a Hann window."""
+
 
 @dataclass(frozen=True, eq=False)
 class Spectra:
@@ -97,13 +100,25 @@ class Spectra:
         rest: FloatArray = left * self.averages / (self.averages - size)
         return rest
 
-    def bound(self) -> FloatArray:
-        """Least NRMSE of a linear map of the inputs, shape (output,); NaN without power."""
-        total = self.outputs.sum(axis=0)
-        out = np.full(total.shape, np.nan)
-        rest = np.minimum(self.unexplained().sum(axis=0), total)  # no map at all leaves the total
-        result: FloatArray = np.sqrt(np.divide(rest, total, out=out, where=total > 0))
-        return result
+    def share(self) -> FloatArray:
+        r"""Share of the power of each output that no linear map of the inputs explains.
+
+        Returns
+        -------
+        ndarray, shape (3, output)
+            The share, at most one, and its bounds of 95 %; NaN without power. The spectrum R that
+            is left has :math:`2 (\sum R)^2 (n - q) / (c \sum R^2)` degrees of freedom, with
+            c = 1.94 for the frequencies that a Hann window mixes. The power of the output is taken
+            as it is.
+        """
+        rest, total = self.unexplained(), self.outputs.sum(axis=0)
+        left = rest.sum(axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            freedom = left**2 / (rest**2).sum(axis=0)
+            freedom *= 2 * (self.averages - self.inputs.shape[1]) / MIXED
+            limits = [freedom / stats.chi2.ppf(p, freedom) for p in (0.975, 0.025)]
+            share: FloatArray = np.minimum([left, *(left * each for each in limits)] / total, 1.0)
+        return share
 
     def gain(self) -> tuple[ComplexArray, FloatArray]:
         r"""Transfer function of each pair, and the radius of its 95 % circle.
@@ -155,8 +170,8 @@ def cross_spectra(
     >>> rng = np.random.default_rng(0)
     >>> u = rng.standard_normal((9000, 1))
     >>> found = cross_spectra([(u, u + rng.standard_normal((9000, 1)))], 1.0, 90)
-    >>> round(float(found.bound()[0]), 1)  # half of the variance is noise
-    0.7
+    >>> round(float(found.share()[0, 0]), 1)  # half of the variance is noise
+    0.5
     """
     long_enough = [piece for piece in pieces if len(piece[0]) >= segment]
     if not long_enough:

@@ -17,6 +17,7 @@ from seakeep.report.page import write_page
 from seakeep.report.section import Drawing, Section
 from seakeep.report.style import shown_unit
 from seakeep.report.tables import Table, number, probability
+from seakeep.report.worth import worth_section
 
 __all__ = ["CHECK_SECTIONS", "check_sections", "write_check"]
 
@@ -143,12 +144,14 @@ def possible_section(checked: Checked) -> Section | None:
     found = checked.found.get("coherence")
     if found is None:
         return None
-    rows, advice = [], []
+    rows, advice, trained = [], [], checked.found.get("training_coherence")
     for state in map(str, found["state"].values):
         own = found.sel(state=state)
         model, linear = float(own["nrmse"]), float(own["linear_bound"])
         more = float(own.get("observables_bound", np.nan))
-        rows.append((state, number(model), number(linear), number(more)))
+        rows += [
+            _bounds_row(each.sel(state=state)) for each in (found, trained) if each is not None
+        ]
         text = f"{state}: model {model:.2g}, linear bound {linear:.2g}"
         if np.isfinite(more):
             text += f", with the observables {more:.2g}"
@@ -157,12 +160,12 @@ def possible_section(checked: Checked) -> Section | None:
         "possible",
         "What is possible",
         words=(
-            "The linear bound estimates the least error of a linear map of the inputs, from the "
-            "coherence of all runs in irregular waves, training included "
-            f"({found.attrs['averages']:.0f} independent segments of "
-            f"{found.attrs['segment']:.3g} s). Leakage between the frequencies of a segment raises "
-            "the estimate, and so do motions slower than a segment: a good model of long records "
-            "lies below it. The model's error is that of free runs over the same runs.",
+            "The linear bound is the least error of a linear map of the inputs, by coherence in "
+            f"{found.attrs['of']} in irregular waves ({found.attrs['averages']:.0f} segments of "
+            f"{found.attrs['segment']:.3g} s). It is estimated from what linear models "
+            "leave, which hardly leaks between frequencies, and lies above the error of none of "
+            "them: the baselines, and this model if it is linear. With observables the model "
+            "itself counts. Its error is that of free runs over the same instants.",
         ),
         points=tuple(advice),
         figures=(
@@ -176,14 +179,25 @@ def possible_section(checked: Checked) -> Section | None:
             Table(
                 "possible",
                 "NRMSE of the model's free runs, and what the inputs allow",
-                ("state", "model", "linear bound", "with observables"),
+                ("state", "of", "model", "linear bound", "95 %", "with observables", "95 % of it"),
                 tuple(rows),
-                "Bounds are corrected for what as many inputs explain of noise by chance.",
-                (1, 2, 3),
-                heat=(1, 2, 3),
+                "Bounds are corrected for what as many inputs explain of noise by chance; "
+                "intervals are those of the part that is left. Training is shown as context.",
+                (2, 3, 4, 5, 6),
+                heat=(2, 3, 5),
             ),
         ),
     )
+
+
+def _bounds_row(own: xr.Dataset) -> tuple[str, ...]:
+    """Error of a state, and its bounds with their intervals."""
+    cells = []
+    for key in ("linear_bound", "observables_bound"):
+        at = [float(own.get(f"{key}{end}", np.nan)) for end in ("", "_lower", "_upper")]
+        known = np.isfinite(at).all()
+        cells += [number(at[0]), f"{at[1]:.3f} to {at[2]:.3f}" if known else number(np.nan)]
+    return (str(own["state"].values), own.attrs["of"], number(float(own["nrmse"])), *cells)
 
 
 def _advice(model: float, linear: float, more: float) -> str:
@@ -192,7 +206,7 @@ def _advice(model: float, linear: float, more: float) -> str:
         return "No free run holds over the test."
     least = np.nanmin([linear, more])
     if model < 0.95 * least:
-        return "The model is below what these segments resolve: no room is seen."
+        return "Better than any linear map of the inputs: no room is seen."
     if model < 1.15 * linear and not more < 0.85 * linear:
         return "As good as the inputs allow: more probes or less noise would help, not more tuning."
     if more < 0.85 * linear and model > 1.15 * more:
@@ -274,28 +288,16 @@ def residuals_section(checked: Checked) -> Section | None:
     found = checked.found.get("residuals")
     if found is None:
         return None
-    lag, past = float(found["lag"][-1]), found.get("input_correlation")
-    rows = []
-    for state in found["state"].values:
-        own = found.sel(state=state)
-        beyond = number(np.nan)
-        if past is not None:
-            share = (np.abs(own["input_correlation"]) > own["input_limit"]).mean()
-            beyond = f"{100 * float(share):.0f} %"
-        rows.append(
-            (
-                str(state),
-                number(float(own["one_step"]), 4),
-                f"{float(own['ljung_box']):.0f}",
-                probability(float(own["probability"])),
-                beyond,
-                *(number(float(own["band_nrmse"].sel(band=band))) for band in found["band"].values),
-                *(number(float(own["age_nrmse"][at])) for at in (found.sizes["lag"] - 2, -1)),
-            )
-        )
+    lag, trained = float(found["lag"][-1]), checked.found.get("training_residuals")
+    rows = [
+        _residuals_row(each.sel(state=state))
+        for state in found["state"].values
+        for each in (found, trained)
+        if each is not None
+    ]
     period = float(found.attrs["encounter_period"])
     columns = (
-        *("state", "one step [SD]", "Ljung–Box Q", "p", "past inputs beyond limit"),
+        *("state", "of", "one step [SD]", "Ljung–Box Q", "p", "past inputs beyond limit"),
         *(
             "slow",
             "wave",
@@ -313,8 +315,8 @@ def residuals_section(checked: Checked) -> Section | None:
         f"{found.attrs['instants']} instants; p is the probability of white noise. Of white "
         "residuals 5 % of the lags lie beyond the limit. Bands: below 0.5, to 2, and above 2 "
         f"cycles per encounter period ({period:.3g} s).",
-        tuple(range(1, len(columns))),
-        heat=(5, 6, 7, 8, 9),
+        tuple(range(2, len(columns))),
+        heat=(6, 7, 8, 9, 10),
     )
     caption = (
         "Per state: autocorrelation of one-step errors and their correlation with past inputs "
@@ -325,9 +327,26 @@ def residuals_section(checked: Checked) -> Section | None:
     words = (
         "A model that has taken all from the data leaves one-step errors that are white and know "
         "nothing of past inputs. With long records even small errors fail this test: read it with "
-        "the size of the error. All runs count, training included.",
+        f"the size of the error. The figure is of the {found.attrs['of']}; the table also shows "
+        "training, as context.",
     )
     return Section("residuals", "Residuals", words, figures=(drawing,), tables=(table,))
+
+
+def _residuals_row(own: xr.Dataset) -> tuple[str, ...]:
+    beyond = np.nan
+    if "input_correlation" in own:
+        beyond = 100 * float((np.abs(own["input_correlation"]) > own["input_limit"]).mean())
+    return (
+        str(own["state"].values),
+        own.attrs["of"],
+        number(float(own["one_step"]), 4),
+        f"{float(own['ljung_box']):.0f}",
+        probability(float(own["probability"])),
+        f"{beyond:.0f} %" if np.isfinite(beyond) else number(np.nan),
+        *(number(float(own["band_nrmse"].sel(band=band))) for band in own["band"].values),
+        *(number(float(own["age_nrmse"][at])) for at in (own.sizes["lag"] - 2, -1)),
+    )
 
 
 def _dt(found: xr.Dataset) -> float:
@@ -366,7 +385,7 @@ def statistics_section(checked: Checked) -> Section | None:
     )
     table = Table(
         "statistics",
-        "Statistics of responses over the tests in irregular waves",
+        f"Statistics of responses over the {found.attrs['of']} in irregular waves",
         columns,
         tuple(rows),
         f"Extreme: most probable largest deviation from the mean in {hours:.3g} h of "
@@ -470,6 +489,7 @@ def drift_section(checked: Checked) -> Section | None:
 
 
 CHECK_SECTIONS: list[tuple[str, tuple[str, ...], Callable[[Checked], Section | None]]] = [
+    ("What the model is worth", ("worth",), worth_section),
     ("Response", ("response", "measured_response", "validation"), response_section),
     ("What is possible", ("coherence",), possible_section),
     ("Free decay and modes", ("decay", "measured_decay", "modes"), decay_section),

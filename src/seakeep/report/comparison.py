@@ -239,7 +239,8 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
 
 def write_differences(table: xr.Dataset, path: Path) -> Path:
     """Write errors of several models as CSV, a row per run and model, and per model for all."""
-    each = table[["anrmse", "change", "lower", "upper", "wave_period"]].to_dataframe()
+    keys = ("anrmse", "anrmse_lower", "anrmse_upper", "change", "lower", "upper", "wave_period")
+    each = table[[*keys]].to_dataframe()
     every = table[[name for name in table.data_vars if str(name).startswith("all_")]]
     of_all = every.to_dataframe().rename(columns=lambda name: name.removeprefix("all_"))
     whole = pd.concat([each.reset_index(), of_all.reset_index().assign(run="")])

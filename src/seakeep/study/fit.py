@@ -182,6 +182,7 @@ def fit_baselines(
     states: Sequence[str],
     inputs: Sequence[str],
     progress: Progress | None = None,
+    prepared: Mapping[str, xr.Dataset] | None = None,
 ) -> dict[str, Model]:
     """Fit every baseline, with its recommended settings, to the training runs of a campaign.
 
@@ -193,6 +194,8 @@ def fit_baselines(
         Channels, those of the model that is compared.
     progress : callable, optional
         Called as ``progress(done, total, run)`` while runs are prepared.
+    prepared : mapping of str to Dataset, optional
+        Prepared runs, the training runs among them; by default these are prepared here.
 
     Returns
     -------
@@ -211,7 +214,8 @@ def fit_baselines(
     SeakeepWarning
         Of each baseline that is left out, with the reason.
     """
-    prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
+    if prepared is None:
+        prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
     runs = training_runs(prepared)
     period, dt = campaign.encounter_period(), float(next(iter(runs.values())).attrs["dt"])
     found: dict[str, Model] = {}

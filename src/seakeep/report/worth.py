@@ -1,0 +1,169 @@
+"""The first screen of the page of ``seakeep check``: error beside baselines, and a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+
+from seakeep.check import Checked
+from seakeep.report.section import Section
+from seakeep.report.tables import MISSING, Table, number, signed
+
+__all__ = ["worth_section"]
+
+USES = {
+    0.1: "can stand in for a measurement (error below 0.1 SD)",
+    0.3: "can be used instant by instant (error below 0.3 SD)",
+    0.7: "shows trends, not instants (error below 0.7 SD)",
+    np.inf: "cannot be used instant by instant (error not surely below 0.7 SD)",
+}
+"""What the limit of the error allows."""
+
+
+def worth_section(checked: Checked) -> Section | None:
+    """Return the error over the tests beside that of baselines, the look-ahead and the verdict."""
+    found = checked.found.get("worth")
+    if found is None:
+        return None
+    points = [*_verdicts(found), *_conditions(found)]
+    if (validity := checked.found.get("validity")) is not None:
+        outside = [str(run) for run in validity["run"].values[validity["outside"].values != ""]]
+        if outside:
+            points.append(
+                f"{', '.join(outside)}: outside the waves that trained the model (see Validity)."
+            )
+    words = (
+        "Free runs from one measured start to the end of each of the "
+        f"{found.sizes['run']} {found.attrs['of']}; errors in measured SDs of the run. A verdict "
+        "reads the upper bound of the 95 % interval of the error: below 0.1 (99 % of the variance "
+        "is forecast), 0.3 (91 %), 0.7 (51 %). Better than a baseline: the paired 95 % interval of "
+        "the change of the error lies below zero. Intervals hold for these runs.",
+    )
+    return Section(
+        "worth",
+        "What the model is worth",
+        words=words,
+        points=tuple(points),
+        tables=(_by_run(found), _by_state(found)),
+    )
+
+
+def _verdicts(found: xr.Dataset) -> Iterator[str]:
+    """One sentence on all states in each kind of waves, and one per group of alike states."""
+    if found.attrs["of"] == "training":
+        yield "No run tests the model. All errors are those of training: memory, not skill."
+    for kind in found["waves"].values:
+        own = found.sel(waves=kind)
+        count = int((found["kind"] == kind).sum())
+        tests = "training" if found.attrs["of"] == "training" else f"test{'s' * (count > 1)}"
+        yield (
+            f"{count} {tests} in {kind} waves: ANRMSE "
+            f"{_with_bounds(own.sel(state='all', model='model'))}{_beside(own)}."
+        )
+        groups: dict[tuple[float, str], list[str]] = {}
+        for state in found["state"].values[1:]:
+            one = own.sel(state=state)
+            baseline = "" if bool(one["better"]) else str(one["best"].values)
+            groups.setdefault((float(one["limit"].fillna(0)), baseline), []).append(str(state))
+        for (limit, baseline), names in sorted(
+            groups.items(), key=lambda each: (not each[0][0], each[0])
+        ):
+            text = USES.get(limit, "not judged: it stands still, or a forecast is lost")
+            if limit and baseline:
+                text += f"; not shown to be better than the baseline {baseline}"
+            yield f"{kind.capitalize()} waves, {', '.join(names)}: {text}."
+
+
+def _beside(own: xr.Dataset) -> str:
+    """The best baseline, and how far the model lies below it."""
+    one = own.sel(state="all")
+    if not (best := str(one["best"].values)):
+        return ""
+    at = one.sel(model=best)
+    low, high = (100 * float(at[f"change_{each}"]) for each in ("lower", "upper"))
+    text = f"; of the best baseline, {best}, {number(float(at['nrmse']))}"
+    if np.isfinite([low, high]).all():
+        text += f" (from there {signed(low, 0)} to {signed(high, 0)} %)".replace("-", "−")
+    return text
+
+
+def _conditions(found: xr.Dataset) -> Iterator[str]:
+    """What the forecasts read after their start."""
+    ahead = float(found["look_ahead"].max())
+    if ahead > 0:
+        yield (
+            f"Look-ahead: the model reads the waves up to {ahead:.3g} s after the instant that it "
+            "forecasts. They must be measured up-wave, or predicted."
+        )
+    else:
+        yield "Look-ahead: none. No wave after the instant of the forecast is read."
+    if state := found.attrs["conditional_on"]:
+        yield f"All errors are conditional on measured {state}, which is read after the start."
+
+
+def _with_bounds(at: xr.Dataset, key: str = "nrmse") -> str:
+    low, high = (float(at[f"{key}_{each}"]) for each in ("lower", "upper"))
+    text = number(float(at[key]))
+    return f"{text} ({low:.3f} to {high:.3f})" if np.isfinite([low, high]).all() else text
+
+
+def _by_run(found: xr.Dataset) -> Table:
+    """ANRMSE of each test, of the model with its interval and of the baselines."""
+    rows, averages, models = [], [], found["model"].values
+    for kind in found["waves"].values:
+        for run in found["run"].values[found["kind"].values == kind]:
+            at = found.sel(run=run)
+            rows.append((str(run), *_cells(at, "anrmse")))
+        averages.append(len(rows))
+        rows.append((f"mean, {kind} waves", *_cells(found.sel(waves=kind, state="all"), "nrmse")))
+    return Table(
+        "worth",
+        "ANRMSE of the model and of baselines",
+        (found.attrs["of"].removesuffix("s"), "model", "95 %", *map(str, models[1:])),
+        tuple(rows),
+        "Baselines are fitted to the training runs with their recommended settings, and read no "
+        "wave after the instant that they forecast."
+        if len(models) > 1
+        else "",
+        tuple(range(1, 2 + len(models))),
+        averages=tuple(averages),
+        heat=(1, *range(3, 2 + len(models))),
+    )
+
+
+def _cells(at: xr.Dataset, key: str) -> tuple[str, ...]:
+    own = at.sel(model="model")
+    low, high = (float(own[f"{key}_{each}"]) for each in ("lower", "upper"))
+    bounds = f"{low:.3f} to {high:.3f}" if np.isfinite([low, high]).all() else MISSING
+    first, *others = (number(float(x)) for x in at[key].values)
+    return (first, bounds, *others)
+
+
+def _by_state(found: xr.Dataset) -> Table:
+    """Mean error of each state, the best baseline, and the verdict."""
+    rows = []
+    for kind in found["waves"].values:
+        for state in found["state"].values[1:]:
+            one = found.sel(waves=kind, state=state)
+            cells, best = _cells(one, "nrmse"), str(one["best"].values)
+            beside = (MISSING, MISSING, MISSING)
+            if best:
+                at = one.sel(model=best)
+                low, high = (100 * float(at[f"change_{each}"]) for each in ("lower", "upper"))
+                known = np.isfinite([low, high]).all()
+                change = f"{signed(low, 0)} to {signed(high, 0)} %" if known else MISSING
+                beside = (best, number(float(at["nrmse"])), change)
+            use = USES.get(float(one["limit"]), "not judged")
+            rows.append((str(state), str(kind), *cells[:2], *beside, use))
+    columns = ("state", "waves", "NRMSE", "95 %", "best baseline", "its NRMSE", "change", "verdict")
+    return Table(
+        "verdicts",
+        "NRMSE of each state, mean over runs, and the verdict",
+        columns,
+        tuple(rows),
+        "Change: from the best baseline to the model, paired 95 % interval.",
+        (2, 3, 5, 6),
+        folded=True,
+    )

@@ -1,0 +1,81 @@
+"""The first screen: error beside baselines, and a verdict that follows from it."""
+
+import numpy as np
+import pytest
+from moored import moored_run
+
+from seakeep import HankelDMDc, check, metrics
+from seakeep.baselines import FIR, Mean
+from seakeep.check import check_model
+from seakeep.check.parts import free_runs
+from seakeep.report.check_page import check_sections
+
+STATES = ["surge", "heave"]
+
+
+def part(seed, **attrs):
+    return moored_run(seed=seed).assign_attrs(encounter_period=1.0, waves="irregular", **attrs)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    span = (0.0, 69.9)
+    lost = part(4, test_span=span)
+    noise = np.random.default_rng(0).standard_normal(lost.sizes["time"])
+    lost["surge"] = (lost.surge + 3 * float(lost.surge.std()) * noise).assign_attrs(units="m")
+    return {
+        "train": part(2, train_span=span),
+        "one": part(3, test_span=span),
+        "two": lost.assign_attrs(waves="regular"),
+    }
+
+
+@pytest.fixture(scope="module")
+def model(runs):
+    spec = HankelDMDc(2, 4, 1e-6, delay_rows="exact")
+    return spec.fit({"train": runs["train"]}, STATES, ["eta"])
+
+
+@pytest.fixture(scope="module")
+def baselines(runs):
+    train = {"train": runs["train"]}
+    return {"mean": Mean().fit(train, STATES), "fir": FIR(0).fit(train, STATES, ["eta"])}
+
+
+def test_errors_are_those_of_the_tests_and_verdicts_follow_from_them(model, runs, baselines):
+    found = check.worth(model, runs, baselines)
+    assert found.attrs["of"] == "tests"
+    assert [*found["run"].values] == ["one", "two"]
+    free = free_runs(model, {"one": runs["one"]})["one"]
+    known = metrics.anrmse(predicted=free.forecast, measured=free.measured)
+    assert float(found.anrmse.sel(model="model", run="one")) == pytest.approx(known)
+    calm, rough = found.sel(waves="irregular"), found.sel(waves="regular")
+    assert calm.limit.values.tolist() == [0.1, 0.1, 0.1]
+    assert bool(calm.better.all())
+    assert float(rough.limit.sel(state="surge")) == np.inf  # nine tenths of it are noise
+    for key, of in (("nrmse", "model"), ("change", "fir")):
+        low, value, high = (found[f"{key}{end}"].sel(model=of) for end in ("_lower", "", "_upper"))
+        assert ((low < value) & (value < high)).all()
+    ratio = calm.nrmse.sel(model="model") / calm.nrmse.sel(model="fir") - 1
+    assert calm.change.sel(model="fir").values == pytest.approx(ratio.values)
+
+
+def test_the_page_starts_with_the_verdict(model, runs, baselines):
+    first, *_ = check_sections(check_model(model, runs, None, baselines))
+    text = "\n".join(first.points)
+    assert "1 test in irregular waves: ANRMSE 0.0" in text
+    assert "of the best baseline, " in text
+    assert "Irregular waves, surge, heave: can stand in for a measurement" in text
+    assert "Regular waves, surge: cannot be used instant by instant" in text
+    assert "Look-ahead: none" in text
+    assert [table.name for table in first.tables] == ["worth", "verdicts"]
+
+
+def test_training_is_judged_apart(model, runs):
+    found = check_model(model, runs).found
+    assert found["residuals"].attrs["of"] == "tests"
+    assert found["training_residuals"].attrs["of"] == "training"
+    alone = check_model(model, {"train": runs["train"]})
+    assert "training_residuals" not in alone.found
+    points = check_sections(alone)[0].points
+    assert points[0].startswith("No run tests the model.")
