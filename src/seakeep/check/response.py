@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
+from scipy.interpolate import interp1d
 
 from seakeep.arrays import ComplexArray, FloatArray, as_real
 from seakeep.check.parts import (
@@ -22,7 +23,7 @@ from seakeep.check.parts import (
 )
 from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
 from seakeep.core.response import frequency_response
-from seakeep.core.spectra import cross_spectra
+from seakeep.core.spectra import Spectra, cross_spectra
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
 from seakeep.models import HankelDMDcModel, HankelEnsemble, Model
 from seakeep.models.engine import Dynamics
@@ -32,8 +33,10 @@ __all__ = ["measured_response", "response", "transfer", "validation"]
 
 WAVE = "wave"
 """Name of the input that is a wave which passes all probes."""
-SEGMENT = 16
+SHORTEST, LONGEST = 16, 32
 """Encounter periods of a segment of Welch's method."""
+AVERAGES = 20
+"""Independent segments that are kept, where the records are long enough."""
 POWER = 0.02
 """Part of the highest power of the wave from which on a frequency is a point."""
 FREQUENCIES = 120
@@ -220,7 +223,8 @@ def measured_response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Datase
     Each run in regular waves is one point, by a harmonic fit in windows of whole periods (ITTC
     7.5-02-07-02.1: type A over the windows, type B from ``attrs["accuracy"]`` of the channels,
     their standard uncertainty). Runs in irregular waves together give a point per frequency, by
-    cross-spectra with the reference probe.
+    cross-spectra with the reference probe in segments of 16 to 32 encounter periods; what leakage
+    does is judged from segments half as long.
 
     Parameters
     ----------
@@ -306,18 +310,21 @@ def _accuracy(run: xr.Dataset, channel: str) -> float:
 
 def _irregular_points(model: Model, parts: list[Part], reference: int, period: float) -> xr.Dataset:
     pieces = [(part.inputs[:, [reference]], part.states) for part in parts]
-    spectra = cross_spectra(pieces, model.dt, round(SEGMENT * period / model.dt))
+    period /= model.dt
+    wanted = 2 * sum(len(part.time) for part in parts) / AVERAGES
+    spectra, gain, radius = _gain(
+        pieces, model.dt, round(np.clip(wanted, SHORTEST * period, LONGEST * period))
+    )
     power = spectra.input_power[:, 0]
     if not power.max() > 0:
         raise DataError(
             f"{model.inputs[reference]} holds no energy: it is constant. Look for a dead probe."
         )
-    gain, radius = spectra.gain()
     coherence = spectra.ordinary()[:, 0]
     name = ", ".join(str(part.run.attrs.get("run", "run")) for part in parts)
     points = []
     for at in np.flatnonzero((power >= POWER * power.max()) & (spectra.frequency > 0)):
-        amplitude, half = np.abs(gain[at, 0]), radius[at, 0]
+        amplitude, half = np.abs(gain[at]), radius[at]
         with np.errstate(divide="ignore", invalid="ignore"):
             turn = np.where(half < amplitude, np.arcsin(np.minimum(half / amplitude, 1)), np.pi)
         nothing = np.full(len(model.states), np.nan)
@@ -328,7 +335,7 @@ def _irregular_points(model: Model, parts: list[Part], reference: int, period: f
                  "wave_amplitude": np.nan},
                 {
                     "amplitude": amplitude,
-                    "phase": np.degrees(np.angle(gain[at, 0])),
+                    "phase": np.degrees(np.angle(gain[at])),
                     "amplitude_uncertainty": half,
                     "phase_uncertainty": np.degrees(turn),
                     "coherence": coherence[at],
@@ -338,6 +345,21 @@ def _irregular_points(model: Model, parts: list[Part], reference: int, period: f
             )
         )  # fmt: skip
     return xr.concat(points, dim="point", coords="minimal")
+
+
+def _gain(
+    pieces: list[tuple[FloatArray, FloatArray]], dt: float, segment: int
+) -> tuple[Spectra, ComplexArray, FloatArray]:
+    """Spectra, transfer functions (frequency, output) from the only input, and their uncertainty.
+
+    Leakage shrinks with longer segments: the change from segments half as long, which is what it
+    moves a point at most, is added to the radius by chance, as a root of squares.
+    """
+    whole, halves = (cross_spectra(pieces, dt, each) for each in (segment, segment // 2))
+    gain, radius = whole.gain()
+    other = interp1d(halves.frequency, halves.gain()[0], axis=0, fill_value="extrapolate")
+    moved = np.abs(gain - other(whole.frequency))
+    return whole, gain[:, 0], np.hypot(radius, moved)[:, 0]
 
 
 def _point(

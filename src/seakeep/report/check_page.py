@@ -43,8 +43,8 @@ def response_section(checked: Checked) -> Section | None:
         )
     if measured is not None and (measured["kind"] == "irregular").any():
         words.append(
-            "Leakage moves points of irregular waves at the edges of their spectrum further than "
-            "the bars show."
+            "Points of irregular waves are of all runs, training included. Their bars hold chance, "
+            "and the change from segments half as long, by which leakage is judged."
         )
     drawing = Drawing(
         "response",
