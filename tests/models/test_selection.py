@@ -102,6 +102,30 @@ def test_squares_are_chosen_where_the_drift_goes_with_them_and_not_without_it():
         assert row["lower"] <= row["score"] <= row["upper"]
 
 
+def test_unseen_seas_are_offered_the_envelopes_of_several_probes_alone():
+    given = {
+        name: run.assign(eta_2=run["eta"] + 0.01 * run["heave"]).assign_attrs(sea_state=name)
+        for name, run in runs().items()
+    }
+    spec = replace(SPEC, input_delays=5)
+    tried = {
+        folds: {
+            row["observables"]: row["score"]
+            for row in select(
+                spec, given, STATES, ["eta", "eta_2"], vary=("observables",), ridges=(1e-3,),
+                horizon=(15.0,), folds=folds,
+            ).rows
+        }
+        for folds in ("run", "sea_state")
+    }  # fmt: skip
+    squares = "slow_squares of order 0", "slow_squares of order 1 and 2"
+    rest = ["powers", ", ".join([*squares, "powers"])]
+    assert list(tried["sea_state"]) == ["none", squares[0], ", ".join(squares), *rest]
+    assert list(tried["run"]) == ["none", "slow_squares", "powers", "slow_squares, powers"]
+    # The drift is made of the envelope.
+    assert tried["sea_state"][squares[0]] < 0.5 * tried["sea_state"]["none"]
+
+
 def test_a_look_ahead_that_the_data_has_is_found():
     given = {
         name: run.assign(eta=("time", np.roll(run["eta"].values, 5), {"units": "m"}))

@@ -15,12 +15,13 @@ from seakeep.tank.dynamics import (
     drift_coefficient,
     drift_envelopes,
     linear_response,
+    mean_drift,
     sea_losses,
     simulate,
     tensions,
 )
 from seakeep.tank.hydrodynamics import excitation_at, far_field_at, response
-from seakeep.tank.seas import Sea, regular_sea
+from seakeep.tank.seas import Sea, irregular_sea, regular_sea
 from seakeep.tank.settings import DriftSettings, VesselSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber
 
@@ -231,6 +232,18 @@ def test_drift_is_what_energy_and_momentum_allow(rig, length, height):
     allowed = sea.wavenumber[0] / sea.omega[0] * (absorbed + out - along)
     # The linearised losses are those of a sinusoid, and the taut stern line is not always there.
     assert drift_coefficient(rig, sea)[0][0] == pytest.approx(allowed, rel=0.03)
+
+
+@pytest.mark.parametrize(("length", "own", "irregular"), [(2.1, 1010, 1067), (4.2, 288, 336)])
+def test_drift_force_per_amplitude_depends_on_the_sea(rig, settings, length, own, irregular):
+    """Quadratic losses of an irregular sea are those of more regular motion at its frequency."""
+    heights = {2.1: 0.105, 4.2: 0.116}
+    regular = regular_sea(length, heights[length], 0.0, 3.6, np.random.default_rng(0))
+    spectrum = settings.runs["irregular_1"].spectrum
+    sea = irregular_sea(spectrum, settings.facility.water_depth, np.random.default_rng(0))
+    # As docs/virtual_tank.md states them, to its last digit.
+    found = [mean_drift(rig, regular.omega, sea_losses(rig, each))[0] for each in (regular, sea)]
+    assert found == pytest.approx([own, irregular], abs=1.5)
 
 
 def slow_force(signs, envelopes, sea, time):

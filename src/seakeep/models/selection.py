@@ -714,8 +714,8 @@ def select(
         alignments = _alignments(settings.alignment, runs, states, inputs)
     wanted = [settings.observables]
     if "observables" in vary and not settings.observables:
-        defaults = default_observables(inputs, samples * step)
-        wanted = list(dict.fromkeys([defaults, defaults[1:], ()]))
+        defaults = default_observables(inputs, samples * step, folds == "sea_state")
+        wanted = list(dict.fromkeys([defaults, defaults[-1:], ()]))
     base = Candidate(
         settings.state_delays,
         settings.input_delays,
@@ -726,7 +726,7 @@ def select(
         settings = replace(settings, ridge=FALLBACK, ridge_scale="per_snapshot")
         ridges = RIDGES
     for chosen in wanted:  # runs may be too short for the longest
-        options = _options(settings, vary, samples, len(chosen))
+        options = _options(settings, vary, samples, chosen)
         options["alignment"] = list(range(len(alignments)))
         made = [
             _problem(
@@ -892,27 +892,37 @@ def _measured(
 
 
 def default_observables(
-    inputs: Sequence[str], period: float | None = None
+    inputs: Sequence[str], period: float | None = None, unseen: bool = False
 ) -> tuple[Observable, ...]:
     """Slow squares of the elevation at the vessel, or of all, and powers of all elevations.
 
-    `period` is the encounter period, s; by default that of the training runs.
+    `period` is the encounter period, s; by default that of the training runs. Where what is chosen
+    must hold in sea states that are `unseen`, the squares of several elevations stand apart from
+    those of their derivatives: the envelopes alone may be all that training tells of other seas.
     """
     elevations = tuple(name for name in inputs if name.startswith("eta"))
     if not elevations:
         return ()
+    powers = Powers(elevations)
     at_vessel = tuple(name for name in elevations if name == "eta_cog") or elevations
-    return SlowSquares(at_vessel, period=period), Powers(elevations)
+    if len(at_vessel) == 1 or not unseen:
+        return SlowSquares(at_vessel, period=period), powers
+    slow = (SlowSquares(at_vessel, orders, period=period) for orders in ((0,), (1, 2)))
+    return *slow, powers
 
 
 def _options(
-    settings: HankelSettings, vary: Sequence[str], period: float, observables: int
+    settings: HankelSettings,
+    vary: Sequence[str],
+    period: float,
+    observables: Sequence[Observable],
 ) -> dict[str, list[Any]]:
     """Values to try of the fields of a candidate."""
     found: dict[str, list[Any]] = {}
     if "observables" in vary:
-        every = tuple(range(observables))
-        found["observables"] = list(dict.fromkeys([(), *((number,) for number in every), every]))
+        every = tuple(range(len(observables)))
+        alone = [tuple(k for k in every if _belongs(observables[k], observables[n])) for n in every]
+        found["observables"] = list(dict.fromkeys([(), *alone, every]))
     for name, periods in (
         ("lead", (0.0, 0.5, 0.75, 1.0)),
         ("input_delays", (2.0, 3.0, 5.0)),
@@ -923,6 +933,24 @@ def _options(
     if "rank" in vary:
         found["truncated"] = [False, True]
     return found
+
+
+def _belongs(other: Observable, one: Observable) -> bool:
+    """Whether an observable is tried with another: itself, and squares below its derivatives."""
+    if isinstance(other, SlowSquares) and isinstance(one, SlowSquares) and other.of == one.of:
+        return max(other.orders) <= max(one.orders)
+    return other == one
+
+
+def _names(observables: Sequence[Observable]) -> list[str]:
+    """Kinds of observables; slow squares that stand apart are told by their orders."""
+    kinds = [each.kind for each in observables]
+    return [
+        f"{each.kind} of order {' and '.join(map(str, each.orders))}"
+        if isinstance(each, SlowSquares) and kinds.count(each.kind) > 1
+        else each.kind
+        for each in observables
+    ]
 
 
 def _alignments(
@@ -1041,6 +1069,7 @@ def _rows_of(
 ) -> Iterator[dict[str, Any]]:
     """Rows of the table: windows are drawn again 400 times for the interval of each score."""
     rng = np.random.default_rng(seed)
+    names = _names(observables)
     for candidate, trial in found.trials:
         count = len(trial.weights)
         drawn = rng.integers(count, size=(400, count))
@@ -1053,8 +1082,7 @@ def _rows_of(
                 "state_delays": candidate.state_delays,
                 "input_delays": candidate.input_delays,
                 "lead": candidate.lead,
-                "observables": ", ".join(observables[k].kind for k in candidate.observables)
-                or "none",
+                "observables": ", ".join(names[k] for k in candidate.observables) or "none",
                 "alignment": "none" if aligned is None else f"{aligned.mode}, {aligned.surge}",
                 "ridge": 0.0 if candidate.truncated else level,
                 "rank": int(level) if candidate.truncated else 0,
