@@ -183,5 +183,6 @@ def _row(name: str, found: Counter[str]) -> None:
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).parent))
+    here = Path(__file__).parent
+    sys.path[:0] = [str(here), str(here.parent / "helpers")]
     sys.exit(main())

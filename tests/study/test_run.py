@@ -351,6 +351,12 @@ def test_contents_that_no_study_writes_are_told(finished):
             spoilt = xr.Dataset({**others, each: ("elsewhere", [1j])}, attrs=group.attrs)
             with pytest.raises(ValueError, match=str(each)):
                 check_contents(attrs, {**groups, name: spoilt})
+    for name in finished.models:
+        for key, value in {"ridge": "x", "rank": 0.5, "lead": None, "select": 1}.items():
+            told = json.loads(attrs["models"])
+            told[name]["settings"][key] = {"value": value, "source": "stated"}
+            with pytest.raises(ValueError, match=rf"models\.{name}: .*\b({key}|prior)\b"):
+                check_contents(attrs | {"models": json.dumps(told)}, groups)
     older = json.loads(attrs["settings"])
     del older["output"]["paper"], older["training"]["placement"]
     filled = check_contents(attrs | {"settings": json.dumps(older)}, groups)["settings"]

@@ -106,7 +106,7 @@ def test_a_measured_spectrum_comes_from_a_file(tmp_path):
     )
     assert settings.runs["a"].spectrum.frequencies == (0.3, 0.6, 1.0)
     assert settings.runs["a"].spectrum.densities == (0.001, 0.003, 0.0)
-    with pytest.raises(RequestError, match=r"runs\.a\.spectrum\.file: .*none\.csv cannot be read"):
+    with pytest.raises(RequestError, match=r"runs\.a\.spectrum\.file: .*none\.csv does not exist"):
         read(tmp_path, '[runs.a]\nspectrum = { file = "none.csv" }\n')
     (tmp_path / "odd.csv").write_text("0.3,0.001\n0.6;0.003\n", encoding="utf-8")
     with pytest.raises(RequestError, match=r"runs\.a\.spectrum\.file: .*Two columns of numbers"):

@@ -177,6 +177,8 @@ def from_description(content: dict[str, Any] | None) -> Prior | None:
     """Rebuild a prior from :func:`describe`; what it does not know raises a DataError."""
     if content is None:
         return None
+    if not isinstance(content, dict) or "prior" not in content:
+        raise DataError(f"a prior is a table with the key 'prior'; received {content!r}.")
     name = str(content["prior"])
     own = {each.__name__: each for each in (Uniform, LogUniform, Fixed)}
     if name in own:

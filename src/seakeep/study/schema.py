@@ -20,7 +20,9 @@ from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
 from seakeep.arrays import GREATEST
 from seakeep.campaign.settings import PreparationSettings
-from seakeep.study.resolve import Source
+from seakeep.errors import SeakeepError
+from seakeep.models import KINDS
+from seakeep.study.resolve import Source, check_settings
 from seakeep.study.settings import Preset, StudySettings
 from seakeep.toml import Table
 
@@ -217,7 +219,7 @@ def _is_bounded(x: Any) -> bool:
     return not beyond.any() or bool(np.isinf(x[beyond]).all())
 
 
-KINDS: Mapping[str, Callable[[Any], bool]] = {
+SOUND: Mapping[str, Callable[[Any], bool]] = {
     "text": lambda x: x.dtype.kind in "OU" and all(isinstance(each, str) for each in x.flat),
     "flag": lambda x: x.dtype.kind == "b",
     "number": _is_bounded,
@@ -252,8 +254,11 @@ def check_contents(attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]) -
         _check_value(kind, value, key)
     datetime.fromisoformat(attrs["created"])
     models, tests = told["models"], told["settings"]["tests"]
-    if set(models) != set(told["settings"]["models"]):
+    stated = {name: each["kind"] for name, each in told["settings"]["models"].items()}
+    if stated != {name: each["kind"] for name, each in models.items()}:
         raise ValueError("models are others than those of the settings")
+    for name, each in models.items():
+        _check_model(each, f"models.{name}", attrs["encounter_period"], attrs["dt"])
     _check_group("runs", groups, models, {})
     owners = {"tests": tests, "models": models, "runs": _texts(groups["runs"], "run"), "all": [""]}
     for owner, rooms in NEEDED.items():
@@ -277,6 +282,19 @@ def check_contents(attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]) -
     return {**attrs, "settings": json.dumps(told["settings"])}
 
 
+def _check_model(told: Mapping[str, Any], place: str, period: float, dt: float) -> None:
+    """Let the class of a kind judge the settings; a kind that was added elsewhere is not known."""
+    if told["kind"] not in KINDS:
+        return
+    values = {key: each["value"] for key, each in told["settings"].items()}
+    try:
+        spec = check_settings(told["kind"], values, period, dt)
+    except (SeakeepError, LookupError, TypeError, ValueError, ArithmeticError) as error:
+        raise ValueError(f"{place}: {error}") from error
+    if (told["ensemble"], told["n_members"]) != (spec.is_ensemble, getattr(spec, "n_members", 1)):
+        raise ValueError(f"{place} has another number of members than its settings")
+
+
 def _texts(group: xr.Dataset, name: str) -> list[str]:
     return [str(each) for each in group[name].values]
 
@@ -298,7 +316,7 @@ def _check_group(
                     raise ValueError(f"{place} is missing")
             elif each in group.variables:
                 x = group.variables[each]
-                if x.dims != dims or not KINDS[kind.rstrip("?")](x.values):
+                if x.dims != dims or not SOUND[kind.rstrip("?")](x.values):
                     held = " ".join(map(str, x.dims))
                     raise ValueError(
                         f"{place} holds {x.dtype} over ({held}), not each a sound {kind} over "

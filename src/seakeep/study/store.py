@@ -22,7 +22,7 @@ import xarray as xr
 from filelock import FileLock, Timeout
 
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
-from seakeep.files import check_output, read_sealed, replacing, write_netcdf
+from seakeep.files import check_output, read_bytes, read_sealed, replacing, write_netcdf
 from seakeep.study.schema import check_contents
 from seakeep.study.settings import FORMAT
 
@@ -235,8 +235,8 @@ class UnitFolder:
 
 def _read_header(path: Path) -> dict[str, Any]:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = json.loads(read_bytes(path))
+    except (RequestError, ValueError, RecursionError):
         found = None
     if not isinstance(found, dict) or "digest" not in found:
         raise RequestError(
@@ -430,9 +430,10 @@ def read_result(folder: Path | str) -> StudyResult:
     except SeakeepError:
         raise
     except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError) as error:
+        missing = "a part is missing: " if isinstance(error, LookupError) else ""
         raise DataError(
-            f"{path} does not hold what a study writes: {type(error).__name__}: {error}. Remove it "
-            "and run the study again."
+            f"{path} does not hold what a study writes: {missing}{error}. Remove it and run the "
+            "study again."
         ) from error
     return StudyResult(folder, attrs, groups)
 

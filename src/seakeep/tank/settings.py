@@ -12,7 +12,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from seakeep.campaign.settings import ChannelName, RunName
-from seakeep.errors import RequestError
+from seakeep.errors import MissingFileError, RequestError
+from seakeep.files import read_bytes
 from seakeep.sizes import MOST_LAGS, MOST_PRODUCTS, MOST_STEPS, too_large
 from seakeep.tank.moorings import LineSettings
 from seakeep.toml import Count, Finite, Mistake, NotNegative, Pair, Positive, Table, validated
@@ -347,15 +348,18 @@ def read_tank(path: Path | str) -> TankSettings:
 def _spectrum_of(path: Path, where: str) -> dict[str, Any]:
     """Keys of a spectrum from a file of two columns."""
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = read_bytes(path).decode("utf-8").splitlines()
         rows = [line for line in lines if line.strip() and not line.startswith("#")]
         heading = bool(rows) and rows[0].partition(",")[0].strip(" +.0123456789eE-") != ""
         table = np.loadtxt(rows[heading:], delimiter=",", ndmin=2)
-    except (OSError, ValueError) as error:
+    except MissingFileError as error:
+        raise RequestError(
+            f"{where}.spectrum.file: {error} The path is relative to the settings file."
+        ) from error
+    except ValueError as error:
         raise RequestError(
             f"{where}.spectrum.file: {path} cannot be read ({error}). Two columns of numbers are "
-            "needed, frequency (Hz) and density (m²/Hz), with a comma between; the path is "
-            "relative to the settings file."
+            "needed, frequency (Hz) and density (m²/Hz), with a comma between."
         ) from error
     if table.shape[1:] != (2,):
         raise RequestError(
