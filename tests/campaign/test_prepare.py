@@ -9,7 +9,7 @@ import xarray as xr
 from small_tank import DT, tank_columns, write_csv
 
 from seakeep import cli
-from seakeep.campaign import load_prepared, read_campaign, write_prepared
+from seakeep.campaign import load_prepared, read_campaign, store, write_prepared
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.files import write_netcdf
 from seakeep.formats import read_columns
@@ -513,6 +513,19 @@ class TestFiles:
         ):
             run = load_prepared(campaign)["second"]
         xr.testing.assert_identical(run, campaign.prepare(["second"])["second"])
+
+    def test_sealed_contents_that_no_preparation_writes_are_prepared_anew(self, campaign):
+        path = write_prepared(campaign, names=["second"])["second"]
+        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as opened:
+            kept = opened.load()
+        finding = '[{"kind": "LAG", "run": "second", "channel": "heave", "text": "x", "value": []}]'
+        attrs = {"dt": -1.0, "quality": finding, "role": 5, "water_depth": "x"}
+        spoilt = [kept.assign_attrs({key: value}) for key, value in attrs.items()]
+        spoilt.append(kept.assign_coords(time=kept["time"].values[::-1]))
+        for each in spoilt:
+            write_netcdf(path, each)
+            with pytest.warns(SeakeepWarning, match=r"second\.nc was altered since"):
+                assert store._fresh(campaign, "second", path) is None
 
     def test_a_byte_that_was_altered_is_noticed(self, campaign):
         """84 of 100 such files were used, with other numbers."""

@@ -107,7 +107,8 @@ def _walker(parent: int) -> subprocess.Popen[str]:
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        text=True,
+        encoding="utf-8",  # whatever PYTHONIOENCODING says of other output
+        env={**os.environ, "PYTHONIOENCODING": "utf-8"},
         start_new_session=True,  # Ctrl-C is not for it
     )
     atexit.register(_end, process, parent)
