@@ -221,6 +221,11 @@ class TestOutputs:
         with pytest.raises(RequestError, match="exists and is not a model"):
             check_output(path, "model")
 
+    def test_a_table_of_any_width_is_known_by_its_start(self, tmp_path):
+        path, names = tmp_path / "a.csv", ",".join(f"member {k:04}" for k in range(2000))
+        path.write_text(f"time,{names}\n1\n")
+        check_output(path, "forecast", header=r"time(,member \d+)+\n")
+
     def test_text_states_what_it_is_and_csv_by_its_header(self, tmp_path):
         path = tmp_path / "a.toml"
         path.write_text("# seakeep_file: campaign\n")

@@ -28,6 +28,7 @@ __all__ = [
     "MARK",
     "check_output",
     "check_place",
+    "check_report",
     "existing_file",
     "make_folder",
     "read_bytes",
@@ -440,7 +441,7 @@ def check_output(
     inputs : iterable of Path
         Files that the command reads.
     header : str, optional
-        Pattern of the first line of a CSV file, which has no place for a mark.
+        Pattern of the start of a CSV file, which has no place for a mark.
 
     Raises
     ------
@@ -456,18 +457,15 @@ def check_output(
             "Choose another name."
         )
     with path.open("rb") as file:
-        binary = path.suffix == ".nc" or file.read(len(HDF5)) == HDF5
-    if binary:
+        start = file.read(HEAD)
+        file.seek(-min(HEAD, path.stat().st_size), os.SEEK_END)
+        both = (start + file.read()).decode("utf-8", "replace")  # PDF keeps its mark at the end
+    if path.suffix == ".nc" or start.startswith(HDF5):
         ours = _mark_of_netcdf(path) == kind
+    elif path.suffix == ".csv":
+        ours = header is not None and re.match(header, both) is not None
     else:
-        with path.open("rb") as file:
-            start = file.read(HEAD).decode("utf-8", "replace")
-            file.seek(-min(HEAD, path.stat().st_size), os.SEEK_END)
-            end = file.read().decode("utf-8", "replace")  # where PDF keeps it
-        if path.suffix == ".csv":
-            ours = header is not None and re.fullmatch(header, start.partition("\n")[0]) is not None
-        else:
-            ours = f"{MARK}: {kind}" in start + end
+        ours = f"{MARK}: {kind}" in both
     if not ours:
         raise RequestError(
             f"{path} exists and is not a {kind} that seakeep wrote; it may be a measurement. "
@@ -475,7 +473,30 @@ def check_output(
         )
 
 
-HEAD = 8192
+def check_report(folder: Path) -> None:
+    """Refuse, before any work, a folder in which a report would replace what none has written.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder for ``report.html``, ``figures/``, ``tables/`` and ``histories/``.
+
+    Raises
+    ------
+    RequestError
+        If it holds a page of others, or no page and files in one of these folders.
+    """
+    page = folder / "report.html"
+    check_output(page, "report")
+    for each in () if page.exists() else ("figures", "tables", "histories"):
+        if any(folder.glob(f"{each}/*")):
+            raise RequestError(
+                f"{folder / each} holds files that no report of seakeep wrote; those of the report "
+                "would stand among them. Choose another folder (-o)."
+            )
+
+
+HEAD = 65536
 """Bytes of a file in which its mark is looked for."""
 
 HDF5 = b"\x89HDF\r\n\x1a\n"

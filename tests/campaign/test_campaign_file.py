@@ -338,6 +338,8 @@ def test_names_that_no_file_or_variable_can_hold(edited):
         assert "a name has 1 to 100 characters, not dots alone, and holds no '/'" in message
         message = refusal(edited(("[runs.second]", f'[runs."{name}"]')))
         assert "because files are named after it" in message
+    message = refusal(edited(("[runs.second]", "[runs.First]")))
+    assert "runs.First: 'first' differs only in the case of its letters, and files" in message
     for name in ("time", "heave_flags"):
         message = refusal(edited(("[channels.acc]", f"[channels.{name}]")))
         assert "a channel is not called 'time', nor does its name end in '_flags'" in message

@@ -715,7 +715,11 @@ def test_debug_shows_the_traceback(run):
             "docs/tutorial/run3.csv",
         ),
         (f"forecast model.nc {CAMPAIGN} --run unseen --start 20 -o other.csv", "other.csv"),
+        (f"forecast model.nc {CAMPAIGN} --run unseen --start 20 -o lf.csv", "lf.csv"),
+        (f"forecast model.nc {CAMPAIGN} --run unseen --start 20 -o crlf.csv", "crlf.csv"),
         (f"compare model.nc {CAMPAIGN} -o mine", "mine/comparison.csv"),
+        (f"check model.nc {CAMPAIGN} -o checked", "checked/tables/modes.csv"),
+        (f"tune {CAMPAIGN} --vary rank", "docs/tutorial/campaign_tuned.png"),
         (f"compare model.nc {CAMPAIGN} -o drawn", "drawn/unseen.png"),
     ],
 )
@@ -725,16 +729,20 @@ def test_no_output_replaces_an_input_or_a_file_of_others(command, kept, run, pla
     for name, text in {
         "docs/tutorial/raw.nc": "CDF\x01",
         "other.csv": "time [s],heave [m],WP_01 [m]\n",
+        "lf.csv": "time [s],heave [m],pitch [rad]\n0.0,1.0,2.0\n",
+        "crlf.csv": "time [s],heave [m],pitch [rad]\r\n0.0,1.0,2.0\r\n",
+        "checked/tables/modes.csv": "mine",
+        "docs/tutorial/campaign_tuned.png": "a photograph",
         "mine/comparison.csv": "run,rating\n",
         "drawn/unseen.png": "a photograph",
     }.items():
-        (place / name).parent.mkdir(exist_ok=True)
-        (place / name).write_text(text)
+        (place / name).parent.mkdir(parents=True, exist_ok=True)
+        (place / name).write_text(text, newline="")
     monkeypatch.setattr("seakeep.campaign.prepare.Campaign.prepare", None)  # no work is done
     before = (place / kept).read_bytes()
     status, _, err = run(command)
     assert status == 2
-    assert "Choose another name" in err
+    assert "Choose another " in err
     assert (place / kept).read_bytes() == before
 
 
@@ -877,7 +885,7 @@ def test_full_scale_by_froudes_law(run, place):
         assert float(large["start"]) == pytest.approx(5 * float(model["start"]), rel=1e-9)
 
 
-def test_fit_forecast_and_compare_report_what_prepare_finds(run, place, tmp_path):
+def test_commands_report_what_prepare_finds(run, place, tmp_path, monkeypatch):
     """One -9999 in heave took NRMSE from 0.028 to 3.03 without a word."""
     folder = tmp_path / "spoilt"
     shutil.copytree(place / "docs" / "tutorial", folder)
@@ -892,6 +900,16 @@ def test_fit_forecast_and_compare_report_what_prepare_finds(run, place, tmp_path
     assert found in err
     _, _, err = run(f"compare {folder}/m.nc {campaign}")
     assert "unseen: heave outlier: 1 samples in 1 place(s)" in err
-    rest = f"--run unseen --start 20 --steps 50 -o {folder}/f.nc"
-    _, _, err = run(f"forecast {folder}/m.nc {campaign} {rest}")
-    assert "unseen: heave outlier: 1 samples in 1 place(s)" in err
+    steps = f"{campaign} --run unseen --steps"
+    # The note comes before the work.
+    monkeypatch.setattr(importlib.import_module("seakeep.study.nowcast"), "nowcast", None)
+    monkeypatch.setattr(seakeep.HankelEnsemble, "calibrate", None)
+    monkeypatch.setattr("seakeep.study.fit_baselines", None)
+    for command in (
+        f"forecast {folder}/m.nc {steps} 50 --start 20 -o {folder}/f.nc",
+        f"compare {folder}/m.nc {steps} 2 -o {folder}/now --nowcast",
+        f"calibrate ensemble.nc {steps} 200 --stop 60 -o {folder}/c.nc",
+        f"check {folder}/m.nc {campaign} --run unseen -o {folder}/checked",
+    ):
+        _, _, err = run(command)
+        assert "unseen: heave outlier: 1 samples in 1 place(s)" in err

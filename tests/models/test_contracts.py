@@ -395,8 +395,21 @@ class TestUnitsAndNumbers:
         with pytest.warns(SeakeepWarning, match=r"'heave' of the run states no unit.*model's 'm'"):
             model.forecast(plain, start=5.0, steps=5)
 
-    def test_a_sample_that_overflows_the_moments_is_refused(self):
+    @pytest.mark.parametrize("channel", ["heave", "eta"])
+    def test_a_sample_whose_square_overflows_is_refused(self, channel):
+        """The channel was dead for the model, and the status of its forecasts "ok"."""
+        model = HankelDMDc(1, 4, 1.0).fit(sea(), ["heave"], ["eta"])
         run = sea()
-        run["heave"].values[7] = 1e155
-        with pytest.raises(DataError, match="'heave' has a standard deviation that is not fin"):
+        step = float(run["time"][1])
+        run[channel].values[7] = 1e155
+        with pytest.raises(DataError, match=rf"'{channel}' of run is 1e\+155 at t = .*a fault"):
             HankelDMDc(1, 4, 1.0).fit(run, ["heave"], ["eta"])
+        with pytest.raises(DataError, match=rf"'{channel}' of the run is 1e\+155 at t = "):
+            model.forecast(run, start=7 * step, steps=5)
+
+    def test_an_observable_that_overflows_is_refused(self):
+        run = sea()
+        run["eta"].values[7] = 1e60
+        spec = HankelDMDc(1, 4, 1.0, observables=[seakeep.Powers(("eta",), (3,))])
+        with pytest.raises(DataError, match=r"has a standard deviation that is not finite"):
+            spec.fit(run, ["heave"], ["eta"])

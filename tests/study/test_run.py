@@ -55,6 +55,25 @@ def finished(study_folder, finished_once):
     return read_result(study_folder / "out")
 
 
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("study.json", "damaged or belongs to no study"),
+        ("units/mine.npz", "units holds files, and .* does not say of which study"),
+        ("tables/mine.csv", "tables holds files that no report of seakeep wrote"),
+        ("histories/mine.js", "histories holds files that no report of seakeep wrote"),
+        ("report.html", "exists and is not a report that seakeep wrote"),
+    ],
+)
+def test_files_of_others_in_the_folder_stay(name, words, tmp_path):
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("mine", encoding="utf-8")
+    with pytest.raises(RequestError, match=words):
+        UnitFolder(tmp_path, "0" * 64).check()
+    assert path.read_text(encoding="utf-8") == "mine"
+
+
 def test_cells_are_what_the_models_say(study_folder, finished):
     study = read_study(study_folder / "study.toml")
     plan, runs = make_plan(study)

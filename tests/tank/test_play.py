@@ -170,6 +170,10 @@ def test_nothing_that_the_tank_has_not_written_is_replaced(short, tmp_path):
     with pytest.raises(RequestError, match=r"mru\.csv exists and is not a raw file that"):
         play(short, tmp_path, names=["regular_2"])
     record.write_text(kept, encoding="utf-8")
+    hidden = (tmp_path / "truth").rename(tmp_path / "apart")
+    with pytest.raises(RequestError, match=r"\w+\.csv exists, and no truth of the tank beside it"):
+        play(short, tmp_path, names=["regular_2"])
+    hidden.rename(tmp_path / "truth")
     (tmp_path / "campaign.toml").write_text("[campaign]\nname = 'mine'\n", encoding="utf-8")
     before = digests(tmp_path)
     with pytest.raises(RequestError, match=r"campaign\.toml exists and is not a campaign"):

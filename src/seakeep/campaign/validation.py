@@ -95,7 +95,14 @@ def _cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
     if wave is None or wave in settings.channel_names:
         yield from _period_mistakes(settings)
     yield from _instrument_mistakes(settings)
+    spelt: dict[str, str] = {}
     for run, each in settings.runs.items():
+        if (other := spelt.setdefault(run.lower(), run)) != run:
+            yield Mistake(
+                ("runs", run),
+                f"'{other}' differs only in the case of its letters, and files are named after "
+                "both. Rename one.",
+            )
         for name in each.channels:
             if name not in settings.channels:
                 yield Mistake(

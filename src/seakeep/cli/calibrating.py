@@ -103,6 +103,7 @@ def calibrate(
     from seakeep.models import is_ensemble, load_model
     from seakeep.models.calibration import check_scale
     from seakeep.models.forecasts import counted
+    from seakeep.quality import warn_of_runs
     from seakeep.signals.time_axis import instant_text, span_text
     from seakeep.study.comparison import samples_of
 
@@ -124,6 +125,7 @@ def calibrate(
     with progress_bar("Preparing") as progress:
         prepared = load_prepared(read, names=wanted, progress=progress)
     every = list(prepared.values())
+    warn_of_runs(every, [*fitted.states, *fitted.inputs])
     first = _instant(start, "--start", read, prepared, fitted.dt)
     last = _instant(stop, "--stop", read, prepared, fitted.dt)
     if first is not None and last is not None and first >= last:

@@ -10,7 +10,7 @@ import typer
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.cli.options import CampaignFile, ModelFile, read_files
 from seakeep.errors import SeakeepError
-from seakeep.files import check_output, make_folder
+from seakeep.files import check_output, check_report, make_folder
 
 __all__ = ["check"]
 
@@ -40,6 +40,7 @@ def check(
     from seakeep.campaign import load_prepared, read_campaign
     from seakeep.check import check_model
     from seakeep.models import load_model
+    from seakeep.quality import warn_of_runs
     from seakeep.report.check_page import check_sections, write_check
     from seakeep.study import fit_baselines
 
@@ -47,8 +48,10 @@ def check(
     identified = load_model(model)
     read = read_campaign(campaign)
     check_output(out / "report.html", "report", read_files(read, model))
+    check_report(out)
     with progress_bar("Preparing") as progress:
         runs = load_prepared(read, names=run or None, progress=progress)
+    warn_of_runs(runs.values(), [*identified.states, *identified.inputs])
     try:
         channels = (identified.states, identified.inputs)
         baselines = fit_baselines(read, *channels, prepared=None if run else runs)

@@ -39,7 +39,7 @@ PIPE_WIDTH = 140
 def results() -> Console:
     """Console of results, on standard output."""
     width = None if sys.stdout.isatty() else PIPE_WIDTH
-    return Console(file=sys.stdout, width=width, highlight=False, markup=False)
+    return Console(file=sys.stdout, width=width, highlight=False, markup=False, emoji=False)
 
 
 def print_table(table: Table, note: bool = True) -> None:
@@ -55,7 +55,7 @@ def print_table(table: Table, note: bool = True) -> None:
 
 def messages() -> Console:
     """Console of messages, on standard error; long lines are left to the terminal."""
-    return Console(file=sys.stderr, highlight=False, soft_wrap=True, markup=False)
+    return Console(file=sys.stderr, highlight=False, soft_wrap=True, markup=False, emoji=False)
 
 
 def worker_count(workers: int | None) -> int:

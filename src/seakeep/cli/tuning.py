@@ -69,7 +69,9 @@ def tune(
             "its folder. Write it beside the campaign file."
         )
     check_place(target, ".toml")
-    check_output(target, "tuned campaign", read_files(read))
+    picture = target.with_suffix(".png")
+    for path, kind in ((target, "tuned campaign"), (picture, "figure")):
+        check_output(path, kind, read_files(read))
     settings = read.model(model)
     with progress_bar("Preparing") as progress:
         spec, _, runs, stop = read_training(read, model, progress)
@@ -99,11 +101,9 @@ def tune(
     kept.unlink(missing_ok=True)
     messages().print(f"Wrote {target}. Fit it with: seakeep fit {target} -o model.nc")
     if find_spec("matplotlib") and found.table.sizes["trial"]:
-        picture = target.with_suffix(".png")
-        figure = found.figure()
-        with replacing(picture) as place:
-            figure.savefig(place, format="png", dpi=150)
-        messages().print(f"Wrote {picture}.")
+        from seakeep.report.style import save_figure
+
+        messages().print(f"Wrote {save_figure(found.figure(), picture)}.")
 
 
 def _tuned(text: str, model: str | None, found: TuneResult, varied: Sequence[str]) -> str:

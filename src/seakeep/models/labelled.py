@@ -11,7 +11,7 @@ from typing import cast
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import GREATEST, FloatArray
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 from seakeep.signals import uniform_step
 from seakeep.signals.time_axis import instant_text, span_text
@@ -191,12 +191,18 @@ def check_channels(run: xr.Dataset, names: Sequence[str], name: str) -> list[xr.
 def check_finite(
     values: FloatArray, names: Sequence[str], name: str, first: int, time: FloatArray
 ) -> None:
-    """Refuse gaps; `first` is the sample of the first row of `values` in the run."""
-    if np.all(np.isfinite(values)):
+    """Refuse gaps, and samples whose squares overflow; `first` is the sample of the first row."""
+    sound = np.abs(values) <= GREATEST
+    if sound.all():
         return
-    bad = ~np.isfinite(values)
+    bad = ~sound
     row, column = (int(index) for index in np.argwhere(bad)[0])
     instant = instant_text(time[first + row], _spacing(time))
+    if np.isfinite(values[row, column]):
+        raise DataError(
+            f"channel '{names[column]}' of {name} is {values[row, column]:.3g} at t = {instant} s, "
+            f"beyond {GREATEST:g}. Look for a fault of the sensor or of its conversion."
+        )
     raise DataError(
         f"channel '{names[column]}' of {name} has {int(bad[:, column].sum())} missing or infinite "
         f"value(s) in the samples needed, the first at t = {instant} s. "

@@ -307,9 +307,12 @@ def write_comparison(tables: Mapping[str, xr.Dataset], path: Path) -> Path:
 
 
 def forecast_header(states: Sequence[str]) -> str:
-    """Pattern of the first line of a CSV file that :func:`write_forecast` writes."""
+    """Pattern of the start of a CSV file that :func:`write_forecast` writes.
+
+    Measurements have such headers too: ours alone end in CR LF, and their rows in LF.
+    """
     one = rf"({'|'.join(map(re.escape, states))})( (std|lower|upper|member \d+))? \[[^]]*\]"
-    return rf'time \[s\](,"?{one}"?)+(,scale_factor)?\r?'
+    return rf'time \[s\](,"?{one}"?)+(,scale_factor)?\r\n[^\r\n]*\n'
 
 
 def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
@@ -320,7 +323,9 @@ def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
         else:
             # Instants are multiples of a step; nine decimals hide the rounding of the product.
             time = pd.Index(forecast["time"].values.round(9), name="time [s]")
-            pd.DataFrame(_columns(forecast), index=time).to_csv(temporary)
+            text = pd.DataFrame(_columns(forecast), index=time).to_csv(lineterminator="\n")
+            header, rows = text.split("\n", 1)
+            temporary.write_text(f"{header}\r\n{rows}", encoding="utf-8", newline="")
     return path
 
 

@@ -15,6 +15,7 @@ from seakeep.errors import RequestError
 from seakeep.models import Model, is_ensemble
 from seakeep.models.labelled import channel_matrix
 from seakeep.models.live import Servable, held_samples
+from seakeep.quality import warn_of_runs
 from seakeep.study.comparison import samples_of
 
 __all__ = ["PERIODS", "SHARE", "labelled_skill", "nowcast", "nowcasts"]
@@ -68,6 +69,7 @@ def nowcasts(
     """
     served = {name: _servable(name, model) for name, model in models.items()}
     prepared = load_prepared(campaign, names=list(runs) or campaign.test_runs)
+    warn_of_runs(prepared.values(), {c for m in models.values() for c in (*m.states, *m.inputs)})
     out: dict[str, list[xr.Dataset]] = {name: [] for name in models}
     total, done = len(models) * len(prepared), 0
     for name, model in served.items():

@@ -46,6 +46,7 @@ HIGHEST = 9.0
 
 STUDY_FILE = "reproduction's study file"
 CAMPAIGN_FILE = "reproduction's campaign file"
+PLAYED = "note of a campaign played"
 
 
 @dataclass(frozen=True)
@@ -240,10 +241,12 @@ def _play(folder: Path, seed: int, progress: Progress | None) -> xr.Dataset:
     made = json.dumps({"settings": settings.model_dump(mode="json"), "versions": versions()})
     digest = hashlib.sha256(made.encode()).hexdigest()
     mark = folder / "played.txt"
-    if not mark.exists() or mark.read_text(encoding="utf-8").strip() != digest:
+    text = f"{MARK}: {PLAYED}\n{digest}\n"
+    if not mark.exists() or mark.read_bytes() != text.encode():
+        check_output(mark, PLAYED)
         with storing(folder):
             play(settings, folder, progress=_named(progress, "playing "))
-            mark.write_text(digest + "\n", encoding="utf-8")
+        _write(mark, text, PLAYED)
     frequency = np.linspace(0.2, 1.5, 261)
     spectra = {
         "nominal": (0.15, 2.12, "nominal, the paper's sea state (0.15 m, 2.12 s)"),

@@ -22,7 +22,7 @@ import xarray as xr
 from filelock import FileLock, Timeout
 
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
-from seakeep.files import check_output, read_bytes, read_sealed, replacing, write_netcdf
+from seakeep.files import check_report, read_bytes, read_sealed, replacing, write_netcdf
 from seakeep.study.schema import check_contents
 from seakeep.study.settings import FORMAT
 
@@ -39,7 +39,6 @@ __all__ = [
 ]
 
 RESULT = "study.nc"
-PAGE = "report.html"
 HEADER = "study.json"
 LOCK = "study.lock"
 UNITS = "units"
@@ -118,21 +117,15 @@ class UnitFolder:
             (self.folder / UNITS).mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=self.folder / UNITS).close()
         header = self.folder / HEADER
-        if header.exists() and self._holds_results():
-            _check_header(self.folder, _read_header(header), self._header())
-        else:
-            self._check_files_of_others()
-
-    def _check_files_of_others(self) -> None:
-        """Refuse a folder in which the report would replace what none has written."""
-        check_output(self.folder / PAGE, "report")
-        if (self.folder / RESULT).exists() or (self.folder / PAGE).exists():
-            return
-        for name in ("figures", "tables"):
-            if any(self.folder.glob(f"{name}/*")):
+        found = _read_header(header) if header.exists() else None
+        if found is not None and self._holds_results():
+            _check_header(self.folder, found, self._header())
+        elif not (self.folder / RESULT).exists():
+            check_report(self.folder)
+            if found is None and any((self.folder / UNITS).iterdir()):
                 raise RequestError(
-                    f"{self.folder / name} holds files that no report of seakeep wrote; those of "
-                    "the report would stand among them. Choose another folder (-o)."
+                    f"{self.folder / UNITS} holds files, and {header} does not say of which study. "
+                    "Choose another folder (-o), or remove this one."
                 )
 
     def open(self, name: str) -> None:

@@ -230,21 +230,22 @@ def noisy_truth(
 
 def _check_outputs(folder: Path, names: list[str], kind: str, filmed: list[str]) -> None:
     """Refuse to overwrite a campaign file or a record that the tank has not written."""
-    campaign = folder / CAMPAIGN_FILE
-    if campaign.exists():
+    if (campaign := folder / CAMPAIGN_FILE).exists():
         check_output(campaign, CAMPAIGN)
     for name in names:
-        raw = folder / "raw" / name
-        for path in [raw / f"{logger}.{kind}" for logger in LOGGERS]:
-            if path.exists():
-                check_output(path, RAW, header=FIRST_LINE)
-        if (hidden := folder / "truth" / f"{name}.nc").exists():
+        raw, hidden = folder / "raw" / name, folder / "truth" / f"{name}.nc"
+        if hidden.exists():
             check_output(hidden, TRUTH)
-        if name in filmed and (raw / f"{SIDE_VIEW}.mp4").exists() and not campaign.exists():
-            raise RequestError(
-                f"{raw / f'{SIDE_VIEW}.mp4'} exists in a folder that is not a campaign of the "
-                "tank; it may be a measurement. Choose another folder."
-            )
+        records = [raw / f"{logger}.{kind}" for logger in LOGGERS]
+        films = [raw / f"{SIDE_VIEW}.mp4"] if name in filmed else []
+        for path in filter(Path.exists, [*records, *films]):
+            if not hidden.exists():  # which is written first
+                raise RequestError(
+                    f"{path} exists, and no truth of the tank beside it; it may be a measurement. "
+                    "Choose another folder."
+                )
+            if path in records:
+                check_output(path, RAW, header=FIRST_LINE)
 
 
 def play(
@@ -310,12 +311,12 @@ def play(
             [record_together(played, SINGLE_RATE, rng)] if one_logger else record_run(played, rng)
         )
         raw, hidden = make_folder(folder / "raw" / name), make_folder(folder / "truth")
+        write_dataset(truth(played, name), hidden / f"{name}.nc")
         files[name] = {record.name: write_record(record, raw, kind) for record in records}
         if name in filmed:
             files[name][SIDE_VIEW] = render_side_view(
                 played, raw / f"{SIDE_VIEW}.mp4", generator(part, name, "video")
             )
-        write_dataset(truth(played, name), hidden / f"{name}.nc")
     relative = {
         run: {key: path.relative_to(folder).as_posix() for key, path in paths.items()}
         for run, paths in files.items()
