@@ -124,6 +124,16 @@ def test_output_in_a_code_page_without_greek_letters_is_no_error(monkeypatch):
     assert b"? over 15 T?" in stream.buffer.getvalue()
 
 
+def test_reproduce_replaces_no_note_of_the_user(tmp_path, capfd):
+    pytest.importorskip("seakeep.tank.play", reason="the virtual tank needs its libraries")
+    own = tmp_path / "campaign" / "played.txt"
+    own.parent.mkdir()
+    own.write_text("mine")
+    assert cli.main(["reproduce", "--quick", "-o", str(tmp_path)]) == 2
+    assert "played.txt exists and is not a note of a campaign played" in capfd.readouterr().err
+    assert own.read_text() == "mine"
+
+
 def test_reproduce_replaces_no_study_file_of_the_user(tmp_path, capfd):
     own = tmp_path / "raw" / "study.toml"
     own.parent.mkdir()
