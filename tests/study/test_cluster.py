@@ -20,8 +20,7 @@ def test_a_worker_that_is_killed_costs_its_units_alone(study_folder, tmp_path_fa
     from dask_processes import Cluster
 
     path = study_folder / "study.toml"
-    text = path.read_text("utf-8").replace("n_members = 4", "n_members = 12")
-    path.write_text(text.replace("windows = 2", "windows = 4", 1), "utf-8")
+    path.write_text(path.read_text("utf-8").replace("windows = 2", "windows = 4", 1), "utf-8")
     study = read_study(path)
     alone = run_study(study, study_folder / "alone")
     cluster = Cluster(tmp_path_factory.mktemp("dask"), workers=2)

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from started import started
 from tutorial_study import put_tutorial
 
 from seakeep.errors import DataError, RequestError
+from seakeep.files import read_sealed
 from seakeep.models.executor import processes
 from seakeep.models.labelled import nearest_sample
 from seakeep.statistics import band_error_over_time
@@ -44,15 +46,15 @@ def finished_once(tmp_path_factory, put_study):
     folder = tmp_path_factory.mktemp("finished")
     put_study(folder)
     with processes(2) as pool:
-        run_study(read_study(folder / "study.toml"), folder / "out", executor=pool)
-    return folder
+        return run_study(read_study(folder / "study.toml"), folder / "out", executor=pool)
 
 
 @pytest.fixture
 def finished(study_folder, finished_once):
-    """The result, copied so that a test may spoil it."""
-    shutil.copytree(finished_once / "out", study_folder / "out")
-    return read_result(study_folder / "out")
+    """The result, its files copied so that a test may spoil them."""
+    folder = study_folder / "out"
+    shutil.copytree(finished_once.folder, folder)
+    return replace(finished_once, folder=folder)
 
 
 @pytest.mark.parametrize(
@@ -186,37 +188,37 @@ def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished
     same(finished, again)
 
 
-def test_two_processes_do_not_work_in_one_folder(study_folder, finished, monkeypatch):
-    study, out = read_study(study_folder / "study.toml"), study_folder / "shared"
-    refused = []
+def test_files_of_others_among_the_units_stay(tmp_path):
+    units = UnitFolder(tmp_path, "digest")
+    units.open("study")
+    units.write("one", {"mean": np.arange(3.0)})
+    (tmp_path / UNITS / "mine").mkdir()
+    units.check()
+    units.clear()
+    assert [each.name for each in (tmp_path / UNITS).iterdir()] == ["mine"]
 
-    def told(done, total, what):
+
+def test_one_process_works_in_a_folder_and_who_waited_takes_its_result(
+    study_folder, finished, monkeypatch
+):
+    study, out = read_study(study_folder / "study.toml"), study_folder / "shared"
+    usual = run.warn_of_slow_study
+    refused, told = [], []
+
+    def third(done, total, what):
         if what == "statistics and densities":
             with pytest.raises(RequestError, match=r"another process works on the study in .*sha"):
                 run_study(study, out)
             refused.append(what)
 
-    same(finished, run_study(study, out, progress=told))
-    assert refused
-    assert not (out / LOCK).exists()
-    (out / "study.nc").unlink()
-    (out / "units").mkdir()
-    (out / "units" / "mine").mkdir()  # is not removed, and does not matter
-    same(finished, run_study(study, out))
-    assert (out / "units" / "mine").exists()
-
-
-def test_who_waited_for_another_process_takes_its_result(study_folder, finished, monkeypatch):
-    study, out = read_study(study_folder / "study.toml"), study_folder / "behind"
-    usual = run.warn_of_slow_study
-
     def overtaken(plan, runs):
         monkeypatch.setattr(run, "warn_of_slow_study", usual)
-        run_study(study, out)
+        same(finished, run_study(study, out, progress=third))
 
     monkeypatch.setattr(run, "warn_of_slow_study", overtaken)
-    told = []
     same(finished, run_study(study, out, progress=lambda *each: told.append(each[2])))
+    assert refused
+    assert not (out / LOCK).exists()
     assert told[-1] == "finished before"
     assert not any(each.startswith("fitting") for each in told)
 
@@ -251,11 +253,11 @@ def test_other_words_reach_a_finished_study(study_folder, finished):
     with (study_folder / "study.toml").open("a", encoding="utf-8") as file:
         file.write("\n[output]\npaper = true\n")
     again = run_study(read_study(study_folder / "study.toml"), study_folder / "out")
-    kept = store.read_result(study_folder / "out")
-    for found in (again, kept):
-        assert found.attrs["study"] == "renamed"
-        assert found.shows_paper
-        same(finished, found)
+    kept = xr.load_dataset(read_sealed(study_folder / "out" / "study.nc"), engine="h5netcdf")
+    assert again.attrs["study"] == kept.attrs["study"] == "renamed"
+    assert again.shows_paper
+    assert json.loads(kept.attrs["settings"])["output"]["paper"]
+    same(finished, again)
 
 
 def test_a_folder_of_another_study_is_refused(study_folder, finished):
