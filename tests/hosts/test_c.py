@@ -134,9 +134,11 @@ def test_a_file_that_seakeep_did_not_write_stays(tmp_path, cases):
 
 
 def test_a_model_on_aligned_waves_says_so(tmp_path, make_run, channels):
-    spec = HankelDMDc(2, 2, 1.0, alignment=ProbeAlignment(surge="none", celerity=2.0))
-    header = write_c(spec.fit(make_run(), **channels), tmp_path)[0].read_text()
-    assert "Give it inputs carried likewise" in header
+    for number, offset in enumerate((0.5, 0.0)):  # without an offset nothing is carried
+        waves = ProbeAlignment(surge="none", celerity=2.0, offset=offset)
+        model = HankelDMDc(2, 2, 1.0, alignment=waves).fit(make_run(), **channels)
+        header = write_c(model, tmp_path, f"rom_{number}")[0].read_text()
+        assert ("Give it inputs carried likewise" in header) == (offset > 0)
 
 
 class TestWhatCannotBeExported:

@@ -258,7 +258,8 @@ def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path)
         for name, factor in {"ours": 0.9, "hold_last": 0.8, "arx": 0.95, "fir": 0.7}.items()
     }
     references = {"hold last": ["hold_last"], "best linear": ["arx", "fir"]}
-    averages, skill, channels = model_blocks(tables, references)
+    averages, skill, channels, extremes = model_blocks(tables, references)
+    assert extremes.title.endswith("extremes of ours")
     assert averages.columns == ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
     assert averages.rows[0][:2] == ("ours", "0.100")
     assert skill.columns == ("model", "below hold last", "below best linear")

@@ -268,6 +268,7 @@ def _runs(
         if len(names) == 1:
             yield "# train = [0.0, 60.0]  # s; in place of role, with test = [60.0, inf]"
         yield "# span = [10.0, inf]  # s; cut the start-up of the waves off"
+        yield "# sea_state = 'A'  # one word for runs in the same sea, which studies judge together"
         if set(own) != {""}:
             yield from ("", f"[runs.{_key(name)}.files]")
             yield from (f"{_key(logger)} = {_value(path)}" for logger, path in own.items())
@@ -390,6 +391,7 @@ def _model(guesses: Sequence[Guess]) -> Iterator[str]:
         yield f"# Loads ({', '.join(loads)}) may be added to the states: they are read off the"
         yield "# motions where a line goes slack and that is better. Judge their extremes."
     yield f"inputs = {_value(inputs)} # guessed: the waves that drive it"
+    yield "# kind = 'bayesian_hankel_dmdc' # an ensemble: its forecasts have a band"
     probes = [name for name in mapped if name.startswith("eta_") and name not in inputs]
     if behind := [name for name in probes if mapped[name].behind]:
         yield f"# {', '.join(behind)} left out: behind the vessel, by name, where its own waves are"

@@ -76,7 +76,8 @@ class Program:
     @property
     def is_aligned(self) -> bool:
         """Whether the model was trained on inputs carried to the vessel."""
-        return self.model.alignment is not None
+        alignment = self.model.alignment
+        return alignment is not None and alignment.settings.carries
 
     @property
     def timing(self) -> str:
@@ -88,7 +89,7 @@ class Program:
                 f"A step of {model.dt:g} s takes the inputs {ahead} samples ({ahead * model.dt:g} "
                 "s) after the instant that it starts from."
             )
-        if (alignment := model.alignment) is not None:
+        if (alignment := model.alignment) is not None and self.is_aligned:
             said += (
                 " They are waves carried to the vessel, as model.aligned_inputs(run) makes them."
             )
@@ -178,7 +179,7 @@ def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray,
     labelled.check_units(run, signature.state_labels + signature.input_labels, name)
     time = np.asarray(run["time"].values, dtype=float)
     at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
-    aligned = program.model.aligned_inputs(run) if program.is_aligned else run
+    aligned = program.model.aligned_inputs(run)
     rows = []
     for source, names, first, stop in (
         (run, signature.states, at - signature.state_delays, at + 1),

@@ -138,8 +138,8 @@ class Lead:
     def describe(self, dt: float) -> list[str]:
         """One line."""
         return [
-            f"  lead          {self.samples} samples ({self.samples * dt:g} s): a step is driven "
-            "by waves up to that much later"
+            f"  lead          {self.samples} samples: a step is driven by waves up to "
+            f"{(self.samples - 1) * dt:.3g} s after the instant that it forecasts"
         ]
 
     def to_json(self) -> Json:
@@ -216,6 +216,11 @@ class ProbeAlignment:
     highest_frequency: float | None = None
     passes: int = 2
     optional: bool = False
+
+    @property
+    def carries(self) -> bool:
+        """Whether waves are carried at all where the probes of a run stand as in training."""
+        return self.surge != "none" or self.offset != 0.0
 
     def __post_init__(self) -> None:
         check_integer("alignment: passes", self.passes, 1)
@@ -512,6 +517,8 @@ class FittedAlignment:
         if speed and settings.celerity is None:
             speed += " in training, each run's own in forecasts"
         lines = [f"  alignment     mode {settings.mode}{speed}; surge {settings.surge}"]
+        if not settings.carries:
+            return ["  alignment     none, but by the offset of a run's probes where it has one"]
         if settings.offset < 0:
             lines.append(
                 f"    offset {settings.offset:g} m carries the waves upstream: a forecast reads "

@@ -567,8 +567,8 @@ class Observed:
             delays = "with the input delays" if bound.delayed else "at lags of their own"
             what = ", ".join(getattr(each, "of", ())) or getattr(each, "expression", "")
             lines.append(
-                f"  observable    {each.kind} of {what}: {columns} {delays}, reads "
-                f"{ahead * dt:.3g} s ahead"
+                f"  observable    {each.kind} of {what}: {columns} {delays}, reads up to "
+                f"{max(ahead - 1, 0) * dt:.3g} s after the instant forecast"
             )
         return lines
 

@@ -777,8 +777,8 @@ def select(
     )
     count = sum(len(trial.means) for _, trial in found.trials)
     note = (
-        f"{level}: out of {count} settings in free runs on {len(problems[0].folds())} parts held "
-        f"out in turn, mean NRMSE {score:.3f}"
+        f"{level}: out of {count} settings (below, the best λ of each kind) in free runs on "
+        f"{len(problems[0].folds())} parts held out in turn, mean NRMSE {score:.3f}"
     )
     if folds == "sea_state":
         note += f"; {_words_of_groups(problems[0].groups)}"

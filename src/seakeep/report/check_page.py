@@ -52,7 +52,8 @@ def response_section(checked: Checked) -> Section | None:
         "the training input holds no energy there.",
         partial(checks.response, found, measured),
     )
-    tables = [] if measured is None else [_points_table(measured, found)]
+    regular = measured is not None and (measured["kind"] == "regular").any()
+    tables = [_points_table(measured, found)] if measured is not None and regular else []
     if "validation" in checked.found:
         tables.append(_validation_table(checked.found["validation"]))
     return Section("response", "Response", tuple(words), figures=(drawing,), tables=tuple(tables))
@@ -235,7 +236,10 @@ def decay_section(checked: Checked) -> Section | None:
         if (measured := checked.found.get("measured_decay")) is not None:
             rows += [_decay_row(measured.sel(run=run)) for run in measured["run"].values]
         columns = ("motion", "period [s]", "damping ratio", "p", "q [1/m or 1/rad]", "of")
-        note = "Decrement of a cycle p + q a. A linear model's does not depend on the amplitude a."
+        note = (
+            "Decrement of a cycle p + q a. A linear model's does not depend on the amplitude a. A "
+            "dash: fewer than three extremes, as where a motion creeps back."
+        )
         tables.append(Table("decay", "Free decay", columns, tuple(rows), note, (1, 2, 3, 4)))
         caption = "What is left of an offset of one training SD after its release in still water."
         figures.append(Drawing("decay", caption, partial(checks.decay, found)))

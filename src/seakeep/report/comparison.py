@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -180,6 +181,8 @@ def model_blocks(
         columns = ("channel", *of_run)
         numeric = tuple(range(1, len(columns)))
         yield Table(f"channels_{run}", f"{run}: NRMSE", columns, tuple(channels), "", numeric)
+        name, at = next(iter(of_run.items()))
+        yield replace(_extremes(at, str(run)), title=f"{run}: extremes of {name}")
 
 
 def _skill(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -358,6 +358,26 @@ def residuals(
     return figure
 
 
+def by_state(
+    found: xr.Dataset,
+    states: Sequence[str] | None,
+    axes: Sequence[Axes] | Axes | None,
+    height: float,
+    draw: Callable[[Any, xr.Dataset, float, str], None],
+) -> Figure:
+    """A panel for each state: `draw` takes Axes, the state's results, factor and unit to show."""
+    chosen = _chosen(found, states)
+    with figure_style():
+        figure, places = panels(axes, len(chosen), 3, (3.0, height))
+        for name, place in zip(chosen, places, strict=True):
+            own = found.sel(state=name)
+            factor, units = displayed(str(own["units"].values))
+            draw(place, own, factor, shown_unit(units) or "?")
+        if axes is None:
+            legend_below(figure, places[0])
+    return figure
+
+
 def exceedance(
     found: xr.Dataset,
     *,
@@ -379,43 +399,33 @@ def exceedance(
     -------
     Figure
     """
-    chosen = _chosen(found, states)
-    with figure_style():
-        figure, places = panels(axes, len(chosen), 3, (3.0, 2.0))
-        for name, place in zip(chosen, places, strict=True):
-            own = found.sel(state=name)
-            factor, units = displayed(str(own["units"].values))
-            measured = own.sel(kind="measured")
-            largest = float(np.nanmax(own["peak"], initial=0.0))
-            level = np.linspace(0, 1.1 * largest or 1.0, 200)
-            thin = {"color": COLOURS["input"], "linewidth": 0.9}
-            if (spread := float(measured["rayleigh_scale"])) > 0:
-                rayleigh = np.exp(-0.5 * (level / spread) ** 2)
-                place.semilogy(factor * level, rayleigh, **thin, linestyle=":", label="Rayleigh")
-            k, b = float(measured["weibull_shape"]), float(measured["weibull_scale"])
-            if np.isfinite(k):
-                weibull = np.exp(-((level / b) ** k))
-                place.semilogy(factor * level, weibull, **thin, label="Weibull of the measured")
-            marks = (("measured", "o", "none"), ("forecast", "x", LINES["forecast"]["color"]))
-            for kind, mark, face in marks:
-                at = own.sel(kind=kind)
-                style = {
-                    "marker": mark,
-                    "markersize": 3,
-                    "linestyle": "none",
-                    "markerfacecolor": face,
-                }
-                colour = LINES[kind]["color"]
-                place.semilogy(
-                    factor * at["peak"], at["exceedance"], color=colour, **style, label=kind
-                )
-            place.set_ylim(0.3 / max(int(own["peaks"].max()), 1), 1.3)
-            place.set_xlim(0, factor * level[-1])
-            place.set_xlabel(f"peak of {short_label(name)} [{shown_unit(units) or '?'}]")
-            place.set_ylabel("exceeded by [1]")
-        if axes is None:
-            legend_below(figure, places[0])
-    return figure
+    return by_state(found, states, axes, 2.0, _exceedance)
+
+
+def _exceedance(place: Any, own: xr.Dataset, factor: float, unit: str) -> None:
+    measured = own.sel(kind="measured")
+    largest = float(np.nanmax(own["peak"], initial=0.0))
+    level = np.linspace(0, 1.1 * largest or 1.0, 200)
+    thin = {"color": COLOURS["input"], "linewidth": 0.9}
+    if (spread := float(measured["rayleigh_scale"])) > 0:
+        rayleigh = np.exp(-0.5 * (level / spread) ** 2)
+        place.semilogy(factor * level, rayleigh, **thin, linestyle=":", label="Rayleigh")
+    k, b = float(measured["weibull_shape"]), float(measured["weibull_scale"])
+    if np.isfinite(k):
+        weibull = np.exp(-((level / b) ** k))
+        place.semilogy(factor * level, weibull, **thin, label="Weibull of the measured")
+    for kind, mark, face in (
+        ("measured", "o", "none"),
+        ("forecast", "x", LINES["forecast"]["color"]),
+    ):
+        at = own.sel(kind=kind)
+        style = {"marker": mark, "markersize": 3, "linestyle": "none", "markerfacecolor": face}
+        peak, colour = factor * at["peak"], LINES[kind]["color"]
+        place.semilogy(peak, at["exceedance"], color=colour, **style, label=kind)
+    place.set_ylim(0.3 / max(int(own["peaks"].max()), 1), 1.3)
+    place.set_xlim(0, factor * level[-1])
+    place.set_xlabel(f"peak of {short_label(str(own['state'].values))} [{unit}]")
+    place.set_ylabel("exceeded by [1]")
 
 
 def density(
@@ -424,37 +434,17 @@ def density(
     states: Sequence[str] | None = None,
     axes: Sequence[Axes] | Axes | None = None,
 ) -> Figure:
-    """Draw the densities of states, measured and forecast.
+    """Draw the densities of states, measured and forecast; arguments as :func:`exceedance`."""
+    return by_state(found, states, axes, 1.9, _density)
 
-    Parameters
-    ----------
-    found : Dataset
-        From :func:`seakeep.check.statistics`.
-    states : sequence of str, optional
-        States to draw; by default all.
-    axes : Axes or sequence of Axes, optional
-        One for each state; by default those of a new figure.
 
-    Returns
-    -------
-    Figure
-    """
-    chosen = _chosen(found, states)
-    with figure_style():
-        figure, places = panels(axes, len(chosen), 3, (3.0, 1.9))
-        for name, place in zip(chosen, places, strict=True):
-            own = found.sel(state=name)
-            factor, units = displayed(str(own["units"].values))
-            unit = shown_unit(units) or "?"
-            for kind in ("measured", "forecast"):
-                height = own["density"].sel(kind=kind) / factor
-                place.plot(factor * own["deviation"], height, **LINES[kind], label=kind)
-            place.set_ylim(bottom=0)
-            place.set_xlabel(f"{short_label(name)} from its mean [{unit}]")
-            place.set_ylabel(f"density [1/{unit}]")
-        if axes is None:
-            legend_below(figure, places[0])
-    return figure
+def _density(place: Any, own: xr.Dataset, factor: float, unit: str) -> None:
+    for kind in ("measured", "forecast"):
+        height = own["density"].sel(kind=kind) / factor
+        place.plot(factor * own["deviation"], height, **LINES[kind], label=kind)
+    place.set_ylim(bottom=0)
+    place.set_xlabel(f"{short_label(str(own['state'].values))} from its mean [{unit}]")
+    place.set_ylabel(f"density [1/{unit}]")
 
 
 def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Figure:
