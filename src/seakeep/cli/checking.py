@@ -63,7 +63,10 @@ def check(
     for section in check_sections(checked):
         for text in (*section.points, *section.notices):
             results().print(f"{section.title}: {text}", soft_wrap=True)
-    kind = f"{len(identified.states)} states, {len(identified.inputs)} inputs"
+    kind = ", ".join(
+        counted(len(names), what)
+        for names, what in ((identified.states, "state"), (identified.inputs, "input"))
+    )
     words = f"{model.name}, a model of kind {identified.kind} ({kind}), on {read.name}."
     page = write_check(checked, out, f"{model.stem}: what the model is worth", words)
     messages().print(f"Wrote {page}.")
