@@ -40,6 +40,7 @@ def check(
     from seakeep.campaign import load_prepared, read_campaign
     from seakeep.check import check_model
     from seakeep.models import load_model
+    from seakeep.models.forecasts import counted
     from seakeep.quality import warn_of_runs
     from seakeep.report.check_page import check_sections, write_check
     from seakeep.study import fit_baselines
