@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from moored import moored_run
 
-from seakeep import HankelDMDc, check, metrics
+from seakeep import HankelDMDc, metrics
 from seakeep.baselines import FIR, Mean
 from seakeep.check import check_model
 from seakeep.check.parts import free_runs
@@ -42,8 +42,13 @@ def baselines(runs):
     return {"mean": Mean().fit(train, STATES), "fir": FIR(0).fit(train, STATES, ["eta"])}
 
 
-def test_errors_are_those_of_the_tests_and_verdicts_follow_from_them(model, runs, baselines):
-    found = check.worth(model, runs, baselines)
+@pytest.fixture(scope="module")
+def checked(model, runs, baselines):
+    return check_model(model, runs, None, baselines)
+
+
+def test_errors_are_those_of_the_tests_and_verdicts_follow_from_them(model, runs, checked):
+    found = checked.found["worth"]
     assert found.attrs["of"] == "tests"
     assert [*found["run"].values] == ["one", "two"]
     free = free_runs(model, {"one": runs["one"]})["one"]
@@ -60,8 +65,8 @@ def test_errors_are_those_of_the_tests_and_verdicts_follow_from_them(model, runs
     assert calm.change.sel(model="fir").values == pytest.approx(ratio.values)
 
 
-def test_the_page_starts_with_the_verdict(model, runs, baselines):
-    first, *_ = check_sections(check_model(model, runs, None, baselines))
+def test_the_page_starts_with_the_verdict(checked):
+    first, *_ = check_sections(checked)
     text = "\n".join(first.points)
     assert "1 test in irregular waves: ANRMSE 0.0" in text
     assert "of the best baseline, " in text
@@ -71,8 +76,8 @@ def test_the_page_starts_with_the_verdict(model, runs, baselines):
     assert [table.name for table in first.tables] == ["worth", "verdicts"]
 
 
-def test_training_is_judged_apart(model, runs):
-    found = check_model(model, runs).found
+def test_training_is_judged_apart(model, runs, checked):
+    found = checked.found
     assert found["residuals"].attrs["of"] == "tests"
     assert found["training_residuals"].attrs["of"] == "training"
     alone = check_model(model, {"train": runs["train"]})

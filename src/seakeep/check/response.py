@@ -289,7 +289,7 @@ def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Da
     found = estimate(harmonics[:, 1:] / harmonics[:, :1], type_b)
     offset = means[:, 1:] - model.signature.state_scale.centre
     sure = estimate(offset.astype(complex), np.array(accuracy[1:]))
-    return _point(
+    return _points(
         model,
         {"run": name, "kind": "regular", "frequency": frequency, "wave_amplitude": amplitude},
         {
@@ -322,29 +322,29 @@ def _irregular_points(model: Model, parts: list[Part], reference: int, period: f
         )
     coherence = spectra.ordinary()[:, 0]
     name = ", ".join(str(part.run.attrs.get("run", "run")) for part in parts)
-    points = []
-    for at in np.flatnonzero((power >= POWER * power.max()) & (spectra.frequency > 0)):
-        amplitude, half = np.abs(gain[at]), radius[at]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            turn = np.where(half < amplitude, np.arcsin(np.minimum(half / amplitude, 1)), np.pi)
-        nothing = np.full(len(model.states), np.nan)
-        points.append(
-            _point(
-                model,
-                {"run": name, "kind": "irregular", "frequency": spectra.frequency[at],
-                 "wave_amplitude": np.nan},
-                {
-                    "amplitude": amplitude,
-                    "phase": np.degrees(np.angle(gain[at])),
-                    "amplitude_uncertainty": half,
-                    "phase_uncertainty": np.degrees(turn),
-                    "coherence": coherence[at],
-                    "offset": nothing,
-                    "offset_uncertainty": nothing,
-                },
-            )
-        )  # fmt: skip
-    return xr.concat(points, dim="point", coords="minimal")
+    at = np.flatnonzero((power >= POWER * power.max()) & (spectra.frequency > 0))
+    amplitude, half = np.abs(gain[at]), radius[at]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turn = np.where(half < amplitude, np.arcsin(np.minimum(half / amplitude, 1)), np.pi)
+    nothing = np.full_like(amplitude, np.nan)
+    return _points(
+        model,
+        {
+            "run": [name] * at.size,
+            "kind": ["irregular"] * at.size,
+            "frequency": spectra.frequency[at],
+            "wave_amplitude": [np.nan] * at.size,
+        },
+        {
+            "amplitude": amplitude,
+            "phase": np.degrees(np.angle(gain[at])),
+            "amplitude_uncertainty": half,
+            "phase_uncertainty": np.degrees(turn),
+            "coherence": coherence[at],
+            "offset": nothing,
+            "offset_uncertainty": nothing,
+        },
+    )
 
 
 def _gain(
@@ -362,13 +362,13 @@ def _gain(
     return whole, gain[:, 0], np.hypot(radius, moved)[:, 0]
 
 
-def _point(
-    model: Model, of_point: Mapping[str, object], values: Mapping[str, FloatArray]
+def _points(
+    model: Model, of_points: Mapping[str, npt.ArrayLike], values: Mapping[str, FloatArray]
 ) -> xr.Dataset:
     return xr.Dataset(
-        {key: (("point", "state"), value[None]) for key, value in values.items()},
+        {key: (("point", "state"), np.atleast_2d(value)) for key, value in values.items()},
         coords={"state": model.states}
-        | {key: ("point", [value]) for key, value in of_point.items()},
+        | {key: ("point", np.atleast_1d(value)) for key, value in of_points.items()},
     )
 
 
