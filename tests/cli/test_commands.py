@@ -672,6 +672,12 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
             2,
             r"steps: received '12\.5'\. Give a whole number such as 400, or encounter periods",
         ),
+        (f"compare model.nc {CAMPAIGN} --steps infT", 2, r"steps: received 'infT'\. Give a whole"),
+        (
+            f"compare model.nc {CAMPAIGN} --steps 1",
+            2,
+            r"has 1 measured instant\(s\), .* earlier start",
+        ),
         (
             f"forecast model.nc {CAMPAIGN} --run unseen --start '900 T' -o f.nc",
             2,

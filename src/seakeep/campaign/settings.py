@@ -85,7 +85,7 @@ class GeneralSettings(Table):
 class RigSettings(Table):
     """``[rig]``: the basin and where things stand in it."""
 
-    water_depth: Annotated[float, Field(gt=0)] | None = Field(
+    water_depth: Annotated[float, AfterValidator(_depth)] | None = Field(
         default=None, description="water depth in metres; 'inf' for deep water"
     )
     wave_direction: Finite | None = Field(
@@ -184,6 +184,13 @@ def _channel_name(name: str) -> str:
             "control characters, because variables of files are named after it; rename it"
         )
     return name
+
+
+def _depth(depth: float) -> float:
+    """Refuse depths whose waves cannot be computed."""
+    if not (1e-3 <= depth <= 1e5 or depth == math.inf):
+        raise ValueError("a water depth is 0.001 to 100 000 m, or inf for deep water; correct it")
+    return depth
 
 
 def _run_name(name: str) -> str:

@@ -431,6 +431,12 @@ def _compare_run(
     found = forecast_run(run, start, steps)
     # The last instant may lie a step beyond the record: the input before it is known.
     inside = found[model.states].sel(time=slice(None, time[-1])).assign_attrs(found.attrs)
+    if (known := inside.sizes["time"]) < 2:
+        raise RequestError(
+            f"the forecast of {name} from {start:g} s has {known} measured instant(s), and errors "
+            f"are judged over two or more; the run ends at {time[-1]:g} s. Choose an earlier start "
+            "or more steps."
+        )
     instants = {"time": inside["time"]}
     forecast, band = inside, None
     if "statistic" in inside.dims:
@@ -685,7 +691,7 @@ def _count(stated: str, name: str, otherwise: str) -> float:
         length = parse_length(stated)
     except RequestError:
         length = None
-    if length is None or length.unit != "T":
+    if length is None or length.unit != "T" or not abs(length.value) < 1e9:
         comma = " Write a decimal point, no comma." if "," in stated else ""
         raise RequestError(
             f"{name}: received '{stated}'. Give {otherwise}, or encounter periods such as "
