@@ -7,7 +7,8 @@ from scipy import signal
 
 import seakeep
 from seakeep import DataError, HankelDMDc, ProbeAlignment, RequestError, load_live
-from seakeep.models import store
+from seakeep.models import growth, store
+from seakeep.models.growth import LeadErrors
 from seakeep.waves import group_speed
 
 START, STEPS = 500, 60  # the record that is kept holds all samples up to there
@@ -268,12 +269,43 @@ def test_bands_hold_what_they_say_on_a_vessel_that_is_known(make_dataset):
     np.testing.assert_allclose(np.diagonal(model.errors.residual), sizes**2, rtol=0.13)
 
 
+def test_what_the_end_of_a_forecast_adds_to_its_errors(models, tmp_path):
+    errors = np.random.default_rng(3).standard_normal((24, 40, 1))
+    alone, square = errors[:, :20].copy(), np.mean(errors[:, 17:20] ** 2, axis=0)
+    alone[:, 17:] *= np.array([[1.0], [2.0], [3.0]])
+    added = growth._ending(alone, errors)
+    np.testing.assert_allclose(added[:2, 0] ** 2, ([3.0, 8.0] * square[1:, 0])[::-1])
+    np.testing.assert_array_equal(added[2:], 0.0)
+    told = LeadErrors(np.eye(1), np.array([[1.0], [2.0], [3.0]]), np.array([[4.0], [2.0]]))
+    np.testing.assert_allclose(told.of_forecast(3), [[1], [4 + 2**2], [9 + 4**2]])
+    np.testing.assert_allclose(told.of_forecast(1, since=1), [[4 + (4 / 2) ** 2]])
+    kept = seakeep.load_model(models["aligned"].save(tmp_path / "model.nc")).errors.ending
+    np.testing.assert_array_equal(kept, models["aligned"].errors.ending)
+    assert kept.any()
+    assert not len(models["plain"].errors.ending)
+
+
 def test_a_lost_sample_takes_predicted_inputs(models, run):
     live, whole = started(models["plain"], run), started(models["plain"], run)
     found = live.step()
     expected = play(whole, run, START, START + 1, lost=[START])[0]
     # One step ahead, waves of twenty samples a period are known to a hundredth.
     assert np.all(np.abs(found - expected) < 0.02 * models["plain"].state_scale.spread)
+
+
+def test_lost_waves_are_those_that_the_probe_up_wave_has_seen(models, run):
+    errors, rough, rng = [], run.copy(deep=True), np.random.default_rng(6)
+    for name in INPUTS:
+        rough[name].values += 5e-4 * rng.standard_normal(run.sizes["time"])
+    for like in (None, run):
+        live = models["plain"].live(like=like)
+        play(live, rough, 0, START)
+        for _ in range(10):
+            live.step()
+        apart = live._known_inputs()[-10:] - matrix(run, INPUTS)[START : START + 10]
+        errors.append(np.sqrt(np.mean(apart**2, axis=0)))
+    assert errors[1][0] == errors[0][0]  # the first probe
+    assert errors[1][1] < 0.5 * errors[0][1]
 
 
 @pytest.mark.parametrize("key", ["plain", "aligned"])

@@ -28,6 +28,8 @@ CARRIED = 2
 """Runs, the longest ones, in which the free runs lie where waves are carried to the vessel."""
 REACH = 3
 """Longest delays of the model that the free runs last."""
+RECORD = 10
+"""Lengths of a free run that the waves of one alone are carried over."""
 LEAST = 64
 """Steps that they last at least: errors of a lightly damped vessel outgrow short delays."""
 
@@ -42,14 +44,32 @@ class LeadErrors:
         Covariance of the one-step residuals.
     rms : ndarray, shape (steps, N)
         Root mean square error of free runs, 1 … steps samples after their starts; it never falls.
+    ending : ndarray, shape (last, N)
+        Root of what the mean square is larger by at the last instants of a forecast, its last one
+        first: no surge is predicted after them, which moves the waves that they look ahead to.
+        Empty where no predicted surge moves the waves.
 
     Notes
     -----
-    Both are raised to what is expected in data that did not train (:func:`lead_errors`).
+    All are raised to what is expected in data that did not train (:func:`lead_errors`).
     """
 
     residual: FloatArray
     rms: FloatArray
+    ending: FloatArray
+
+    def of_forecast(self, steps: int, since: int = 0) -> FloatArray:
+        """Mean squares over a forecast, shape (steps, N), `since` samples after measured states.
+
+        What the end adds has come about over as many steps as there were.
+        """
+        leads = np.arange(1, steps + 1)
+        variances: FloatArray = self.at(leads + since) ** 2
+        last = min(steps, len(self.ending))
+        if last:
+            part = np.minimum(leads[-last:] / len(self.ending), 1.0)[:, None]
+            variances[-last:] += (part * self.ending[last - 1 :: -1]) ** 2
+        return variances
 
     def at(self, leads: npt.ArrayLike) -> FloatArray:
         """RMS errors at leads (samples from 1 on), shape (…, N); held after the last."""
@@ -59,9 +79,11 @@ class LeadErrors:
 
     def to_variables(self) -> dict[str, tuple[tuple[str, ...], FloatArray]]:
         """Variables of a file."""
+        ending = {"ending_errors": (("from_end", "state"), self.ending)}
         return {
             "residual_covariance": (("state", "other_state"), self.residual),
             "lead_errors": (("lead", "state"), self.rms),
+            **(ending if len(self.ending) else {}),
         }
 
     @classmethod
@@ -72,6 +94,9 @@ class LeadErrors:
         return cls(
             store.numbers(dataset, "residual_covariance", (channels, channels)),
             store.numbers(dataset, "lead_errors", (None, channels)),
+            store.numbers(dataset, "ending_errors", (None, channels))
+            if "ending_errors" in dataset
+            else np.zeros((0, channels)),
         )
 
 
@@ -109,6 +134,9 @@ class Stretch:
         """What free runs from these samples read."""
         if self.source is not None and steps > 1:
             signature, name, run, begin = self.source
+            if len(starts) == 1:  # as a forecast reads it: the record up to there
+                begin_at = begin + (starts[0] - RECORD * steps) * signature.dt
+                run = run.sel(time=slice(begin_at, None))
             places = [(name, begin + at * signature.dt) for at in starts]
             return read_windows(signature, {name: run}, places, steps)
         return Windows(
@@ -143,11 +171,10 @@ def lead_errors(
     )
     longest_first = sorted(stretches, key=lambda each: each.first - each.last)
     carried = any(each.source for each in stretches)
-    parts = [
-        _errors(members, each, starts, s, z, steps, readouts)
-        for each, starts in _places(longest_first[: CARRIED if carried else None], steps, WINDOWS)
-    ]
-    errors = np.concatenate(parts)
+    places = _places(longest_first[: CARRIED if carried else None], steps, WINDOWS)
+    errors = np.concatenate(
+        [_errors(members, each, starts, s, z, steps, readouts) for each, starts in places]
+    )
     known = np.isfinite(errors)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # where all have diverged
         square = np.where(known, errors**2, 0.0).sum(axis=0) / known.sum(axis=0)
@@ -159,7 +186,27 @@ def lead_errors(
     grown = np.stack([isotonic_regression(each).x for each in square.T], axis=1)
     factor = _unseen(members, stretches)
     residual = factor * residuals.T @ residuals / len(residuals)
-    return LeadErrors(residual, np.sqrt(factor * grown))
+    ending = np.zeros((0, square.shape[1]))
+    if carried and steps > 4:
+        every = [(each, start) for each, starts in places for start in starts]
+        alone = [
+            _errors(members, each, [start], s, z, steps // 2, readouts)
+            for each, start in every[::2]
+        ]
+        ending = _ending(np.concatenate(alone), errors[::2])
+    return LeadErrors(residual, np.sqrt(factor * grown), np.sqrt(factor) * ending)
+
+
+def _ending(alone: FloatArray, errors: FloatArray) -> FloatArray:
+    """Root of what errors of runs that are read up to their ends have more than longer ones."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        more = alone**2 - errors[:, : alone.shape[1]] ** 2
+    known = np.isfinite(more)
+    mean = np.where(known, more, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    last = mean[: -1 - alone.shape[1] // 2 : -1]
+    falling = [isotonic_regression(each, increasing=False).x for each in last.T]
+    result: FloatArray = np.sqrt(np.maximum(np.stack(falling, axis=1), 0.0))
+    return result
 
 
 def _unseen(members: Sequence[Dynamics], stretches: Sequence[Stretch]) -> float:

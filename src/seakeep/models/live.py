@@ -227,7 +227,8 @@ class Live:
         ----------
         u : array_like, shape (Q,), or mapping of names to numbers, optional
             Measured inputs at this instant, physical units. None where the sample was lost: its
-            inputs are predicted from those before.
+            inputs are predicted from those before, and from the probe up-wave where positions are
+            known.
         y : array_like, shape (N,), or mapping of names to numbers, optional
             Measured states at this instant, NaN for what is missing; a mapping may leave them out.
         time : float, optional
@@ -295,8 +296,7 @@ class Live:
                     f"the inputs of a lost sample are predicted from those before, and there are "
                     f"{filled}. Start with at least 4 samples of u."
                 )
-            expected: FloatArray = predict_waves(self._known_inputs(), 1)[0]
-            return expected
+            return self._foreseen()
         inputs = _sample("u", u, names)
         if not np.all(np.isfinite(inputs)):
             bad = names[int(np.flatnonzero(~np.isfinite(inputs))[0])]
@@ -305,6 +305,18 @@ class Live:
                 "all inputs of the sample are predicted then."
             )
         return inputs
+
+    def _foreseen(self) -> FloatArray:
+        """Inputs of a sample that was lost: from each record, and from the probe up-wave."""
+        known, placed = self._known_inputs(), np.count_nonzero(np.isfinite(self._places))
+        expected: FloatArray
+        if placed < 2 or not self.ready:
+            expected = predict_waves(known, 1)[0]
+            return expected
+        rng, dt = np.random.default_rng(0), self.signature.dt
+        pair = draw_sea(known, 1, 1, rng, dt=dt, positions=self._places, depth=self._depth)
+        expected = pair.mean(axis=0)[0]  # the draws lie about it
+        return expected
 
     def _known_inputs(self) -> FloatArray:
         """Inputs that waves are predicted from: the last ones, always as many once there are."""
@@ -491,9 +503,10 @@ class Live:
         Dataset
             States with dimensions (statistic, time): ``mean``, ``std``, ``lower``, ``upper``.
             Each channel's ``attrs["lead_time"]`` is the time after :attr:`time` up to which its
-            ``std`` stays below ``attrs["share"]`` of its SD in training, s. ``std`` holds the
-            errors of free runs in training, those of the estimate, the spread of the members and
-            that of the waves that are not known. ``attrs["predictable"]`` is the time for which
+            ``std`` stays below ``attrs["share"]`` of its SD in training, s; where it is as long as
+            the forecast, it is at least that. ``std`` holds the errors of free runs in training,
+            those of the estimate, the spread of the members and that of the waves that are not
+            known. ``attrs["predictable"]`` is the time for which
             the waves at the probe farthest down-wave are known from the one farthest up-wave, s
             (:func:`seakeep.signals.prediction.predictable_time`); 0 without positions and depth.
 
@@ -597,11 +610,10 @@ class Live:
 
     def _error_variances(self, steps: int) -> FloatArray:
         """Variances of the model's errors and the estimate's, never above the open loop's."""
-        leads, since = np.arange(1, steps + 1), self._at["since"]
-        own = self.errors.at(leads) ** 2
+        own = self.errors.of_forecast(steps)
         if not self._filter.covariance.any():
             return own
-        bound = self.errors.at(leads + since) ** 2
+        bound = self.errors.of_forecast(steps, self._at["since"])
         if not self._at["partly"]:
             return bound
         result: FloatArray = np.minimum(own + self._filter.ahead(steps), bound)

@@ -36,7 +36,7 @@ def nowcast_blocks(found: Mapping[str, xr.Dataset]) -> Iterator[Table]:
             rows = [
                 (
                     str(name),
-                    number(float(each["lead_time"])),
+                    _lead_time(float(each["lead_time"]), float(lead[-1])),
                     *(number(float(each["error"][place])) for place in places),
                     f"{float(each['coverage'].mean()):.0f}",
                 )
@@ -52,6 +52,11 @@ def nowcast_blocks(found: Mapping[str, xr.Dataset]) -> Iterator[Table]:
             columns = (*columns, "in band %")
             numeric = tuple(range(1, len(columns)))
             yield Table(f"nowcast_{model}_{run}", title, columns, tuple(rows), note, numeric)
+
+
+def _lead_time(found: float, longest: float) -> str:
+    """In words where the error was below the share as far as forecasts went."""
+    return number(found) if found < longest - 1e-9 else f"at least {number(longest)}"
 
 
 def write_nowcasts(found: Mapping[str, xr.Dataset], path: Path) -> Path:

@@ -105,7 +105,8 @@ def nowcast(
     Dataset
         Over (channel, lead): ``error`` and ``claimed``, root mean square error and what the model
         says of it, in training SDs, and ``coverage`` of the band, %; over channel ``lead_time``,
-        s, up to which ``error`` stays below ``attrs["share"]``. No wave after a start is read.
+        s, up to which ``error`` stays below ``attrs["share"]``: the longest lead where it never
+        rises above. No wave after a start is read.
 
     Raises
     ------
