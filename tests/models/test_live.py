@@ -276,9 +276,9 @@ def test_what_the_end_of_a_forecast_adds_to_its_errors(models, tmp_path):
     added = growth._ending(alone, errors)
     np.testing.assert_allclose(added[:2, 0] ** 2, ([3.0, 8.0] * square[1:, 0])[::-1])
     np.testing.assert_array_equal(added[2:], 0.0)
-    told = LeadErrors(np.eye(1), np.array([[1.0], [2.0], [3.0]]), np.array([[4.0], [2.0]]))
-    np.testing.assert_allclose(told.of_forecast(3), [[1], [4 + 2**2], [9 + 4**2]])
-    np.testing.assert_allclose(told.of_forecast(1, since=1), [[4 + (4 / 2) ** 2]])
+    told = LeadErrors(np.eye(1), *(np.array([each]).T for each in ([1.0, 2, 3], [4.0, 3, 2, 1])))
+    np.testing.assert_allclose(told.of_forecast(3), [[1 + 4 / 2], [4 + 9], [9 + 16]])
+    np.testing.assert_allclose(told.of_forecast(1, since=1), [[4 + 16 / 2]])
     kept = seakeep.load_model(models["aligned"].save(tmp_path / "model.nc")).errors.ending
     np.testing.assert_array_equal(kept, models["aligned"].errors.ending)
     assert kept.any()

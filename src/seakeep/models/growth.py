@@ -61,14 +61,14 @@ class LeadErrors:
     def of_forecast(self, steps: int, since: int = 0) -> FloatArray:
         """Mean squares over a forecast, shape (steps, N), `since` samples after measured states.
 
-        What the end adds has come about over as many steps as there were.
+        What the end adds comes about over half as many steps as it is told for.
         """
         leads = np.arange(1, steps + 1)
         variances: FloatArray = self.at(leads + since) ** 2
         last = min(steps, len(self.ending))
         if last:
-            part = np.minimum(leads[-last:] / len(self.ending), 1.0)[:, None]
-            variances[-last:] += (part * self.ending[last - 1 :: -1]) ** 2
+            part = np.minimum(2.0 * leads[-last:] / len(self.ending), 1.0)[:, None]
+            variances[-last:] += part * self.ending[last - 1 :: -1] ** 2
         return variances
 
     def at(self, leads: npt.ArrayLike) -> FloatArray:
