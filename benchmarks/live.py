@@ -2,6 +2,7 @@
 
 python benchmarks/live.py steps [COUNT]                  # time and memory of COUNT steps
 python benchmarks/live.py bands CAMPAIGN.toml [KIND [STARTS]]     # errors and bands; KIND of SPECS
+python benchmarks/live.py lost CAMPAIGN.toml                      # filling of lost samples of waves
 python benchmarks/live.py chain MODEL.nc CAMPAIGN.toml RUN    # live chain against the offline one
 """
 
@@ -16,6 +17,7 @@ import xarray as xr
 import seakeep
 from seakeep.campaign import load_prepared
 from seakeep.formats import read_columns
+from seakeep.signals.prediction import draw_sea, predict_waves
 
 TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorial" / "campaign.toml"
 LEADS = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0)
@@ -61,7 +63,7 @@ def steps(count=1_000_000):
             )
 
 
-def bands(campaign, kind="plain", starts=40):
+def bands(campaign, kind="plain", starts=60):
     """Errors of forecasts and what 95 % bands hold: each training run held out once, and played.
 
     The waves after a start are known; or predicted, with what the probe up-wave has seen; or
@@ -115,6 +117,29 @@ def _served(model, run, steps, starts):
     }
 
 
+def lost(campaign, gaps=100):
+    """Errors in gaps of waves that are filled from each record, or from the probe up-wave too."""
+    read = seakeep.read_campaign(campaign)
+    name, names = read.training_runs[0], list(read.model().inputs)
+    run = load_prepared(read, names=[name])[name]
+    u = np.stack([run[each].values for each in names], axis=1)
+    rig = {"dt": float(run.attrs["dt"]), "depth": float(run.attrs["water_depth"])}
+    rig["positions"] = [run[each].attrs["x_position"] for each in names]
+    fills = {
+        "own record": lambda record, count: predict_waves(record, count),
+        "up-wave": lambda record, count: draw_sea(
+            record, count, 1, np.random.default_rng(0), **rig
+        ).mean(axis=0),
+    }
+    for words, fill in fills.items():
+        begun, apart = time.process_time(), []
+        for at in np.linspace(1600, len(u) - 40, int(gaps)).astype(int):
+            apart.append(fill(u[at - 1552 : at], 16) - u[at : at + 16])
+        spent = 1e3 * (time.process_time() - begun) / int(gaps)
+        error = np.sqrt(np.mean(np.square(apart), axis=0)) / u.std(axis=0)
+        print(f"{words}: SD at 1 and 16 samples {error[[0, -1]].round(3).tolist()}, {spent:.0f} ms")
+
+
 def chain(model, campaign, name, until=120.0):
     """Difference of live and offline samples, and of forecasts that start from them."""
     fitted, read = seakeep.load_model(model), seakeep.read_campaign(campaign)
@@ -161,4 +186,4 @@ def chain(model, campaign, name, until=120.0):
 
 
 if __name__ == "__main__":
-    {"steps": steps, "bands": bands, "chain": chain}[sys.argv[1]](*sys.argv[2:])
+    {"steps": steps, "bands": bands, "lost": lost, "chain": chain}[sys.argv[1]](*sys.argv[2:])

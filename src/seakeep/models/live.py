@@ -202,8 +202,8 @@ class Live:
         """Running mean of the normalised innovation squared, per measured state.
 
         One where the innovations are as large as the residuals of training, over the last few
-        hundred samples. Well above one, the model no longer fits the vessel, or a sensor its
-        channel; NaN before the first prediction.
+        hundred samples. Well above one for longer than that, the model no longer fits the vessel,
+        or a sensor its channel; NaN before the first prediction.
         """
         return self._sum / self._weight if self._weight else math.nan
 
