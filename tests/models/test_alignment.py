@@ -307,7 +307,7 @@ def test_a_predicted_surge_gives_the_same_arrays_with_an_executor(runs):
     ensemble = aligned_ensemble(runs, mode="dispersion", surge="predicted")
     run = drifting_run(7)
     alone = ensemble.forecast(run, start=60.0, steps=30)
-    with processes(2) as executor:
+    with processes(1) as executor:
         other = ensemble.forecast(run, start=60.0, steps=30, executor=executor)
     xr.testing.assert_identical(alone, other)
 
