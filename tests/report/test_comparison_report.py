@@ -8,15 +8,18 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from seakeep.files import check_output
 from seakeep.report.comparison import (
     band_findings,
     comparison_blocks,
     difference_blocks,
+    forecast_header,
     model_blocks,
     write_comparison,
     write_differences,
     write_forecast,
 )
+from seakeep.report.nowcast import write_nowcasts
 from seakeep.report.style import LINES
 from seakeep.study import (
     Comparison,
@@ -162,6 +165,17 @@ def test_the_figure_of_an_ensemble_shows_mean_and_band():
     figure.draw_without_rendering()
     box = legend.get_window_extent()
     assert box.y1 <= figure.axes[-1].get_tightbbox().y0 + 1  # below the panels, over none
+
+
+def test_no_name_is_a_formula_in_what_is_written(tmp_path):
+    name, data = "=1+1", {key: ("channel", [0.5]) for key in ("error", "claimed", "coverage")}
+    made = xr.Dataset(data, {"channel": [name]}).expand_dims(run=[name], lead=[1.0])
+    path = write_nowcasts({name: made.assign(lead_time=("channel", [1.0]))}, tmp_path / "n.csv")
+    assert path.read_text().splitlines()[1] == "'=1+1,'=1+1,'=1+1,1.0,0.5,0.5,0.5,1.0"
+    forecast = xr.Dataset({name: ("time", [1.0])}, {"time": [0.1]})
+    path = write_forecast(forecast, tmp_path / "f.csv")
+    assert path.read_text().splitlines()[0] == "time [s],'=1+1 []"
+    check_output(path, "forecast", header=forecast_header([name]))  # may be replaced
 
 
 def test_labels_of_many_channels_are_whole_and_apart():

@@ -24,6 +24,7 @@ __all__ = [
     "forecast_header",
     "forecast_words",
     "model_blocks",
+    "plain_cells",
     "write_comparison",
     "write_differences",
     "write_forecast",
@@ -250,9 +251,7 @@ def write_differences(table: xr.Dataset, path: Path) -> Path:
     front = ["run", "wave_period", "model"]
     whole = whole[front + [name for name in whole.columns if name not in front]]
     with replacing(path) as temporary:
-        whole.map(lambda cell: plain_cell(cell) if isinstance(cell, str) else cell).to_csv(
-            temporary, index=False
-        )
+        plain_cells(whole).to_csv(temporary, index=False)
     return path
 
 
@@ -303,10 +302,13 @@ def write_comparison(tables: Mapping[str, xr.Dataset], path: Path) -> Path:
     front = ["run", "channel", "channel_units", *["model"] * (len(tables) > 1)]
     whole = whole[front + [name for name in whole.columns if name not in front]]
     with replacing(path) as temporary:
-        whole.map(lambda cell: plain_cell(cell) if isinstance(cell, str) else cell).to_csv(
-            temporary, index=False
-        )
+        plain_cells(whole).to_csv(temporary, index=False)
     return path
+
+
+def plain_cells(table: pd.DataFrame) -> pd.DataFrame:
+    """A table in which no text is a formula."""
+    return table.map(lambda cell: plain_cell(cell) if isinstance(cell, str) else cell)
 
 
 def forecast_header(states: Sequence[str]) -> str:
@@ -314,7 +316,7 @@ def forecast_header(states: Sequence[str]) -> str:
 
     Measurements have such headers too: ours alone end in CR LF, and their rows in LF.
     """
-    one = rf"({'|'.join(map(re.escape, states))})( (std|lower|upper|member \d+))? \[[^]]*\]"
+    one = rf"'?({'|'.join(map(re.escape, states))})( (std|lower|upper|member \d+))? \[[^]]*\]"
     return rf'time \[s\](,"?{one}"?)+(,scale_factor)?\r\n[^\r\n]*\n'
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.files import replacing
+from seakeep.report.comparison import plain_cells
 from seakeep.report.figures.common import FURTHER, grid_of_axes, short_label
 from seakeep.report.style import figure_style, new_figure
 from seakeep.report.tables import Table, number
@@ -66,7 +67,7 @@ def write_nowcasts(found: Mapping[str, xr.Dataset], path: Path) -> Path:
         for model, of_model in found.items():
             table = of_model[HEADER.split(",")[4:]].to_dataframe().reset_index()
             table.insert(0, "model", model)
-            table[HEADER.split(",")].to_csv(stream, index=False, header=False)
+            plain_cells(table[HEADER.split(",")]).to_csv(stream, index=False, header=False)
     return path
 
 
