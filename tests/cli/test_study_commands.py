@@ -124,21 +124,21 @@ def test_output_in_a_code_page_without_greek_letters_is_no_error(monkeypatch):
     assert b"? over 15 T?" in stream.buffer.getvalue()
 
 
-def test_reproduce_replaces_no_note_of_the_user(tmp_path, capfd):
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("raw/study.toml", "exists and is not a reproduction's study file"),
+        ("report.html", "exists and is not a report that seakeep wrote"),
+        ("tables/mine.csv", "tables holds files that no report of seakeep wrote"),
+        ("campaign/played.txt", "exists and is not a note of a campaign played"),
+    ],
+)
+def test_reproduce_replaces_no_file_of_the_user(name, words, tmp_path, capfd):
     pytest.importorskip("seakeep.tank.play", reason="the virtual tank needs its libraries")
-    own = tmp_path / "campaign" / "played.txt"
-    own.parent.mkdir()
+    own = tmp_path / name
+    own.parent.mkdir(exist_ok=True)
     own.write_text("mine")
     assert cli.main(["reproduce", "--quick", "-o", str(tmp_path)]) == 2
-    assert "played.txt exists and is not a note of a campaign played" in capfd.readouterr().err
+    assert words in capfd.readouterr().err
     assert own.read_text() == "mine"
-
-
-def test_reproduce_replaces_no_study_file_of_the_user(tmp_path, capfd):
-    own = tmp_path / "raw" / "study.toml"
-    own.parent.mkdir()
-    own.write_text("mine")
-    assert cli.main(["reproduce", "--quick", "-o", str(tmp_path)]) == 2
-    assert "exists and is not a reproduction's study file" in capfd.readouterr().err
-    assert own.read_text() == "mine"
-    assert not (tmp_path / "campaign").exists()
+    assert not (tmp_path / "campaign" / "raw").exists()

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from seakeep.files import replacing
+from seakeep.files import check_output, replacing
 from seakeep.report.html import inline_svg, rendered
 from seakeep.report.section import Drawing, Section
 from seakeep.report.sections import SECTIONS
@@ -102,6 +102,7 @@ def write_page(
         The page.
     """
     tell = progress or (lambda done, total, what: None)
+    check_output(folder / "report.html", "report")
     drawings = [each for section in sections for each in section.figures]
     drawn: dict[str, Markup | None] = {}
     with storing(folder), figure_style():

@@ -22,7 +22,7 @@ import xarray as xr
 from seakeep.campaign import read_campaign, write_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
-from seakeep.files import MARK, check_output, replacing
+from seakeep.files import MARK, check_output, check_report, replacing
 from seakeep.models.executor import as_finished, on_this_machine
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
@@ -173,6 +173,7 @@ def reproduce(
         with storing(out):
             (out / act.name).mkdir(parents=True, exist_ok=True)
         check_output(out / act.name / "study.toml", STUDY_FILE)
+    check_report(out)
     nominal = _play(out / "campaign", seed, progress)
     campaigns = [out / "campaign" / "campaign.toml"]
     if any(act.without_drift for act in acts):
