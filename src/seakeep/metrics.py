@@ -196,7 +196,8 @@ def _valued(
 
 def _block(p: FloatArray, m: FloatArray) -> int:
     """Instants over which the squared errors of a forecast depend on each other."""
-    square = np.nansum(((p - m) / m.std(axis=-2, keepdims=True)) ** 2, axis=-1)
+    spread = m.std(axis=-2, keepdims=True)
+    square = np.nansum(((p - m) / np.where(spread > 0, spread, np.nan)) ** 2, axis=-1)
     square = np.where(np.isfinite(square), square, 0.0).reshape(-1, p.shape[-2]).mean(axis=0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeakeepWarning)  # few blocks widen the interval

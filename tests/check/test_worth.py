@@ -1,12 +1,14 @@
 """The first screen: error beside baselines, and a verdict that follows from it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from moored import moored_run
 
 from seakeep import HankelDMDc, metrics
 from seakeep.baselines import FIR, Mean
-from seakeep.check import check_model
+from seakeep.check import Checked, check_model, worth
 from seakeep.check.parts import free_runs
 from seakeep.report.check_page import check_sections
 
@@ -84,3 +86,51 @@ def test_training_is_judged_apart(model, runs, checked):
     assert "training_residuals" not in alone.found
     points = check_sections(alone)[0].points
     assert points[0].startswith("No run tests the model.")
+
+
+def worded(found, **more):
+    return check_sections(replace(Checked({"worth": found}, {}, {}), **more))[0].points
+
+
+class Lost:
+    """A baseline whose forecasts diverge."""
+
+    def __init__(self, model):
+        self.model = model
+
+    def __getattr__(self, name):
+        return getattr(self.model, name)
+
+    def forecast(self, *given):
+        found = self.model.forecast(*given)
+        return found.assign({k: found[k] * np.nan for k in STATES})
+
+
+def test_a_baseline_that_is_lost_does_not_count_and_is_named(model, runs, baselines):
+    found = worth(model, runs, {**baselines, "subspace": Lost(baselines["fir"])})
+    assert bool(found.sel(waves="irregular").better.all())
+    points = worded(found)
+    assert any("subspace: its forecast of one, two diverges" in each for each in points)
+    assert "not shown" not in " ".join(each for each in points if "heave" in each)
+
+
+@pytest.mark.parametrize(
+    ("low", "words"),
+    [
+        (0.22, "; worse than the baseline fir (+22 to +71 %)."),
+        (-0.03, "; not shown to be better than the baseline fir (−3 to +71 %)."),
+    ],
+)
+def test_worse_than_a_baseline_is_said(checked, low, words):
+    found = checked.found["worth"].copy(deep=True)
+    found["better"][:], found["rival"][:] = False, "fir"
+    found["change_lower"][:], found["change_upper"][:] = low, 0.71
+    text = next(each for each in worded(found) if each.startswith("Irregular waves, surge"))
+    assert text.endswith(words)
+
+
+def test_what_repeats_training_and_what_stands_still_are_said(model, runs):
+    flat = runs["one"].assign(heave=(0 * runs["one"].heave).assign_attrs(units="m"))
+    points = worded(worth(model, {"one": flat}), repeats={"one": "77 % of it"})
+    assert any("heave: cannot be judged: it stands still" in each for each in points)
+    assert all("(memory, not skill: one repeat" in e for e in points if e.startswith("Irreg"))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import BoolArray, FloatArray
 from seakeep.check.parts import (
     FreeRun,
     Known,
@@ -57,7 +57,8 @@ def coherence(
         Over (state, input, frequency): ``ordinary`` coherence; over (state, frequency):
         ``multiple`` coherence with all inputs, corrected for what q inputs explain by chance, and
         ``spectrum`` of the state; over state: ``linear_bound`` with ``linear_bound_lower`` and
-        ``linear_bound_upper`` (95 %), and ``nrmse`` of the model's free runs, pooled. With
+        ``linear_bound_upper`` (95 %), and ``nrmse`` of the model's free runs, pooled,
+        all NaN where the state stands ``still`` (below 1 % of its SD in training). With
         observables also ``multiple_observables`` and ``observables_bound`` with its interval, of
         inputs and observables together. ``attrs``: ``averages`` (independent segments),
         ``segment`` (s), ``observables`` (their names) and ``of`` ("tests" or "training").
@@ -113,18 +114,20 @@ def coherence(
             "dead probe."
         )
     over, size = ("state", "frequency"), len(model.states)
+    spreads = sum(((x - x.mean(axis=0)) ** 2).sum(axis=0) for _, x in pieces)
+    still = np.sqrt(spreads[:size] / samples) < 0.01 * model.signature.state_scale.spread
     found = {
         "ordinary": (("state", "input", "frequency"), spectra.ordinary()[..., :size].T),
         "spectrum": (over, spectra.outputs[:, :size].T),
-        "nrmse": ("state", pooled_nrmse(own)),
+        "nrmse": ("state", np.where(still, np.nan, pooled_nrmse(own))),
+        "still": ("state", still),
     }
-    spreads = sum(((x - x.mean(axis=0)) ** 2).sum(axis=0) for _, x in pieces)
     named = [("linear_bound", "multiple", spectra, len(references) + linear)]
     if names:
         named.append(("observables_bound", "multiple_observables", further, len(references) + 1))
     for bound, multiple, of_all, count in named:
         found[bound], found[f"{bound}_lower"], found[f"{bound}_upper"], found[multiple] = _bound(
-            of_all, spreads, size, count
+            of_all, spreads, size, count, still
         )
     return xr.Dataset(
         found,
@@ -146,7 +149,9 @@ def coherence(
     )
 
 
-def _bound(spectra: Spectra, spreads: FloatArray, size: int, count: int) -> list[Any]:
+def _bound(
+    spectra: Spectra, spreads: FloatArray, size: int, count: int, unjudged: BoolArray
+) -> list[Any]:
     """Bound with its interval, over state, and multiple coherence over (state, frequency).
 
     Outputs are the states and what `count` - 1 references leave of them, one after the other;
@@ -156,7 +161,7 @@ def _bound(spectra: Spectra, spreads: FloatArray, size: int, count: int) -> list
     with np.errstate(divide="ignore", invalid="ignore"):
         error = np.sqrt(share * spreads.reshape(-1, size)[:count] / spreads[:size])
     best = np.argmin(np.where(np.isfinite(error[0]), error[0], np.inf), axis=0), np.arange(size)
-    bounds = np.minimum(error[:, *best], 1.0)
+    bounds = np.where(unjudged, np.nan, np.minimum(error[:, *best], 1.0))
     rest = spectra.unexplained().reshape(len(spectra.frequency), -1, size)[:, *best]
     power = spectra.outputs[:, :size]
     alike = 1 - np.divide(rest, power, out=np.ones_like(power), where=power > 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import xarray as xr
@@ -68,11 +68,14 @@ class Checked:
         Why each other one could not.
     notes : dict of str to tuple of str
         Warnings of each.
+    repeats : dict of str to str, optional
+        Tests whose input repeats training input, in words.
     """
 
     found: dict[str, xr.Dataset]
     refused: dict[str, str]
     notes: dict[str, tuple[str, ...]]
+    repeats: dict[str, str] = field(default_factory=dict)
 
 
 def check_model(

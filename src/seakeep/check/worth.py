@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.check.parts import Known, beside, free_runs, is_regular, judged
+from seakeep.check.parts import FreeRun, Known, beside, free_runs, is_regular, judged
 from seakeep.metrics import anrmse_differences
 from seakeep.models import Model
 
@@ -47,11 +47,14 @@ def worth(
         ``change`` of the model from each baseline (−0.2 for 20 % less; paired), with their bounds.
         Bounds are of 95 %, and hold for these runs. Over (waves, state): ``limit``, the least of
         0.1, 0.3 and 0.7 that ``nrmse_upper`` of the model lies below (infinite if none, NaN of a
-        state that stands still or is lost), ``best``, the baseline of least error, and ``better``,
-        whether ``change_upper`` from each baseline lies below zero. Over run: ``kind`` of waves,
+        state that stands still or is lost), ``still``, whether that is because it stands
+        still in one of the runs, ``best``, the baseline of least error, ``better``, whether
+        ``change_upper`` from each baseline that is judged lies below zero, and ``rival``, the
+        judged baseline with the largest ``change_upper``. Over run: ``kind`` of waves,
         ``sea_state``, and ``look_ahead``, how long after an instant the model reads the waves (s).
-        ``attrs``: ``of`` ("tests" or "training"), and the measured state that the alignment of
-        the waves reads after the start (``conditional_on``).
+        ``attrs``: ``of`` ("tests" or "training"), the measured state that the alignment of
+        the waves reads after the start (``conditional_on``), and ``lost``, which baselines do not
+        count and why, in words.
 
     Raises
     ------
@@ -92,10 +95,19 @@ def worth(
     limit = np.select(
         [~np.isfinite(most), *(most < each for each in LIMITS)], [np.nan, *LIMITS], np.inf
     )
-    known = np.where(np.isfinite(error), error, np.inf)[:, :, 1:]
-    best = np.array([*every][1:] or [""])[
-        known.argmin(axis=2) if len(every) > 1 else 0 * limit.astype(int)
-    ]
+    # A baseline that is lost does not count.
+    known = np.isfinite(error[:, :, 1:])
+    labels = np.array([*every][1:] or [""])
+    none = np.zeros(limit.shape, dtype=int)
+    least = np.where(known, error[:, :, 1:], np.inf).argmin(axis=2) if len(every) > 1 else none
+    above = np.where(known, change[2][:, :, 1:], -np.inf)
+    most_above = np.nan_to_num(above, nan=np.inf).argmax(axis=2) if len(every) > 1 else none
+    named = known.any(axis=2)
+    ends = np.array([
+        [True, *np.all([np.isfinite(own[r].forecast).all(0) for r in own if waves[r] == kind], 0)]
+        for kind in kinds
+    ])  # fmt: skip
+    still = np.isnan(limit) & ends
     each = xr.concat([of[0][["anrmse", "anrmse_lower", "anrmse_upper"]] for of in tables], "run")
     dims, signature = ("waves", "state", "model"), model.signature
     names = [r for kind in kinds for r in own if waves[r] == kind]
@@ -111,8 +123,10 @@ def worth(
             "change_lower": (dims, change[1]),
             "change_upper": (dims, change[2]),
             "limit": (dims[:2], limit),
-            "best": (dims[:2], best),
-            "better": (dims[:2], (change[2][:, :, 1:] < 0).all(axis=2)),
+            "still": (dims[:2], still),
+            "best": (dims[:2], np.where(named, labels[least], "")),
+            "rival": (dims[:2], np.where(named, labels[most_above], "")),
+            "better": (dims[:2], named & ((change[2][:, :, 1:] < 0) | ~known).all(axis=2)),
         },
         coords={
             "model": [*every],
@@ -123,5 +137,18 @@ def worth(
             "sea_state": ("run", [str(runs[r].attrs.get("sea_state", "")) for r in names]),
             "look_ahead": ("run", np.maximum(ahead, 0.0), {"units": "s"}),
         },
-        attrs={"of": of, "conditional_on": str(next(filter(None, reads), ""))},
+        attrs={
+            "of": of,
+            "conditional_on": str(next(filter(None, reads), "")),
+            "lost": "; ".join(_lost(every, baselines or {})),
+        },
     )
+
+
+def _lost(every: Mapping[str, Mapping[str, FreeRun]], baselines: Mapping[str, Model]) -> list[str]:
+    """Baselines that do not count in all runs, each with the reason."""
+    told = [f"{label}: not all runs can be forecast" for label in baselines if label not in every]
+    for label, free in list(every.items())[1:]:
+        if bad := [r for r, each in free.items() if not np.isfinite(each.forecast).all()]:
+            told.append(f"{label}: its forecast of {', '.join(bad)} diverges")
+    return told

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -44,6 +45,7 @@ def check(
     from seakeep.quality import warn_of_runs
     from seakeep.report.check_page import check_sections, write_check
     from seakeep.study import fit_baselines
+    from seakeep.study.fit import repeats_of
 
     make_folder(out)
     identified = load_model(model)
@@ -61,6 +63,8 @@ def check(
         baselines = {}
     with progress_bar("Checking") as progress:
         checked = check_model(identified, runs, progress, baselines)
+    repeats = repeats_of(identified, read, runs)
+    checked = replace(checked, repeats={name: str(each) for name, each in repeats.items()})
     for section in check_sections(checked):
         for text in (*section.points, *section.notices):
             results().print(f"{section.title}: {text}", soft_wrap=True)

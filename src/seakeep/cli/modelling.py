@@ -377,7 +377,9 @@ def _figures(runs: list[str], out: Path, suffix: str) -> dict[str, Path]:
 def _with_baselines(fitted: Mapping[str, Model], campaign: Campaign) -> dict[str, Model]:
     """Models and baselines of the same channels, by name."""
     from seakeep.study import fit_baselines
+    from seakeep.study.comparison import check_alike
 
+    check_alike(fitted)
     first = next(iter(fitted.values()))
     channels = max((each.inputs for each in fitted.values()), key=len)
     with progress_bar("Baselines") as progress:

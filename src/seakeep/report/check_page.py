@@ -145,18 +145,26 @@ def possible_section(checked: Checked) -> Section | None:
     found = checked.found.get("coherence")
     if found is None:
         return None
-    rows, advice, trained = [], [], checked.found.get("training_coherence")
+    rows, trained = [], checked.found.get("training_coherence")
+    advice: dict[str, list[str]] = {}
+    unjudged: dict[str, list[str]] = {}
+    ahead = "worth" in checked.found and bool((checked.found["worth"]["look_ahead"] > 0).any())
     for state in map(str, found["state"].values):
         own = found.sel(state=state)
-        model, linear = float(own["nrmse"]), float(own["linear_bound"])
-        more = float(own.get("observables_bound", np.nan))
         rows += [
             _bounds_row(each.sel(state=state)) for each in (found, trained) if each is not None
         ]
+        if bool(own["still"]):
+            unjudged.setdefault("it stands still in these runs", []).append(state)
+            continue
+        model, linear = float(own["nrmse"]), float(own["linear_bound"])
+        more = float(own.get("observables_bound", np.nan))
         text = f"{state}: model {model:.2g}, linear bound {linear:.2g}"
         if np.isfinite(more):
             text += f", with the observables {more:.2g}"
-        advice.append(f"{text}. {_advice(model, linear, more)}")
+        advice.setdefault(_advice(model, linear, more, ahead), []).append(text)
+    points = [f"{'; '.join(states)}. {text}" for text, states in advice.items()]
+    points += [f"{', '.join(of)}: cannot be judged: {why}." for why, of in unjudged.items()]
     return Section(
         "possible",
         "What is possible",
@@ -168,7 +176,7 @@ def possible_section(checked: Checked) -> Section | None:
             "them: the baselines, and this model if it is linear. With observables the model "
             "itself counts. Its error is that of free runs over the same instants.",
         ),
-        points=tuple(advice),
+        points=tuple(points),
         figures=(
             Drawing(
                 "coherence",
@@ -201,19 +209,23 @@ def _bounds_row(own: xr.Dataset) -> tuple[str, ...]:
     return (str(own["state"].values), own.attrs["of"], number(float(own["nrmse"])), *cells)
 
 
-def _advice(model: float, linear: float, more: float) -> str:
-    """What the distance of a model from its bounds says."""
+def _advice(model: float, linear: float, more: float, ahead: bool) -> str:
+    """What the distance of a model from its bounds says; `ahead`, whether it has a look-ahead."""
     if not np.isfinite(model):
         return "No free run holds over the test."
     least = np.nanmin([linear, more])
+    first = "" if ahead else "a look-ahead (waves measured up-wave), "
     if model < 0.95 * least:
         return "Better than any linear map of the inputs: no room is seen."
     if model < 1.15 * linear and not more < 0.85 * linear:
-        return "As good as the inputs allow: more probes or less noise would help, not more tuning."
+        return (
+            "As good as a linear map of these inputs allows. What may help: "
+            f"{first}observables, more probes or less noise."
+        )
     if more < 0.85 * linear and model > 1.15 * more:
         return "Observables can tell more than any linear map, and there is room left."
     if model > 1.15 * least:
-        return "There is room: more delays, another ridge or more training may help."
+        return f"There is room. What may help: {first}more delays, another ridge, more training."
     return "As good as inputs and observables allow."
 
 
@@ -427,6 +439,10 @@ def validity_section(checked: Checked) -> Section | None:
     columns = (
         *("run", "part", "waves", "height [m]", "period [s]", "steepness", "mean surge [m]"),
     )
+    repeats = [
+        f"{text[0].upper()}{text[1:]} This test shows memory, not skill."
+        for text in checked.repeats.values()
+    ]
     outside = [
         f"{run}: {text}. What the model says there is an extrapolation."
         for run, text in zip(found["run"].values, found["outside"].values, strict=True)
@@ -441,7 +457,10 @@ def validity_section(checked: Checked) -> Section | None:
     return Section(
         "validity",
         "Validity",
-        points=tuple(outside) or ("All tests lie inside the waves that trained the model.",),
+        points=(
+            *(outside or ["All tests lie inside the waves that trained the model."]),
+            *repeats,
+        ),
         figures=(Drawing("validity", caption, partial(checks.validity, found)),),
         tables=(Table("validity", "Waves", columns, tuple(rows), "", (3, 4, 5, 6)),),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import xarray as xr
@@ -27,7 +27,9 @@ def worth_section(checked: Checked) -> Section | None:
     found = checked.found.get("worth")
     if found is None:
         return None
-    points = [*_verdicts(found), *_conditions(found)]
+    points = [*_verdicts(found, checked.repeats), *_conditions(found)]
+    if lost := found.attrs["lost"]:
+        points.append(f"Baselines that do not count in all verdicts: {lost}.")
     if (validity := checked.found.get("validity")) is not None:
         outside = [str(run) for run in validity["run"].values[validity["outside"].values != ""]]
         if outside:
@@ -50,13 +52,15 @@ def worth_section(checked: Checked) -> Section | None:
     )
 
 
-def _verdicts(found: xr.Dataset) -> Iterator[str]:
+def _verdicts(found: xr.Dataset, repeats: Mapping[str, str]) -> Iterator[str]:
     """One sentence on all states in each kind of waves, and one per group of alike states."""
     if found.attrs["of"] == "training":
         yield "No run tests the model. All errors are those of training: memory, not skill."
     for kind in found["waves"].values:
         own = found.sel(waves=kind)
-        count = int((found["kind"] == kind).sum())
+        names = [str(run) for run in found["run"].values[found["kind"].values == kind]]
+        count, known = len(names), [run for run in names if run in repeats]
+        memory = f" (memory, not skill: {', '.join(known)} repeat training input)" * bool(known)
         tests = "training" if found.attrs["of"] == "training" else f"test{'s' * (count > 1)}"
         yield (
             f"{count} {tests} in {kind} waves: ANRMSE "
@@ -64,16 +68,34 @@ def _verdicts(found: xr.Dataset) -> Iterator[str]:
         )
         groups: dict[tuple[float, str], list[str]] = {}
         for state in found["state"].values[1:]:
-            one = own.sel(state=state)
-            baseline = "" if bool(one["better"]) else str(one["best"].values)
-            groups.setdefault((float(one["limit"].fillna(0)), baseline), []).append(str(state))
-        for (limit, baseline), names in sorted(
-            groups.items(), key=lambda each: (not each[0][0], each[0])
-        ):
-            text = USES.get(limit, "not judged: it stands still, or a forecast is lost")
-            if limit and baseline:
-                text += f"; not shown to be better than the baseline {baseline}"
-            yield f"{kind.capitalize()} waves, {', '.join(names)}: {text}."
+            limit, text = _verdict(own.sel(state=state))
+            groups.setdefault((limit, text), []).append(str(state))
+        for (_, text), alike in sorted(groups.items(), key=lambda each: (not each[0][0], each[0])):
+            yield f"{kind.capitalize()} waves, {', '.join(alike)}: {text}{memory}."
+
+
+def _verdict(one: xr.Dataset) -> tuple[float, str]:
+    """Limit of a state (0 where none can be judged), and what its error allows, in words."""
+    limit = float(one["limit"].fillna(0))
+    if not limit:
+        why = (
+            "it stands still in one of these runs or more"
+            if bool(one["still"])
+            else "its forecast is lost"
+        )
+        return limit, f"cannot be judged: {why}"
+    text, rival = USES[limit], str(one["rival"].values)
+    if not rival or bool(one["better"]):
+        return limit, text
+    at = one.sel(model=rival)
+    low, high = (100 * float(at[f"change_{each}"]) for each in ("lower", "upper"))
+    how = "worse" if low > 0 else "not shown to be better"
+    beside = f" ({_percent(low, high)})" if np.isfinite([low, high]).all() else ""
+    return limit, f"{text}; {how} than the baseline {rival}{beside}"
+
+
+def _percent(low: float, high: float) -> str:
+    return f"{signed(low, 0)} to {signed(high, 0)} %".replace("-", "−")
 
 
 def _beside(own: xr.Dataset) -> str:
@@ -85,7 +107,7 @@ def _beside(own: xr.Dataset) -> str:
     low, high = (100 * float(at[f"change_{each}"]) for each in ("lower", "upper"))
     text = f"; of the best baseline, {best}, {number(float(at['nrmse']))}"
     if np.isfinite([low, high]).all():
-        text += f" (from there {signed(low, 0)} to {signed(high, 0)} %)".replace("-", "−")
+        text += f" (from there {_percent(low, high)})"
     return text
 
 

@@ -325,13 +325,7 @@ def compare_models(
             "no run of the campaign tests a model. Name one with --run, or give one "
             "role = 'test' or a span test = [start, end]."
         )
-    forecast = [model.states for model in models.values()]
-    if any(states != forecast[0] for states in forecast):
-        listed = "; ".join(f"{name}: {', '.join(each.states)}" for name, each in models.items())
-        raise RequestError(
-            f"models are compared on the same channels, and these forecast different ones ({listed}"
-            "). Compare them one by one, or fit them with the same states."
-        )
+    check_alike(models)
     prepared = load_prepared(campaign, names=wanted, progress=progress)
     used = dict.fromkeys(c for model in models.values() for c in (*model.states, *model.inputs))
     warn_of_runs(prepared.values(), list(used))
@@ -368,6 +362,17 @@ def compare_models(
         parts = [part for each in of_run for part in (each.measured, each.inputs)]
         _warn_of_dead(xr.merge(parts, compat="override"), of_run[0].run)
     return found
+
+
+def check_alike(models: Mapping[str, Model]) -> None:
+    """Refuse models that forecast different channels."""
+    forecast = [model.states for model in models.values()]
+    if any(states != forecast[0] for states in forecast):
+        listed = "; ".join(f"{name}: {', '.join(each.states)}" for name, each in models.items())
+        raise RequestError(
+            f"models are compared on the same channels, and these forecast different ones ({listed}"
+            "). Compare them one by one, or fit them with the same states."
+        )
 
 
 def _warn_of_known(model: Model, compared: Comparison) -> None:

@@ -27,6 +27,7 @@ __all__ = [
     "find_repeat",
     "fit_baselines",
     "fit_campaign",
+    "repeats_of",
     "training_runs",
     "warn_of_repeats",
     "warn_of_waves",
@@ -276,8 +277,10 @@ def _warn_of_slow_model(model: Model, runs: Mapping[str, xr.Dataset]) -> None:
     warn_of_slow_motions(parts, model.states, trained, float(period))
 
 
-def warn_of_repeats(model: Model, campaign: Campaign, tested: Mapping[str, xr.Dataset]) -> None:
-    """Warn where a test run's input repeats the model's training input, up to a constant phase.
+def repeats_of(
+    model: Model, campaign: Campaign, tested: Mapping[str, xr.Dataset]
+) -> dict[str, Repeat]:
+    """Tests whose input repeats the model's training input, up to a constant phase, by run.
 
     Training runs that the campaign marks as regular waves are left out: regular waves repeat by
     their nature. So are runs that the campaign does not have.
@@ -288,19 +291,32 @@ def warn_of_repeats(model: Model, campaign: Campaign, tested: Mapping[str, xr.Da
         if name in campaign.settings.runs and campaign.settings.runs[name].waves != "regular"
     }
     if not (model.inputs and training):
-        return
+        return {}
     missing = [name for name in training if name not in tested]
     prepared = dict(tested) | (load_prepared(campaign, names=missing) if missing else {})
     pieces = {
         name: prepared[name].sel(time=slice(first - 1e-6, stop + 1e-6))
         for name, (first, stop) in training.items()
     }
+    found: dict[str, Repeat] = {}
     for name, run in tested.items():
         part = _test_part(run, pieces.get(name))
         # What a member leaves of a training run is too short to be judged.
         enough = name not in training or part.sizes["time"] >= model.history_samples
         if enough and campaign.settings.runs[name].waves != "regular":
-            _warn_of_repeat(model.inputs, pieces, name, part, model.dt)
+            repeat = find_repeat(model.inputs, pieces, name, part, model.dt)
+            found |= {} if repeat is None else {name: repeat}
+    return found
+
+
+def warn_of_repeats(model: Model, campaign: Campaign, tested: Mapping[str, xr.Dataset]) -> None:
+    """Warn where a test run's input repeats the model's training input."""
+    for repeat in repeats_of(model, campaign, tested).values():
+        warnings.warn(
+            f"{repeat} This test shows memory, not skill: test on another run.",
+            SeakeepWarning,
+            stacklevel=3,
+        )
 
 
 def _test_part(run: xr.Dataset, trained: xr.Dataset | None) -> xr.Dataset:
@@ -310,17 +326,6 @@ def _test_part(run: xr.Dataset, trained: xr.Dataset | None) -> xr.Dataset:
     if trained is not None:  # a test on the training part repeats by definition
         return run.sel(time=slice(float(trained["time"][-1]) + 1e-6, None))
     return run
-
-
-def _warn_of_repeat(
-    inputs: Sequence[str], pieces: Mapping[str, xr.Dataset], name: str, test: xr.Dataset, dt: float
-) -> None:
-    if (found := find_repeat(inputs, pieces, name, test, dt)) is not None:
-        warnings.warn(
-            f"{found} This test shows memory, not skill: test on another run.",
-            SeakeepWarning,
-            stacklevel=4,
-        )
 
 
 @dataclass(frozen=True)
