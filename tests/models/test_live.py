@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from drifting import INPUTS, STATES, drifting_run
-from scipy import signal
+from scipy import signal, stats
 
 import seakeep
 from seakeep import DataError, HankelDMDc, ProbeAlignment, RequestError, load_live
@@ -206,7 +206,7 @@ def test_waves_that_are_not_known_widen_the_band(models, run):
         leads = [each[name].attrs["lead_time"] for each in (unknown, part, known)]
         assert leads == sorted(leads)
         width = known[name].sel(statistic="upper") - known[name].sel(statistic="lower")
-        np.testing.assert_allclose(width, 2 * 1.959964 * deviations[0], rtol=1e-6)
+        np.testing.assert_allclose(width, 2 * stats.t.ppf(0.975, 48) * deviations[0], rtol=1e-6)
 
 
 def test_what_follows_is_predicted_as_the_forecast_predicts_it(models, run):

@@ -25,7 +25,7 @@ from seakeep.errors import RequestError, did_you_mean
 from seakeep.models import engine, store
 from seakeep.models.engine import Dynamics, Windows
 from seakeep.models.forecasts import label_channels, rows_by_name
-from seakeep.models.growth import LeadErrors
+from seakeep.models.growth import WINDOWS, LeadErrors
 from seakeep.models.inputs import Chain, FittedAlignment, Measured
 from seakeep.models.interface import Regressors, Signature, Span, typed
 from seakeep.models.summaries import statistic_coordinate
@@ -758,19 +758,15 @@ def held_samples(inside: BoolArray) -> npt.NDArray[np.intp]:
     return found
 
 
-def _quantile(
-    level: float, spread: FloatArray, variance: FloatArray, drawn: bool
-) -> FloatArray | float:
-    """Half-width of the band in standard deviations.
+def _quantile(level: float, spread: FloatArray, variance: FloatArray, drawn: bool) -> FloatArray:
+    """Half-width of the band in standard deviations: Student's quantile.
 
-    Normal; Student's where part of the variance is the `spread` of few futures that were `drawn`,
-    with the degrees of freedom of Satterthwaite (1946).
+    Part of the variance is the `spread` of few futures, where they were `drawn`, and the rest is
+    known from free runs; the degrees of freedom are those of Satterthwaite (1946).
     """
-    part = 0.5 + 0.5 * level
-    if not drawn:
-        return float(special.ndtri(part))
-    share = np.maximum(spread / np.maximum(variance, np.finfo(float).tiny), 1e-3)
-    found: FloatArray = special.stdtrit(PAIRS / share**2, part)
+    share = spread / np.maximum(variance, np.finfo(float).tiny)
+    doubt = (1.0 - share) ** 2 / WINDOWS + (share**2 / PAIRS if drawn else 0.0)
+    found: FloatArray = special.stdtrit(1.0 / np.maximum(doubt, 1e-6), 0.5 + 0.5 * level)
     return found
 
 
