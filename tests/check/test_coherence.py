@@ -6,8 +6,10 @@ import scipy
 import xarray as xr
 
 from seakeep import HankelDMDc, Powers, check
+from seakeep.check import Checked
 from seakeep.core.spectra import cross_spectra
 from seakeep.errors import DataError
+from seakeep.report.check_page import possible_section
 
 RNG = np.random.default_rng
 
@@ -44,6 +46,18 @@ def test_the_bound_of_a_quadratic_vessel_is_its_quadratic_part(run):
     assert float(found.linear_bound[0]) == pytest.approx(0.5, abs=0.03)
     assert float(found.nrmse[0]) == pytest.approx(0.5, abs=0.03)
     assert "observables_bound" not in found
+    assert (found.multiple >= found.ordinary.max("input")).all()
+
+
+def test_a_state_too_slow_for_the_segments_is_not_judged(run):
+    slow = np.sin(0.1 * run.time) + 0.01 * run.heave
+    both = run.assign(surge=slow.assign_attrs(units="m"))
+    model = HankelDMDc(0, 3, 1e-3).fit(both.isel(time=slice(0, 4000)), ["surge"], ["eta"])
+    found = check.coherence(model, {"run": both})
+    assert float(found.period[0]) == pytest.approx(62.8, rel=0.05)  # a segment has 16 s
+    assert np.isnan(found.linear_bound[0])
+    text = possible_section(Checked({"coherence": found}, {}, {})).points[0]
+    assert text.startswith("surge: cannot be judged: its slow period of 6")
 
 
 def test_observables_lower_the_bound(run):

@@ -20,6 +20,7 @@ from seakeep.check.parts import (
     regressors,
     used_parts,
 )
+from seakeep.core.harmonics import dominant_frequency
 from seakeep.core.spectra import Spectra, cross_spectra
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Model
@@ -55,10 +56,12 @@ def coherence(
     -------
     Dataset
         Over (state, input, frequency): ``ordinary`` coherence; over (state, frequency):
-        ``multiple`` coherence with all inputs, corrected for what q inputs explain by chance, and
+        ``multiple`` coherence with all inputs, corrected for what q inputs explain by chance (not
+        below that with one input), and
         ``spectrum`` of the state; over state: ``linear_bound`` with ``linear_bound_lower`` and
         ``linear_bound_upper`` (95 %), and ``nrmse`` of the model's free runs, pooled,
-        all NaN where the state stands ``still`` (below 1 % of its SD in training). With
+        all NaN where the state stands ``still`` (below 1 % of its SD in training); bounds are NaN
+        where its dominant ``period`` (s) exceeds a third of a segment. With
         observables also ``multiple_observables`` and ``observables_bound`` with its interval, of
         inputs and observables together. ``attrs``: ``averages`` (independent segments),
         ``segment`` (s), ``observables`` (their names) and ``of`` ("tests" or "training").
@@ -116,19 +119,30 @@ def coherence(
     over, size = ("state", "frequency"), len(model.states)
     spreads = sum(((x - x.mean(axis=0)) ** 2).sum(axis=0) for _, x in pieces)
     still = np.sqrt(spreads[:size] / samples) < 0.01 * model.signature.state_scale.spread
-    found = {
+    wave = max((x[:, :size] for _, x in pieces), key=len)
+    slow = np.array([
+        np.nan if each else 1 / dominant_frequency(wave[:, k], model.dt)
+        for k, each in enumerate(still)
+    ])  # fmt: skip
+    unjudged = still | (slow > segment * model.dt / 3)
+    found: dict[str, Any] = {
         "ordinary": (("state", "input", "frequency"), spectra.ordinary()[..., :size].T),
         "spectrum": (over, spectra.outputs[:, :size].T),
         "nrmse": ("state", np.where(still, np.nan, pooled_nrmse(own))),
         "still": ("state", still),
+        "period": ("state", slow, {"units": "s"}),
     }
     named = [("linear_bound", "multiple", spectra, len(references) + linear)]
     if names:
         named.append(("observables_bound", "multiple_observables", further, len(references) + 1))
     for bound, multiple, of_all, count in named:
         found[bound], found[f"{bound}_lower"], found[f"{bound}_upper"], found[multiple] = _bound(
-            of_all, spreads, size, count, still
+            of_all, spreads, size, count, unjudged
         )
+    least: FloatArray = spectra.ordinary()[..., :size].max(axis=1).T
+    for _, multiple, *_ in named:
+        least = np.maximum(np.asarray(found[multiple][1], dtype=float), least)
+        found[multiple] = (over, least)
     return xr.Dataset(
         found,
         coords={

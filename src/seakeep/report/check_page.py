@@ -86,7 +86,7 @@ def _points_table(measured: xr.Dataset, found: xr.Dataset) -> Table:
         columns,
         tuple(rows),
         "± expanded uncertainty at 95 % by ITTC 7.5-02-07-02.1: scatter over windows of whole "
-        "periods, and the accuracy of the instruments where the campaign states it.",
+        "periods, and the accuracy of the instruments. Without a stated accuracy: scatter only.",
         (1, 2),
         folded=True,
     )
@@ -157,6 +157,13 @@ def possible_section(checked: Checked) -> Section | None:
         if bool(own["still"]):
             unjudged.setdefault("it stands still in these runs", []).append(state)
             continue
+        if float(own["period"]) > found.attrs["segment"] / 3:
+            why = (
+                f"its slow period of {float(own['period']):.3g} s exceeds a third of a segment of "
+                f"{found.attrs['segment']:.3g} s"
+            )
+            unjudged.setdefault(why, []).append(state)
+            continue
         model, linear = float(own["nrmse"]), float(own["linear_bound"])
         more = float(own.get("observables_bound", np.nan))
         text = f"{state}: model {model:.2g}, linear bound {linear:.2g}"
@@ -165,6 +172,11 @@ def possible_section(checked: Checked) -> Section | None:
         advice.setdefault(_advice(model, linear, more, ahead), []).append(text)
     points = [f"{'; '.join(states)}. {text}" for text, states in advice.items()]
     points += [f"{', '.join(of)}: cannot be judged: {why}." for why, of in unjudged.items()]
+    if "worth" in checked.found and (state := checked.found["worth"].attrs["conditional_on"]):
+        points.append(
+            f"The inputs are carried by measured {state} and so hold part of it: with waves alone "
+            f"the bounds of {state}, and of what follows it, are higher."
+        )
     return Section(
         "possible",
         "What is possible",
@@ -257,7 +269,8 @@ def decay_section(checked: Checked) -> Section | None:
         figures.append(Drawing("decay", caption, partial(checks.decay, found)))
         words.append(
             "The model holds an offset for the length of its history, and is released. A motion "
-            "with fewer than three extremes has neither period nor damping."
+            "with fewer than three extremes has neither period nor damping: it creeps back, or its "
+            "forecast leans on the waves and forgets the state."
         )
     if (modes := checked.found.get("modes")) is not None:
         caption = "Modes that decay slowest: states that take part in each (parts of one)."
@@ -344,7 +357,8 @@ def residuals_section(checked: Checked) -> Section | None:
         "A model that has taken all from the data leaves one-step errors that are white and know "
         "nothing of past inputs. With long records even small errors fail this test: read it with "
         f"the size of the error. The figure is of the {found.attrs['of']}; the table also shows "
-        "training, as context.",
+        "training, as context. Errors by age start at other instants than the free runs of the "
+        "first section, and so differ from them.",
     )
     return Section("residuals", "Residuals", words, figures=(drawing,), tables=(table,))
 
@@ -407,7 +421,8 @@ def statistics_section(checked: Checked) -> Section | None:
         f"Extreme: most probable largest deviation from the mean in {hours:.3g} h of "
         "these records' time (3 h at full scale), by Weibull's law; its interval is what the fit "
         "does not know. Rayleigh's law has the shape 2. JSD: Jensen–Shannon divergence of the "
-        "densities forecast and measured (0 to 0.69).",
+        "densities forecast and measured (0 to 0.69), of deviations from the mean: no offset is "
+        "seen. Peaks of slow channels mix slow and wave motion.",
         tuple(range(2, len(columns))),
     )
     caption = (
@@ -439,6 +454,10 @@ def validity_section(checked: Checked) -> Section | None:
     columns = (
         *("run", "part", "waves", "height [m]", "period [s]", "steepness", "mean surge [m]"),
     )
+    note = (
+        "Steepness here is height over wave length in the depth of the run. Reasons judge "
+        "steepness in deep water, by spectral mean period, so that their figures differ a little."
+    )
     repeats = [
         f"{text[0].upper()}{text[1:]} This test shows memory, not skill."
         for text in checked.repeats.values()
@@ -462,7 +481,7 @@ def validity_section(checked: Checked) -> Section | None:
             *repeats,
         ),
         figures=(Drawing("validity", caption, partial(checks.validity, found)),),
-        tables=(Table("validity", "Waves", columns, tuple(rows), "", (3, 4, 5, 6)),),
+        tables=(Table("validity", "Waves", columns, tuple(rows), note, (3, 4, 5, 6)),),
     )
 
 

@@ -31,11 +31,11 @@ def worth_section(checked: Checked) -> Section | None:
     if lost := found.attrs["lost"]:
         points.append(f"Baselines that do not count in all verdicts: {lost}.")
     if (validity := checked.found.get("validity")) is not None:
-        outside = [str(run) for run in validity["run"].values[validity["outside"].values != ""]]
-        if outside:
-            points.append(
-                f"{', '.join(outside)}: outside the waves that trained the model (see Validity)."
-            )
+        points += [
+            f"{run}: outside what trained the model ({why})."
+            for run, why in zip(validity["run"].values, validity["outside"].values, strict=True)
+            if why
+        ]
     words = (
         "Free runs from one measured start to the end of each of the "
         f"{found.sizes['run']} {found.attrs['of']}; errors in measured SDs of the run. A verdict "
@@ -146,7 +146,7 @@ def _by_run(found: xr.Dataset) -> Table:
         (found.attrs["of"].removesuffix("s"), "model", "95 %", *map(str, models[1:])),
         tuple(rows),
         "Baselines are fitted to the training runs with their recommended settings, and read no "
-        "wave after the instant that they forecast."
+        "wave after the instant that they forecast and no measured state after the start."
         if len(models) > 1
         else "",
         tuple(range(1, 2 + len(models))),

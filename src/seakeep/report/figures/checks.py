@@ -127,7 +127,7 @@ def response(
                 place.set_xlim(float(found["frequency"][0]), float(found["frequency"][-1]))
                 place.set_xlabel("frequency [Hz]")
         if axes is None:
-            legend_below(figure, places[0])
+            legend_below(figure, places[0], "upper")
     return figure
 
 
@@ -161,12 +161,12 @@ def _points(gain: Any, turn: Any, measured: xr.Dataset, factor: float) -> None:
             )
 
 
-def legend_below(figure: Any, place: Any) -> None:
+def legend_below(figure: Any, place: Any, side: str = "lower") -> None:
     handles, labels = place.get_legend_handles_labels()
     unique = dict(zip(labels, handles, strict=True))
     across = max(1, int(13 * figure.get_figwidth() / (6 + max(map(len, unique)))))  # letters
     figure.legend(
-        unique.values(), unique, loc="outside lower center", ncols=min(len(unique), across)
+        unique.values(), unique, loc=f"outside {side} center", ncols=min(len(unique), across)
     )
 
 
