@@ -56,6 +56,7 @@ def test_errors_are_those_of_the_tests_and_verdicts_follow_from_them(model, runs
     free = free_runs(model, {"one": runs["one"]})["one"]
     known = metrics.anrmse(predicted=free.forecast, measured=free.measured)
     assert float(found.anrmse.sel(model="model", run="one")) == pytest.approx(known)
+    assert found.run_nrmse.sel(run="one").values.mean() == pytest.approx(known)
     calm, rough = found.sel(waves="irregular"), found.sel(waves="regular")
     assert calm.limit.values.tolist() == [0.1, 0.1, 0.1]
     assert bool(calm.better.all())
@@ -75,7 +76,7 @@ def test_the_page_starts_with_the_verdict(checked):
     assert "Irregular waves, surge, heave: can stand in for a measurement" in text
     assert "Regular waves, surge: cannot be used instant by instant" in text
     assert "Look-ahead: none" in text
-    assert [table.name for table in first.tables] == ["worth", "verdicts"]
+    assert [table.name for table in first.tables] == ["worth", "verdicts", "worth_of_runs"]
 
 
 def test_training_is_judged_apart(model, runs, checked):

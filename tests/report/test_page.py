@@ -13,6 +13,7 @@ import xarray as xr
 from tutorial_study import put_tutorial
 
 from seakeep.errors import RequestError
+from seakeep.files import check_report
 from seakeep.report.sections.errors import error_table, errors
 from seakeep.report.sections.histories import history_data, pack
 from seakeep.report.sections.judgements import PUBLISHED, age, coverage_table, divergence_table
@@ -35,7 +36,8 @@ from seakeep.report.figures.boxes import FEWEST, draw_box_violin
 from seakeep.report.figures.common import grid_of_axes, model_colour
 from seakeep.report.figures.eigenvalues import eigenvalue_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
-from seakeep.report.page import write_report
+from seakeep.report.page import write_page, write_report
+from seakeep.report.section import Drawing, Section
 
 STUDY = """
 [study]
@@ -441,6 +443,21 @@ def test_boxes_and_whiskers_are_matplotlibs():
     drawn = {round(float(y), 12) for line in axes.lines for y in line.get_ydata()}
     for key in ("med", "q1", "q3", "whislo", "whishi"):
         assert round(float(expected[key]), 12) in drawn
+
+
+def test_a_report_that_was_interrupted_is_written_again(tmp_path):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    stamp = {"description": "Words.", "finished": ""}
+    section = Section("drawn", "Drawn", figures=(Drawing("lines", "Lines", interrupted),))
+    with pytest.raises(KeyboardInterrupt):
+        write_page(tmp_path, "Title", stamp, (section,))
+    (tmp_path / "figures" / "lines.png").touch()
+    check_report(tmp_path)  # raises nothing: the folder is ours
+    assert "not finished" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    write_page(tmp_path, "Title", stamp, ())
+    assert "not finished" not in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_folder_without_a_study_has_no_report(tmp_path):

@@ -9,6 +9,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.check.parts import FreeRun, Known, beside, free_runs, is_regular, judged
+from seakeep.core.metrics import nrmse
 from seakeep.metrics import anrmse_differences
 from seakeep.models import Model
 
@@ -50,7 +51,8 @@ def worth(
         state that stands still or is lost), ``still``, whether that is because it stands
         still in one of the runs, ``best``, the baseline of least error, ``better``, whether
         ``change_upper`` from each baseline that is judged lies below zero, and ``rival``, the
-        judged baseline with the largest ``change_upper``. Over run: ``kind`` of waves,
+        judged baseline with the largest ``change_upper``. Over (run, channel): ``run_nrmse``
+        of the model. Over run: ``kind`` of waves,
         ``sea_state``, and ``look_ahead``, how long after an instant the model reads the waves (s).
         ``attrs``: ``of`` ("tests" or "training"), the measured state that the alignment of
         the waves reads after the start (``conditional_on``), and ``lost``, which baselines do not
@@ -111,6 +113,14 @@ def worth(
     each = xr.concat([of[0][["anrmse", "anrmse_lower", "anrmse_upper"]] for of in tables], "run")
     dims, signature = ("waves", "state", "model"), model.signature
     names = [r for kind in kinds for r in own if waves[r] == kind]
+    each_run = [
+        nrmse(
+            predicted=own[r].forecast[None],
+            measured=own[r].measured[None],
+            training_std=signature.state_scale.spread,
+        )[0]
+        for r in names
+    ]
     ahead = [signature.input_map.look_ahead(runs[r], model.dt) - model.dt for r in names]
     reads = [signature.input_map.notes(runs[r]).get("conditional_on", "") for r in names]
     return xr.Dataset(
@@ -122,6 +132,7 @@ def worth(
             "change": (dims, change[0]),
             "change_lower": (dims, change[1]),
             "change_upper": (dims, change[2]),
+            "run_nrmse": (("run", "channel"), np.array(each_run)),
             "limit": (dims[:2], limit),
             "still": (dims[:2], still),
             "best": (dims[:2], np.where(named, labels[least], "")),
@@ -132,6 +143,7 @@ def worth(
             "model": [*every],
             "run": names,
             "state": ["all", *model.states],
+            "channel": list(model.states),
             "waves": kinds,
             "kind": ("run", [waves[r] for r in names]),
             "sea_state": ("run", [str(runs[r].attrs.get("sea_state", "")) for r in names]),

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from seakeep.files import check_output, replacing
+from seakeep.files import MARK, check_output, replacing
 from seakeep.report.html import inline_svg, rendered
 from seakeep.report.section import Drawing, Section
 from seakeep.report.sections import SECTIONS
@@ -29,6 +29,10 @@ __all__ = ["write_page", "write_report"]
 SHORT = re.compile(r"(\.\d)\d+")
 RASTER_DPI = 80
 """Of pictures without vectors: as wide as the page."""
+UNFINISHED = f"""<!DOCTYPE html>
+<meta name="generator" content="{MARK}: report">
+<p>This report was not finished. Run its command again.</p>
+"""
 
 
 Progress = Callable[[int, int, str], None]
@@ -102,10 +106,14 @@ def write_page(
         The page.
     """
     tell = progress or (lambda done, total, what: None)
-    check_output(folder / "report.html", "report")
+    page = folder / "report.html"
+    check_output(page, "report")
     drawings = [each for section in sections for each in section.figures]
     drawn: dict[str, Markup | None] = {}
     with storing(folder), figure_style():
+        if not page.exists():  # figures of an interrupted report are known as ours
+            with replacing(page) as temporary:
+                temporary.write_text(UNFINISHED, encoding="utf-8")
         for each in ("figures", "tables"):
             (folder / each).mkdir(exist_ok=True)
         for table in (each for section in sections for each in section.tables):
@@ -114,7 +122,6 @@ def write_page(
         for number, drawing in enumerate(drawings):
             tell(number, len(drawings), f"drawing {drawing.name.replace('_', ' ')}")
             drawn[drawing.name] = _drawn(drawing, folder / "figures")
-        page = folder / "report.html"
         text = rendered(
             "report.html",
             kind="report",

@@ -48,7 +48,7 @@ def worth_section(checked: Checked) -> Section | None:
         "What the model is worth",
         words=words,
         points=tuple(points),
-        tables=(_by_run(found), _by_state(found)),
+        tables=(_by_run(found), _by_state(found), _of_runs(found)),
     )
 
 
@@ -187,5 +187,23 @@ def _by_state(found: xr.Dataset) -> Table:
         tuple(rows),
         "Change: from the best baseline to the model, paired 95 % interval.",
         (2, 3, 5, 6),
+    )
+
+
+def _of_runs(found: xr.Dataset) -> Table:
+    """Error of each state in each run, which no mean hides."""
+    errors = found["run_nrmse"]
+    runs = [str(run) for run in errors["run"].values]
+    return Table(
+        "worth_of_runs",
+        "NRMSE of each state in each run",
+        ("state", *runs),
+        tuple(
+            (str(state), *(number(float(x)) for x in errors.sel(channel=state).values))
+            for state in errors["channel"].values
+        ),
+        "",
+        tuple(range(1, 1 + len(runs))),
+        heat=tuple(range(1, 1 + len(runs))),
         folded=True,
     )
