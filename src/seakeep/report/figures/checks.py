@@ -127,7 +127,7 @@ def response(
                 place.set_xlim(float(found["frequency"][0]), float(found["frequency"][-1]))
                 place.set_xlabel("frequency [Hz]")
         if axes is None:
-            legend_below(figure, places[0], "upper")
+            legend_below(figure, places[0], side="upper")
     return figure
 
 
@@ -161,9 +161,11 @@ def _points(gain: Any, turn: Any, measured: xr.Dataset, factor: float) -> None:
             )
 
 
-def legend_below(figure: Any, place: Any, side: str = "lower") -> None:
-    handles, labels = place.get_legend_handles_labels()
-    unique = dict(zip(labels, handles, strict=True))
+def legend_below(figure: Any, *places: Any, side: str = "lower") -> None:
+    unique: dict[str, Any] = {}
+    for place in places:
+        handles, labels = place.get_legend_handles_labels()
+        unique |= dict(zip(labels, handles, strict=True))
     across = max(1, int(13 * figure.get_figwidth() / (6 + max(map(len, unique)))))  # letters
     figure.legend(
         unique.values(), unique, loc=f"outside {side} center", ncols=min(len(unique), across)
@@ -337,7 +339,6 @@ def residuals(
                     style = {"color": COLOURS["measured"], "linewidth": 1.0, "linestyle": line}
                     values = own["input_correlation"].sel(input=each)
                     past.plot(own["lag"], values, **style, label=str(each))
-                past.legend(fontsize=6, loc="upper right")
             past.set(xlabel="lag of the input [s]", ylabel="correlation [1]")
             past.set_title("with past inputs", loc="left", fontsize=8)
             power = own["measured_spectrum"].values
@@ -351,10 +352,14 @@ def residuals(
             spectrum.set_ylim(bottom=1e-6)
             spectrum.set(xlabel="frequency [Hz]", ylabel="power over peak [1]")
             spectrum.set_title("free runs", loc="left", fontsize=8)
-            spectrum.legend(fontsize=6, loc="upper right")
             age.plot(own["age"], own["age_nrmse"], **LINES["forecast"])
             age.set_ylim(bottom=0)
             age.set(xlabel="age of the forecast [s]", ylabel="error [SD]")
+        if axes is None:
+            legend_below(figure, *places[1:3], side="upper")
+        else:
+            for place in (past, spectrum):
+                place.legend(fontsize=6)
     return figure
 
 
