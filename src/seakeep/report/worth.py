@@ -177,7 +177,7 @@ def _by_state(found: xr.Dataset) -> Table:
                 known = np.isfinite([low, high]).all()
                 change = f"{signed(low, 0)} to {signed(high, 0)} %" if known else MISSING
                 beside = (best, number(float(at["nrmse"])), change)
-            use = USES.get(float(one["limit"]), "not judged")
+            use = USES.get(float(one["limit"]), "not judged").partition(" (")[0]
             rows.append((str(state), str(kind), *cells[:2], *beside, use))
     columns = ("state", "waves", "NRMSE", "95 %", "best baseline", "its NRMSE", "change", "verdict")
     return Table(
@@ -187,6 +187,7 @@ def _by_state(found: xr.Dataset) -> Table:
         tuple(rows),
         "Change: from the best baseline to the model, paired 95 % interval.",
         (2, 3, 5, 6),
+        folded=True,
     )
 
 
