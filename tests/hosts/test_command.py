@@ -28,8 +28,11 @@ def test_sources_take_the_name_of_the_model_and_the_instants_are_told(run, tmp_p
 
 
 def test_what_an_alignment_leaves_to_the_host_is_told(make_run, channels):
-    spec = HankelDMDc(2, 2, 1.0, alignment=ProbeAlignment(surge="none", celerity=2.0))
-    model = spec.fit(make_run(), **channels)
+    for offset in (0.0, 0.5):
+        alignment = ProbeAlignment(surge="none", celerity=2.0, offset=offset)
+        model = HankelDMDc(2, 2, 1.0, alignment=alignment).fit(make_run(), **channels)
+        carries = "as model.aligned_inputs(run) makes them." in program_of(model).timing
+        assert carries == (offset != 0)
     assert program_of(model).timing.endswith("as model.aligned_inputs(run) makes them.")
     predicted = ProbeAlignment(mode="dispersion", surge="predicted")
     model = HankelDMDc(2, 2, 1.0, alignment=predicted).fit(drifting_run(), STATES, INPUTS)

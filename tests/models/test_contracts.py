@@ -77,7 +77,7 @@ class TestLead:
         assert errors[0] > 0.5
         assert errors[1] < 1e-6  # a linear law without noise, to the ridge
         assert (seeing.lead_samples, seeing.history_samples) == (5, 9)
-        assert "lead          5 samples (0.5 s)" in seeing.summary()
+        assert "lead          5 samples: a step is driven by waves up to 0.4 s" in seeing.summary()
 
     def test_nothing_beyond_the_lead_is_read_and_the_forecast_says_how_far(self):
         run = sea(ahead=4)
