@@ -15,7 +15,7 @@ SAMPLED = {
 }  # fmt: skip
 """One case of so many in the default run: some ten per area, in half a minute."""
 PART = 30
-"""One case of so many where the attack is asked for: a thousand, in fifteen minutes."""
+"""One case of so many where the attack is asked for: a thousand, in half an hour."""
 
 
 @pytest.fixture(scope="module")
