@@ -9,7 +9,6 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.check.parts import FreeRun, Known, beside, free_runs, is_regular, judged
-from seakeep.core.metrics import nrmse
 from seakeep.metrics import anrmse_differences
 from seakeep.models import Model
 
@@ -51,7 +50,7 @@ def worth(
         state that stands still or is lost), ``still``, whether that is because it stands
         still in one of the runs, ``best``, the baseline of least error, ``better``, whether
         ``change_upper`` from each baseline that is judged lies below zero, and ``rival``, the
-        judged baseline with the largest ``change_upper``. Over (run, channel): ``run_nrmse``
+        judged baseline with the largest ``change_upper``. Over (channel, run): ``run_nrmse``
         of the model. Over run: ``kind`` of waves,
         ``sea_state``, and ``look_ahead``, how long after an instant the model reads the waves (s).
         ``attrs``: ``of`` ("tests" or "training"), the measured state that the alignment of
@@ -110,17 +109,10 @@ def worth(
         for kind in kinds
     ])  # fmt: skip
     still = np.isnan(limit) & ends
+    of_runs = np.hstack([[table["anrmse"].values[0] for table in of[1:]] for of in tables])
     each = xr.concat([of[0][["anrmse", "anrmse_lower", "anrmse_upper"]] for of in tables], "run")
     dims, signature = ("waves", "state", "model"), model.signature
     names = [r for kind in kinds for r in own if waves[r] == kind]
-    each_run = [
-        nrmse(
-            predicted=own[r].forecast[None],
-            measured=own[r].measured[None],
-            training_std=signature.state_scale.spread,
-        )[0]
-        for r in names
-    ]
     ahead = [signature.input_map.look_ahead(runs[r], model.dt) - model.dt for r in names]
     reads = [signature.input_map.notes(runs[r]).get("conditional_on", "") for r in names]
     return xr.Dataset(
@@ -132,7 +124,7 @@ def worth(
             "change": (dims, change[0]),
             "change_lower": (dims, change[1]),
             "change_upper": (dims, change[2]),
-            "run_nrmse": (("run", "channel"), np.array(each_run)),
+            "run_nrmse": (("channel", "run"), of_runs),
             "limit": (dims[:2], limit),
             "still": (dims[:2], still),
             "best": (dims[:2], np.where(named, labels[least], "")),

@@ -88,10 +88,15 @@ def _verdict(one: xr.Dataset) -> tuple[float, str]:
     if not rival or bool(one["better"]):
         return limit, text
     at = one.sel(model=rival)
-    low, high = (100 * float(at[f"change_{each}"]) for each in ("lower", "upper"))
+    low, high = _change(at)
     how = "worse" if low > 0 else "not shown to be better"
     beside = f" ({_percent(low, high)})" if np.isfinite([low, high]).all() else ""
     return limit, f"{text}; {how} than the baseline {rival}{beside}"
+
+
+def _change(at: xr.Dataset) -> tuple[float, float]:
+    """Bounds of the change from a baseline, %."""
+    return 100 * float(at["change_lower"]), 100 * float(at["change_upper"])
 
 
 def _percent(low: float, high: float) -> str:
@@ -104,7 +109,7 @@ def _beside(own: xr.Dataset) -> str:
     if not (best := str(one["best"].values)):
         return ""
     at = one.sel(model=best)
-    low, high = (100 * float(at[f"change_{each}"]) for each in ("lower", "upper"))
+    low, high = _change(at)
     text = f"; of the best baseline, {best}, {number(float(at['nrmse']))}"
     if np.isfinite([low, high]).all():
         text += f" (from there {_percent(low, high)})"
@@ -173,7 +178,7 @@ def _by_state(found: xr.Dataset) -> Table:
             beside = (MISSING, MISSING, MISSING)
             if best:
                 at = one.sel(model=best)
-                low, high = (100 * float(at[f"change_{each}"]) for each in ("lower", "upper"))
+                low, high = _change(at)
                 known = np.isfinite([low, high]).all()
                 change = f"{signed(low, 0)} to {signed(high, 0)} %" if known else MISSING
                 beside = (best, number(float(at["nrmse"])), change)

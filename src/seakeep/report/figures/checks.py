@@ -127,7 +127,7 @@ def response(
                 place.set_xlim(float(found["frequency"][0]), float(found["frequency"][-1]))
                 place.set_xlabel("frequency [Hz]")
         if axes is None:
-            legend_below(figure, places[0], side="upper")
+            legend_outside(figure, places[0], side="upper")
     return figure
 
 
@@ -161,7 +161,7 @@ def _points(gain: Any, turn: Any, measured: xr.Dataset, factor: float) -> None:
             )
 
 
-def legend_below(figure: Any, *places: Any, side: str = "lower") -> None:
+def legend_outside(figure: Any, *places: Any, side: str = "lower") -> None:
     unique: dict[str, Any] = {}
     for place in places:
         handles, labels = place.get_legend_handles_labels()
@@ -218,7 +218,7 @@ def coherence(
             place.set(xlim=(0, top), ylim=(0, 1.02), xlabel="frequency [Hz]")
             place.set_ylabel(f"coherence, {short_label(name)} [1]")
         if axes is None:
-            legend_below(figure, places[0])
+            legend_outside(figure, places[0])
     return figure
 
 
@@ -356,7 +356,7 @@ def residuals(
             age.set_ylim(bottom=0)
             age.set(xlabel="age of the forecast [s]", ylabel="error [SD]")
         if axes is None:
-            legend_below(figure, *places[1:3], side="upper")
+            legend_outside(figure, *places[1:3], side="upper")
         else:
             for place in (past, spectrum):
                 place.legend(fontsize=6)
@@ -379,7 +379,7 @@ def by_state(
             factor, units = displayed(str(own["units"].values))
             draw(place, own, factor, shown_unit(units) or "?")
         if axes is None:
-            legend_below(figure, places[0])
+            legend_outside(figure, places[0])
     return figure
 
 
@@ -491,7 +491,7 @@ def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) ->
             place.margins(x=0.15)
             place.set_ylim(0, 1.2 * float(found[y].max()))
         if axes is None:
-            legend_below(figure, places[0])
+            legend_outside(figure, places[0])
     return figure
 
 
@@ -541,5 +541,5 @@ def drift(
             place.set_xlabel("frequency [Hz]")
             place.set_ylabel(f"{short_label(name)} [{shown_unit(units) or '?'}]")
         if axes is None:
-            legend_below(figure, places[0])
+            legend_outside(figure, places[0])
     return figure

@@ -11,7 +11,7 @@ import xarray as xr
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError
 from seakeep.models import summarize
-from seakeep.report.figures.checks import legend_below, panels
+from seakeep.report.figures.checks import legend_outside, panels
 from seakeep.report.figures.common import FURTHER, short_label
 from seakeep.report.style import COLOURS, LINES, THIN, axis_label, figure_style
 
@@ -122,7 +122,7 @@ def _histories(
             place.set_xlabel("time [s]" if place is places[-1] else "")
         if axes is None:
             figure.align_ylabels(places)
-            legend_below(figure, places[0])
+            legend_outside(figure, places[0])
     return figure
 
 
@@ -158,5 +158,5 @@ def errors(table: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> F
         place.set_ylim(bottom=0)
         place.set_ylabel("NRMSE [SD], 95 % intervals")
         if axes is None and len(runs) > 1:
-            legend_below(figure, place)
+            legend_outside(figure, place)
     return figure
