@@ -36,31 +36,58 @@ def _filtered(extended: FloatArray, transfer: FloatArray, padding: int) -> Float
     return out[padding : extended.shape[0] - padding]
 
 
-def linear_prediction(series: FloatArray, order: int) -> FloatArray:
-    """Coefficients of an autoregressive model by Burg's method.
+def reflections(series: FloatArray, order: int) -> FloatArray:
+    """Reflection coefficients of an autoregressive model by Burg's method, shape (order,).
 
     Notes
     -----
-    J. P. Burg, Maximum entropy spectral analysis (1975): each reflection coefficient minimises
-    the sum of forward and backward prediction errors.
+    J. P. Burg, Maximum entropy spectral analysis (1975): each one minimises the sum of forward and
+    backward prediction errors. All lie between −1 and 1.
     """
     forward, backward = series[1:].copy(), series[:-1].copy()
-    polynomial = np.array([1.0])
+    out = np.zeros(order)
     # Below this the errors are rounding: a pure tone needs two coefficients and gets no more.
     floor = np.finfo(float).eps * float(series @ series)
-    for _ in range(order):
+    for place in range(order):
         power = float(forward @ forward + backward @ backward)
         if power <= floor:
             break
-        reflection = -2.0 * float(forward @ backward) / power
-        padded = np.append(polynomial, 0.0)
-        polynomial = padded + reflection * padded[::-1]
-        updated = forward + reflection * backward
-        backward = (backward + reflection * forward)[:-1]
+        out[place] = -2.0 * float(forward @ backward) / power
+        updated = forward + out[place] * backward
+        backward = (backward + out[place] * forward)[:-1]
         forward = updated[1:]
-    out = np.zeros(order)
-    out[: polynomial.size - 1] = -polynomial[1:]
     return out
+
+
+def whitening(reflection: FloatArray) -> FloatArray:
+    """Filters that leave the innovations of a series, shape (…, order + 1).
+
+    Levinson's recursion, from reflection coefficients of shape (…, order); those between −1 and 1
+    give filters whose inverses are stable.
+    """
+    order = reflection.shape[-1]
+    out = np.zeros((*reflection.shape[:-1], order + 1))
+    out[..., 0] = 1.0
+    for place in range(order):
+        block = out[..., : place + 2]
+        block += reflection[..., place, None] * block[..., ::-1]
+    return out
+
+
+def continued(past: FloatArray, filters: FloatArray, innovations: FloatArray) -> FloatArray:
+    """What innovations make after a series of zero mean, shape (number, count), of as many filters.
+
+    `filters`, shape (number, order + 1), are those of :func:`whitening`.
+    """
+    order = filters.shape[1] - 1
+    lags = scipy.linalg.toeplitz(past[: -order - 1 : -1], np.zeros(order))
+    states = -filters[:, 1:] @ lags
+    return np.stack(
+        [
+            scipy.signal.lfilter([1.0], each, given, zi=state)[0]
+            for each, given, state in zip(filters, innovations, states, strict=True)
+        ]
+    )
 
 
 def predicted_extension(
@@ -88,10 +115,9 @@ def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
     The order is at most a third of the number of samples.
     """
     order = max(1, min(order, past.size // 3))
-    denominator = np.concatenate([[1.0], -linear_prediction(past, order)])
-    state = scipy.signal.lfiltic([1.0], denominator, past[: -order - 1 : -1])
-    out: FloatArray = scipy.signal.lfilter([1.0], denominator, np.zeros(count), zi=state)[0]
-    return out
+    found = whitening(reflections(past, order))
+    result: FloatArray = continued(past, found[None], np.zeros((1, count)))[0]
+    return result
 
 
 def _checked_band(band: tuple[float, float], dt: float, samples: int) -> tuple[float, float]:

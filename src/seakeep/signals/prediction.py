@@ -10,7 +10,7 @@ import numpy.typing as npt
 import scipy
 
 from seakeep.arrays import FloatArray, as_series, whole_number
-from seakeep.signals.calculus import linear_prediction, predicted
+from seakeep.signals.calculus import continued, predicted, reflections, whitening
 from seakeep.signals.propagation import LEAST_CORRELATION, band_limit, carry_by_dispersion
 from seakeep.sizes import MOST_AHEAD, check_size
 from seakeep.waves import group_speed
@@ -23,6 +23,8 @@ encounter periods is 0.53 SD with one half of a period, 0.43 with one, 0.38 with
 four."""
 UNLIKE = math.sqrt(1.0 - LEAST_CORRELATION**2)
 """Part of a record's SD that may be left of it once the waves carried to it are taken off."""
+WHOLLY = 1.0 - 1e-12
+"""Largest reflection coefficient whose error is drawn: rounding hides those of a pure tone."""
 SLOWLY, QUICKLY = 0.99, 0.05
 """Shares of a record's variance below the waves that arrive last, and below the first ones."""
 
@@ -79,7 +81,7 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
 def draw_waves(
     series: npt.ArrayLike, count: int, pairs: int, rng: np.random.Generator
 ) -> FloatArray:
-    """Draw what may follow elevations, each from its own record: futures about the predicted one.
+    r"""Draw what may follow elevations, each from its own record: futures about the predicted one.
 
     Parameters
     ----------
@@ -94,8 +96,10 @@ def draw_waves(
     Returns
     -------
     ndarray, shape (2 * pairs, count) or (2 * pairs, count, channel)
-        Innovations of the power that the autoregressive model leaves of the record, raised by
-        Akaike's final prediction error: (n + p)/(n − p) for p coefficients found from n samples.
+        Each pair has an autoregressive model of its own, since its coefficients are known from a
+        record of n samples only: Fisher's transform of the m-th reflection coefficient has a
+        standard error of :math:`1/\sqrt{n - m - 3}`. Innovations have the power that the model
+        leaves of the record, n/(n − p) times for p coefficients.
 
     Raises
     ------
@@ -116,12 +120,18 @@ def draw_waves(
     errors = np.empty((pairs, int(count), flat.shape[1]))
     for column, values in enumerate(flat.T):
         deviations = values - values.mean()
-        order = max(1, min(_memory(deviations), deviations.size // 3))
-        whitening = np.concatenate([[1.0], -linear_prediction(deviations, order)])
-        left = scipy.signal.lfilter(whitening, [1.0], deviations)[order:]
-        unseen = (deviations.size + order) / (deviations.size - order)
-        innovations = math.sqrt(unseen) * left.std() * rng.standard_normal((pairs, int(count)))
-        errors[..., column] = scipy.signal.lfilter([1.0], whitening, innovations, axis=1)
+        size = deviations.size
+        order = max(1, min(_memory(deviations), size // 3))
+        found = reflections(deviations, order)
+        left = scipy.signal.lfilter(whitening(found), [1.0], deviations)[order:]
+        power = math.sqrt(size / (size - order)) * left.std()
+        apart = rng.standard_normal((pairs, order)) / np.sqrt(
+            np.maximum(size - 3 - np.arange(1, order + 1), 1)
+        )
+        filters = whitening(np.tanh(np.arctanh(np.clip(found, -WHOLLY, WHOLLY)) + apart))
+        innovations = power * rng.standard_normal((pairs, int(count)))
+        made = continued(deviations, filters, innovations)
+        errors[..., column] = made - predicted(deviations, int(count), order)
     errors = errors.reshape(pairs, *expected.shape)
     return np.concatenate([expected + errors, expected - errors])
 
