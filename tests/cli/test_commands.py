@@ -674,6 +674,16 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
             2,
             r"steps: received '12\.5'\. Give a whole number such as 400, or encounter periods",
         ),
+        (
+            f"forecast model.nc {FROM_20.replace('50', '1' + 400 * '0')} -o f.nc",
+            2,
+            r"--steps is larger than 9223372036854775807\. Give a smaller number\.",
+        ),
+        (
+            f"compare model.nc {CAMPAIGN} --steps {5000 * '1'}",
+            2,
+            r"steps: received '1{12}\.\.\.1{13}'\. Give a whole number",
+        ),
         (f"compare model.nc {CAMPAIGN} --steps infT", 2, r"steps: received 'infT'\. Give a whole"),
         (
             f"compare model.nc {CAMPAIGN} --steps 1",

@@ -190,7 +190,7 @@ class TestObservableOfAnother:
         model = HankelDMDc(0, 0, 1.0, observables=(Half(),)).fit(run, ["heave"], ["eta"])
         path = model.save(tmp_path / "m.nc")
         monkeypatch.delitem(OBSERVABLES, "half")
-        with pytest.raises(DataError, match=r"observables: kind must be .* received 'half'"):
+        with pytest.raises(DataError, match=r"kind must be .* received 'half'\. A kind of another"):
             load_model(path)
 
 

@@ -378,6 +378,9 @@ def test_contents_that_no_study_writes_are_told(finished):
             told[name]["settings"][key] = {"value": value, "source": "stated"}
             with pytest.raises(ValueError, match=rf"models\.{name}: .*\b({key}|prior)\b"):
                 check_contents(attrs | {"models": json.dumps(told)}, groups)
+        told = json.loads(attrs["models"])  # a kind that another module adds may well be this one
+        told[name]["settings"]["observables"] = {"value": [{"kind": "mine"}], "source": "stated"}
+        check_contents(attrs | {"models": json.dumps(told)}, groups)
     older = json.loads(attrs["settings"])
     del older["output"]["paper"], older["training"]["placement"]
     filled = check_contents(attrs | {"settings": json.dumps(older)}, groups)["settings"]

@@ -538,7 +538,14 @@ class FittedAlignment:
         made = typed(cls, content)
         counts = {len(made.inputs), len(made.carried), len(made.positions)}
         positive = (made.celerity, made.period, made.water_depth, made.highest_frequency)
-        if len(counts) > 1 or any(each is not None and each <= 0 for each in positive):
+        needed = [made.celerity if made.settings.mode == "effective" else made.highest_frequency]
+        if made.settings.surge == "predicted":
+            needed.append(made.period)
+        if (
+            len(counts) > 1
+            or None in needed
+            or any(each is not None and each <= 0 for each in positive)
+        ):
             raise ValueError("the alignment of the inputs is not one of a vessel in waves")
         return made
 

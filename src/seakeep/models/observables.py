@@ -412,7 +412,12 @@ def from_json(table: Mapping[str, Any]) -> Observable:
     """
     settings = dict(table)
     kind = settings.pop("kind", None)
-    check_choice("observables: kind", kind, list(OBSERVABLES))
+    try:
+        check_choice("observables: kind", kind, list(OBSERVABLES))
+    except RequestError as error:
+        raise RequestError(
+            f"{error} A kind of another module is known once that is imported."
+        ) from None
     made = OBSERVABLES[str(kind)]
     known = [each.name for each in fields(made)]  # type: ignore[arg-type]
     for key in settings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
@@ -12,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep import metrics, statistics
+from seakeep.arrays import whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.conventions import displayed
@@ -682,13 +684,12 @@ def samples_of(
     stated: float | str, campaign: Campaign, runs: Iterable[xr.Dataset], dt: float, name: str
 ) -> int:
     """Number of samples; a length in encounter periods is rounded to the nearest one."""
-    if not isinstance(stated, str):
-        return int(stated)
     try:
-        return int(stated)
+        count = int(stated)
     except ValueError:
-        count = _count(stated, name, "a whole number such as 400")
-        return round(count * _period(campaign, runs) / dt)
+        length = _count(str(stated), name, "a whole number such as 400")
+        return round(length * _period(campaign, runs) / dt)
+    return whole_number(count, name)
 
 
 def _count(stated: str, name: str, otherwise: str) -> float:
@@ -699,8 +700,8 @@ def _count(stated: str, name: str, otherwise: str) -> float:
     if length is None or length.unit != "T" or not abs(length.value) < 1e9:
         comma = " Write a decimal point, no comma." if "," in stated else ""
         raise RequestError(
-            f"{name}: received '{stated}'. Give {otherwise}, or encounter periods such as "
-            f"'15 T'.{comma}"
+            f"{name}: received {reprlib.repr(stated)}. Give {otherwise}, or encounter periods such "
+            f"as '15 T'.{comma}"
         )
     return length.value
 

@@ -22,6 +22,7 @@ from seakeep.arrays import GREATEST
 from seakeep.campaign.settings import PreparationSettings
 from seakeep.errors import SeakeepError
 from seakeep.models import KINDS
+from seakeep.models.observables import OBSERVABLES
 from seakeep.study.resolve import Source, check_settings
 from seakeep.study.settings import Preset, StudySettings
 from seakeep.toml import Table
@@ -283,10 +284,15 @@ def check_contents(attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]) -
 
 
 def _check_model(told: Mapping[str, Any], place: str, period: float, dt: float) -> None:
-    """Let the class of a kind judge the settings; a kind that was added elsewhere is not known."""
-    if told["kind"] not in KINDS:
-        return
+    """Let the class of a kind judge the settings; kinds that were added elsewhere are not known."""
     values = {key: each["value"] for key, each in told["settings"].items()}
+    observables = values.get("observables")
+    tables = observables if isinstance(observables, list) else []
+    added = any(
+        isinstance(each, dict) and str(each.get("kind")) not in OBSERVABLES for each in tables
+    )
+    if told["kind"] not in KINDS or added:
+        return
     try:
         spec = check_settings(told["kind"], values, period, dt)
     except (SeakeepError, LookupError, TypeError, ValueError, ArithmeticError) as error:
