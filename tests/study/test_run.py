@@ -392,6 +392,16 @@ def test_contents_that_no_study_writes_are_told(finished):
         read_result(finished.folder)
 
 
+def test_words_of_a_result_come_back_in_any_alphabet(finished):
+    groups = dict(finished.groups)
+    name = f"chosen/{finished.models[0]}"
+    words = np.full(groups[name]["words"].shape, "the best λ of run Åsgård 試験")
+    groups[name] = groups[name].assign(words=(groups[name]["words"].dims, words))
+    store.write_result(finished.folder, finished.attrs, groups)
+    found = read_result(finished.folder).groups[name]["words"].values
+    np.testing.assert_array_equal(found, words)
+
+
 def test_a_damaged_result_is_told(tmp_path):
     (tmp_path / "study.nc").write_bytes(b"no NetCDF")
     with pytest.raises(DataError, match=r"study.nc was cut off, altered.* it has no checksum"):

@@ -408,7 +408,7 @@ def read_result(folder: Path | str) -> StudyResult:
     from xarray.backends import H5NetCDFStore
 
     try:
-        with h5netcdf.File(read_sealed(path), "r") as file:
+        with h5netcdf.File(read_sealed(path), "r", decode_vlen_strings=True) as file:
             attrs = {key: _plain(value) for key, value in file.attrs.items()}
             if attrs["format"] != FORMAT:
                 raise RequestError(
