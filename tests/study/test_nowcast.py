@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from tutorial_study import put_tutorial
 
 from seakeep.study import read_study, run_study
@@ -51,12 +52,21 @@ def test_a_study_judges_its_models_in_service(study, result):
 
 def test_the_report_shows_it_and_the_key_leaves_other_studies_as_they_were(study, result):
     pytest.importorskip("matplotlib")
+    from seakeep.report.nowcast import nowcast_blocks
     from seakeep.report.sections.service import service
 
     section = service(result)
     assert [each.name for each in section.figures] == ["nowcast_unseen"]
     assert len(section.figures[0].draw().axes) == 1
     assert section.tables[0].title == "unseen: single in service"
+    found = result.groups["nowcast/single"]
+    longest = float(found["lead"][-1])
+    for lead_time, words in ((0.5 * longest, ""), (longest, "at least ")):
+        told = found.assign(lead_time=xr.full_like(found["lead_time"], lead_time))
+        (table,) = nowcast_blocks({"single": told})
+        assert [row[1].startswith(words) and float(row[1][len(words) :]) for row in table.rows] == (
+            pytest.approx([lead_time] * len(table.rows), rel=1e-3)  # as many digits are printed
+        )
     other = study.path.with_name("other.toml")
     other.write_text(STUDY.replace("nowcast = true", ""), "utf-8")
     stated = study.path.with_name("stated.toml")
