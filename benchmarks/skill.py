@@ -73,6 +73,7 @@ alignment = {{ mode = "effective", surge = "measured" }}
 [models.ensemble]
 kind = "bayesian_hankel_dmdc"
 n_members = 12
+train_on = "all"
 
 [models.windows]
 kind = "bayesian_hankel_dmdc"

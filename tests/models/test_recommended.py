@@ -13,9 +13,11 @@ from seakeep import (
     BayesianHankelDMDc,
     DataError,
     HankelDMDc,
+    LogUniform,
     ProbeAlignment,
     RequestError,
     Select,
+    Uniform,
     load_model,
 )
 from seakeep.models.inputs import FittedAlignment
@@ -78,6 +80,28 @@ def test_an_ensemble_draws_around_what_was_chosen(tmp_path):
     assert (again.selection, again.origin) == (ensemble.selection, ensemble.origin)
     kept = BayesianHankelDMDc.from_json(spec.to_json())
     assert (kept.ridge, kept.select) == ("rollout", spec.select)
+
+
+def test_members_learn_from_windows_of_long_runs_and_else_from_all_of_them():
+    spec = dataclasses.replace(
+        BayesianHankelDMDc.recommended(T, n_members=12), ridge=LogUniform(0.1, 10), select=None
+    )
+    long = {name: sea(seed, samples=round(130 * PERIOD)) for seed, name in enumerate("abc")}
+    taught = spec.fit(long, STATES, INPUTS)
+    assert taught.origin["train_on"] == "windows"
+    assert {draw.run for draw in taught.members} == {0, 1, 2}
+    lengths = np.array([draw.window for draw in taught.members]) / PERIOD
+    assert 60 <= lengths.min() < lengths.max() <= 120
+    assert len({(draw.run, draw.last, draw.window) for draw in taught.members}) == 12
+    regular = {**long, "c": long["c"].assign_attrs(waves="regular")}
+    short = {**long, "c": sea(2, samples=round(110 * PERIOD))}
+    alone = {"a": long["a"]}
+    for given in (regular, short, alone):
+        ensemble = spec.fit(given, STATES, INPUTS)
+        assert ensemble.origin["train_on"] == "all"
+        assert {(draw.run, draw.window) for draw in ensemble.members} == {(None, None)}
+    again = dataclasses.replace(spec, train_on="windows", train_length=Uniform(60, 120))
+    assert again.fit(long, STATES, INPUTS).origin == taught.origin
 
 
 def rig(run: xr.Dataset, depth: float | None, position: float | None) -> xr.Dataset:

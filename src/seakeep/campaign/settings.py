@@ -820,10 +820,10 @@ class ModelSettings(Table):
     sampling: Literal["monte_carlo", "sobol"] | None = Field(
         default=None, description="'monte_carlo' or 'sobol'; for an ensemble"
     )
-    train_on: Literal["all", "runs", "windows"] | None = Field(
+    train_on: Literal["all", "runs", "windows", "auto"] | None = Field(
         default=None,
-        description="what a member learns from: 'all' runs, one of the 'runs', or one of their "
-        "'windows'; for an ensemble",
+        description="what a member learns from: 'all' runs, one of the 'runs', one of their "
+        "'windows', or 'auto', windows of long runs; for an ensemble",
     )
 
     @model_validator(mode="after")

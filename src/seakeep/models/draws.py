@@ -29,7 +29,7 @@ from seakeep.models.settings import History, periods_to_samples
 __all__ = ["Draw", "Sampling", "TrainOn", "draw_members"]
 
 Sampling = Literal["monte_carlo", "sobol"]
-TrainOn = Literal["all", "runs", "windows"]
+TrainOn = Literal["all", "runs", "windows", "auto"]
 
 PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
 """Settings that are drawn, in the order of a member's numbers."""

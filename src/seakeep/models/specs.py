@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self, get_args
 
 import numpy as np
 import xarray as xr
@@ -356,6 +356,11 @@ def _around_any(
 
 
 PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
+WINDOW = Uniform(60, 120)
+"""Encounter periods that a member learns from where runs are long.
+
+Members that learn from windows of one run each differ most where the waves are unlike those of the
+training (docs/howto/bands.md)."""
 
 
 @dataclass(frozen=True)
@@ -386,9 +391,11 @@ class BayesianHankelDMDc:
         Root of the members' generators. A Generator gives one number, when the settings are made.
     sampling : {"monte_carlo", "sobol"}, optional
         Independent points, or a scrambled Sobol net.
-    train_on : {"all", "runs", "windows"}, optional
+    train_on : {"all", "runs", "windows", "auto"}, optional
         What a member learns from: the windows at ``stop`` in all runs together (the paper); that
         in one run, drawn for each member; or a window that ends anywhere up to ``stop`` in one run.
+        "auto" takes windows of 60 to 120 encounter periods where there are several runs, each lasts
+        120, and none is of regular waves (``attrs["waves"]``), and all runs otherwise.
     dt : float, optional
         Time step the runs must have, s; None takes theirs.
     lead : int or float, optional
@@ -451,7 +458,7 @@ class BayesianHankelDMDc:
         periods_to_samples(1, period, 0.5 * period if self.dt is None else self.dt)
         _check_lead(self.lead)
         check_choice("sampling", self.sampling, ("monte_carlo", "sobol"))
-        check_choice("train_on", self.train_on, ("all", "runs", "windows"))
+        check_choice("train_on", self.train_on, get_args(TrainOn))
         object.__setattr__(self, "observables", observables_of(self.observables))
         object.__setattr__(self, "readouts", readouts_of(self.readouts))
         object.__setattr__(self, "select", Select.of(self.select))
@@ -620,7 +627,8 @@ class BayesianHankelDMDc:
         -------
         BayesianHankelDMDc
             As there, with half to one and a half times the delay of the states, two to four
-            periods of the inputs, and 0.3 to 3 times the λ that free runs choose.
+            periods of the inputs, 0.3 to 3 times the λ that free runs choose, and members that
+            learn from windows of long runs (``train_on = "auto"``).
         """
         return cls(
             encounter_period=encounter_period,
@@ -636,6 +644,7 @@ class BayesianHankelDMDc:
             alignment=ALIGNMENT,
             lead=LEAD_PERIODS,
             readouts="auto",
+            train_on="auto",
             select=Select(observables=True, period=encounter_period),
         )
 
@@ -736,6 +745,18 @@ class BayesianHankelDMDc:
             readouts = readouts_for(central, until(named, stop), list(states), list(inputs))
         return self._drawn(named, states, inputs, stop, readouts)
 
+    def _taught_by(self, runs: Collection[xr.Dataset], shortest: float) -> BayesianHankelDMDc:
+        """Settings that say what members learn from; `shortest` is the time of a run, s."""
+        if self.train_on != "auto":
+            return self
+        seed = self.seed_sequence
+        long = len(runs) > 1 and shortest >= WINDOW.high * self.encounter_period
+        if not long or any(run.attrs.get("waves") == "regular" for run in runs):
+            return replace(self, train_on="all", seed=seed)
+        return replace(
+            self, train_on="windows", train_length=self.train_length or WINDOW, seed=seed
+        )
+
     def _drawn(
         self,
         named: dict[str, xr.Dataset],
@@ -759,7 +780,8 @@ class BayesianHankelDMDc:
             last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name) + 1
             for name, run in named.items()
         ]
-        members = draw_members(self, dt, samples, input_map)
+        spec = self._taught_by(named.values(), min(samples) * dt)
+        members = draw_members(spec, dt, samples, input_map)
         earliest = reach(members, samples, self.history == "inside", input_map)
         arrays, trained = _training_arrays(named, states, inputs, samples, earliest, input_map)
         # Direct regressors have no value where they need inputs from before the record; no member
@@ -785,7 +807,7 @@ class BayesianHankelDMDc:
         )
         return HankelEnsemble(
             settings=shared,
-            origin=self.to_json(),
+            origin=spec.to_json(),
             members=tuple(members),
             arrays=arrays,
             signature=signature,
