@@ -294,7 +294,9 @@ def coverage(found: Mapping[str, Results]) -> list[str]:
         "## Goals: the 95 % band of the ensemble of `recommended`, calibrated",
         "",
         "Coverage averaged over the channels, by what each member learns from: all training runs, "
-        "or a window of one of them. Members of windows differ more where the sea is another one.",
+        "or a window of one of them. Members of windows differ more where the sea is another one. "
+        "By default, windows teach them in the regular tests, whose training runs last 128 T̂, and "
+        "all runs in the irregular ones, whose training lasts 64 T̂ of each.",
         "",
         *markdown(
             ("members learn from", "test", "coverage", "good", "stretch", *found, "reached"), rows

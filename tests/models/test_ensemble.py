@@ -526,7 +526,10 @@ def test_an_ensemble_without_inputs(run):
         ({"ridge": 100}, "ridge must be a prior; received 100"),
         ({"n_members": 0}, "n_members must be an integer of at least 1; received 0"),
         ({"sampling": "grid"}, "sampling must be 'monte_carlo' or 'sobol'; received 'grid'"),
-        ({"train_on": "half"}, "train_on must be 'all', 'runs', 'windows' or 'auto'; received 'half'"),
+        (
+            {"train_on": "half"},
+            "train_on must be 'all', 'runs', 'windows' or 'auto'; received 'half'",
+        ),
         ({"seed": -1}, "seed must be an integer, zero or more, a SeedSequence or a Generator"),
         ({"encounter_period": 0}, "encounter_period must be a positive number of seconds"),
         ({"delay_rows": "none"}, "delay_rows must be 'ridge' or 'exact'"),
