@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -150,6 +151,10 @@ def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tmp_path, mon
     assert tuned.ridge_scale == "per_snapshot"
     assert tuned.readouts == {}  # the tutorial's line is linear
     assert not (tmp_path / "campaign_tuned.scores.json").exists()
+    tried = pd.read_csv(tmp_path / "campaign_tuned.csv")
+    assert tried["chosen"].sum() == 1
+    assert np.all((tried["lower"] <= tried["score"]) & (tried["score"] <= tried["upper"]))
+    assert len(tried) > 9  # each λ of each lead
     text = (tmp_path / "campaign_tuned.toml").read_text()
     changed = ("state_delays", "input_delays", "ridge", "lead")
     kept = [line for line in before.splitlines() if line.strip() and not line.startswith(changed)]
@@ -158,6 +163,28 @@ def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tmp_path, mon
     assert "lies in another folder" in capsys.readouterr().err
     assert main(["tune", "campaign.toml", "-o", "tuned"]) == 2
     assert "Name it tuned.toml" in capsys.readouterr().err
+
+
+def test_the_command_takes_windows_and_folds_from_the_file(tmp_path, monkeypatch, capsys):
+    for path in TUTORIAL.iterdir():
+        if path.suffix in (".csv", ".toml"):
+            shutil.copy(path, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    from seakeep.cli import main
+
+    path = tmp_path / "campaign.toml"
+    head, rest = path.read_text().split("[model]\n", 1)
+    path.write_text(f'{head}[model]\nselect = {{ horizon = ["5 T", 10] }}\n{rest}')
+    given = {}
+
+    def spy(*_, **more):
+        given.update(more)
+        raise RequestError("seen")
+
+    monkeypatch.setattr("seakeep.tuning.tune", spy)
+    assert main(["tune", "campaign.toml"]) == 2
+    assert "seen" in capsys.readouterr().err
+    assert (given["horizon"], given["folds"]) == ((5.0, 10.0), "run")
 
 
 def test_a_tuned_file_holds_the_read_outs_and_is_else_as_it_was():

@@ -104,6 +104,15 @@ def test_members_learn_from_windows_of_long_runs_and_else_from_all_of_them():
     assert again.fit(long, STATES, INPUTS).origin == taught.origin
 
 
+def test_the_step_may_be_that_of_the_runs_and_must_agree_with_it():
+    assert HankelDMDc.recommended(T, runs=runs()) == HankelDMDc.recommended(T, DT)
+    assert BayesianHankelDMDc.recommended(T, runs=runs()).dt == pytest.approx(DT)
+    with pytest.raises(RequestError, match=r"neither dt .* nor runs are given"):
+        HankelDMDc.recommended(T)
+    with pytest.raises(DataError, match="step"):
+        HankelDMDc.recommended(T, 2 * DT, runs())
+
+
 def rig(run: xr.Dataset, depth: float | None, position: float | None) -> xr.Dataset:
     run = run.rename(drift="surge").assign_attrs(encounter_period=T)
     if depth is not None:

@@ -427,6 +427,15 @@ def test_a_preset_fills_in_what_is_not_stated_key_by_key_and_says_so():
     assert sources["ridge"] == "stated"
 
 
+@pytest.mark.parametrize(
+    ("horizon", "found"), [("15 T", (15.0,)), (["5 T", 10], (5.0, 10.0)), (7.5, (7.5,))]
+)
+def test_the_horizon_of_free_runs_is_stated_in_encounter_periods(horizon, found):
+    table = {"states": ("heave",), "inputs": ("eta_fwd",), "select": {"horizon": horizon}}
+    settings = ModelSettings.model_validate(table)
+    assert resolve_model(settings, 2.0, 0.1, preset="recommended").spec.select.horizon == found
+
+
 def test_a_study_that_leaves_sea_states_out_chooses_so_too():
     settings = ModelSettings(states=("heave",), inputs=("eta_fwd",))
     found = resolve_model(settings, 2.0, 0.1, preset="recommended", folds="sea_state")

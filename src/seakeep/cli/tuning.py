@@ -51,13 +51,14 @@ def tune(
     """Choose settings by free runs on held-out training runs.
 
     Each candidate is fitted to all training runs but one and judged by free runs on that one.
-    The choice is written into a copy of the campaign file. After an interruption, the same command
-    continues the search.
+    The choice is written into a copy of the campaign file, all that was tried into a CSV file beside
+    it. After an interruption, the same command continues the search.
 
     Example: seakeep tune docs/tutorial/campaign.toml --vary input_delays
     """
     from seakeep.campaign import read_campaign
-    from seakeep.models import HankelDMDc
+    from seakeep.models import HankelDMDc, Select
+    from seakeep.report.comparison import plain_cells
     from seakeep.study.fit import read_training
     from seakeep.tuning import tune as search
 
@@ -69,9 +70,9 @@ def tune(
             "its folder. Write it beside the campaign file."
         )
     check_place(target, ".toml")
-    picture = target.with_suffix(".png")
-    for path, kind in ((target, "tuned campaign"), (picture, "figure")):
-        check_output(path, kind, read_files(read))
+    picture, tried = target.with_suffix(".png"), target.with_suffix(".csv")
+    for path, kind in ((target, "tuned campaign"), (picture, "figure"), (tried, "table")):
+        check_output(path, kind, read_files(read), "state_delays,input_delays,lead,observables,")
     settings = read.model(model)
     with progress_bar("Preparing") as progress:
         spec, _, runs, stop = read_training(read, model, progress)
@@ -81,6 +82,7 @@ def tune(
             "--model, or set kind = 'hankel_dmdc'."
         )
     kept, varied = target.with_suffix(".scores.json"), vary or ["observables"]
+    chosen = spec.select or Select()
     with member_executor(workers, scheduler) as executor, progress_bar("Tuning") as progress:
         found = search(
             spec,
@@ -88,7 +90,8 @@ def tune(
             list(settings.states),
             list(settings.inputs),
             vary=varied,
-            folds=spec.select.folds if spec.select else "run",
+            horizon=chosen.horizon,
+            folds=chosen.folds,
             stop=stop,
             executor=executor,
             progress=progress,
@@ -100,7 +103,12 @@ def tune(
         place.write_text(text, encoding="utf-8")
     kept.unlink(missing_ok=True)
     messages().print(f"Wrote {target}. Fit it with: seakeep fit {target} -o model.nc")
-    if find_spec("matplotlib") and found.table.sizes["trial"]:
+    if not found.table.sizes["trial"]:
+        return
+    with replacing(tried) as place:
+        plain_cells(found.table.to_dataframe()).to_csv(place, index=False)
+    messages().print(f"Wrote {tried}: all that was tried.")
+    if find_spec("matplotlib"):
         from seakeep.report.style import save_figure
 
         messages().print(f"Wrote {save_figure(found.figure(), picture)}.")

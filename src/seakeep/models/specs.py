@@ -182,15 +182,19 @@ class HankelDMDc(HankelSettings):
         )
 
     @classmethod
-    def recommended(cls, encounter_period: float, dt: float) -> Self:
+    def recommended(
+        cls, encounter_period: float, dt: float | None = None, runs: Runs | None = None
+    ) -> Self:
         """Settings we recommend: what the data do not decide is stated, the rest `fit` chooses.
 
         Parameters
         ----------
         encounter_period : float
             Mean encounter period, s.
-        dt : float
-            Time step, s.
+        dt : float, optional
+            Time step, s; by default that of `runs`.
+        runs : Dataset or collection of Datasets, optional
+            Training runs, whose step this must be.
 
         Returns
         -------
@@ -203,9 +207,10 @@ class HankelDMDc(HankelSettings):
             out in turn; where nothing can be held out there are none, and λ is 1e-3 per snapshot
             pair.
         """
+        step = _step_of(dt, runs)
 
         def samples(periods: float) -> int:
-            return periods_to_samples(periods, encounter_period, dt)
+            return periods_to_samples(periods, encounter_period, step)
 
         return cls(
             state_delays=samples(STATE_PERIODS),
@@ -615,6 +620,7 @@ class BayesianHankelDMDc:
         dt: float | None = None,
         n_members: int = 100,
         seed: int | np.random.SeedSequence | np.random.Generator = 0,
+        runs: Runs | None = None,
     ) -> Self:
         """Priors around :meth:`HankelDMDc.recommended`.
 
@@ -622,6 +628,8 @@ class BayesianHankelDMDc:
         ----------
         encounter_period, dt, n_members, seed
             As in :meth:`paper`.
+        runs
+            As in :meth:`HankelDMDc.recommended`.
 
         Returns
         -------
@@ -638,7 +646,7 @@ class BayesianHankelDMDc:
             ridge="rollout",
             n_members=n_members,
             seed=seed,
-            dt=dt,
+            dt=dt if runs is None else _step_of(dt, runs),
             delay_rows="exact",
             ridge_scale="per_snapshot",
             alignment=ALIGNMENT,
@@ -837,6 +845,19 @@ def _seed_sequence(seed: object) -> np.random.SeedSequence:
             f"received {seed!r}."
         )
     return np.random.SeedSequence(int(seed))
+
+
+def _step_of(dt: float | None, runs: Runs | None) -> float:
+    """Time step that is stated, which must be that of runs, or theirs."""
+    if runs is None:
+        if dt is None:
+            raise RequestError("neither dt (s) nor runs are given. Give one of them.")
+        return dt
+    named = as_runs(runs)
+    step = labelled.common_step(named)
+    if dt is not None:
+        labelled.check_step(*next((run, name) for name, run in named.items()), dt)
+    return step
 
 
 def _check_lead(lead: object) -> None:

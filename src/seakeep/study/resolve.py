@@ -331,7 +331,10 @@ def _select(table: dict[str, Any], encounter_period: float | None) -> dict[str, 
     made = {"period": encounter_period, **table}
     if "horizon" in table:
         given = table["horizon"]
-        made["horizon"] = tuple(each.value if isinstance(each, Length) else each for each in given)
+        every = given if isinstance(given, list | tuple) else (given,)
+        made["horizon"] = tuple(
+            parse_length(each).value if isinstance(each, str) else each for each in every
+        )
     return made
 
 
