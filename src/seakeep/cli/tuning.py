@@ -51,8 +51,8 @@ def tune(
     """Choose settings by free runs on held-out training runs.
 
     Each candidate is fitted to all training runs but one and judged by free runs on that one.
-    The choice is written into a copy of the campaign file, all that was tried into a CSV file beside
-    it. After an interruption, the same command continues the search.
+    The choice is written into a copy of the campaign file, and all that was tried into a CSV file
+    beside it. After an interruption, the same command continues the search.
 
     Example: seakeep tune docs/tutorial/campaign.toml --vary input_delays
     """
