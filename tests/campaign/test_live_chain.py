@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import ground
 import numpy as np
 import pytest
 import xarray as xr
@@ -66,6 +67,49 @@ def test_how_rows_are_cut_up_does_not_matter(campaign, rows):
     assert small["time"].values[0] == large["time"].values[0]
     assert abs(small.sizes["time"] - large.sizes["time"]) < 8
     assert whole.push({}).sizes["time"] == 0
+
+
+def test_a_gap_is_masked_and_what_follows_it_is_as_if_there_were_none(campaign, rows):
+    assert campaign.settings.preparation.gaps == "refuse"
+    time = rows["t"]
+    kept = (time < 20.0) | (time > 23.0)
+    gapped = {name: each[kept] for name, each in rows.items()}
+    settings = {"delay": "1 T", "window": "20 T"}
+    found = sent(campaign.live_chain("unseen", **settings), gapped)
+    whole = sent(campaign.live_chain("unseen", **settings), rows)
+    np.testing.assert_array_equal(found["time"], whole["time"])
+    inside = (found["time"] > 20.1) & (found["time"] < 22.9)
+    assert found["heave"].isel(time=inside).isnull().all()
+    after = found["time"] > 40.0
+    for name in ("heave", "eta_fwd"):
+        left = (found[name] - whole[name]).isel(time=after).std() / whole[name].std()
+        assert left < 1e-3  # the memory of filters fades within some periods
+
+
+def test_a_silent_logger_is_named_before_the_rows_of_others_pile_up(tmp_path):
+    place = ground.write(tmp_path)
+    chain = seakeep.read_campaign(place / "campaign.toml").live_chain("one", delay=2.0, window=20.0)
+    rows = {key: read_columns(place / f"one_{key}.csv").values for key in ("probes", "mru")}
+
+    def between(key, first, stop):
+        at = np.searchsorted(next(iter(rows[key].values())), [first, stop])
+        return {name: each[slice(*at)] for name, each in rows[key].items()}
+
+    for first in range(0, 20, 4):
+        chain.push({key: between(key, first, first + 4) for key in rows})
+    for first in range(20, 36, 4):
+        chain.push({"probes": between("probes", first, first + 4)})
+    size = len(chain._rows["probes"]["p1"])
+    with pytest.raises(RequestError, match=r"'mru' has sent nothing for .* NaN in its columns"):
+        chain.push({"probes": between("probes", 36, 48)})
+    assert len(chain._rows["probes"]["p1"]) == size  # nothing was taken
+    lost = {
+        name: each if number == 0 else np.full(len(each), np.nan)
+        for number, (name, each) in enumerate(between("mru", 20, 48).items())
+    }
+    found = chain.push({"probes": between("probes", 36, 48), "mru": lost})
+    assert found["eta_fwd"].sel(time=slice(25.0, 40.0)).notnull().all()
+    assert found["heave"].sel(time=slice(25.0, 40.0)).isnull().all()
 
 
 def test_bad_samples_are_refused_and_not_taken(campaign, rows):

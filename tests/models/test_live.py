@@ -192,6 +192,17 @@ def test_consistency_is_one_as_in_training_and_rises_with_another_vessel(models,
     assert live.consistency > 3
 
 
+@pytest.mark.parametrize("value", [9.97e36, 1e200])
+def test_a_spike_is_forgotten_by_the_consistency(models, run, value):
+    live = started(models["plain"], run)
+    spoilt = run.copy(deep=True)
+    spoilt["heave"].values[START] = value
+    play(live, spoilt, START, START + 5)
+    assert 0.3 < live.consistency < 10  # 100 / 256 for each of some samples
+    play(live, run, START + 5, START + 600)
+    assert 0.5 < live.consistency < 1.5
+
+
 def test_waves_that_are_not_known_widen_the_band(models, run):
     model = models["lead"]
     live = started(model, run)

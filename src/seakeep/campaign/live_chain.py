@@ -20,7 +20,7 @@ from seakeep.campaign.pipeline import cleaned, derived, mapped, read, resampled,
 from seakeep.campaign.readers import find_column, time_column, time_unit_of
 from seakeep.campaign.settings import CampaignSettings
 from seakeep.conventions import conversion
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import RequestError, SeakeepError, did_you_mean
 from seakeep.formats import Columns, Options
 from seakeep.signals import Clock
 
@@ -112,21 +112,35 @@ class LiveChain:
         -------
         Dataset
             All channels of the campaign over ``time``, the instants on the reference's clock, in
-            steps of :attr:`dt`; often none. NaN where the campaign masks gaps.
+            steps of :attr:`dt`; often none. NaN in gaps that the campaign does not bridge: what
+            preparation refuses is masked in service.
 
         Raises
         ------
         RequestError
-            If a logger or a column is unknown, lengths differ, or instants do not increase.
-            Nothing was taken then.
+            If a logger or a column is unknown, lengths differ, instants do not increase, or a
+            logger is silent for longer than the window.
         DataError
-            If the chain cannot use the samples, such as where the campaign refuses gaps.
+            If the chain cannot use the samples. Nothing was taken then, as with a RequestError.
         """
+        before = self._rows, self._origin, self._given
         new = {key: self._checked(key, table) for key, table in samples.items()}
-        for key, table in new.items():
-            kept = self._rows[key]
-            for name, values in table.items():
-                kept[name] = np.concatenate([kept[name], values])
+        self._rows = {
+            key: {
+                name: np.concatenate([values, new[key][name]]) if key in new else values
+                for name, values in table.items()
+            }
+            for key, table in self._rows.items()
+        }
+        try:
+            self._check_all_send()
+            return self._handed_out()
+        except SeakeepError:
+            self._rows, self._origin, self._given = before
+            raise
+
+    def _handed_out(self) -> xr.Dataset:
+        """Model samples that are ready, and no row kept that none needs any more."""
         if self._origin is None and all(len(self._instants(key)) for key in self._rows):
             # As offline: multiples of the step from the first instant of the reference.
             firsts = [float(self._instants(key)[0]) for key in self._rows]
@@ -176,6 +190,19 @@ class LiveChain:
         clock = self._template.clocks[key]
         found: FloatArray = clock.reference(self._rows[key][name] * factor)
         return found
+
+    def _check_all_send(self) -> None:
+        """Refuse a silent logger: nothing can be made without it, and the others' rows pile up."""
+        instants = {key: self._instants(key) for key in self._rows}
+        start = min((float(each[0]) for each in instants.values() if each.size), default=0.0)
+        newest = {key: float(each[-1]) if each.size else start for key, each in instants.items()}
+        last = min(newest, key=newest.__getitem__)
+        silent = max(newest.values()) - newest[last]
+        if silent > self.window:
+            raise RequestError(
+                f"'{last}' has sent nothing for {silent:g} s, and samples are made of all loggers. "
+                "Send rows of it up to the others' instants, NaN in its columns."
+            )
 
     def _ready(self) -> int:
         """Number of the model sample up to before which all are ready."""

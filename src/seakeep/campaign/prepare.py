@@ -529,8 +529,11 @@ class Campaign:
             )
         columns = {name: each.columns for name, each in source.loggers.items()}
         whole = settings.runs[run].model_copy(update={"record": None})
-        runs = {**settings.runs, run: whole}
-        settings = settings.model_copy(update={"runs": runs})
+        changed: dict[str, Any] = {"runs": {**settings.runs, run: whole}}
+        if settings.preparation.gaps == "refuse":  # rows get lost in service
+            masked = settings.preparation.model_copy(update={"gaps": "mask"})
+            changed["preparation"] = masked
+        settings = settings.model_copy(update=changed)
         template = Template(run, settings, paths, columns, found.clocks[run], dt)
         return LiveChain(template, late, length, whole_number(every, "every"))
 

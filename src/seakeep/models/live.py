@@ -43,6 +43,8 @@ BLOCK = 16
 """Samples whose waves an alignment carries together: that costs as much for one as for many."""
 CONSISTENCY = 256
 """Samples over which the consistency is averaged, as a time constant."""
+SPIKE = 100.0
+"""What a single sample adds to the consistency at most: a spike tells of a sensor, for a while."""
 RIG = ("water_depth", "celerity", "probe_offset")
 """Attributes of a run that an alignment reads."""
 Judge = Callable[[int, FloatArray], None]
@@ -427,7 +429,10 @@ class Live:
         number = np.count_nonzero(np.isfinite(innovation))
         if number:
             fade = 1.0 - 1.0 / CONSISTENCY
-            self._sum = fade * self._sum + float(told @ precision @ told) / number
+            with np.errstate(over="ignore", invalid="ignore"):
+                square = float(told @ precision @ told) / number
+            # Not a number where it overflows.
+            self._sum = fade * self._sum + (square if square < SPIKE else SPIKE)
             self._weight = fade * self._weight + 1.0
 
     def _find_rows(self, stop: int, known: FloatArray) -> None:
