@@ -30,6 +30,7 @@ __all__ = [
     "check_place",
     "check_report",
     "existing_file",
+    "expanded",
     "make_folder",
     "read_bytes",
     "read_sealed",
@@ -177,6 +178,30 @@ def sha256_of(path: Path) -> str:
 def _shown(path: Path | str) -> str:
     text = str(path).replace("\0", "\\0")
     return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]}…{text[-LONGEST // 2 :]}"
+
+
+def expanded(path: str | Path) -> Path:
+    """Path with the home folder in place of ``~``.
+
+    Parameters
+    ----------
+    path : str or Path
+        As the user gave it.
+
+    Returns
+    -------
+    Path
+        The path.
+
+    Raises
+    ------
+    MissingFileError
+        If no home is known of the user that ``~`` names.
+    """
+    try:
+        return Path(path).expanduser()
+    except RuntimeError as error:
+        raise _unreadable(path, error) from None
 
 
 def _unreadable(path: Path | str, error: Exception) -> MissingFileError:

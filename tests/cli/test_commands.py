@@ -675,6 +675,13 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
             r"steps: received '12\.5'\. Give a whole number such as 400, or encounter periods",
         ),
         (
+            f"forecast model.nc {CAMPAIGN} --run unseen --start 1e400 -o f.nc",
+            2,
+            r"--start: received '1e400'\. Give an instant within the run, s\.",
+        ),
+        ("prepare ~seakeep-nobody/c.toml", 2, r"cannot be read: .*home directory"),
+        ("study ~seakeep-nobody/s.toml", 2, r"cannot be read: .*home directory"),
+        (
             f"forecast model.nc {FROM_20.replace('50', '1' + 400 * '0')} -o f.nc",
             2,
             r"--steps is larger than 9223372036854775807\. Give a smaller number\.",

@@ -23,7 +23,7 @@ from pydantic import BaseModel
 
 NUMBERS = (0, -1, 10**8, 10**20, 2**64, 0.5, 1e-320, 1e-9, 1e7, 1e300, float("inf"),
            float("nan"))  # fmt: skip
-TEXTS = ("", "x", "/", "../x", "\0", "a\nb", "$\\frac{", "n" * 300, "~nobody/x", "heave")
+TEXTS = ("", "x", "/", "../x", "\0", "a\nb", "$\\frac{", "n" * 300, "~seakeep-nobody/x", "heave")
 LENGTHS = ("1e300 T", "infT", "1e-9 T")
 OTHERS = (True, [], {}, [[1]], [1e-300, 1e300], [5.0, 1.0], {"uniform": [1e-300, 1e300]},
           {"fixed": 1e9}, {"x": {"x": 1}})  # fmt: skip
@@ -341,7 +341,7 @@ def odd_paths(folder: Path) -> dict[str, str]:
         "fifo": "fifo.nc", "fifo toml": "fifo.toml", "fifo csv": "fifo.csv", "socket": "s.nc",
         "loop": "loop.nc", "folder": "folder.nc", "nul": "a\0b.nc", "long": "n" * 400 + ".nc",
         "long toml": "n" * 400 + ".toml",
-        "long path": "n/" * 3000 + "x.nc", "home": "~nobody/x.nc", "empty": "empty.nc",
+        "long path": "n/" * 3000 + "x.nc", "home": "~seakeep-nobody/x.nc", "empty": "empty.nc",
         "nothing": "",
         "zero toml": "zero.toml", "zero csv": "zero.csv", "zero nc": "zero.nc",
         "below a file": "campaign.toml/x.nc", "surrogate": "\udcff.nc",

@@ -180,11 +180,36 @@ def test_an_unknown_kind_asks_for_an_update(saved):
 
 
 @pytest.mark.parametrize(
-    "attrs", [{"settings": "{"}, {"settings": '{"ridge": -1}'}, {"training": "{}"}]
+    "attrs",
+    [
+        *({"settings": "{"}, {"settings": '{"ridge": -1}'}, {"settings": 20_000 * "["}),
+        {"training": "{}"},
+    ],
 )
 def test_a_file_with_broken_contents_is_incomplete(saved, attrs):
     edited(saved, **attrs)
     with pytest.raises(DataError, match=r"rom\.nc is incomplete: .* Fit the model again"):
+        load_model(saved)
+
+
+@pytest.mark.parametrize(
+    ("attribute", "key", "value", "words"),
+    [
+        ("settings", "state_delays", 10**9, "state_delays is 1000000000 in its settings"),
+        ("signature", "dt", 1e-300, "dt is 1e-300"),
+    ],
+)
+def test_a_number_that_does_not_fit_the_others_is_refused(saved, attribute, key, value, words):
+    kept = json.loads(xr.load_dataset(saved, engine="h5netcdf").attrs[attribute])
+    edited(saved, **{attribute: json.dumps(kept | {key: value})})
+    with pytest.raises(DataError, match=rf"rom\.nc is incomplete: {words}"):
+        load_model(saved)
+
+
+def test_a_scale_of_another_sign_is_refused(saved):
+    dataset = xr.load_dataset(saved, engine="h5netcdf")
+    write_netcdf(saved, dataset.assign(state_std=-dataset["state_std"]))
+    with pytest.raises(DataError, match=r"reach of state channels is negative"):
         load_model(saved)
 
 

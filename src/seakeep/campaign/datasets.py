@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from seakeep.errors import DataError, RequestError, did_you_mean
-from seakeep.files import make_folder, sha256_of
+from seakeep.files import expanded, make_folder, sha256_of
 
 __all__ = ["DATASETS", "PublicDataset", "data_folder", "fetch", "find_dataset", "state_of"]
 
@@ -106,7 +106,7 @@ def find_dataset(name: str) -> PublicDataset:
 def data_folder() -> Path | None:
     """Folder named by ``SEAKEEP_DATA_DIR``, or None where it is not set."""
     named = os.environ.get("SEAKEEP_DATA_DIR")
-    return Path(named).expanduser() if named else None
+    return expanded(named) if named else None
 
 
 def state_of(dataset: PublicDataset, folder: Path | None) -> str:

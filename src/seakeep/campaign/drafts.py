@@ -27,7 +27,7 @@ from seakeep.campaign.readers import time_column, time_step_of, time_unit_of
 from seakeep.campaign.settings import FileSettings
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
-from seakeep.files import MARK
+from seakeep.files import MARK, expanded
 from seakeep.formats import Columns, read_columns
 from seakeep.formats.columns import named_unit
 
@@ -323,9 +323,9 @@ def _test_of(names: Sequence[str], seas: Mapping[str, Sea]) -> str:
 def _relative(path: Path, folder: Path | str | None) -> str:
     """Path as the campaign should write it; the data folder, where it is named, by its name."""
     data = os.environ.get("SEAKEEP_DATA_DIR")
-    absolute = path.expanduser().resolve()
-    if data and absolute.is_relative_to(Path(data).expanduser().resolve()):
-        inside = absolute.relative_to(Path(data).expanduser().resolve())
+    absolute = expanded(path).resolve()
+    if data and absolute.is_relative_to(expanded(data).resolve()):
+        inside = absolute.relative_to(expanded(data).resolve())
         return "${SEAKEEP_DATA_DIR}/" + inside.as_posix()
     return Path(os.path.relpath(absolute, Path(folder or ".").resolve())).as_posix()
 

@@ -33,6 +33,7 @@ from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettin
 from seakeep.campaign.survey import Failures, Survey, spare, survey
 from seakeep.campaign.validation import read_settings
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
+from seakeep.files import expanded
 from seakeep.formats import Columns, Options, read_columns
 from seakeep.quality import as_json, warn_of
 from seakeep.signals import Clock, uniform_step
@@ -617,7 +618,7 @@ def read_campaign(path: Path | str, preset: str | None = None) -> Campaign:
         If the file is missing, is not TOML, or does not describe a campaign: one message names
         every key at fault, the value received, and the remedy.
     """
-    path = Path(path).expanduser()
+    path = expanded(path)
     settings = read_settings(path)
     preparation = settings.preparation.filtered_as(preset or settings.preset)
     return Campaign(path, settings.model_copy(update={"preparation": preparation}))

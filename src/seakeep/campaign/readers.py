@@ -15,7 +15,7 @@ from seakeep.arrays import FloatArray
 from seakeep.campaign.settings import FileSettings
 from seakeep.conventions import conversion, si_unit
 from seakeep.errors import DataError, RequestError, did_you_mean
-from seakeep.files import sha256_of
+from seakeep.files import expanded, sha256_of
 from seakeep.formats import Columns, is_recording_folder, read_columns
 from seakeep.formats.columns import is_unit, meant_column, named_unit
 from seakeep.signals.time_axis import check_order, instant_text
@@ -56,7 +56,7 @@ def expand(file: str, folder: Path) -> Path:
             )
         return found
 
-    return folder / Path(_VARIABLE.sub(value, file)).expanduser()
+    return folder / expanded(_VARIABLE.sub(value, file))
 
 
 def checksum(path: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib.util import find_spec
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -150,6 +151,8 @@ def forecast(
     prepared = _prepared(read, run)
     warn_of_runs([prepared], [*identified.states, *identified.inputs])
     first = instant_of(start, read, [prepared], "--start")
+    if not isfinite(first):
+        raise RequestError(f"--start: received {start[:20]!r}. Give an instant within the run, s.")
     count = None if steps is None else samples_of(steps, read, [prepared], identified.dt, "--steps")
     left = round((float(prepared["time"][-1]) - first) / identified.dt)
     warn_of_waves(identified, prepared, run, first, left if count is None else count)

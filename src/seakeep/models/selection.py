@@ -740,7 +740,7 @@ def select(
                 inputs,
                 base,
                 options,
-                tuple(round(each * samples) for each in horizon),
+                tuple(max(round(each * samples), 1) for each in horizon),
                 folds,
             )
             for alignment in alignments

@@ -135,10 +135,10 @@ class Select:
         given = self.horizon if isinstance(self.horizon, tuple | list) else (self.horizon,)
         for value in (*given, *(() if self.period is None else (self.period,))):
             real = isinstance(value, numbers.Real) and not isinstance(value, bool)
-            if not real or not 0 < value < math.inf:
+            if not real or not 1e-6 < value < 1e6:
                 raise RequestError(
-                    "select: horizon (encounter periods) and period (s) must be positive; "
-                    f"received {value!r}."
+                    "select: horizon (encounter periods) and period (s) must lie between 1e-6 and "
+                    f"1e6; received {value!r}."
                 )
         if not given:
             raise RequestError("select: horizon is empty. Write horizon=(15, 45).")

@@ -156,7 +156,15 @@ class HankelDMDc(HankelSettings):
     def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
         """Rebuild the model that a file holds."""
         settings = cls.from_json(json.loads(dataset.attrs["settings"]))
-        return HankelDMDcModel.from_dataset(dataset, settings)
+        model = HankelDMDcModel.from_dataset(dataset, settings)
+        fitted = model.signature
+        for key in ("state_delays", "input_delays"):
+            if getattr(settings, key) != getattr(fitted, key):
+                raise ValueError(
+                    f"{key} is {getattr(settings, key)} in its settings, and its matrices have "
+                    f"{getattr(fitted, key)}"
+                )
+        return model
 
     @classmethod
     def paper(cls, encounter_period: float, dt: float) -> Self:

@@ -105,7 +105,7 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
     for key, value in delays.items():
         if type(value) is not int or value < 0:
             raise ValueError(f"{key} is {value!r}, not a number of samples")
-    if not (np.isfinite(dt) and dt > 0) or not state_labels:
+    if not 1e-9 < dt < 1e9 or not state_labels:
         raise ValueError(f"dt is {dt!r} and there are {len(state_labels)} states")
     delayed, direct = input_map.regressors(input_labels)
     sizes = {"state": len(state_labels), "input": len(delayed), "direct": len(direct)}
@@ -113,6 +113,9 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
         group: Scale(*(numbers(dataset, f"{group}_{name}", (size,)) for name in MOMENTS))
         for group, size in sizes.items()
     }
+    for group, scale in scales.items():
+        if np.any(scale.std <= 0) or np.any(scale.spread < 0) or np.any(scale.reach < 0):
+            raise ValueError(f"a standard deviation or a reach of {group} channels is negative")
     names = [label.name for label in state_labels]
     return Signature(
         dt=dt,
@@ -187,7 +190,10 @@ def rebuilt(source: str | Path, build: Callable[[], Value]) -> Value:
         return build()
     except DataError:
         raise
-    except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
+    except (
+        *(LookupError, TypeError, ValueError, ArithmeticError, AttributeError),
+        RecursionError,
+    ) as error:
         missing = "a part is missing: " if isinstance(error, LookupError) else ""
         raise DataError(
             f"{source} is incomplete: {missing}{error}. Fit the model again."

@@ -672,12 +672,10 @@ def instant_of(
     stated: float | str, campaign: Campaign, runs: Iterable[xr.Dataset], name: str
 ) -> float:
     """Instant in seconds."""
-    if not isinstance(stated, str):
-        return float(stated)
     try:
         return float(stated)
-    except ValueError:
-        return _count(stated, name, "seconds such as 20") * _period(campaign, runs)
+    except (ValueError, OverflowError):
+        return _count(str(stated), name, "seconds such as 20") * _period(campaign, runs)
 
 
 def samples_of(

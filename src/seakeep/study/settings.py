@@ -19,7 +19,7 @@ from seakeep.campaign import Campaign, read_campaign
 from seakeep.campaign.readers import expand
 from seakeep.campaign.settings import ModelSettings
 from seakeep.errors import did_you_mean
-from seakeep.files import sha256_of
+from seakeep.files import expanded, sha256_of
 from seakeep.sizes import MOST_SERIES
 from seakeep.toml import Count, Mistake, Names, Positive, Table, read_toml, refusal, validated
 
@@ -317,7 +317,7 @@ def read_study(path: Path | str) -> Study:
         If a file is missing, is not TOML, or does not describe a study: one message names every key
         at fault, the value received, and the remedy.
     """
-    path = Path(path).expanduser()
+    path = expanded(path)
     settings = validated(StudySettings, read_toml(path, "study"), path, "study")
     preset = settings.study.preset
     campaign = read_campaign(expand(settings.study.campaign, path.parent), preset)
