@@ -88,13 +88,12 @@ def existing_file(path: Path | str) -> Path:
         If there is no such file, it is a folder, a pipe, a socket or a device, or the system
         refuses to look at it.
     """
+    place = expanded(path)
     try:
-        place = Path(path).expanduser()
         mode = place.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
         raise _missing(Path(path)) from None
-    # Names with NUL raise ValueError, `~` without a home RuntimeError.
-    except (OSError, ValueError, RuntimeError) as error:
+    except (OSError, ValueError) as error:  # names with NUL raise ValueError
         raise _unreadable(path, error) from None
     if (found := _kind_of(mode)) is not None:
         raise MissingFileError(

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import tomlkit
 
+from seakeep.campaign.datasets import data_folder
 from seakeep.campaign.guesses import (
     HYSTERESIS,
     MOTIONS,
@@ -322,11 +323,10 @@ def _test_of(names: Sequence[str], seas: Mapping[str, Sea]) -> str:
 
 def _relative(path: Path, folder: Path | str | None) -> str:
     """Path as the campaign should write it; the data folder, where it is named, by its name."""
-    data = os.environ.get("SEAKEEP_DATA_DIR")
+    data = data_folder()
     absolute = expanded(path).resolve()
-    if data and absolute.is_relative_to(expanded(data).resolve()):
-        inside = absolute.relative_to(expanded(data).resolve())
-        return "${SEAKEEP_DATA_DIR}/" + inside.as_posix()
+    if data and absolute.is_relative_to(data.resolve()):
+        return "${SEAKEEP_DATA_DIR}/" + absolute.relative_to(data.resolve()).as_posix()
     return Path(os.path.relpath(absolute, Path(folder or ".").resolve())).as_posix()
 
 

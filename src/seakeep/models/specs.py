@@ -783,9 +783,7 @@ class BayesianHankelDMDc:
     ) -> HankelEnsemble:
         """The ensemble of settings that leave nothing to be chosen."""
         stops = stop_instants(stop, list(named))
-        dt = labelled.common_step(named)
-        if self.dt is not None:
-            labelled.check_step(*next((run, name) for name, run in named.items()), self.dt)
+        dt = _step_of(self.dt, named)
         shared = self.shared(dt)
         labels = labelled.common_labels(named, states), labelled.common_labels(named, inputs)
         if shared.maps:

@@ -191,7 +191,11 @@ def rebuilt(source: str | Path, build: Callable[[], Value]) -> Value:
     except DataError:
         raise
     except (
-        *(LookupError, TypeError, ValueError, ArithmeticError, AttributeError),
+        LookupError,
+        TypeError,
+        ValueError,
+        ArithmeticError,
+        AttributeError,
         RecursionError,
     ) as error:
         missing = "a part is missing: " if isinstance(error, LookupError) else ""

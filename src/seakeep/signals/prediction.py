@@ -66,9 +66,7 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     True
     """
     array = as_series(series, minimum=4, channels=True)
-    number_of = whole_number(count, "count")
-    check_size("waves are predicted over some periods, and count =", number_of, MOST_AHEAD,
-               "samples", "Give fewer.")  # fmt: skip
+    number_of = _checked(count)
     flat = array.reshape(array.shape[0], -1)
     out = np.empty((number_of, flat.shape[1]))
     for column, values in enumerate(flat.T):
@@ -115,25 +113,29 @@ def draw_waves(
     ((6, 5), True)
     """
     array = as_series(series, minimum=4, channels=True)
-    expected = predict_waves(array, count)
+    number_of = _checked(count)
     flat = array.reshape(array.shape[0], -1)
-    errors = np.empty((pairs, int(count), flat.shape[1]))
+    expected = np.empty((number_of, flat.shape[1]))
+    errors = np.empty((pairs, *expected.shape))
     for column, values in enumerate(flat.T):
-        deviations = values - values.mean()
+        mean = values.mean()
+        deviations = values - mean
         size = deviations.size
         order = max(1, min(_memory(deviations), size // 3))
         found = reflections(deviations, order)
-        left = scipy.signal.lfilter(whitening(found), [1.0], deviations)[order:]
+        own = whitening(found)
+        made = continued(deviations, own[None], np.zeros((1, number_of)))[0]
+        expected[:, column] = mean + made
+        left = scipy.signal.lfilter(own, [1.0], deviations)[order:]
         power = math.sqrt(size / (size - order)) * left.std()
         apart = rng.standard_normal((pairs, order)) / np.sqrt(
             np.maximum(size - 3 - np.arange(1, order + 1), 1)
         )
         filters = whitening(np.tanh(np.arctanh(np.clip(found, -WHOLLY, WHOLLY)) + apart))
-        innovations = power * rng.standard_normal((pairs, int(count)))
-        made = continued(deviations, filters, innovations)
-        errors[..., column] = made - predicted(deviations, int(count), order)
-    errors = errors.reshape(pairs, *expected.shape)
-    return np.concatenate([expected + errors, expected - errors])
+        innovations = power * rng.standard_normal((pairs, number_of))
+        errors[..., column] = continued(deviations, filters, innovations) - made
+    futures = np.concatenate([expected + errors, expected - errors])
+    return futures.reshape((2 * pairs, -1, *array.shape[1:]))
 
 
 def draw_sea(
@@ -237,6 +239,14 @@ def predictable_time(series: npt.ArrayLike, dt: float, distance: float, depth: f
     """
     edge = band_limit(series, dt, QUICKLY)
     return float(distance / group_speed(2 * np.pi * edge, depth))
+
+
+def _checked(count: object) -> int:
+    """Number of samples to predict."""
+    number_of = whole_number(count, "count")
+    check_size("waves are predicted over some periods, and count =", number_of, MOST_AHEAD,
+               "samples", "Give fewer.")  # fmt: skip
+    return number_of
 
 
 def _memory(deviations: FloatArray) -> int:
