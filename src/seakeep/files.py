@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
+from seakeep.sizes import check_declared
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -382,8 +383,12 @@ def read_sealed(path: Path | str) -> io.BytesIO:
     MissingFileError
         If there is no such file, or it cannot be read.
     DataError
-        If its checksum is missing or another one.
+        If its checksum is missing or another one, or what it holds would take far more memory than
+        disk.
     """
+    # Here, so that commands that read no such file start without HDF5.
+    import h5py
+
     content, stated = _content(read_bytes(path))
     if hashlib.sha256(content).hexdigest() != stated:
         why = "its checksum is another one" if stated else "it has no checksum at its end"
@@ -391,7 +396,16 @@ def read_sealed(path: Path | str) -> io.BytesIO:
             f"{path} was cut off, altered or damaged, or seakeep did not write it: {why}. Copy it "
             "again, or remove it and make it anew."
         )
-    return io.BytesIO(content)
+    kept = io.BytesIO(content)
+    try:
+        with h5py.File(kept, "r") as file:
+            check_declared(path, file, "Remove it and make it anew.")
+    except OSError as error:
+        raise DataError(
+            f"{path} is no NetCDF file, although its checksum fits: {error}. Remove it and make it "
+            "anew."
+        ) from None
+    return kept
 
 
 def _content(file: bytes) -> tuple[bytes, str]:

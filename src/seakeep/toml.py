@@ -455,6 +455,8 @@ def _reason(item: Any, place: list[str], table: type[BaseModel] | None, descript
         return unknown_key(place[-1], value, known)
     if (kind == "missing" and place[-1].isdigit()) or kind == "too_long":
         return f"received {_shown(value)}, a list of the wrong length ({len(value)}).{give}"
+    if kind == "too_short":
+        return f"received {_shown(value)}, which is empty.{give}"
     if kind == "missing":
         return f"missing. Add it: {description}." if description else "missing. Add it."
     if kind == "value_error":

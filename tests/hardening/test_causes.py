@@ -1,7 +1,9 @@
 """What the attack found, cause by cause, where no case of it shows the cause."""
 
 import hashlib
+import io
 import os
+import re
 import subprocess
 import sys
 
@@ -10,8 +12,11 @@ import h5py
 import numpy as np
 import pytest
 
+from seakeep import load_model
+from seakeep.campaign import read_campaign
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.files import (
+    SEAL,
     check_place,
     make_folder,
     read_sealed,
@@ -56,6 +61,34 @@ def test_bytes_are_compared_before_hdf5_reads_them(tmp_path, make_dataset):
         read_sealed(path)
 
 
+def seal(path, content):
+    path.write_bytes(content + SEAL + hashlib.sha256(content).hexdigest().encode())
+    return path
+
+
+@pytest.mark.parametrize(
+    ("sizes", "said"),
+    [
+        ((10**9,), r"'h0' declares 1000000000 values \(7629 MiB\)"),
+        ((3 * 10**7,) * 3, r"its 3 sets declare too much together \(687 MiB\)"),
+    ],
+)
+def test_what_a_file_of_ours_declares_is_judged_before_it_is_read(tmp_path, sizes, said):
+    made = io.BytesIO()
+    with h5py.File(made, "w") as file:
+        for number, size in enumerate(sizes):
+            file.create_dataset(f"h{number}", (size,), "f8", chunks=(10**5,), fillvalue=1.0)
+    path = seal(tmp_path / "m.nc", made.getvalue())
+    with pytest.raises(DataError, match=rf"m\.nc: {said}, and 0 MiB.* make it anew\."):
+        load_model(path)
+
+
+def test_a_sealed_file_that_is_no_netcdf_is_refused(tmp_path):
+    path = seal(tmp_path / "m.nc", b"words")
+    with pytest.raises(DataError, match=r"m\.nc is no NetCDF file, although its checksum fits"):
+        load_model(path)
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with names are POSIX")
 def test_nothing_but_a_regular_file_is_replaced(tmp_path):
     os.mkfifo(tmp_path / "pipe.nc")
@@ -80,6 +113,28 @@ def test_a_study_clears_what_a_killed_run_left_and_says_so(tmp_path):
     ):
         assert not list(tmp_path.glob("units/*"))
     assert (tmp_path / "notes.tmp").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("n_members = 3", "n_members = 100000000",
+         "models.ensemble.n_members: received 100000000, which should be less than or equal to "
+         "1000000. Give number of members of an ensemble, 1 to 1000000"),
+        ('"one_mru.csv"', '"a\\u0000b.csv"',
+         "runs.one.files.mru: no file has a name with a NUL character; correct it; received"),
+        ("[model.alignment]", "[model.select]\nhorizon = []\n[model.alignment]",
+         "model.select.horizon: received [], which is empty. Give a length of free runs in"),
+        ("[model.alignment]", "[model.select]\nhorizon = '1e300 T'\n[model.alignment]",
+         "model.select.horizon: free runs last 1e-6 to 1e6 encounter periods, such as '15 T'; "
+         "received '1e300 T'"),
+    ],
+)  # fmt: skip
+def test_what_no_run_can_change_is_judged_before_a_run_is_read(tmp_path, old, new, said):
+    path = tmp_path / "campaign.toml"
+    path.write_text(ground.CAMPAIGN.replace(old, new), encoding="utf-8")
+    with pytest.raises(RequestError, match=re.escape(said)):
+        read_campaign(path)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="a process cannot be asked for without ending it")

@@ -24,12 +24,14 @@ from pydantic import (
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.formats import Options
+from seakeep.sizes import MOST_MEMBERS
 from seakeep.toml import (
     Count,
     Delay,
     Duration,
     Finite,
     Instant,
+    Length,
     Names,
     NotNegative,
     Positive,
@@ -202,11 +204,18 @@ def _run_name(name: str) -> str:
     return name
 
 
+def _file_name(name: str) -> str:
+    if "\0" in name:
+        raise ValueError("no file has a name with a NUL character; correct it")
+    return name
+
+
 LONGEST_NAME = 100
 """Characters of a name: file systems allow 255 bytes, of which our own prefixes and suffixes take
 some."""
 ChannelName = Annotated[str, AfterValidator(_channel_name)]
 RunName = Annotated[str, AfterValidator(_run_name)]
+FileName = Annotated[str, AfterValidator(_file_name)]
 Band = Annotated[tuple[Positive, Positive], Field(strict=False), AfterValidator(_rising_band)]
 TwoColumns = Annotated[tuple[str, str], Field(strict=False)]
 Vector = Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]
@@ -483,6 +492,21 @@ def _listed(value: object) -> object:
     return tuple(value) if isinstance(value, list | tuple) else (value,)
 
 
+def _horizons(given: tuple[float | Length, ...]) -> tuple[float | Length, ...]:
+    values = [each.value if isinstance(each, Length) else each for each in given]
+    if not all(1e-6 < value < 1e6 for value in values):
+        raise ValueError("free runs last 1e-6 to 1e6 encounter periods, such as '15 T'")
+    return given
+
+
+Horizons = Annotated[
+    tuple[Duration, ...],
+    BeforeValidator(_listed),
+    Field(min_length=1),
+    AfterValidator(_horizons),
+]
+
+
 class AlignmentSettings(Table):
     """``alignment`` of a model: the keys of :class:`seakeep.ProbeAlignment`."""
 
@@ -530,7 +554,7 @@ class SelectSettings(Table):
     observables: bool = Field(
         default=False, description="true or false: whether free runs choose among observables"
     )
-    horizon: Annotated[tuple[Duration, ...], BeforeValidator(_listed), Field(min_length=1)] = Field(
+    horizon: Horizons = Field(
         default=(15.0, 45.0),
         description="a length of free runs in encounter periods, such as '15 T', or a list of them",
     )
@@ -549,8 +573,10 @@ class RunSettings(Table):
     used for both. `record` cuts the files before anything else is done with them.
     """
 
-    file: str | None = Field(default=None, description="the file, relative to the campaign file")
-    files: dict[str, str] = Field(
+    file: FileName | None = Field(
+        default=None, description="the file, relative to the campaign file"
+    )
+    files: dict[str, FileName] = Field(
         default_factory=dict, description="instrument = its file, relative to the campaign file"
     )
     sea_state: str = Field(default="", description="a name for the sea state")
@@ -811,8 +837,8 @@ class ModelSettings(Table):
     input_delay: NumberOrPrior | None = Field(
         default=None, description="a prior or a number, in encounter periods; for an ensemble"
     )
-    n_members: Annotated[int, Field(ge=1)] | None = Field(
-        default=None, description="number of members of an ensemble"
+    n_members: Annotated[int, Field(ge=1, le=MOST_MEMBERS)] | None = Field(
+        default=None, description=f"number of members of an ensemble, 1 to {MOST_MEMBERS}"
     )
     seed: Annotated[int, Field(ge=0)] | None = Field(
         default=None, description="an integer, 0 or more; for an ensemble"

@@ -16,7 +16,7 @@ from pathlib import Path
 import h5py
 
 from seakeep.errors import DataError
-from seakeep.sizes import most_bytes
+from seakeep.sizes import check_declared
 
 __all__ = ["open_hdf5"]
 
@@ -74,7 +74,7 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
             f"{PATIENCE:g} s. Copy or download it again."
         )
     with h5py.File(path, "r") as file:
-        _check_declared(path, file)
+        check_declared(path, file, "Save what was measured alone.")
         yield file
 
 
@@ -119,20 +119,3 @@ def _end(process: subprocess.Popen[str], parent: int) -> None:
     if os.getpid() == parent:  # not that of a fork
         process.kill()
         process.communicate()
-
-
-def _check_declared(path: Path, file: h5py.File) -> None:
-    """Refuse an HDF5 file with a set that declares far more values than it stores."""
-
-    def look(name: str, item: h5py.Dataset | h5py.Group) -> None:
-        if not isinstance(item, h5py.Dataset) or item.size is None:
-            return
-        declared, stored = item.size * item.dtype.itemsize, item.id.get_storage_size()
-        if declared > most_bytes(stored):
-            raise DataError(
-                f"{path}: '{name}' declares {item.size} values ({declared / 2**20:.0f} MiB), and "
-                f"{stored / 2**20:.3g} MiB are stored: it was never filled, or is damaged. Save "
-                "what was measured alone."
-            )
-
-    file.visititems(look)
