@@ -178,6 +178,19 @@ def test_no_name_is_a_formula_in_what_is_written(tmp_path):
     check_output(path, "forecast", header=forecast_header([name]))  # may be replaced
 
 
+def test_a_forecast_says_per_instant_until_when_it_reads_the_waves(tmp_path):
+    data, attrs = {"heave": ("time", [1.0, 2.0])}, {"reads_input_until": 0.6}
+    forecast = xr.Dataset(data, {"time": [0.1, 0.2]}, attrs)
+    path = write_forecast(forecast, tmp_path / "f.csv")
+    assert path.read_text().splitlines() == [
+        "time [s],heave [],waves read until [s]", "0.1,1.0,0.7", "0.2,2.0,0.8",
+    ]  # fmt: skip
+    check_output(path, "forecast", header=forecast_header(["heave"]))  # may be replaced
+    forecast.attrs["reads_input_until"] = -0.1  # a model without a look-ahead
+    text = write_forecast(forecast, path).read_text()
+    assert text.splitlines()[0] == "time [s],heave []"
+
+
 def test_labels_of_many_channels_are_whole_and_apart():
     pytest.importorskip("matplotlib")
     from seakeep.report.overlay import overlay_figure
@@ -582,11 +595,15 @@ def test_without_matplotlib_the_message_names_the_extra(monkeypatch):
 def test_tables_say_what_a_forecast_was_conditional_on(tmp_path):
     judged = comparison()
     notes = {"conditional_on": "surge", "probe_offset": 38.8, "probe_offset_spread": 1.2}
+    notes["reads_input_until"] = 3.24
     judged.forecast.attrs.update(notes)
     table = comparison_table([judged])
-    note = "conditional on measured surge; probe offset 38.8 ± 1.2 m"
+    note = (
+        "conditional on measured surge; reads the waves up to 3.24 s after each instant; "
+        "probe offset 38.8 ± 1.2 m"
+    )
     assert block_of(table).note == note
     rows = list(csv.DictReader(write_csv(table, tmp_path / "t.csv").read_text().splitlines()))
     assert {row["conditional_on"] for row in rows} == {"surge"}
-    assert float(rows[0]["probe_offset_spread"]) == 1.2
+    assert (float(rows[0]["probe_offset_spread"]), float(rows[0]["look_ahead"])) == (1.2, 3.24)
     assert block_of(comparison_table([comparison()])).note == ""

@@ -131,7 +131,12 @@ def forecast(
     from seakeep.campaign import read_campaign
     from seakeep.models import is_ensemble, load_model
     from seakeep.quality import warn_of_runs
-    from seakeep.report.comparison import forecast_header, forecast_words, write_forecast
+    from seakeep.report.comparison import (
+        forecast_header,
+        forecast_words,
+        look_ahead_words,
+        write_forecast,
+    )
     from seakeep.signals.time_axis import instant_text
     from seakeep.study import forecast_at_full_scale, with_degrees
     from seakeep.study.comparison import instant_of, samples_of
@@ -184,9 +189,10 @@ def forecast(
     write_forecast(result, out)
     status = result.attrs["status"]
     begin = instant_text(float(result.attrs["start"]), identified.dt)
+    reads = look_ahead_words(float(result.attrs.get("reads_input_until", 0.0)))
     messages().print(
         f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
-        f"t = {begin} s, status {status}.{scaled}"
+        f"t = {begin} s, status {status}{reads and f'; {reads}'}.{scaled}"
     )
     if not _usable(result):
         raise typer.Exit(1)

@@ -23,6 +23,7 @@ __all__ = [
     "difference_blocks",
     "forecast_header",
     "forecast_words",
+    "look_ahead_words",
     "model_blocks",
     "plain_cells",
     "write_comparison",
@@ -56,8 +57,10 @@ _STORED = (
 """Columns of a CSV file."""
 _OF_RUNS = (
     *("start", "status", "anrmse", "anrmse_lower", "anrmse_upper", "training_anrmse"),
-    *("conditional_on", "probe_offset", "probe_offset_spread"),
+    *("conditional_on", "look_ahead", "probe_offset", "probe_offset_spread"),
 )
+UNTIL = "waves read until [s]"
+"""Column of a forecast's CSV file where the model looks ahead."""
 _OF_BANDS = ("band", "level", "members", "diverged")
 _OF_SCALE = ("scale", "scale_factor")
 
@@ -140,6 +143,8 @@ def _note(at: xr.Dataset) -> str:
         said.append(status)
     if condition := str(at["conditional_on"].values):
         said.append(f"conditional on measured {condition}")
+    if ahead := look_ahead_words(float(at["look_ahead"])):
+        said.append(ahead)
     offset, spread = float(at["probe_offset"]), float(at["probe_offset_spread"])
     if np.isfinite(offset):
         known = f" ± {spread:.2g}" if np.isfinite(spread) else ""
@@ -170,8 +175,13 @@ def model_blocks(
             for name, at in of_run.items()
         ]
         title = f"{run}: models against measurement"
-        lost = [f"{n}: {s}" for n, at in of_run.items() if (s := str(at["status"].values)) != "ok"]
-        note = "; ".join(lost)
+        told = [f"{n}: {s}" for n, at in of_run.items() if (s := str(at["status"].values)) != "ok"]
+        told += [
+            f"{n} {ahead}"
+            for n, at in of_run.items()
+            if (ahead := look_ahead_words(float(at["look_ahead"])))
+        ]
+        note = "; ".join(told)
         yield Table(f"models_{run}", title, heads, tuple(rows), note, tuple(range(1, len(heads))))
         if references:
             yield _skill(of_run, references, str(run))
@@ -317,7 +327,12 @@ def forecast_header(states: Sequence[str]) -> str:
     Measurements have such headers too: ours alone end in CR LF, and their rows in LF.
     """
     one = rf"'?({'|'.join(map(re.escape, states))})( (std|lower|upper|member \d+))? \[[^]]*\]"
-    return rf'time \[s\](,"?{one}"?)+(,scale_factor)?\r\n[^\r\n]*\n'
+    return rf'time \[s\](,"?{one}"?)+(,{re.escape(UNTIL)})?(,scale_factor)?\r\n[^\r\n]*\n'
+
+
+def look_ahead_words(seconds: float) -> str:
+    """How far a forecast reads the waves, as a clause; empty without a look-ahead."""
+    return f"reads the waves up to {seconds:.3g} s after each instant" if seconds > 0.0 else ""
 
 
 def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
@@ -350,6 +365,8 @@ def _columns(forecast: xr.Dataset) -> dict[str, FloatArray]:
                 break
         else:
             columns[plain_cell(f"{name} [{units}]")] = variable.values
+    if (ahead := float(forecast.attrs.get("reads_input_until", 0.0))) > 0.0:
+        columns[UNTIL] = (forecast["time"].values + ahead).round(9)
     if forecast.attrs.get("scale") == "full":
         scale = float(forecast.attrs["scale_factor"])
         columns["scale_factor"] = np.full(forecast.sizes["time"], scale)

@@ -493,11 +493,11 @@ def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = Tru
         (:mod:`seakeep.metrics`); ``training_anrmse`` over all, ``slack_channels`` (how many
         cannot), ``status``, ``start``, and ``conditional_on``: the measured output that the
         forecast read after its start, or an empty text; ``probe_offset`` and
-        ``probe_offset_spread`` (m), NaN where the run has none. For an ensemble
-        also ``coverage``, the percentage of measured instants that lie in the band,
-        ``band_width``, its mean width (in ``channel_units``), and
-        ``relative_band_width`` (in measured standard deviations); over ``run``:
-        ``mean_coverage`` over the channels that can be judged, ``members``, ``diverged``,
+        ``probe_offset_spread`` (m), NaN where the run has none; ``look_ahead``, how long after an
+        instant the last wave lies that its forecast reads (s). For an ensemble also ``coverage``,
+        the percentage of measured instants that lie in the band, ``band_width``, its mean width (in
+        ``channel_units``), and ``relative_band_width`` (in measured standard deviations); over
+        ``run``: ``mean_coverage`` over the channels that can be judged, ``members``, ``diverged``,
         ``level`` and ``band`` ("members" or "calibrated"). At full scale ``scale`` ("full") and
         ``scale_factor`` over ``run``.
     """
@@ -568,6 +568,7 @@ _COLUMNS = {
     "coverage": ("%", "measured instants in the band"),
     "band_width": ("channel's", "mean width of the band"),
     "relative_band_width": ("1", "mean width of the band in measured standard deviations"),
+    "look_ahead": ("s", "time after an instant up to which its forecast reads the waves"),
 }
 
 
@@ -606,6 +607,7 @@ def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
             "conditional_on": str(p.attrs.get("conditional_on", "")),
             "probe_offset": float(p.attrs.get("probe_offset", np.nan)),
             "probe_offset_spread": float(p.attrs.get("probe_offset_spread", np.nan)),
+            "look_ahead": max(float(p.attrs.get("reads_input_until", 0.0)), 0.0),
             "start": comparison.start,
         },
         coords={
