@@ -205,7 +205,7 @@ of = ["heave"]
 [models.other]
 states = ["a"]  # kept
 """
-    text = _tuned(before, None, result, ["readouts"])
+    text = _tuned(before, None, result, ["readouts"], None, None)
     middle = """
 [model.readouts.bow]
 kind = "stacked"
@@ -222,11 +222,15 @@ states = ["a"]  # kept
     assert text.endswith(middle)
     assert "# of the model\nstate_delays = 6\n" in text
     assert "old" not in text
-    assert _tuned(text, None, result, ["readouts"]) == text
-    none = _tuned(text, None, replace(result, spec=replace(spec, readouts=())), ["readouts"])
+    assert _tuned(text, None, result, ["readouts"], None, None) == text
+    without = replace(result, spec=replace(spec, readouts=()))
+    none = _tuned(text, None, without, ["readouts"], None, None)
     assert "readouts = {}\n" in none
     assert none.endswith('\n# of the next table\n[models.other]\nstates = ["a"]  # kept\n')
-    assert _tuned(before, None, result, []).endswith(before[before.index("[model.readouts.old]") :])
+    kept = _tuned(before, None, result, [], None, None)
+    assert kept.endswith(before[before.index("[model.readouts.old]") :])
+    assert "# as it was" not in kept  # it spoke of the λ before
+    assert "ridge = 0.001 # chosen by seakeep tune" in kept
 
 
 def test_a_tuned_file_holds_rank_and_alignment():
@@ -245,7 +249,7 @@ celerity = 2.0
     aligned = seakeep.ProbeAlignment(mode="dispersion", surge="predicted", passes=3)
     spec = replace(SPEC, ridge=0.0, rank=64, alignment=aligned)
     result = seakeep.TuneResult(spec, xr.Dataset(), "")
-    read = tomllib.loads(_tuned(before, None, result, ["rank", "alignment"]))
+    read = tomllib.loads(_tuned(before, None, result, ["rank", "alignment"], "recommended", 20.0))
     assert read["model"]["alignment"] == {
         "mode": "dispersion",
         "surge": "predicted",
@@ -255,9 +259,9 @@ celerity = 2.0
     assert "next" in read
     plain = replace(SPEC, ridge=1e-3)
     result = replace(result, spec=plain)
-    read = tomllib.loads(_tuned(before, None, result, ["rank", "alignment"]))
+    read = tomllib.loads(_tuned(before, None, result, ["rank", "alignment"], "recommended", 20.0))
     assert not {"rank", "alignment", "preset"} & set(read["model"])
-    kept = tomllib.loads(_tuned(before, None, result, ["ridge"]))["model"]
+    kept = tomllib.loads(_tuned(before, None, result, ["ridge"], "recommended", 20.0))["model"]
     assert kept["alignment"] == {"mode": "effective", "celerity": 2.0}
 
 
@@ -316,3 +320,27 @@ of = ["heave"]
     assert powers == seakeep.Powers("eta_fwd", (2,))
     assert spec.readouts == (seakeep.ReadOut("mooring_bow", ("heave",), "hinge"),)
     assert isinstance(spec, HankelDMDc)
+
+
+def test_a_tuned_file_states_what_was_varied_in_periods_and_the_preset_it_goes_with():
+    from seakeep.cli.tuning import _tuned
+
+    spec = replace(SPEC, ridge=1e-3, lead=15, ridge_scale="per_snapshot")
+    result = seakeep.TuneResult(spec, xr.Dataset(), "")
+    before = '[model]\nstates = ["a"]\nselect = { horizon = [5] }\nlead = "1 T"  # one period\n'
+    text = _tuned(before, None, result, ["lead", "observables"], "recommended", 20.0)
+    assert tomllib.loads(text)["model"] == {
+        "states": ["a"],
+        "lead": "0.75 T",
+        "ridge": 1e-3,
+        "ridge_scale": "per_snapshot",
+        "preset": "recommended",
+        "observables": [],
+    }
+    assert "one period" not in text
+    # A length in periods is as exact as the samples that it stands for; samples stay samples.
+    odd = replace(result, spec=replace(spec, input_delays=1234))
+    text = _tuned(before, None, odd, ["input_delays"], "recommended", 31.37)
+    assert round(float(tomllib.loads(text)["model"]["input_delays"].split()[0]) * 31.37) == 1234
+    text = _tuned(before.replace('"1 T"', "3"), None, result, ["lead"], None, 20.0)
+    assert tomllib.loads(text)["model"]["lead"] == 15

@@ -95,7 +95,8 @@ def tune(
     Parameters
     ----------
     spec : HankelDMDc
-        Where the search starts, with exact delay rows; what `vary` does not name stays.
+        Where the search starts, with exact delay rows; what `vary` does not name stays, but that
+        observables are chosen where ``spec.select`` says so.
     runs : Dataset, sequence of Dataset, or mapping of names to Datasets
         Training runs.
     states, inputs : sequence of str
@@ -141,6 +142,8 @@ def tune(
             f"folds must be 'run', 'sea_state' or an integer of at least 2; received {folds!r}."
         )
     check_names(states, inputs)
+    if spec.select is not None and spec.select.observables:
+        vary = list(dict.fromkeys([*vary, "observables"]))
     named = until(as_runs(runs), stop)
     known: MutableMapping[str, Any] = {}
     if resume is not None:

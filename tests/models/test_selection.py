@@ -10,7 +10,15 @@ from drifting import INPUTS as PROBES
 from drifting import STATES as DRIFTING
 from drifting import drifting_run
 
-from seakeep import HankelDMDc, ProbeAlignment, RequestError, SlowSquares, load_model, metrics
+from seakeep import (
+    HankelDMDc,
+    Powers,
+    ProbeAlignment,
+    RequestError,
+    SlowSquares,
+    load_model,
+    metrics,
+)
 from seakeep.models.selection import RIDGES, WORST, select
 
 DT, PERIOD = 0.1, 10  # s, samples
@@ -100,6 +108,28 @@ def test_squares_are_chosen_where_the_drift_goes_with_them_and_not_without_it():
     assert sum(row["chosen"] for row in found.rows) == 1
     for row in found.rows:
         assert row["lower"] <= row["score"] <= row["upper"]
+
+
+def test_what_each_observable_is_worth_is_told_where_they_are_stated_too():
+    squares = SlowSquares("eta", orders=(0,), lags=(0, 1))
+    spec = replace(SPEC, observables=[squares, Powers("eta", powers=(3,))])
+    model = spec.fit(runs(), STATES, INPUTS)
+    assert model.settings.observables == spec.observables
+    every = select(spec, runs(), STATES, INPUTS, vary=["observables"])
+    alone = {
+        kind: min(row["score"] for row in every.rows if row["observables"] == kind)
+        for kind in ("slow_squares", "powers")
+    }
+    assert f"; without slow_squares of eta {alone['powers']:.3f}" in model.summary()
+    assert f"; without powers of eta {alone['slow_squares']:.3f}" in model.summary()
+    assert alone["powers"] > 1.5 * alone["slow_squares"]  # the drift goes with the squares
+    # Nothing is held out where all is stated, so that nothing is known of it.
+    plain = replace(model.settings, select=None).fit(runs(), STATES, INPUTS)
+    assert "  chosen        nothing: all is stated; seakeep tune finds" in plain.summary()
+    assert (
+        "chosen"
+        not in replace(plain.settings, observables=()).fit(runs(), STATES, INPUTS).summary()
+    )
 
 
 def test_unseen_seas_are_offered_the_envelopes_of_several_probes_alone():

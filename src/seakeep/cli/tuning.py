@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,12 +20,17 @@ from seakeep.cli.options import (
 )
 from seakeep.errors import RequestError
 from seakeep.files import check_output, check_place, replacing
+from seakeep.toml import Length
 
 if TYPE_CHECKING:
-    from seakeep.models import ProbeAlignment, ReadOut
+    from seakeep.models import HankelDMDc, ProbeAlignment, ReadOut
+    from seakeep.models.observables import Observable
     from seakeep.tuning import TuneResult
 
 __all__ = ["tune"]
+
+COMMENTED = ("ridge", "state_delays", "input_delays", "lead", "rank", "observables")
+"""Keys of a tuned file after which it says where they come from."""
 
 
 def tune(
@@ -35,7 +40,8 @@ def tune(
         typer.Option(
             "--vary",
             help="What to choose beside the ridge: observables, lead, input_delays, state_delays, "
-            "rank, alignment, readouts. Repeat it for several. Default: observables.",
+            "rank, alignment, readouts. Repeat it for several. Default: observables, which are "
+            "chosen too where the file leaves them open.",
         ),
     ] = None,
     out: Annotated[
@@ -57,9 +63,10 @@ def tune(
     Example: seakeep tune docs/tutorial/campaign.toml --vary input_delays
     """
     from seakeep.campaign import read_campaign
-    from seakeep.models import HankelDMDc, Select
+    from seakeep.models import HankelDMDc, Select, labelled
     from seakeep.report.comparison import plain_cells
     from seakeep.study.fit import read_training
+    from seakeep.study.resolve import counts_in_periods, preset_of
     from seakeep.tuning import tune as search
 
     read = read_campaign(campaign)
@@ -81,15 +88,17 @@ def tune(
             f"kind = '{settings.kind}' cannot be tuned: a Hankel model is. Name another model with "
             "--model, or set kind = 'hankel_dmdc'."
         )
-    kept, varied = target.with_suffix(".scores.json"), vary or ["observables"]
+    period = read.encounter_period() if counts_in_periods(settings) else None
+    kept = target.with_suffix(".scores.json")
     chosen = spec.select or Select()
+    varied = {*(vary or ["observables"]), *(["observables"] if chosen.observables else [])}
     with member_executor(workers, scheduler) as executor, progress_bar("Tuning") as progress:
         found = search(
             spec,
             runs,
             list(settings.states),
             list(settings.inputs),
-            vary=varied,
+            vary=sorted(varied),
             horizon=chosen.horizon,
             folds=chosen.folds,
             stop=stop,
@@ -98,7 +107,14 @@ def tune(
             resume=kept,
         )
     typer.echo(found.describe())
-    text = _tuned(campaign.read_text(encoding="utf-8"), model, found, varied)
+    text = _tuned(
+        campaign.read_text(encoding="utf-8"),
+        model,
+        found,
+        varied,
+        preset_of(settings),
+        period if period is None else period / labelled.common_step(runs),
+    )
     with replacing(target) as place:
         place.write_text(text, encoding="utf-8")
     kept.unlink(missing_ok=True)
@@ -114,52 +130,99 @@ def tune(
         messages().print(f"Wrote {save_figure(found.figure(), picture)}.")
 
 
-def _tuned(text: str, model: str | None, found: TuneResult, varied: Sequence[str]) -> str:
-    """The campaign file with the choice in the table of the model, and nothing else changed."""
+def _tuned(
+    text: str,
+    model: str | None,
+    found: TuneResult,
+    varied: Collection[str],
+    preset: str | None,
+    period: float | None,
+) -> str:
+    """The campaign file with the choice in the table of the model, and nothing else changed.
+
+    `preset` is what the table takes, stated or not, and `period` the encounter period in samples,
+    where the campaign has one.
+    """
+    import tomlkit
+
+    document = tomlkit.parse(text)
+    table: Any = document["model"] if model is None else document["models"][model]
+    # Blank lines and comments there belong to the next table, if this one is in one place.
+    between = _after(table) if isinstance(table, tomlkit.items.Table) else []
+    values = _choice(found.spec, table, varied, preset, period)
+    stale = {
+        "select": True,  # nothing is left to be chosen
+        "rank": True,
+        "alignment": "alignment" in varied,
+        "readouts": "readouts" in values,
+        "preset": "preset" not in values,
+    }
+    for key in (key for key, yes in stale.items() if yes):
+        table.pop(key, None)
+    for key, value in sorted(values.items(), key=lambda each: each[0] == "readouts"):
+        if table.get(key) == value:
+            continue
+        table[key] = value
+        if key in COMMENTED:
+            table[key].comment("chosen by seakeep tune, by free runs on held-out training runs")
+    if between:
+        _end(table).extend(between)
+    first = "# seakeep_file: tuned campaign\n"
+    body = tomlkit.dumps(document)
+    return body if body.startswith(first) else first + body
+
+
+def _choice(
+    spec: HankelDMDc,
+    table: Mapping[str, Any],
+    varied: Collection[str],
+    preset: str | None,
+    period: float | None,
+) -> dict[str, Any]:
+    """Keys of the table of a model that state the choice, and the preset that it goes with."""
+    values: dict[str, Any] = {"ridge": spec.ridge, "ridge_scale": spec.ridge_scale}
+    stated = set(varied)
+    if preset is not None and "alignment" in varied and spec.alignment is None:
+        # The preset may bring an alignment, so that all which it states is stated in its place.
+        stated |= {"readouts", "state_delays", "input_delays", "lead"}
+        values["delay_rows"] = spec.delay_rows
+    elif preset is not None:
+        values["preset"] = preset
+    for key in ("state_delays", "input_delays", "lead"):
+        if key in stated:
+            count = int(getattr(spec, key))
+            values[key] = count if isinstance(table.get(key), int) else _in_periods(count, period)
+    if spec.rank is not None:
+        values["rank"] = spec.rank
+    if "observables" in stated:
+        values["observables"] = _observables(spec.observables)
+    if "alignment" in stated and spec.alignment is not None:
+        values["alignment"] = _alignment(spec.alignment)
+    if "readouts" in stated:
+        values["readouts"] = "auto" if spec.readouts == "auto" else _readouts(spec.readouts)
+    return values
+
+
+def _observables(chosen: Sequence[Observable]) -> Any:
+    """A list of tables, a line for each."""
     import tomlkit
 
     from seakeep.models.observables import to_json
 
-    document = tomlkit.parse(text)
-    table: Any = document["model"] if model is None else document["models"][model]
-    spec = found.spec
-    values: dict[str, Any] = {
-        "state_delays": spec.state_delays,
-        "input_delays": spec.input_delays,
-        "lead": spec.lead,
-        "delay_rows": spec.delay_rows,
-        "ridge": spec.ridge,
-        "ridge_scale": spec.ridge_scale,
-    }
-    tables = tomlkit.array()
-    for each in spec.observables:
+    rows = tomlkit.array()
+    for each in chosen:
         row = tomlkit.inline_table()
         row.update({k: v for k, v in to_json(each).items() if v not in (None, "")})
-        tables.append(row)
-    values["observables"] = tables.multiline(bool(spec.observables))
-    # Blank lines and comments there belong to the next table, if this one is in one place.
-    between = _after(table) if isinstance(table, tomlkit.items.Table) else []
-    table.pop("rank", None)
-    if spec.rank is not None:
-        values["rank"] = spec.rank
-    for key, value in values.items():
-        table[key] = value
-    stated = set(varied)
-    if "alignment" in varied:
-        table.pop("alignment", None)
-        if spec.alignment is not None:
-            table["alignment"] = _alignment(spec.alignment)
-        elif table.pop("preset", None):  # which may bring an alignment, and read-outs
-            stated.add("readouts")
-    if "readouts" in stated:
-        table.pop("readouts", None)
-        table["readouts"] = "auto" if spec.readouts == "auto" else _readouts(spec.readouts)
-    if between:
-        _end(table).extend(between)
-    table["ridge"].comment("chosen by seakeep tune, by free runs on held-out training runs")
-    first = "# seakeep_file: tuned campaign\n"
-    body = tomlkit.dumps(document)
-    return body if body.startswith(first) else first + body
+        rows.append(row)
+    return rows.multiline(bool(chosen))
+
+
+def _in_periods(samples: int, period: float | None) -> int | str:
+    """A number of samples as a file states it: in periods, which hold at any sampling rate."""
+    if period is None:
+        return samples
+    lengths = (Length(float(f"{samples / period:.{digits}g}")) for digits in range(2, 16))
+    return str(next(each for each in lengths if round(each.at(period)) == samples))
 
 
 def _alignment(chosen: ProbeAlignment) -> Any:

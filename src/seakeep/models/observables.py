@@ -397,6 +397,12 @@ OBSERVABLES: dict[str, type[Observable]] = {
 }
 
 
+def named(observable: Observable) -> str:
+    """Name of an observable in texts: its kind, and what it is made of."""
+    made_of = ", ".join(getattr(observable, "of", ())) or getattr(observable, "expression", "")
+    return f"{observable.kind} of {made_of}"
+
+
 def to_json(observable: Observable) -> dict[str, Any]:
     """Kind and settings as JSON values."""
     return {"kind": observable.kind, **asdict(observable)}  # type: ignore[call-overload]
@@ -570,9 +576,8 @@ class Observed:
             ahead = bound.ahead + (self.lead if bound.delayed else 0)
             columns = f"{len(bound.labels)} column{'' if len(bound.labels) == 1 else 's'}"
             delays = "with the input delays" if bound.delayed else "at lags of their own"
-            what = ", ".join(getattr(each, "of", ())) or getattr(each, "expression", "")
             lines.append(
-                f"  observable    {each.kind} of {what}: {columns} {delays}, reads up to "
+                f"  observable    {named(each)}: {columns} {delays}, reads up to "
                 f"{max(ahead - 1, 0) * dt:.3g} s after the instant forecast"
             )
         return lines

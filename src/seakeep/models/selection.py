@@ -34,7 +34,7 @@ from seakeep.models.inputs import (
 )
 from seakeep.models.interface import Drive, Span
 from seakeep.models.labelled import mean_period
-from seakeep.models.observables import Observable, Observed, Powers, SlowSquares
+from seakeep.models.observables import Observable, Observed, Powers, SlowSquares, named
 from seakeep.models.readouts import FittedReadOut, ReadOut, readouts_asked
 from seakeep.models.settings import HankelSettings, Select
 from seakeep.models.stacking import PERIODS, Held, fit_readouts
@@ -760,6 +760,7 @@ def select(
             else (),
             "readouts" in vary,
         )
+    known = {} if known is None else known
     found = search(
         problems,
         base,
@@ -771,6 +772,13 @@ def select(
         alike=0.0 if folds == "sea_state" else ALIKE,
     )
     taken = found.candidate
+    without = [
+        replace(taken, observables=tuple(each for each in taken.observables if each != number))
+        for number in taken.observables
+    ]
+    untried = [each for each in without if each not in dict(found.trials)]
+    more = tuple(_judged(problems, untried, ridges, executor, progress, known))
+    found = replace(found, trials=found.trials + more)
     best = dict(found.trials)[taken]
     score = float(best.means[best.levels.index(found.level)])
     complete = replace(
@@ -790,6 +798,10 @@ def select(
     note = (
         f"{level}: out of {count} settings (below, the best λ of each kind) in free runs on "
         f"{len(problems[0].folds())} parts held out in turn, mean NRMSE {score:.3f}"
+    )
+    note += "".join(
+        f"; without {named(chosen[number])} {dict(found.trials)[less].means.min():.3f}"
+        for number, less in zip(taken.observables, without, strict=True)
     )
     if folds == "sea_state":
         note += f"; {_words_of_groups(problems[0].groups)}"

@@ -63,6 +63,8 @@ STATE_PERIODS, INPUT_PERIODS, LEAD_PERIODS = 1.0, 3.0, 0.75
 """Delays and look-ahead that we recommend; a search from there gains a twentieth at most."""
 ALIGNMENT = ProbeAlignment(mode="dispersion", surge="predicted", passes=3, optional=True)
 """Of what we recommend. The third pass takes a tenth off the error on the virtual tank."""
+STATED = "nothing: all is stated; seakeep tune finds the error without each observable"
+"""How the settings of a model were chosen that leave nothing open, where it has observables."""
 
 
 @dataclass(frozen=True)
@@ -329,7 +331,8 @@ class HankelDMDc(HankelSettings):
         if self.readouts:
             check_names(states, inputs)
             readouts = readouts_for(self, until(named, stop), list(states), list(inputs))
-        return self._fitted(named, states, inputs, stop, readouts)
+        model = self._fitted(named, states, inputs, stop, readouts)
+        return replace(model, selection=STATED if self.observables else "")
 
     def _fitted(
         self,
@@ -759,7 +762,8 @@ class BayesianHankelDMDc:
         if self.readouts:
             central = self.central(labelled.common_step(named))
             readouts = readouts_for(central, until(named, stop), list(states), list(inputs))
-        return self._drawn(named, states, inputs, stop, readouts)
+        ensemble = self._drawn(named, states, inputs, stop, readouts)
+        return replace(ensemble, selection=STATED if self.observables else "")
 
     def _taught_by(self, runs: Collection[xr.Dataset], shortest: float) -> BayesianHankelDMDc:
         """Settings that say what members learn from; `shortest` is the time of a run, s."""

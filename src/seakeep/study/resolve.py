@@ -143,7 +143,7 @@ def counts_in_periods(settings: ModelSettings) -> bool:
     """Whether a model is stated in encounter periods: by a preset, a key, or as an ensemble."""
     by_kind = _kind_of(settings).is_ensemble
     squares = any(each.get("kind") == SlowSquares.kind for each in settings.observables or ())
-    named = _preset(settings) is not None or settings.select is not None
+    named = preset_of(settings) is not None or settings.select is not None
     return named or by_kind or squares or any(lengths(settings))
 
 
@@ -206,7 +206,7 @@ def resolve_model(
     if settings.preset is None and preset is not None:  # a baseline may lack the paper's
         preset = next((p for p in (preset, "recommended") if hasattr(kind, p)), None)
     else:
-        preset = _preset(settings)
+        preset = preset_of(settings)
     stated = settings.arguments()
     stated.pop("stop", None)
     known = list(_defaults(kind))
@@ -259,7 +259,7 @@ def _filled(
     return cast("Spec", made)
 
 
-def _preset(settings: ModelSettings) -> str | None:
+def preset_of(settings: ModelSettings) -> str | None:
     """What a table names, or takes where it states none of the keys that have no default."""
     kind = _kind_of(settings)
     needed = {key for key, default in _defaults(kind).items() if default is MISSING}
