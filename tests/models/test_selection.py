@@ -25,13 +25,19 @@ DT, PERIOD = 0.1, 10  # s, samples
 STATES, INPUTS = ["heave", "drift"], ["eta"]
 
 
-def sea(seed: int, samples: int = 700, noise: float = 0.3) -> xr.Dataset:
-    """A heave that is linear in the wave, and a drift that goes with its slow square."""
+def sea(
+    seed: int, samples: int = 700, noise: float = 0.3, frequency: float | None = None
+) -> xr.Dataset:
+    """A heave that is linear in the wave, and a drift that goes with its slow square.
+
+    The wave is irregular, or regular of a `frequency` (Hz).
+    """
     rng = np.random.default_rng(seed)
     t = np.arange(samples) * DT
     eta = np.zeros(samples)
-    for _ in range(12):
-        eta += 0.1 * np.cos(2 * np.pi * rng.uniform(0.7, 1.3) * t + rng.uniform(0, 2 * np.pi))
+    for _ in range(12 if frequency is None else 1):
+        omega = 2 * np.pi * (rng.uniform(0.7, 1.3) if frequency is None else frequency)
+        eta += (0.1 if frequency is None else 0.3) * np.cos(omega * t + rng.uniform(0, 2 * np.pi))
     heave, drift = np.zeros(samples), np.zeros(samples)
     square = np.convolve(eta**2, np.hanning(31) / np.hanning(31).sum(), "same")
     for k in range(2, samples):
