@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from seakeep import load_model
+from seakeep import BayesianHankelDMDc, Fixed, load_model
 from seakeep.campaign import read_campaign
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.files import (
@@ -25,6 +25,7 @@ from seakeep.files import (
     write_netcdf,
 )
 from seakeep.formats import limits, read_columns
+from seakeep.models import store
 from seakeep.study.store import UnitFolder
 
 
@@ -80,6 +81,68 @@ def test_what_a_file_of_ours_declares_is_judged_before_it_is_read(tmp_path, size
             file.create_dataset(f"h{number}", (size,), "f8", chunks=(10**5,), fillvalue=1.0)
     path = seal(tmp_path / "m.nc", made.getvalue())
     with pytest.raises(DataError, match=rf"m\.nc: {said}, and 0 MiB.* make it anew\."):
+        load_model(path)
+
+
+@pytest.fixture(scope="module")
+def ensemble(make_dataset):
+    t = 0.1 * np.arange(400.0)
+    run = make_dataset(t, heave=np.sin(t), eta=np.cos(1.3 * t))
+    spec = BayesianHankelDMDc(
+        train_length=Fixed(4), state_delay=Fixed(0.2), input_delay=Fixed(0.3), ridge=Fixed(1.0),
+        encounter_period=5.0, n_members=2, seed=1,
+    )  # fmt: skip
+    return spec.fit(run, states=["heave"], inputs=["eta"])
+
+
+@pytest.mark.parametrize(
+    ("attribute", "old", "new", "said"),
+    [
+        ("signature", '"dt": 0.1', '"dt": "x"',
+         "signature.dt: received 'x', which should be a number"),
+        ("signature", '"dt": 0.1', '"dt": ' + "9" * 5000,
+         f"signature.dt: received {'9' * 60}, which nothing measures"),
+        ("signature", '"dt": 0.1, ', "", "signature.dt is missing"),
+        ("signature", '"maps": []', '"maps": 5',
+         "input_map.maps: received 5, which should be a list"),
+        ("ensemble", '"seed": "1"', '"seed": "' + "9" * 5000 + '"',
+         f"seed: received '{'9' * 59}, which should be a whole number"),
+        ("ensemble", '"value": 1.0', '"value": "x"',
+         "ridge.value: received 'x', which should be a number"),
+        ("ensemble", '"encounter_period": 5.0', '"encounter_period": "x"',
+         "encounter_period must be a positive number of seconds; received 'x'"),
+        ("runs", '"offsets": [185]', '"offsets": ["x"]',
+         "runs.offsets.0: received 'x', which should be an integer"),
+        ("calibration", "null", "x", "calibration: received 'x', which is no JSON"),
+        ("runs", "{", "[" * 9999, "runs is nested hundreds of levels deep"),
+    ],
+)  # fmt: skip
+def test_a_value_of_another_kind_in_a_model_file_is_named(
+    ensemble, tmp_path, attribute, old, new, said
+):
+    kept = ensemble.to_dataset()
+    assert old in kept.attrs[attribute]
+    kept.attrs[attribute] = kept.attrs[attribute].replace(old, new, 1)
+    path = store.write(kept, tmp_path / "m.nc", ensemble.kind)
+    with pytest.raises(DataError) as refused:
+        load_model(path)
+    assert str(refused.value) == (
+        f"{path} does not hold what seakeep writes: {said}. Fit the model again."
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "dims", "said"),
+    [
+        ("ridge", ("member",), "ridge is <U1 over ('member',), not a number per member"),
+        ("states_0", ("sample", "state"), "states_0 holds <U1, not numbers"),
+    ],
+)
+def test_words_in_place_of_numbers_of_a_model_file_are_named(ensemble, tmp_path, name, dims, said):
+    kept = ensemble.to_dataset().drop_vars(name)
+    words = np.full([kept.sizes.get(each, 1) for each in dims], "x")
+    path = store.write(kept.assign({name: (dims, words)}), tmp_path / "m.nc", ensemble.kind)
+    with pytest.raises(DataError, match=re.escape(said)):
         load_model(path)
 
 

@@ -192,7 +192,9 @@ def test_a_file_whose_alignment_lacks_what_its_mode_needs_is_refused(models, key
     signature = json.loads(dataset.attrs["signature"])
     signature["input_map"]["maps"][0][lost] = None
     write_netcdf(path, dataset.assign_attrs(signature=json.dumps(signature)))
-    with pytest.raises(DataError, match=r"rom\.nc is incomplete: .*of a vessel in waves"):
+    with pytest.raises(
+        DataError, match=r"rom\.nc does not hold what seakeep writes: .*of a vessel in waves"
+    ):
         load_model(path)
 
 

@@ -276,7 +276,7 @@ def altered(calibrated, path, **values):
         ({"floor": "gone"}, r"calibrated by an older seakeep.* Calibrate the ensemble again"),
         ({"floor": [0.1]}, r"floor of the calibration is not a list of 2 numbers from zero on"),
         ({"margin": [0.1, -1.0]}, r"margin of the calibration is not a list of 2 numbers"),
-        ({"windows": "gone"}, "a part is missing: 'windows'"),
+        ({"windows": "gone"}, r"calibration\.windows is missing"),
         ({"law": [[1.0, 2.0]]}, "law of the calibration is not a table of 4 rows of 2 numbers"),
         ({"level": 2.0}, "level must lie between 0 and 1"),
     ],

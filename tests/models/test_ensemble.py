@@ -331,7 +331,10 @@ def test_a_damaged_file_is_refused(run, tmp_path):
     ensemble = fitted(run)
     damaged = ensemble.to_dataset().drop_vars("delayed_0")
     path = seakeep.models.store.write(damaged, tmp_path / "e.nc", "bayesian_hankel_dmdc")
-    with pytest.raises(DataError, match=r"e.nc is incomplete: .*delayed_0.* Fit the model again"):
+    with pytest.raises(
+        DataError,
+        match=r"e.nc does not hold what seakeep writes: .*delayed_0.* Fit the model again",
+    ):
         seakeep.load_model(path)
 
 

@@ -163,7 +163,7 @@ def test_a_single_bit_that_changed_is_noticed(saved, part):
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("seakeep_format", "has the old layout 0"), ("signature", "incomplete: a part is missing")],
+    [("seakeep_format", "has the old layout 0"), ("signature", "a part is missing")],
 )
 def test_a_file_that_lacks_what_it_is_known_by_is_refused(saved, name, message):
     dataset = xr.load_dataset(saved, engine="h5netcdf")
@@ -188,7 +188,9 @@ def test_an_unknown_kind_asks_for_an_update(saved):
 )
 def test_a_file_with_broken_contents_is_incomplete(saved, attrs):
     edited(saved, **attrs)
-    with pytest.raises(DataError, match=r"rom\.nc is incomplete: .* Fit the model again"):
+    with pytest.raises(
+        DataError, match=r"rom\.nc does not hold what seakeep writes: .* Fit the model again"
+    ):
         load_model(saved)
 
 
@@ -202,7 +204,7 @@ def test_a_file_with_broken_contents_is_incomplete(saved, attrs):
 def test_a_number_that_does_not_fit_the_others_is_refused(saved, attribute, key, value, words):
     kept = json.loads(xr.load_dataset(saved, engine="h5netcdf").attrs[attribute])
     edited(saved, **{attribute: json.dumps(kept | {key: value})})
-    with pytest.raises(DataError, match=rf"rom\.nc is incomplete: {words}"):
+    with pytest.raises(DataError, match=rf"rom\.nc does not hold what seakeep writes: {words}"):
         load_model(saved)
 
 
@@ -217,7 +219,9 @@ def test_a_file_whose_matrices_do_not_fit_its_delays_is_refused(saved):
     dataset = xr.load_dataset(saved, engine="h5netcdf")
     dataset = dataset.isel(regressor=slice(1, None))
     write_netcdf(saved, dataset)
-    with pytest.raises(DataError, match=r"rom\.nc is incomplete: .*coefficients"):
+    with pytest.raises(
+        DataError, match=r"rom\.nc does not hold what seakeep writes: .*coefficients"
+    ):
         load_model(saved)
 
 

@@ -26,7 +26,7 @@ from seakeep.core.calibration import (
 )
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice
+from seakeep.models.checks import check_choice, typed
 from seakeep.models.engine import Runs as FreeRuns
 from seakeep.models.engine import Windows, member_series, read_windows
 from seakeep.models.executor import Progress
@@ -149,32 +149,50 @@ class Calibration:
         )
 
     @classmethod
-    def from_json(cls, text: str, channels: int) -> Calibration | None:
-        """Rebuild from :meth:`to_json`, for so many states; None for ``null``."""
-        kept: Json | None = json.loads(text)
-        if kept is None:
+    def from_json(cls, content: object, channels: int) -> Calibration | None:
+        """Rebuild from the values of :meth:`to_json`, for so many states; None stays None."""
+        if content is None:
             return None
-        if "floor" not in kept:
+        if not isinstance(content, dict) or "floor" not in content:
             raise DataError(
                 "the ensemble's band was calibrated by an older seakeep, in a form that is no "
                 "longer read. Calibrate the ensemble again, from its file without a calibration."
             )
-        arrays = {key: _positive(kept, key, channels) for key in NUMBERS}
-        floor = None if kept["floor"] is None else _positive(kept, "floor", channels)
-        found = ConformalMargin(**arrays, level=fraction(kept["level"], "level"))
-        spans = {name: (float(a), float(b)) for name, (a, b) in kept["spans"].items()}
-        windows = {name: int(count) for name, count in kept["windows"].items()}
-        law = None if kept["law"] is None else np.array(kept["law"], dtype=float)
-        if law is not None and (law.shape != (4, channels) or not np.all(np.isfinite(law))):
-            raise ValueError(
-                f"law of the calibration is not a table of 4 rows of {channels} numbers"
-            )
-        return cls(found, floor, law, windows, int(kept["steps"]), spans, kept["folds"])
+        kept = typed(_Kept, content, "calibration")
+        arrays = {key: _positive(getattr(kept, key), key, channels) for key in NUMBERS}
+        floor = None if kept.floor is None else _positive(kept.floor, "floor", channels)
+        found = ConformalMargin(**arrays, level=fraction(kept.level, "level"))
+        law = None
+        if kept.law is not None:
+            sizes = [len(row) for row in kept.law]
+            if sizes != [channels] * 4 or not np.all(np.isfinite(kept.law)):
+                raise ValueError(
+                    f"law of the calibration is not a table of 4 rows of {channels} numbers"
+                )
+            law = np.array(kept.law)
+        return cls(found, floor, law, kept.windows, kept.steps, kept.spans, kept.folds)
 
 
-def _positive(kept: Json, key: str, channels: int) -> FloatArray:
+@dataclass(frozen=True)
+class _Kept:
+    """What a file holds of a calibration."""
+
+    margin: list[float]
+    block_length: list[float]
+    blocks: list[float]
+    warranted: list[float]
+    level: float
+    floor: list[float] | None
+    law: list[list[float]] | None
+    windows: dict[str, int]
+    steps: int
+    spans: dict[str, tuple[float, float]]
+    folds: str | None
+
+
+def _positive(stated: list[float], key: str, channels: int) -> FloatArray:
     """Numbers of a calibration, one per state, none negative."""
-    values = np.array(kept[key], dtype=float)
+    values = np.array(stated)
     if values.shape != (channels,) or not np.all(values >= 0):
         raise ValueError(
             f"{key} of the calibration is not a list of {channels} numbers from zero on"

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import functools
+import json
 import numbers
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from typing import Any, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
 
 from seakeep.errors import RequestError, did_you_mean
 
-__all__ = ["check_choice", "check_integer", "settings_of"]
+__all__ = ["SHOWN", "check_choice", "check_integer", "check_keys", "settings_of", "typed"]
+
+SHOWN = 60
+"""Characters of a received value that a message shows at most."""
 
 Settings = TypeVar("Settings")
+Made = TypeVar("Made")
 
 
 def check_choice(name: str, value: object, choices: Sequence[str]) -> None:
@@ -78,12 +86,78 @@ def settings_of(kind: type[Settings], name: str, value: object, example: str) ->
             f"{name} must be a seakeep.{kind.__name__} or None; received {value!r}. Write "
             f"{name}=seakeep.{kind.__name__}({example})."
         )
-    dataclass: Any = kind
-    known = [each.name for each in fields(dataclass)]
-    for key in value:
-        if key not in known:
-            raise RequestError(
-                f"{name}: unknown key '{key}'.{did_you_mean(str(key), known)} Keys: "
-                f"{', '.join(known)}."
-            )
+    check_keys(kind, value, f"{name}: ")
     return kind(**value)
+
+
+def check_keys(kind: type, table: Mapping[str, object], what: str = "") -> None:
+    """Refuse a table that has a key which a dataclass lacks, or lacks one that it needs.
+
+    Parameters
+    ----------
+    kind : type
+        The dataclass.
+    table : mapping
+        Its arguments.
+    what : str, optional
+        Start of the message, such as ``"alignment: "``.
+
+    Raises
+    ------
+    RequestError
+        Of the first such key.
+    """
+    taken = [each for each in fields(kind) if each.init]
+    known = [each.name for each in taken]
+    needed = [
+        each.name for each in taken if each.default is MISSING and each.default_factory is MISSING
+    ]
+    listed = f"Keys: {', '.join(known)}."
+    for key in table:
+        if key not in known:
+            near = did_you_mean(str(key), known)
+            raise RequestError(f"{what}unknown key '{key}'.{near} {listed}")
+    if missing := [key for key in needed if key not in table]:
+        raise RequestError(f"{what}the key '{missing[0]}' is missing. {listed}")
+
+
+def typed(kind: type[Made], content: object, place: str = "") -> Made:
+    """Rebuild a dataclass from JSON values; its annotations say of which types they must be.
+
+    Parameters
+    ----------
+    kind : type
+        The dataclass.
+    content : object
+        JSON values.
+    place : str, optional
+        What a message calls them; by default the name of the class.
+
+    Raises
+    ------
+    ValueError
+        If a value is missing, or of another type.
+    """
+    anything: Any = kind  # mypy takes no type for hashable
+    try:
+        made: Made = _adapter(anything).validate_json(json.dumps(content), strict=True)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join([place or kind.__name__, *map(str, first["loc"])])
+        if first["type"] == "missing":
+            raise ValueError(f"{key} is missing") from None
+        if first["type"] == "value_error":
+            raise ValueError(f"{key}: {first['ctx']['error']}") from None
+        words = first["msg"].removeprefix("Input ").replace("valid ", "")
+        for theirs, ours in _WORDS:
+            words = words.replace(theirs, ours)
+        raise ValueError(f"{key}: received {first['input']!r:.{SHOWN}}, which {words}") from None
+    return made
+
+
+_WORDS = (("a array", "a list"), ("an object", "a table"), ("a integer", "an integer"))
+
+
+@functools.cache
+def _adapter(kind: Any) -> Any:
+    return TypeAdapter(kind)

@@ -26,6 +26,7 @@ from seakeep.models.calibration import (
     warn_of_horizon,
     widened,
 )
+from seakeep.models.checks import typed
 from seakeep.models.draws import Draw
 from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
 from seakeep.models.executor import Progress, in_order, one_blas_thread
@@ -739,7 +740,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
         cls, dataset: xr.Dataset, signature: Signature, settings: HankelSettings, origin: Json
     ) -> HankelEnsemble:
         """Rebuild an ensemble from :meth:`to_dataset`; its members are equal to the last bit."""
-        place = store.content(dataset, "runs")
+        place = typed(_Place, store.content(dataset, "runs"), "runs")
         delayed, direct = signature.input_map.regressors(signature.input_labels)
         names = (
             tuple(signature.states),
@@ -749,17 +750,17 @@ class HankelEnsemble(_Forecasts, store.Saved):
         series = [
             tuple(
                 store.numbers(dataset, f"{group}_{number}", (None, len(channels)))
-                for number in range(len(place["names"]))
+                for number in range(len(place.names))
             )
             for group, channels in zip(("states", "delayed", "direct"), names, strict=True)
         ]
         arrays = TrainingArrays(
-            names=tuple(str(name) for name in place["names"]),
+            names=place.names,
             states=series[0],
             delayed=series[1],
             direct=series[2],
-            offsets=tuple(int(offset) for offset in place["offsets"]),
-            begins=tuple(float(begin) for begin in place["begins"]),
+            offsets=place.offsets,
+            begins=place.begins,
             channels=names,
         )
         if len({len(arrays.names), len(arrays.offsets), len(arrays.begins)}) != 1:
@@ -767,15 +768,24 @@ class HankelEnsemble(_Forecasts, store.Saved):
         return cls(
             settings=settings,
             origin=origin,
-            members=tuple(_draw(dataset, number) for number in range(dataset.sizes["member"])),
+            members=_draws(dataset),
             arrays=arrays,
             signature=signature,
             coverage=Coverage.from_dataset(dataset),
             calibration=Calibration.from_json(
-                dataset.attrs["calibration"], len(signature.state_labels)
+                store.document(dataset, "calibration"), len(signature.state_labels)
             ),
             selection=str(dataset.attrs["selection"]),
         )
+
+
+@dataclass(frozen=True)
+class _Place:
+    """What a file holds of the runs that train."""
+
+    names: tuple[str, ...]
+    offsets: tuple[int, ...]
+    begins: tuple[float, ...]
 
 
 def _radius(ensemble: HankelEnsemble, number: int) -> float:
@@ -958,14 +968,24 @@ def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Data
     return xr.Dataset(variables, coords={"member": np.arange(len(members))}, attrs=attrs)
 
 
-def _draw(dataset: xr.Dataset, member: int) -> Draw:
-    fields: dict[str, Any] = {name: float(dataset[name].values[member]) for name in DRAWN}
+def _draws(dataset: xr.Dataset) -> tuple[Draw, ...]:
+    columns: dict[str, list[Any]] = {}
+    for name in (*DRAWN, *ROUNDED):
+        found = dataset[name]
+        if found.dims != ("member",) or found.dtype.kind not in ("i" if name in ROUNDED else "f"):
+            raise ValueError(f"{name} is {found.dtype} over {found.dims}, not a number per member")
+        columns[name] = found.values.tolist()
     for name, (attribute, _) in ROUNDED.items():
-        value = int(dataset[name].values[member])
-        if value < 0 and attribute not in OPTIONAL:
-            raise ValueError(f"{name} of member {member} is {value}")
-        fields[attribute] = None if value < 0 and attribute in OPTIONAL else value
-    return Draw(**fields)
+        values = columns.pop(name)
+        if attribute not in OPTIONAL and min(values) < 0:
+            raise ValueError(f"{name} of member {values.index(min(values))} is {min(values)}")
+        columns[attribute] = [
+            None if each < 0 and attribute in OPTIONAL else each for each in values
+        ]
+    return tuple(
+        Draw(**dict(zip(columns, each, strict=True)))
+        for each in zip(*columns.values(), strict=True)
+    )
 
 
 def _warn_of_unstable(radii: FloatArray) -> None:

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 import xarray as xr
@@ -27,8 +27,8 @@ from scipy import signal
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice, check_integer, settings_of
-from seakeep.models.interface import Drive, InputMap, Json, Regressors, Span, plain, typed
+from seakeep.models.checks import check_choice, check_integer, settings_of, typed
+from seakeep.models.interface import Drive, InputMap, Json, Regressors, Span, plain
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.observables import Observed
 from seakeep.signals.propagation import (
@@ -247,13 +247,14 @@ class ProbeAlignment:
                     f"alignment: {key} = {getattr(self, key)!r} belongs to mode = '{mode}'; "
                     f"received mode = '{self.mode}'. Leave it out, or change the mode."
                 )
-        if isinstance(self.channels, str):
-            raise RequestError(
-                f"alignment: channels must be a list of names; received the string "
-                f"'{self.channels}'. Write channels=['{self.channels}']."
-            )
-        if self.channels is not None:
-            object.__setattr__(self, "channels", tuple(self.channels))
+        names: Any = self.channels
+        if names is not None:
+            if isinstance(names, str) or not isinstance(names, Iterable):
+                raise RequestError(
+                    f"alignment: channels must be a list of names; received {names!r}. Write "
+                    f"channels=['{names}']."
+                )
+            object.__setattr__(self, "channels", tuple(names))
 
     @classmethod
     def of(cls, value: object) -> Self | None:
@@ -791,14 +792,14 @@ class Chain:
     def from_json(cls, content: Json) -> Self:
         """Rebuild from :meth:`to_json`; an unknown kind raises a DataError."""
         maps = []
-        for each in content["maps"]:
-            rest = {key: value for key, value in each.items() if key != "kind"}
-            if each["kind"] not in MAPS:
+        for rest in typed(list[Json], content.get("maps"), "input_map.maps"):
+            kind = str(rest.pop("kind", ""))
+            if kind not in MAPS:
                 raise DataError(
-                    f"the input map '{each['kind']}' is not known here. Update seakeep, or import "
-                    "the module that adds it to seakeep.models.inputs.MAPS."
+                    f"the input map '{kind}' is not known here. Update seakeep, or import the "
+                    "module that adds it to seakeep.models.inputs.MAPS."
                 )
-            maps.append(MAPS[each["kind"]].from_json(rest))
+            maps.append(MAPS[kind].from_json(rest))
         return cls(tuple(maps))
 
 

@@ -7,16 +7,14 @@ and one line in :data:`seakeep.models.inputs.MAPS`.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 import xarray as xr
-from pydantic import TypeAdapter, ValidationError
 
 from seakeep.arrays import FloatArray
 from seakeep.models.labelled import ChannelLabel, Runs, Stop
@@ -35,10 +33,7 @@ __all__ = [
     "Span",
     "Spec",
     "plain",
-    "typed",
 ]
-
-Made = TypeVar("Made")
 
 Json = dict[str, Any]
 """Settings as JSON values."""
@@ -51,22 +46,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     return [plain(each) for each in value] if isinstance(value, list | tuple) else value
-
-
-def typed(kind: type[Made], content: Mapping[str, object]) -> Made:
-    """Rebuild a dataclass from JSON values; its annotations say of which types they must be.
-
-    Raises
-    ------
-    ValueError
-        If a value is missing, too many, or of another type.
-    """
-    try:
-        return TypeAdapter(kind).validate_json(json.dumps(content), strict=True)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(map(str, first["loc"]))
-        raise ValueError(f"{kind.__name__}.{place}: {first['msg']}") from None
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,11 +23,12 @@ from seakeep.arrays import BoolArray, FloatArray, as_real, fraction, positive, w
 from seakeep.core.kalman import DelayFilter, process_noise
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.models import engine, store
+from seakeep.models.checks import typed
 from seakeep.models.engine import Dynamics, Windows
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import WINDOWS, LeadErrors
 from seakeep.models.inputs import Chain, FittedAlignment, Measured
-from seakeep.models.interface import Regressors, Signature, Span, typed
+from seakeep.models.interface import Regressors, Signature, Span
 from seakeep.models.summaries import statistic_coordinate
 from seakeep.signals.prediction import draw_sea, predict_waves, predictable_time
 
@@ -683,7 +684,7 @@ class Live:
                 raise ValueError(f"{name} is {found.dtype} of shape {found.shape}")
             values[:] = found
         self._sum, self._weight, self._time = map(float, dataset["running"].values)
-        self._at = typed(dict[str, int], store.content(dataset, "places"))
+        self._at = typed(dict[str, int], store.content(dataset, "places"), "places")
         if not self._is_placed(**self._at):
             raise ValueError("the places in its record do not fit together")
 
@@ -731,7 +732,7 @@ def load_live(model: Servable, path: str | Path) -> Live:
         raise RequestError(
             f"{path} holds a model and no state of a live one. Load it with seakeep.load_model."
         )
-    live = store.rebuilt(path, lambda: _restored(model, dataset))
+    live = store.rebuilt(path, lambda: _restored(model, dataset), "Start anew with model.live().")
     if live is None:
         raise RequestError(
             f"{path} is the state of another model. Load the model that was in service, or start "
@@ -742,7 +743,7 @@ def load_live(model: Servable, path: str | Path) -> Live:
 
 def _restored(model: Servable, dataset: xr.Dataset) -> Live | None:
     """The state that a file holds; None where it is another model's."""
-    rig = store.content(dataset, "rig")
+    rig = typed(dict[str, dict[str, float]], store.content(dataset, "rig"), "rig")
     like = xr.Dataset(
         {name: ((), 0.0, {"x_position": each}) for name, each in rig["positions"].items()},
         attrs=rig["run"],

@@ -20,7 +20,7 @@ from seakeep.arrays import FloatArray
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice
+from seakeep.models.checks import check_choice, check_keys, typed
 from seakeep.models.interface import Drive, Regressors, Span
 from seakeep.models.labelled import ChannelLabel
 from seakeep.signals import expressions
@@ -204,10 +204,10 @@ class SlowSquares:
         lags = _numbers(self.lags, f"{what}: lags", "encounter periods from 0", lambda n: n >= 0)
         object.__setattr__(self, "lags", lags)
         meant = "per encounter period, above 0 and at most 1"
-        _numbers(self.cutoff, f"{what}: cutoff", meant, lambda n: 0 < n <= 1)
-        _numbers(self.lead, f"{what}: lead", "encounter periods from 0", lambda n: n >= 0)
+        _numbers((self.cutoff,), f"{what}: cutoff", meant, lambda n: 0 < n <= 1)
+        _numbers((self.lead,), f"{what}: lead", "encounter periods from 0", lambda n: n >= 0)
         if self.period is not None:
-            _numbers(self.period, f"{what}: period", "seconds above 0", lambda n: n > 0)
+            _numbers((self.period,), f"{what}: period", "seconds above 0", lambda n: n > 0)
 
     def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
         """Columns for these inputs; see :class:`Observable`."""
@@ -363,8 +363,9 @@ class Expression:
     kind: ClassVar[str] = "expression"
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name:
-            raise RequestError(f"expression: name must be a word; received {self.name!r}.")
+        for key in ("name", "expression"):
+            if not isinstance(text := getattr(self, key), str) or not text:
+                raise RequestError(f"expression: {key} must be a text; received {text!r}.")
         if "mean(" in self.expression.replace(" ", ""):
             raise RequestError(
                 f"expression {self.expression!r}: mean is over all of a record, which a row must "
@@ -425,17 +426,8 @@ def from_json(table: Mapping[str, Any]) -> Observable:
             f"{error} A kind of another module is known once that is imported."
         ) from None
     made = OBSERVABLES[str(kind)]
-    known = [each.name for each in fields(made)]  # type: ignore[arg-type]
-    for key in settings:
-        if key not in known:
-            raise RequestError(
-                f"observables: {kind} has no key '{key}'.{did_you_mean(key, known)} Keys: "
-                f"{', '.join(known)}."
-            )
-    try:
-        return made(**settings)
-    except TypeError as error:
-        raise RequestError(f"observables: {kind}: {error}. Keys: {', '.join(known)}.") from None
+    check_keys(made, settings, f"observables: {kind}: ")
+    return made(**settings)
 
 
 def observables_of(value: object) -> tuple[Observable, ...]:
@@ -445,7 +437,13 @@ def observables_of(value: object) -> tuple[Observable, ...]:
             f"observables must be a list; received {value!r}. Write "
             "observables=[seakeep.SlowSquares('eta_cog')]."
         )
-    return tuple(from_json(each) if isinstance(each, Mapping) else each for each in value)
+    made = [from_json(each) if isinstance(each, Mapping) else each for each in value]
+    if strange := [each for each in made if not hasattr(each, "bind")]:
+        raise RequestError(
+            f"observables must hold observables, such as seakeep.SlowSquares; received "
+            f"{strange[0]!r}."
+        )
+    return tuple(made)
 
 
 @dataclass(frozen=True)
@@ -595,13 +593,20 @@ class Observed:
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Self:
         """Rebuild from :meth:`to_json`."""
-        return cls(
-            tuple(from_json(each) for each in content["observables"]),
-            int(content["lead"]),
-            tuple(ChannelLabel(**each) for each in content["inputs"]),
-            float(content["dt"]),
-            content["period"],
-        )
+        kept = typed(_Kept, content, "observed")
+        made = tuple(from_json(each) for each in kept.observables)
+        return cls(made, kept.lead, kept.inputs, kept.dt, kept.period)
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """What a file holds of fitted observables."""
+
+    observables: list[dict[str, Any]]
+    lead: int
+    inputs: tuple[ChannelLabel, ...]
+    dt: float
+    period: float | None
 
 
 @dataclass(frozen=True, eq=False)

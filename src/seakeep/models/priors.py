@@ -14,6 +14,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from seakeep.errors import DataError, RequestError
+from seakeep.models.checks import SHOWN, typed
 
 __all__ = ["Fixed", "LogUniform", "Prior", "Uniform", "check_prior", "describe", "from_description"]
 
@@ -173,21 +174,38 @@ def describe(prior: Prior | None) -> dict[str, Any] | None:
     return {"prior": f"scipy.stats.{distribution}", "args": args, "kwds": kwds}
 
 
-def from_description(content: dict[str, Any] | None) -> Prior | None:
-    """Rebuild a prior from :func:`describe`; what it does not know raises a DataError."""
+@dataclass(frozen=True)
+class _Frozen:
+    """What a file holds of a distribution of SciPy."""
+
+    args: list[float]
+    kwds: dict[str, float]
+
+
+def from_description(setting: str, content: object) -> Prior | None:
+    """Rebuild the prior of a setting from :func:`describe`; DataError for what is not known."""
     if content is None:
         return None
     if not isinstance(content, dict) or "prior" not in content:
-        raise DataError(f"a prior is a table with the key 'prior'; received {content!r}.")
+        raise DataError(
+            f"{setting}: a prior is a table with the key 'prior'; received {content!r:.{SHOWN}}. "
+            "Fit the model again."
+        )
     name = str(content["prior"])
-    own = {each.__name__: each for each in (Uniform, LogUniform, Fixed)}
+    own: dict[str, Any] = {each.__name__: each for each in (Uniform, LogUniform, Fixed)}
     if name in own:
-        made: Prior = own[name](**{key: value for key, value in content.items() if key != "prior"})
+        made: Prior = typed(own[name], content, setting)
         return made
     from scipy import stats
 
     distribution = getattr(stats, name.removeprefix("scipy.stats."), None)
     if not isinstance(distribution, stats.rv_continuous | stats.rv_discrete):
-        raise DataError(f"the prior '{name}' is not known here. Update seakeep or SciPy.")
-    frozen: Prior = distribution(*content["args"], **content["kwds"])
+        raise DataError(
+            f"{setting}: the prior '{name}' is not known here. Update seakeep or SciPy."
+        )
+    kept = typed(_Frozen, content, setting)
+    try:
+        frozen: Prior = distribution(*kept.args, **kept.kwds)
+    except TypeError:
+        raise ValueError(f"{setting}: '{name}' takes other parameters than the file has") from None
     return frozen

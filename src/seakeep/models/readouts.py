@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any, Literal, Self, get_args
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from seakeep.arrays import FloatArray
 from seakeep.core.readouts import LinearHinges
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.models.checks import check_choice
+from seakeep.models.checks import check_choice, check_keys, typed
 from seakeep.models.labelled import ChannelLabel
 
 __all__ = [
@@ -158,35 +158,60 @@ class FittedReadOut:
     @classmethod
     def from_json(cls, content: Mapping[str, Any], states: Sequence[str]) -> Self:
         """Rebuild from :meth:`to_json`; what does not fit the states raises a ValueError."""
-        channel, of, kept = str(content["channel"]), tuple(content["of"]), content["function"]
-        function = None
-        if kept is not None:
-            floor = kept["floor"]
-            function = LinearHinges(
-                [int(each) for each in kept["linear"]],
-                [int(each) for each in kept["columns"]],
-                np.array(kept["knots"], dtype=float),
-                np.array(kept["weights"], dtype=float),
-                -np.inf if floor is None else float(floor),
-            )
-            size = 1 + len(function.linear) + function.knots.size
-            columns = {*function.linear, *function.columns}
-            if (
-                function.weights.shape != (size,)
-                or function.knots.shape[:1] != (len(function.columns),)
-                or not columns <= set(range(len(states)))
-                or not np.all(np.isfinite(function.weights))
-            ):
-                raise ValueError(f"the read-out of {channel} does not fit the states")
+        kept = typed(_Kept, content, "readouts")
+        function = None if kept.function is None else kept.function.made(len(states))
+        if kept.channel not in states or (kept.function is not None and function is None):
+            raise ValueError(f"the read-out of {kept.channel} does not fit the states")
         return cls(
-            channel=channel,
-            of=of,
-            kind=content["kind"],
-            column=list(states).index(channel),
-            units=str(content["units"]),
-            scores={str(key): float(value) for key, value in content["scores"].items()},
+            channel=kept.channel,
+            of=kept.of,
+            kind=kept.kind,
+            column=list(states).index(kept.channel),
+            units=kept.units,
+            scores=kept.scores,
             function=function,
         )
+
+
+@dataclass(frozen=True)
+class _KeptHinges:
+    """What a file holds of a function."""
+
+    linear: list[int]
+    columns: list[int]
+    knots: list[list[float]]
+    weights: list[float]
+    floor: float | None
+
+    def made(self, states: int) -> LinearHinges | None:
+        """Rebuild the function of so many states; None where it is none of them."""
+        if (
+            len(self.weights) != 1 + len(self.linear) + sum(map(len, self.knots))
+            or len(self.knots) != len(self.columns)
+            or len(set(map(len, self.knots))) > 1
+            or not {*self.linear, *self.columns} <= set(range(states))
+            or not np.all(np.isfinite(self.weights))
+        ):
+            return None
+        return LinearHinges(
+            self.linear,
+            self.columns,
+            np.array(self.knots, dtype=float),
+            np.array(self.weights),
+            -np.inf if self.floor is None else self.floor,
+        )
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """What a file holds of a fitted read-out."""
+
+    channel: str
+    of: tuple[str, ...]
+    kind: ReadOutKind
+    units: str
+    scores: dict[str, float]
+    function: _KeptHinges | None
 
 
 def read_out(readouts: Sequence[FittedReadOut], values: FloatArray) -> FloatArray:
@@ -220,16 +245,7 @@ def readouts_of(value: object) -> ReadOuts:
 
 
 def _of_table(table: Mapping[str, Any]) -> ReadOut:
-    known = [each.name for each in fields(ReadOut)]
-    for key in table:
-        if key not in known:
-            raise RequestError(
-                f"readouts: there is no key '{key}'.{did_you_mean(key, known)} Keys: "
-                f"{', '.join(known)}."
-            )
-    for key in ("channel", "of"):
-        if key not in table:
-            raise RequestError(f"readouts: the table {dict(table)} states no {key}. Add it.")
+    check_keys(ReadOut, table, "readouts: ")
     return ReadOut(**table)
 
 

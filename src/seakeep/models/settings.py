@@ -11,8 +11,8 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 
 from seakeep.core.embedding import History
-from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
-from seakeep.models.checks import check_choice, check_integer, settings_of
+from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.models.checks import check_choice, check_integer, check_keys, settings_of
 from seakeep.models.html import settings_html
 from seakeep.models.inputs import Lead, ProbeAlignment
 from seakeep.models.interface import Fittable, Json, Needs, plain
@@ -28,6 +28,7 @@ __all__ = [
     "Select",
     "check_integer",
     "check_ridge",
+    "check_seconds",
     "periods_to_samples",
 ]
 
@@ -57,15 +58,21 @@ def periods_to_samples(periods: float, encounter_period: float, dt: float) -> in
     RequestError
         If period or step are not positive, or the step is as long as the period.
     """
-    for name, value in (("encounter_period", encounter_period), ("dt", dt)):
-        if not (math.isfinite(value) and value > 0):
-            raise RequestError(f"{name} must be a positive number of seconds; received {value!r}.")
+    check_seconds("encounter_period", encounter_period)
+    check_seconds("dt", dt)
     if dt >= encounter_period:
         raise RequestError(
             f"the time step dt = {dt:g} s is no shorter than the encounter period of "
             f"{encounter_period:g} s. Are the two swapped?"
         )
     return math.floor(periods * encounter_period / dt + 0.5)
+
+
+def check_seconds(name: str, value: object) -> None:
+    """Refuse a period or a step that is not a positive number."""
+    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    if not (real and math.isfinite(value) and value > 0):  # type: ignore[arg-type,operator]
+        raise RequestError(f"{name} must be a positive number of seconds; received {value!r}.")
 
 
 def check_ridge(value: object, may_choose: bool = False) -> None:
@@ -280,11 +287,7 @@ class HankelSettings:
     @classmethod
     def from_json(cls, content: Json) -> Self:
         """Settings from JSON values; an unknown key or a value out of range raises an error."""
-        known = [each.name for each in fields(cls) if each.init]
-        for key in content:
-            if key not in known:
-                raise RequestError(f"unknown key '{key}'.{did_you_mean(key, known)}")
-        stated = dict(content)
+        check_keys(cls, content)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeakeepWarning)  # given when the settings were made
-            return cls(**stated)
+            return cls(**content)

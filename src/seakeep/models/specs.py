@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -11,9 +10,9 @@ from typing import Any, ClassVar, Literal, Self, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled, store
-from seakeep.models.checks import check_choice
+from seakeep.models.checks import SHOWN, check_choice, check_keys, typed
 from seakeep.models.draws import Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.executor import Progress
@@ -42,6 +41,7 @@ from seakeep.models.settings import (
     RidgeScale,
     Select,
     check_integer,
+    check_seconds,
     periods_to_samples,
 )
 from seakeep.models.training import (
@@ -157,7 +157,7 @@ class HankelDMDc(HankelSettings):
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
         """Rebuild the model that a file holds."""
-        settings = cls.from_json(json.loads(dataset.attrs["settings"]))
+        settings = cls.from_json(store.content(dataset, "settings"))
         model = HankelDMDcModel.from_dataset(dataset, settings)
         fitted = model.signature
         for key in ("state_delays", "input_delays"):
@@ -372,6 +372,8 @@ def _around_any(
 
 
 PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
+LONGEST_SEED = 100
+"""Digits of a seed; the entropy of NumPy has 39."""
 WINDOW = Uniform(60, 120)
 """Encounter periods that a member learns from where runs are long.
 
@@ -470,6 +472,7 @@ class BayesianHankelDMDc:
         check_size("n_members =", self.n_members, MOST_MEMBERS, "members",
                    "A hundred show a band, ten thousand its tails.", LONG_MEMBERS)  # fmt: skip
         period = self.encounter_period
+        check_seconds("encounter_period", period)
         # Without dt any step shorter than the period will do; the runs' own is checked at fit.
         periods_to_samples(1, period, 0.5 * period if self.dt is None else self.dt)
         _check_lead(self.lead)
@@ -564,16 +567,19 @@ class BayesianHankelDMDc:
     @classmethod
     def from_json(cls, content: Json) -> Self:
         """Settings from :meth:`to_json`; an unknown key or a value out of range raises an error."""
-        known = [each.name for each in fields(cls) if each.init] + ["spawn_key"]
-        for key in content:
-            if key not in known:
-                raise RequestError(f"unknown key '{key}'.{did_you_mean(key, known)}")
         stated = dict(content)
-        seed = np.random.SeedSequence(
-            int(stated.pop("seed")), spawn_key=[int(key) for key in stated.pop("spawn_key")]
-        )
+        spawn_key = typed(list[int], stated.pop("spawn_key", None), "spawn_key")
+        check_keys(cls, stated)
+        entropy = str(stated.pop("seed"))
+        if not (entropy.isdecimal() and len(entropy) <= LONGEST_SEED):
+            raise RequestError(
+                f"seed: received {entropy!r:.{SHOWN}}, which should be a whole number"
+            )
+        seed = np.random.SeedSequence(int(entropy), spawn_key=spawn_key)
         stated |= {
-            name: from_description(stated[name]) for name in PRIORS if stated[name] != "rollout"
+            name: from_description(name, stated[name])
+            for name in PRIORS
+            if stated.get(name) != "rollout"
         }
         stated["observables"] = observables_of(stated.get("observables", []))
         stated["readouts"] = readouts_of(stated.get("readouts", []))
@@ -582,7 +588,7 @@ class BayesianHankelDMDc:
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> HankelEnsemble:
         """Rebuild the ensemble that a file holds."""
-        spec = cls.from_json(json.loads(dataset.attrs["ensemble"]))
+        spec = cls.from_json(store.content(dataset, "ensemble"))
         signature = store.unpack_signature(dataset)
         return HankelEnsemble.from_dataset(
             dataset, signature, spec.shared(signature.dt), spec.to_json()

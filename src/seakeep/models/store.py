@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -15,6 +15,7 @@ import xarray as xr
 from seakeep.arrays import GREATEST, FloatArray
 from seakeep.errors import DataError, MissingFileError, RequestError
 from seakeep.files import MARK, check_output, read_sealed, replacing, write_netcdf
+from seakeep.models.checks import SHOWN, typed
 from seakeep.models.inputs import Chain
 from seakeep.models.interface import Json, Scale, Signature
 from seakeep.models.labelled import ChannelLabel
@@ -25,6 +26,7 @@ __all__ = [
     "Saved",
     "as_json",
     "content",
+    "document",
     "labels",
     "numbers",
     "pack_signature",
@@ -97,18 +99,15 @@ def signature_json(signature: Signature) -> Json:
 
 def unpack_signature(dataset: xr.Dataset) -> Signature:
     """Rebuild a signature; a file whose parts do not fit together raises a ValueError."""
-    kept = content(dataset, "signature")
-    state_labels, input_labels = labels(dataset, "states"), labels(dataset, "inputs")
-    input_map = Chain.from_json(kept["input_map"])
-    dt = float(kept["dt"])
-    delays = {key: kept[key] for key in ("state_delays", "input_delays")}
-    for key, value in delays.items():
-        if type(value) is not int or value < 0:
+    kept = typed(_Signature, content(dataset, "signature"), "signature")
+    input_map = Chain.from_json(kept.input_map)
+    for key in ("state_delays", "input_delays"):
+        if (value := getattr(kept, key)) < 0:
             raise ValueError(f"{key} is {value!r}, not a number of samples")
-    if not 1e-9 < dt < 1e9 or not state_labels:
-        raise ValueError(f"dt is {dt!r} and there are {len(state_labels)} states")
-    delayed, direct = input_map.regressors(input_labels)
-    sizes = {"state": len(state_labels), "input": len(delayed), "direct": len(direct)}
+    if not 1e-9 < kept.dt < 1e9 or not kept.states:
+        raise ValueError(f"dt is {kept.dt!r} and there are {len(kept.states)} states")
+    delayed, direct = input_map.regressors(kept.inputs)
+    sizes = {"state": len(kept.states), "input": len(delayed), "direct": len(direct)}
     scales = {
         group: Scale(*(numbers(dataset, f"{group}_{name}", (size,)) for name in MOMENTS))
         for group, size in sizes.items()
@@ -116,51 +115,95 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
     for group, scale in scales.items():
         if np.any(scale.std <= 0) or np.any(scale.spread < 0) or np.any(scale.reach < 0):
             raise ValueError(f"a standard deviation or a reach of {group} channels is negative")
-    names = [label.name for label in state_labels]
+    names = [label.name for label in kept.states]
     return Signature(
-        dt=dt,
-        state_labels=state_labels,
-        input_labels=input_labels,
-        **delays,
+        dt=kept.dt,
+        state_labels=kept.states,
+        input_labels=kept.inputs,
+        state_delays=kept.state_delays,
+        input_delays=kept.input_delays,
         input_map=input_map,
         state_scale=scales["state"],
         input_scale=scales["input"],
         direct_scale=scales["direct"],
-        readouts=tuple(FittedReadOut.from_json(each, names) for each in kept["readouts"]),
+        readouts=tuple(FittedReadOut.from_json(each, names) for each in kept.readouts),
     )
 
 
-def labels(dataset: xr.Dataset, group: str) -> tuple[ChannelLabel, ...]:
+@dataclass(frozen=True)
+class _Signature:
+    """What the attribute ``signature`` of a file holds."""
+
+    dt: float
+    states: tuple[ChannelLabel, ...]
+    inputs: tuple[ChannelLabel, ...]
+    state_delays: int
+    input_delays: int
+    input_map: Json
+    readouts: list[Json]
+
+
+def labels(dataset: xr.Dataset, group: Literal["states", "inputs"]) -> tuple[ChannelLabel, ...]:
     """Labels of the states or inputs that a file names."""
-    return tuple(
-        ChannelLabel(*(str(each[key]) for key in ("name", "units", "long_name")))
-        for each in content(dataset, "signature")[group]
-    )
+    return typed(tuple[ChannelLabel, ...], content(dataset, "signature").get(group), group)
 
 
 def content(dataset: xr.Dataset, name: str) -> Json:
     """JSON table that a file keeps in an attribute."""
-    found = json.loads(dataset.attrs[name], parse_constant=_constant, parse_float=_bounded)
+    found = document(dataset, name)
     if not isinstance(found, dict):
         raise ValueError(f"{name} is no table")
     return found
 
 
-def _constant(text: str) -> float:
-    if text == "NaN":
-        raise ValueError("a number is NaN")
-    return float(text)
+def document(dataset: xr.Dataset, name: str) -> Any:
+    """JSON value that a file keeps in an attribute; numbers that nothing measures are refused."""
+    text = str(dataset.attrs[name])
+    try:
+        found = json.loads(
+            text, parse_constant=_constant, parse_float=_bounded, parse_int=_bounded_integer
+        )
+    except json.JSONDecodeError:
+        raise ValueError(f"{name}: received {text!r:.{SHOWN}}, which is no JSON") from None
+    except RecursionError:
+        raise ValueError(f"{name} is nested hundreds of levels deep") from None
+    _refuse_odd(found, name)
+    return found
 
 
-def _bounded(text: str) -> float:
-    if abs(value := float(text)) > GREATEST:
-        raise ValueError(f"a number is {text}, which nothing measures")
-    return value
+@dataclass(frozen=True)
+class _Odd:
+    """A number that nothing measures, until its key is known."""
+
+    text: str
+
+
+def _constant(text: str) -> float | _Odd:
+    return _Odd(text) if text == "NaN" else float(text)
+
+
+def _bounded(text: str) -> float | _Odd:
+    return value if abs(value := float(text)) <= GREATEST else _Odd(text)
+
+
+def _bounded_integer(text: str) -> int | _Odd:
+    return int(text) if abs(float(text)) <= GREATEST else _Odd(text)
+
+
+def _refuse_odd(value: object, place: str) -> None:
+    if isinstance(value, _Odd):
+        raise ValueError(f"{place}: received {value.text:.{SHOWN}}, which nothing measures")
+    if isinstance(value, dict | list):
+        for key, each in value.items() if isinstance(value, dict) else enumerate(value):
+            _refuse_odd(each, f"{place}.{key}")
 
 
 def numbers(dataset: xr.Dataset, name: str, shape: Sequence[int | None]) -> FloatArray:
     """Array of finite numbers of a shape; None stands for any length."""
-    values = np.ascontiguousarray(dataset[name].values, dtype=np.float64)
+    found = dataset[name].values
+    if found.dtype.kind not in "fiub":
+        raise ValueError(f"{name} holds {found.dtype}, not numbers")
+    values = np.ascontiguousarray(found, dtype=np.float64)
     fits = values.ndim == len(shape) and all(
         wanted in (None, found) for wanted, found in zip(shape, values.shape, strict=True)
     )
@@ -184,12 +227,14 @@ def _plain(value: object) -> object:
     raise TypeError(type(value).__name__)
 
 
-def rebuilt(source: str | Path, build: Callable[[], Value]) -> Value:
+def rebuilt(
+    source: str | Path, build: Callable[[], Value], mend: str = "Fit the model again."
+) -> Value:
     """What `build` makes of a file's content; anything that does not fit raises one DataError."""
     try:
         return build()
-    except DataError:
-        raise
+    except DataError as error:
+        raise DataError(f"{source}: {error}") from error
     except (
         LookupError,
         TypeError,
@@ -200,7 +245,7 @@ def rebuilt(source: str | Path, build: Callable[[], Value]) -> Value:
     ) as error:
         missing = "a part is missing: " if isinstance(error, LookupError) else ""
         raise DataError(
-            f"{source} is incomplete: {missing}{error}. Fit the model again."
+            f"{source} does not hold what seakeep writes: {missing}{str(error).rstrip('.')}. {mend}"
         ) from error
 
 

@@ -16,8 +16,9 @@ from seakeep.core.embedding import History, TrainingWindow, training_window
 from seakeep.core.solve import Method, Solution, identify
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import labelled
+from seakeep.models.checks import typed
 from seakeep.models.inputs import Chain, Measured
-from seakeep.models.interface import Json, Regressors, Scale, Signature, Span, typed
+from seakeep.models.interface import Json, Regressors, Scale, Signature, Span
 from seakeep.models.labelled import ChannelLabel, Stop
 from seakeep.models.settings import HankelSettings
 

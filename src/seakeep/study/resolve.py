@@ -17,7 +17,7 @@ from seakeep.campaign import ModelSettings, PriorSettings
 from seakeep.campaign.settings import CampaignSettings
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import KINDS, ProbeAlignment, Select, Spec
-from seakeep.models.interface import typed
+from seakeep.models.checks import typed
 from seakeep.models.observables import Observable, SlowSquares, observables_of
 from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform
 from seakeep.models.settings import periods_to_samples
