@@ -32,6 +32,7 @@ __all__ = [
     "check_report",
     "existing_file",
     "expanded",
+    "is_there",
     "make_folder",
     "read_bytes",
     "read_sealed",
@@ -101,6 +102,20 @@ def existing_file(path: Path | str) -> Path:
             f"{_shown(path)} is {found[0]}, and only regular files are read. {found[1]}"
         )
     return place
+
+
+def is_there(path: Path) -> bool:
+    """Whether there is a file, a folder or another thing at a path.
+
+    Raises
+    ------
+    MissingFileError
+        If the system refuses to look at it, as at names that are too long.
+    """
+    try:
+        return path.exists()
+    except (OSError, ValueError) as error:
+        raise _unreadable(path, error) from None
 
 
 def _kind_of(mode: int) -> tuple[str, str] | None:
@@ -526,7 +541,7 @@ def check_report(folder: Path) -> None:
     """
     page = folder / "report.html"
     check_output(page, "report")
-    for each in () if page.exists() else ("figures", "tables", "histories"):
+    for each in () if is_there(page) else ("figures", "tables", "histories"):
         if any(folder.glob(f"{each}/*")):
             raise RequestError(
                 f"{folder / each} holds files that no report of seakeep wrote; those of the report "

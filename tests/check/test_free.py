@@ -5,7 +5,8 @@ import pytest
 import scipy
 import xarray as xr
 
-from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, check
+from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, LogUniform, check
+from seakeep.check.parts import free_windows
 from seakeep.core.decay import free_decay
 from seakeep.errors import DataError, RequestError
 
@@ -93,3 +94,16 @@ def test_what_cannot_be_judged_says_why(model):
     ensemble = spec.fit(run, ["heave"], ["eta"])
     with pytest.raises(RequestError, match=r"For an ensemble, check a member"):
         check.modes(ensemble)
+
+
+def test_free_runs_of_an_ensemble_are_the_mean_of_its_members():
+    run = oscillator_run(samples=600)
+    spec = BayesianHankelDMDc(
+        encounter_period=3.0, train_length=Fixed(4), state_delay=Fixed(0.1),
+        input_delay=Fixed(0.1), ridge=LogUniform(0.1, 10.0), n_members=3, seed=0,
+    )  # fmt: skip
+    ensemble = spec.fit(run, ["heave"], ["eta"], stop=20.0)
+    starts = np.array([21.0, 25.0])
+    made = free_windows(ensemble, run, starts, 20)
+    each = [ensemble.forecast(run, start, 20)["heave"].mean("member").values for start in starts]
+    np.testing.assert_allclose(made[..., 0], each, rtol=1e-12)

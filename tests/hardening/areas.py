@@ -5,12 +5,15 @@ from __future__ import annotations
 import copy
 import functools
 import gzip
+import hashlib
+import itertools
 import json
 import os
 import socket
 import tempfile
 import typing
 from collections.abc import Callable, Iterator
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +27,8 @@ from pydantic import BaseModel
 NUMBERS = (0, -1, 10**8, 10**20, 2**64, 0.5, 1e-320, 1e-9, 1e7, 1e300, float("inf"),
            float("nan"))  # fmt: skip
 TEXTS = ("", "x", "/", "../x", "\0", "a\nb", "$\\frac{", "n" * 300, "~seakeep-nobody/x", "heave")
-LENGTHS = ("1e300 T", "infT", "1e-9 T")
-OTHERS = (True, [], {}, [[1]], [1e-300, 1e300], [5.0, 1.0], {"uniform": [1e-300, 1e300]},
+LENGTHS = ("1e300 T", "infT", "1e-9 T", "0 T", "-1 T", "nan T", "1 /T")
+OTHERS = (True, [], {}, [[1]], [["1 T"]], [1e-300, 1e300], [5.0, 1.0], {"uniform": [1e-300, 1e300]},
           {"fixed": 1e9}, {"x": {"x": 1}})  # fmt: skip
 EXPRESSIONS = {
     "minus": "-" * 5000 + "heave",
@@ -66,6 +69,32 @@ def areas_of_settings(place: Path) -> Iterator[Case]:
             for i, value in enumerate(values_for(annotation)):
                 name = f"{what} {'.'.join(trail)} = {str(value)[:20]!r} ({i})"
                 yield Case("settings", name, functools.partial(with_key, what, trail, value))
+    yield from _tables_of_models()
+
+
+def _tables_of_models() -> Iterator[Case]:
+    """Each key of an observable, of a read-out and of a prior, with each absurd value."""
+    from seakeep.models import OBSERVABLES, ReadOut
+
+    priors = {"uniform": [1, 2], "log_uniform": [1, 2], "fixed": 1, "distribution": "norm"}
+    kinds: list[tuple[str, Any, Callable[[dict[str, Any]], object]]] = [
+        *((kind, made, lambda table: [table]) for kind, made in OBSERVABLES.items()),
+        ("readouts", ReadOut, lambda table: {"pitch": table}),
+    ]
+    for kind, made, within in kinds:
+        key = "readouts" if kind == "readouts" else "observables"
+        whole = {"of": ["heave"]} if kind == "readouts" else {"kind": kind, "of": ["eta_fwd"]}
+        for name in (*(each.name for each in fields(made)), "kind", "x"):
+            for i, value in enumerate((*NUMBERS, *TEXTS, *LENGTHS, *OTHERS)):
+                table = within({**whole, name: value})
+                yield Case("settings", f"{kind} {name} = {str(value)[:20]!r} ({i})",
+                           functools.partial(with_key, "campaign", ("model", key),
+                                             table))  # fmt: skip
+    for key in priors:
+        for i, value in enumerate((*NUMBERS, *TEXTS, *OTHERS)):
+            yield Case("settings", f"prior {key} = {str(value)[:20]!r} ({i})",
+                       functools.partial(with_key, "campaign", ("models", "ensemble", "ridge"),
+                                         {key: value}))  # fmt: skip
 
 
 def with_key(what: str, trail: tuple[str, ...], value: object) -> object:
@@ -115,8 +144,9 @@ def keys_of(root: type[BaseModel], table: dict[str, Any]) -> Iterator[Key]:
         yield (key,), field.annotation
         inner = table_in(field.annotation)
         there = table.get(key)
-        if inner is not None and isinstance(there, dict):
-            named = dict_of(field.annotation)
+        named = dict_of(field.annotation)
+        if inner is not None and (isinstance(there, dict) or (there is None and not named)):
+            there = there or {}
             if not named:
                 yield from (((key, *rest), kind) for rest, kind in keys_of(inner, there))
                 continue
@@ -438,7 +468,7 @@ def path_in_function(name: str, kind: str) -> object:
     return "done"
 
 
-ODD = (None, "x", -1, 10**9, 1e308, float("nan"), [], {})
+ODD = (None, "x", -1, 10**9, 1e308, float("nan"), [], {}, True, [[1]], 10**400, "9" * 5000)
 
 
 def leaves(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
@@ -460,28 +490,28 @@ def contents(place: Path) -> Iterator[Case]:
     for name in (each for each in MODELS if (place / f"{each}.nc").exists()):
         with xr.open_dataset(place / f"{name}.nc", engine="h5netcdf") as kept:
             attrs, variables = dict(kept.attrs), list(kept.variables)
-        yield from _mutations(
+        yield from mutations(
             "contents", name, attrs, variables, functools.partial(spoil_model, name)
         )
     places = ("filled", "final", "rows", "begins", "taken", "since", "partly", "complete")
     attrs = {"places": json.dumps(dict.fromkeys(places, 0)), "rig": "{}", "model": "x"}
     arrays = ["u", "x", "y", "delayed", "direct", "gains", "precisions", "plain", "covariance",
               "history", "innovation", "running", "noise"]  # fmt: skip
-    yield from _mutations("contents", "live", attrs, arrays, spoil_live)
+    yield from mutations("contents", "live", attrs, arrays, spoil_live)
     if (place / "results").exists():
         yield from _study_contents(place)
     with xr.open_dataset(
         place / "prepared" / "one.nc", engine="h5netcdf", decode_times=False
     ) as kept:
         attrs, variables = dict(kept.attrs), list(kept.variables)
-    yield from _mutations("contents", "prepared", attrs, variables, spoil_prepared)
+    yield from mutations("contents", "prepared", attrs, variables, spoil_prepared)
 
 
 def _study_contents(place: Path) -> Iterator[Case]:
     from seakeep.study import read_result
 
     result = read_result(place / "results")
-    yield from _mutations("contents", "study", result.attrs, [], spoil_study)
+    yield from mutations("contents", "study", result.attrs, [], spoil_study)
     for group in result.groups:
         for each in [None, *result.groups[group].variables]:
             for change in CHANGES:
@@ -490,8 +520,9 @@ def _study_contents(place: Path) -> Iterator[Case]:
                                              change=change))  # fmt: skip
 
 
-def _mutations(area: str, name: str, attrs: dict[str, Any], variables: list[Any],
-               spoil: Callable[..., object]) -> Iterator[Case]:  # fmt: skip
+def mutations(area: str, name: str, attrs: dict[str, Any], variables: list[Any],
+              spoil: Callable[..., object]) -> Iterator[Case]:  # fmt: skip
+    """Each attribute, each value in its JSON, and each variable as another one."""
     for key, value in attrs.items():
         for i, odd in enumerate((*ODD, "drop")):
             yield Case(area, f"{name} {key} = {odd!r} ({i})", functools.partial(
@@ -551,7 +582,7 @@ def changed_attrs(attrs: Any, attribute: tuple[Any, ...], value: Any) -> dict[st
         if value == "drop":
             del attrs[key]
         else:
-            plain = isinstance(value, str | int | float) and not isinstance(value, bool)
+            plain = isinstance(value, str | float) or (type(value) is int and value < 2**63)
             attrs[key] = value if plain else json.dumps(value)
         return attrs
     whole = inner = json.loads(attrs[key])
@@ -766,38 +797,52 @@ def array(name: str, place: int, kind: str) -> object:
     return "done"
 
 
-OPTIONS = {
-    "--start": "forecast", "--steps": "forecast", "--level": "forecast", "--run": "forecast",
-    "--band": "forecast", "--ahead": "forecast", "--workers": "forecast", "--model": "fit",
-    "--skip-rows": "init", "--delimiter": "init", "--decimal": "init", "--group": "init",
-    "--folds": "calibrate", "--stop": "calibrate", "--scale": "calibrate", "--seed": "tank",
-    "--vary": "tune", "--format": "compare", "--video": "tank", "--spacing": "tank",
-    "--scheduler": "fit", "--member": "export", "--onnx": "export",
-}  # fmt: skip
 WORDS = ("", "0", "-1", "1", "1e300", "1e-320", "inf", "nan", "infT", "-infT", "1e300 T", "1e-9 T",
-         "nanT", "9" * 5000, "1e400", "58", "57.9", "59.9", "60", "-1e9", "18446744073709551616",
-         "1.5", "x", "x" * 300, "\\x00", "é", "ridge=", "ridge=1e-320,1e300", "ridge=nan",
-         "state_delays=1000000", "n_members=100000000", "1000000000000", "12 T", "tcp://nowhere:1",
-         "0x10", "1_000", "½", "٣")  # fmt: skip
+         "nanT", "9" * 5000, "9" * 400, "1e400", "58", "57.9", "59.9", "60", "-1e9",
+         "18446744073709551616", "1.5", "x", "x" * 300, "\\x00", "é", "ridge=",
+         "ridge=1e-320,1e300", "ridge=nan", "state_delays=1000000",
+         "n_members=100000000", "1000000000000", "12 T", "tcp://nowhere:1", "0x10",
+         "1_000", "½", "٣")  # fmt: skip
 
 
 def options(place: Path) -> Iterator[Case]:
-    """Values of options that are no paths."""
-    for option, verb in OPTIONS.items():
-        for i, word in enumerate(WORDS):
-            extra = COMMANDS[verb]
+    """Each option of each command, with each word; flags stand alone and in pairs."""
+    for verb, option, values in options_of_commands():
+        if not values:
+            yield Case("options", f"{verb} {option}", command(*COMMANDS[verb], option))
+        for i, word in enumerate(WORDS if values else ()):
             if option == "--scheduler" and word not in ("", "x", "tcp://nowhere:1", "0"):
                 continue
             if option == "--workers" and len(word) > 2 and word.isdigit():
                 continue
             yield Case("options", f"{verb} {option} {word[:20]} ({i})",
-                       command(*extra, option, word))  # fmt: skip
-            if verb == "forecast" and option in ("--start", "--steps", "--level", "--workers"):
-                more = ("compare", "ensemble.nc", "campaign.toml", "-o", "o")
-                yield Case("options", f"compare {option} {word[:20]} ({i})",
-                           command(*more, option, word))  # fmt: skip
-                yield Case("options", f"calibrate {option} {word[:20]} ({i})",
-                           command(*COMMANDS["calibrate"], option, word))  # fmt: skip
+                       command(*COMMANDS[verb], option, *[word] * values))  # fmt: skip
+            if verb in ("compare", "check", "export"):
+                head, _, *tail = COMMANDS[verb]
+                yield Case("options", f"{verb} ensemble {option} {word[:20]} ({i})",
+                           command(head, "ensemble.nc", *tail, option,
+                                   *[word] * values))  # fmt: skip
+    for verb in COMMANDS:
+        flags = [o for v, o, values in options_of_commands() if v == verb and not values]
+        for first, second in itertools.combinations(flags, 2):
+            yield Case("options", f"{verb} {first} {second}",
+                       command(*COMMANDS[verb], first, second))  # fmt: skip
+
+
+def options_of_commands() -> Iterator[tuple[str, str, int]]:
+    """Command, option, and how many values it takes, of the commands themselves."""
+    import typer
+
+    from seakeep.cli import app
+
+    group: Any = typer.main.get_command(app)
+    for verb in COMMANDS:
+        for each in group.commands[verb].params:
+            if each.param_type_name == "option" and "--help" not in each.opts:
+                option = max((*each.opts, *each.secondary_opts), key=len)
+                if verb == "reproduce" and option != "--preset":
+                    continue  # whatever is taken runs for minutes
+                yield verb, option, 0 if each.is_flag else each.nargs
 
 
 def sizes(place: Path) -> Iterator[Case]:
@@ -833,6 +878,20 @@ def _filled(name: str) -> None:
             made[: 10**6] = 1.0
 
 
+def _sealed(name: str) -> None:
+    """Replace a file of ours by one with a sound checksum that declares 10^9 values."""
+    import h5py
+
+    from seakeep.files import SEAL, read_sealed
+
+    made = read_sealed(name)
+    with h5py.File(made, "r+") as file:
+        where = file if "groups" not in file.attrs else file["spectra"]
+        where.create_dataset("more", (10**9,), "f8", chunks=(10**5,), fillvalue=1.0)
+    content = made.getvalue()
+    Path(name).write_bytes(content + SEAL + hashlib.sha256(content).hexdigest().encode())
+
+
 def _model_request(**how: Any) -> object:
     import seakeep
     from seakeep.campaign import load_prepared, read_campaign
@@ -859,6 +918,11 @@ def _call(room: str, name: str, **how: Any) -> object:
     return "done"
 
 
+def _sealed_then(name: str, verb: str) -> object:
+    _sealed(name)
+    return command(*COMMANDS[verb])()
+
+
 def _after(make: Callable[[str], None], name: str, verb: str) -> object:
     make(name)
     if verb == "init":
@@ -877,6 +941,10 @@ SIZES: dict[str, Callable[[], object]] = {
     "declared set, init": lambda: _after(_declared, "b.h5", "init"),
     "declared set, prepare": lambda: _after(_declared, "b.h5", "prepare"),
     "hollow set, init": lambda: _after(_filled, "b.h5", "init"),
+    "declared set in a model": lambda: _sealed_then("model.nc", "compare"),
+    "declared set in an ensemble": lambda: _sealed_then("ensemble.nc", "calibrate"),
+    "declared set in a study": lambda: _sealed_then("results/study.nc", "report"),
+    "declared set in a prepared run": lambda: _sealed_then("prepared/one.nc", "fit"),
     "forecast of 10^12 steps": lambda: _model_request(steps=10**12),
     "forecast of 10^12 steps by an ensemble": lambda: _model_request(
         model="ensemble.nc", steps=10**12),

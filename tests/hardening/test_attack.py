@@ -1,20 +1,26 @@
 """Nothing breaks it: each case of the attack is answered, by a result or by an error of ours."""
 
+import re
+
 import pytest
 
 pytest.importorskip("resource", reason="limits of time and memory are POSIX")
 pytest.importorskip("matplotlib")
 
 import ground
-from areas import AREAS
+import xarray as xr
+from areas import AREAS, MODELS, mutations, spoiled
 from attack import judged, sample
 
+from seakeep.errors import SeakeepError
+from seakeep.models import KINDS, store
+
 SAMPLED = {
-    "settings": 1400, "texts": 25, "names": 90, "paths": 150, "options": 150, "contents": 900,
+    "settings": 1400, "texts": 25, "names": 90, "paths": 150, "options": 401, "contents": 1100,
     "flips": 400, "arrays": 500, "sizes": 9,
 }  # fmt: skip
 """One case of so many in the default run: some ten per area, in half a minute."""
-PART = {"sizes": 1, "contents": 90}
+PART = {"sizes": 1, "contents": 110, "settings": 40}
 """One case of so many where the attack is asked for; 30 in other areas. Files take longest: each
 case of a study draws its report anew."""
 
@@ -45,3 +51,30 @@ def test_a_sample_of_the_attack_is_answered(area, small):
 @pytest.mark.parametrize("area", AREAS)
 def test_the_attack_is_answered(area, whole):
     assert fallen(area, whole, PART.get(area, 30)) == {}
+
+
+PYTHONS = re.compile(
+    r"object|argument|subscript|unhashable|convert|attribute|unpack|invalid literal|indices|len\(\)"
+    r"|must be real|Expecting|Exceeds|inhomogeneous|broadcast|dtype\(|ufunc|unexpected|recursion"
+)
+"""Words of Python and NumPy, which tell nobody what to mend."""
+
+
+@pytest.mark.hardening
+@pytest.mark.parametrize("name", MODELS)
+def test_whatever_a_model_file_holds_is_taken_or_named(name, whole):
+    with xr.open_dataset(whole / f"{name}.nc", engine="h5netcdf") as opened:
+        kept = opened.load()
+
+    def load(**how):
+        made = spoiled(kept, **how)
+        store.rebuilt("m.nc", lambda: KINDS[kept.attrs["seakeep_kind"]].restore(made))
+
+    words = {}
+    for case in mutations("contents", name, dict(kept.attrs), list(kept.variables), load):
+        try:
+            case.call()
+        except SeakeepError as error:
+            words[case.name] = str(error)
+    assert len(words) > 400
+    assert {each: said for each, said in words.items() if PYTHONS.search(said)} == {}

@@ -14,6 +14,7 @@ import pytest
 
 from seakeep import BayesianHankelDMDc, Fixed, load_model
 from seakeep.campaign import read_campaign
+from seakeep.cli import main
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.files import (
     SEAL,
@@ -164,6 +165,35 @@ def test_nothing_but_a_regular_file_is_replaced(tmp_path):
             check_place(tmp_path / name)
     with pytest.raises(RequestError, match=r"cannot make the folder .*null (byte|character)"):
         make_folder(tmp_path / "a\0b")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("init", "one_mru.csv", "-o", "n" * 400),
+        ("prepare", "campaign.toml", "-o", "n" * 400),
+        ("tank", "--settings", "tank.toml", "--out", "n" * 400),
+        ("report", "n" * 400),
+        ("study", "study.toml", "-o", "o"),
+    ],
+)
+def test_a_path_that_cannot_be_looked_at_is_told(tmp_path, monkeypatch, capsys, arguments):
+    place = ground.write(tmp_path)
+    monkeypatch.chdir(place)
+    study = ground.STUDY.replace("[study]", f"[study]\ntruth = {'n' * 400!r}")
+    (place / "study.toml").write_text(study, encoding="utf-8")
+    assert main(list(arguments)) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert re.search(r"n{150}…n.* cannot be read: File name too long\. Correct the", said)
+
+
+def test_what_the_system_refuses_is_no_fault_of_seakeep(monkeypatch, capsys):
+    def fail(*_, **__):
+        raise OSError(5, "Input/output error", "run.nc")
+
+    monkeypatch.setattr("seakeep.campaign.read_campaign", fail)
+    assert main(["prepare", "campaign.toml"]) == 1
+    assert "Error: run.nc: Input/output error. Correct the path" in capsys.readouterr().err
 
 
 def test_a_study_clears_what_a_killed_run_left_and_says_so(tmp_path):

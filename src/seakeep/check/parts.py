@@ -246,9 +246,10 @@ def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) ->
 def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) -> FloatArray:
     """Free runs from several starts, (window, steps, N); for an ensemble the members' mean."""
     found = model.forecast_windows(run, starts.tolist(), steps)
-    values = np.stack([found[name].values for name in model.states], axis=-1)
-    result: FloatArray = values.mean(axis=0) if "member" in found.dims else values
-    return result
+    if "member" in found.dims:
+        found = found[model.states].mean("member", skipna=False)
+    values: FloatArray = np.stack([found[name].values for name in model.states], axis=-1)
+    return values
 
 
 def one_step(model: Model, run: xr.Dataset, first: int, last: int) -> FloatArray:

@@ -99,6 +99,12 @@ def _unforeseen(error: Exception) -> str:
             f"there is not enough memory ({error}). Ask for fewer samples, channels, members or "
             "workers, or take a machine with more."
         )
+    if isinstance(error, OSError):
+        place = "" if error.filename is None else f"{error.filename}: "
+        return (
+            f"{place}{error.strerror or error}. Correct the path, or check its permissions and the "
+            "disk."
+        )
     return (
         f"{type(error).__name__}: {error}. This is a fault of seakeep; run the command again with "
         "--debug and report what it prints together with `seakeep info`."

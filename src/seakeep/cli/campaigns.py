@@ -10,7 +10,7 @@ import typer
 
 from seakeep.cli.console import messages, progress_bar, results
 from seakeep.errors import RequestError, SeakeepError
-from seakeep.files import check_output, replacing
+from seakeep.files import check_output, is_there, replacing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,7 +52,7 @@ def init(
     from seakeep.campaign import draft_campaign
 
     if out is not None:
-        if out.exists() and not force:
+        if is_there(out) and not force:
             raise RequestError(f"{out} exists already. Give another name, or --force.")
         check_output(out, "draft", files)
     folder = Path() if out is None else out.parent
@@ -137,7 +137,7 @@ def _check_sheet(read: Campaign, folder: Path) -> None:
     """Refuse, before any work, to replace files of the user by those of the sheet."""
     from seakeep.report.quality_sheet import SHEET
 
-    if folder.is_dir():
+    if is_there(folder):
         for name in ("quality.html", *(f"quality_{run}.png" for run in read.runs)):
             check_output(folder / name, SHEET)
 

@@ -9,7 +9,7 @@ import typer
 
 from seakeep.cli.console import messages, print_table, progress_bar
 from seakeep.errors import RequestError
-from seakeep.files import check_output, make_folder
+from seakeep.files import check_output, is_there, make_folder
 
 if TYPE_CHECKING:
     from seakeep.tank.dynamics import Rig
@@ -75,7 +75,7 @@ def tank(
     names = run or list(wanted.runs)
     drawn = ["hydrodynamics", "spectrum", *(f"run_{name}" for name in names)] if figures else []
     for path in [] if out is None else [out / "figures" / f"{name}.png" for name in drawn]:
-        if path.exists():
+        if is_there(path):
             check_output(path, "figure")
     rig = check_settings(wanted, names)
     if out is not None:

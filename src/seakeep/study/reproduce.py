@@ -22,7 +22,7 @@ import xarray as xr
 from seakeep.campaign import read_campaign, write_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
-from seakeep.files import MARK, check_output, check_report, replacing
+from seakeep.files import MARK, check_output, check_report, is_there, replacing
 from seakeep.models.executor import as_finished, on_this_machine
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
@@ -217,7 +217,7 @@ def read_reproduction(out: Path | str) -> dict[str, StudyResult]:
     RequestError, DataError
         As :func:`seakeep.study.read_result`.
     """
-    played = [act.name for act in ACTS if (Path(out) / act.name / "study.toml").exists()]
+    played = [act.name for act in ACTS if is_there(Path(out) / act.name / "study.toml")]
     return {name: read_result(Path(out) / name) for name in played}
 
 

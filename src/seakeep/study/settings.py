@@ -19,7 +19,7 @@ from seakeep.campaign import Campaign, read_campaign
 from seakeep.campaign.readers import expand
 from seakeep.campaign.settings import ModelSettings
 from seakeep.errors import did_you_mean
-from seakeep.files import expanded, sha256_of
+from seakeep.files import expanded, is_there, sha256_of
 from seakeep.sizes import MOST_SERIES
 from seakeep.toml import Count, Mistake, Names, Positive, Table, read_toml, refusal, validated
 
@@ -294,7 +294,7 @@ class Study:
 
 def _checksums(folder: Path) -> dict[str, str]:
     """SHA-256 of each file of a folder."""
-    files = (each for each in folder.rglob("*") if each.is_file())
+    files = (each for each in folder.rglob("*") if each.is_file()) if is_there(folder) else ()
     return {path.relative_to(folder).as_posix(): sha256_of(path) for path in files}
 
 

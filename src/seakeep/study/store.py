@@ -22,7 +22,7 @@ import xarray as xr
 from filelock import FileLock, Timeout
 
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
-from seakeep.files import check_report, read_bytes, read_sealed, replacing, write_netcdf
+from seakeep.files import check_report, is_there, read_bytes, read_sealed, replacing, write_netcdf
 from seakeep.study.schema import check_contents
 from seakeep.study.settings import FORMAT
 
@@ -393,7 +393,7 @@ def read_result(folder: Path | str) -> StudyResult:
     """
     folder = Path(folder)
     path = folder / RESULT
-    if not path.exists():
+    if not is_there(path):
         started = (folder / HEADER).exists()
         raise RequestError(
             f"{folder} holds no finished study ({RESULT} is missing). "

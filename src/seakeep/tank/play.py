@@ -12,7 +12,7 @@ import xarray as xr
 
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.files import MARK, check_output, make_folder
+from seakeep.files import MARK, check_output, is_there, make_folder
 from seakeep.tank.delivery import (
     CAMPAIGN,
     FIRST_LINE,
@@ -230,7 +230,7 @@ def noisy_truth(
 
 def _check_outputs(folder: Path, names: list[str], kind: str, filmed: list[str]) -> None:
     """Refuse to overwrite a campaign file or a record that the tank has not written."""
-    if (campaign := folder / CAMPAIGN_FILE).exists():
+    if is_there(campaign := folder / CAMPAIGN_FILE):
         check_output(campaign, CAMPAIGN)
     for name in names:
         raw, hidden = folder / "raw" / name, folder / "truth" / f"{name}.nc"
