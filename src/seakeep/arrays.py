@@ -7,6 +7,7 @@ of unequal length. The message says what was received and how to correct it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ __all__ = [
     "as_generator",
     "as_real",
     "as_series",
+    "as_table",
     "fraction",
     "number",
     "positive",
@@ -265,6 +267,13 @@ def whole_number(value: object, name: str, least: int = 1) -> int:
             f"{name} must be a whole number of at least {least}; received {value!r}."
         )
     return int(value)
+
+
+def as_table(value: object, name: str) -> Mapping[Any, Any]:
+    """Mapping as it is; anything else raises a RequestError."""
+    if not isinstance(value, Mapping):
+        raise RequestError(f"{name} must be a mapping, such as a dict; received {value!r}.")
+    return value
 
 
 def as_generator(rng: object) -> np.random.Generator:

@@ -6,13 +6,14 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import ground
 import h5py
 import numpy as np
 import pytest
 
-from seakeep import BayesianHankelDMDc, Fixed, load_model
+from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, ProbeAlignment, load_model
 from seakeep.campaign import read_campaign
 from seakeep.cli import main
 from seakeep.errors import DataError, RequestError, SeakeepWarning
@@ -28,6 +29,11 @@ from seakeep.files import (
 from seakeep.formats import limits, read_columns
 from seakeep.models import store
 from seakeep.study.store import UnitFolder
+
+EVERY = BayesianHankelDMDc(
+    train_length=Fixed(4), state_delay=Fixed(0.2), input_delay=Fixed(0.3), ridge=Fixed(1.0),
+    encounter_period=5.0, n_members=2, seed=1,
+)  # fmt: skip
 
 
 @pytest.fixture
@@ -86,14 +92,20 @@ def test_what_a_file_of_ours_declares_is_judged_before_it_is_read(tmp_path, size
 
 
 @pytest.fixture(scope="module")
-def ensemble(make_dataset):
+def wave(make_dataset):
     t = 0.1 * np.arange(400.0)
-    run = make_dataset(t, heave=np.sin(t), eta=np.cos(1.3 * t))
-    spec = BayesianHankelDMDc(
-        train_length=Fixed(4), state_delay=Fixed(0.2), input_delay=Fixed(0.3), ridge=Fixed(1.0),
-        encounter_period=5.0, n_members=2, seed=1,
-    )  # fmt: skip
-    return spec.fit(run, states=["heave"], inputs=["eta"])
+    noise = np.random.default_rng(0).standard_normal(400) * 0.01
+    return make_dataset(t, heave=np.sin(t) + noise, eta=np.cos(1.3 * t))
+
+
+@pytest.fixture(scope="module")
+def served(wave):
+    return HankelDMDc(2, 3, 1.0).fit(wave, states=["heave"], inputs=["eta"])
+
+
+@pytest.fixture(scope="module")
+def ensemble(wave):
+    return EVERY.fit(wave, states=["heave"], inputs=["eta"])
 
 
 @pytest.mark.parametrize(
@@ -145,6 +157,40 @@ def test_words_in_place_of_numbers_of_a_model_file_are_named(ensemble, tmp_path,
     path = store.write(kept.assign({name: (dims, words)}), tmp_path / "m.nc", ensemble.kind)
     with pytest.raises(DataError, match=re.escape(said)):
         load_model(path)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (
+            lambda m, c: m.live(noise=[1]),
+            r"noise must be a mapping, such as a dict; received \[1\]",
+        ),
+        (
+            lambda m, c: m.live(noise={"heave": 1e300}),
+            r"noise of heave is 1e\+300 m, which nothing",
+        ),
+        (lambda m, c: m.live(like={}), r"like must be a Dataset, .*; received dict"),
+        (lambda m, c: c.live_chain(None), r"campaign\.toml has no run 'None'"),
+        (lambda m, c: c.seconds([1]), r"a length must be a number; received \[1\]"),
+        (lambda m, c: c.live_chain("one").push(None), r"samples must be a mapping"),
+        (lambda m, c: c.live_chain("one").push({"mru": 1}), r"samples of 'mru' must be a mapping"),
+        (
+            lambda m, c: replace(EVERY, dt=1e-320),
+            r"are countless steps of dt = .* Correct the step",
+        ),
+        (lambda m, c: replace(EVERY, ridge=np.ones(2)), r"ridge must be a prior; received array"),
+        (lambda m, c: replace(EVERY, readouts=np.ones(2)), r"readouts must hold seakeep\.ReadOut"),
+        (
+            lambda m, c: ProbeAlignment(celerity=np.ones(2)),
+            r"alignment: celerity must be a positive",
+        ),
+    ],
+)
+def test_arguments_of_another_kind_are_named(served, tmp_path, call, said):
+    campaign = read_campaign(ground.write(tmp_path) / "campaign.toml")
+    with pytest.raises(RequestError, match=said):
+        call(served, campaign)
 
 
 def test_a_sealed_file_that_is_no_netcdf_is_refused(tmp_path):

@@ -92,6 +92,16 @@ def test_predicted_surge_reads_no_measured_surge_after_the_start(models):
     assert "conditional_on" not in expected.attrs
 
 
+def test_a_look_ahead_beyond_the_delays_follows_the_predicted_surge(runs):
+    alignment = ProbeAlignment(mode="dispersion", surge="predicted")
+    settings = HankelDMDc(10, 4, 1e-3, delay_rows="exact", alignment=alignment, lead=9)
+    model, run = settings.fit(runs, STATES, INPUTS), drifting_run(7)
+    expected = model.forecast(run, start=60.0, steps=100)
+    assert all(np.isfinite(each).all() for each in expected.data_vars.values())
+    run["surge"].values[run["time"].values > 60.0] = 100.0
+    xr.testing.assert_identical(model.forecast(run, start=60.0, steps=100), expected)
+
+
 def test_measured_surge_says_that_it_was_read(models):
     run = drifting_run(7)
     forecast = models["dispersion"].forecast(run, start=60.0, steps=300)

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, as_real
+from seakeep.arrays import FloatArray, as_real, as_table
 from seakeep.campaign.pipeline import cleaned, derived, mapped, read, resampled, sync
 from seakeep.campaign.readers import find_column, time_column, time_unit_of
 from seakeep.campaign.settings import CampaignSettings
@@ -124,7 +124,9 @@ class LiveChain:
             If the chain cannot use the samples. Nothing was taken then, as with a RequestError.
         """
         before = self._rows, self._origin, self._given
-        new = {key: self._checked(key, table) for key, table in samples.items()}
+        new = {
+            key: self._checked(key, table) for key, table in as_table(samples, "samples").items()
+        }
         self._rows = {
             key: {
                 name: np.concatenate([values, new[key][name]]) if key in new else values
@@ -163,7 +165,7 @@ class LiveChain:
         columns, path = self._template.columns[key], self._template.paths[key]
         arrays = {
             find_column(path, columns, name): as_real(values, name)
-            for name, values in table.items()
+            for name, values in as_table(table, f"samples of '{key}'").items()
         }
         missing = [name for name in self._rows[key] if name not in arrays]
         sizes = {each.shape for each in arrays.values()}

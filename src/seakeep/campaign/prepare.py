@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import whole_number
+from seakeep.arrays import number, whole_number
 from seakeep.campaign.live_chain import LiveChain, Template
 from seakeep.campaign.pipeline import (
     Run,
@@ -217,9 +217,9 @@ class Campaign:
 
     def _run(self, name: str) -> RunSettings:
         runs = self.settings.runs
-        if name not in runs:
+        if not isinstance(name, str) or name not in runs:
             raise RequestError(
-                f"{self.path} has no run '{name}'.{did_you_mean(name, runs)} "
+                f"{self.path} has no run '{name}'.{did_you_mean(str(name), runs)} "
                 f"Runs: {', '.join(runs)}."
             )
         return runs[name]
@@ -374,7 +374,7 @@ class Campaign:
             If the text is not a length, or the campaign has no encounter period.
         """
         if not isinstance(stated, str):
-            return float(stated)
+            return number(stated, "a length")
         length = parse_length(stated)
         if length.unit != "T":
             raise RequestError(f"received '{stated}', a frequency. Give a length such as '15 T'.")

@@ -214,7 +214,7 @@ def calibrate(
     named = labelled.as_runs(runs)
     level = fraction(level, "level")
     check_scale(scale)
-    if folds not in (None, "run"):
+    if not (folds is None or (isinstance(folds, str) and folds == "run")):
         raise RequestError(f"folds must be 'run', or None for unread windows; received {folds!r}.")
     sources = dict.fromkeys(named, ensemble)
     if folds:

@@ -230,7 +230,7 @@ class ProbeAlignment:
             )
         check_choice("alignment: mode", self.mode, ("effective", "dispersion"))
         check_choice("alignment: surge", self.surge, ("measured", "predicted", "none"))
-        if self.celerity != "common":
+        if not (isinstance(self.celerity, str) and self.celerity == "common"):
             meant = "a positive number, 'common' or None"
             _check_number("celerity", self.celerity, "m/s", meant)
         _check_number(
@@ -646,15 +646,18 @@ class _Carried:
     def rows(
         self, first: int, stop: int, known: int | None = None, states: FloatArray | None = None
     ) -> Regressors:
-        surge = self.surge[first : stop if self.period is None or known is None else known + 1]
+        end = stop if self.period is None or known is None else known + 1
+        begin = min(first, end)  # a look-ahead beyond the delays starts after what is known
+        surge = self.surge[begin:end]
         if self.period is not None:
             # The low-pass filter settles on what was measured before.
-            before = self.surge[max(first - round(SETTLED * self.period), 0) : first]
+            before = self.surge[max(first - round(SETTLED * self.period), 0) : begin]
             gaps = np.flatnonzero(~np.isfinite(before))
             before = before[gaps[-1] + 1 :] if gaps.size else before
             later = None if states is None else states[:, self.column]
-            after = self._after(surge, stop, known, later)
-            surge = _slow(np.concatenate([before, surge, after]), self.period)[len(before) :]
+            after = self._after(surge if surge.size else before, stop, known, later)
+            followed = _slow(np.concatenate([before, surge, after]), self.period)
+            surge = followed[len(followed) - (stop - first) :]
         stretch = self._stretch(first)
         out = self.values[first:stop].copy()
         inside = slice(first - stretch.first, stop - stretch.first)

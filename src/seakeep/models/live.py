@@ -19,7 +19,16 @@ import numpy.typing as npt
 import xarray as xr
 from scipy import special
 
-from seakeep.arrays import BoolArray, FloatArray, as_real, fraction, positive, whole_number
+from seakeep.arrays import (
+    GREATEST,
+    BoolArray,
+    FloatArray,
+    as_real,
+    as_table,
+    fraction,
+    positive,
+    whole_number,
+)
 from seakeep.core.kalman import DelayFilter, process_noise
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.models import engine, store
@@ -811,6 +820,11 @@ def _rig(signature: Signature, like: xr.Dataset | None) -> dict[str, dict[str, f
     """Attributes of a run that an alignment reads."""
     if like is None:
         return {"run": {}, "positions": {}}
+    given: object = like
+    if not isinstance(given, xr.Dataset):
+        raise RequestError(
+            f"like must be a Dataset, a run of the rig in service; received {type(given).__name__}."
+        )
     positions = {
         name: float(like[name].attrs["x_position"])
         for name in signature.inputs
@@ -840,7 +854,7 @@ def _places(
 def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArray:
     out, names = np.zeros(len(signature.states)), signature.states
     units = [label.units for label in signature.state_labels]
-    for name, value in (noise or {}).items():
+    for name, value in ({} if noise is None else as_table(noise, "noise")).items():
         if name not in names:
             raise RequestError(
                 f"noise names '{name}', which is not a state.{did_you_mean(name, names)} States: "
@@ -848,6 +862,11 @@ def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArra
             )
         place = names.index(name)
         out[place] = positive(value, f"noise of {name}", units[place])
+        if out[place] > GREATEST:
+            raise RequestError(
+                f"noise of {name} is {out[place]:g} {units[place]}, which nothing measures. "
+                "Correct it."
+            )
     return out
 
 

@@ -224,7 +224,7 @@ def read_out(readouts: Sequence[FittedReadOut], values: FloatArray) -> FloatArra
 
 def readouts_of(value: object) -> ReadOuts:
     """Read-outs as they are, or made of tables of their keys, or the word."""
-    if value == "auto":
+    if isinstance(value, str) and value == "auto":
         return "auto"
     if isinstance(value, str | Mapping) or not isinstance(value, Iterable):
         raise RequestError(

@@ -65,7 +65,13 @@ def periods_to_samples(periods: float, encounter_period: float, dt: float) -> in
             f"the time step dt = {dt:g} s is no shorter than the encounter period of "
             f"{encounter_period:g} s. Are the two swapped?"
         )
-    return math.floor(periods * encounter_period / dt + 0.5)
+    samples = periods * encounter_period / dt
+    if not math.isfinite(samples):
+        raise RequestError(
+            f"{periods:g} encounter periods of {encounter_period:g} s are countless steps of dt = "
+            f"{dt:g} s. Correct the step."
+        )
+    return math.floor(samples + 0.5)
 
 
 def check_seconds(name: str, value: object) -> None:
@@ -131,10 +137,7 @@ class Select:
     folds: Literal["run", "sea_state"] = "run"
 
     def __post_init__(self) -> None:
-        if self.folds not in ("run", "sea_state"):
-            raise RequestError(
-                f"select: folds must be 'run' or 'sea_state'; received {self.folds!r}."
-            )
+        check_choice("select: folds", self.folds, ("run", "sea_state"))
         if not isinstance(self.observables, bool):
             raise RequestError(
                 f"select: observables must be True or False; received {self.observables!r}."

@@ -466,7 +466,8 @@ class BayesianHankelDMDc:
     def __post_init__(self) -> None:
         for name in PRIORS:
             value = getattr(self, name)
-            if (name, value) not in (("train_length", None), ("ridge", "rollout")):
+            stated = value is not None and not isinstance(value, str)
+            if stated or (name, value) not in (("train_length", None), ("ridge", "rollout")):
                 check_prior(name, value)
         check_integer("n_members", self.n_members, 1)
         check_size("n_members =", self.n_members, MOST_MEMBERS, "members",
