@@ -137,7 +137,7 @@ def _check_sheet(read: Campaign, folder: Path) -> None:
     """Refuse, before any work, to replace files of the user by those of the sheet."""
     from seakeep.report.quality_sheet import SHEET
 
-    if is_there(folder):
+    if is_there(folder) and folder.is_dir():
         for name in ("quality.html", *(f"quality_{run}.png" for run in read.runs)):
             check_output(folder / name, SHEET)
 
