@@ -21,7 +21,7 @@ from seakeep import (
     load_model,
 )
 from seakeep.files import write_netcdf
-from seakeep.models import processes
+from seakeep.models import processes, store
 
 
 def spec(alignment):
@@ -206,6 +206,19 @@ def test_a_file_whose_alignment_lacks_what_its_mode_needs_is_refused(models, key
         DataError, match=r"rom\.nc does not hold what seakeep writes: .*of a vessel in waves"
     ):
         load_model(path)
+
+
+@pytest.mark.parametrize("key", ["inputs", "states"])
+def test_a_file_whose_alignment_is_of_other_channels_is_refused(models, key, tmp_path):
+    kept = models["predicted"].to_dataset()
+    signature = json.loads(kept.attrs["signature"])
+    signature["input_map"]["maps"][0][key][0] = "x"
+    kept.attrs["signature"] = json.dumps(signature)
+    store.write(kept, tmp_path / "rom.nc", "hankel_dmdc")
+    with pytest.raises(
+        DataError, match=r"rom\.nc does .*input_map aligns .*x.*, and the model has"
+    ):
+        load_model(tmp_path / "rom.nc")
 
 
 def test_a_probe_that_was_moved_and_says_so_changes_nothing(models):

@@ -116,6 +116,13 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
         if np.any(scale.std <= 0) or np.any(scale.spread < 0) or np.any(scale.reach < 0):
             raise ValueError(f"a standard deviation or a reach of {group} channels is negative")
     names = [label.name for label in kept.states]
+    inputs = [label.name for label in kept.inputs]
+    aligned = input_map.alignment
+    if aligned is not None and (list(aligned.inputs), list(aligned.states)) != (inputs, names):
+        raise ValueError(
+            f"input_map aligns {', '.join((*aligned.inputs, *aligned.states))}, and the model has "
+            f"{', '.join((*inputs, *names))}"
+        )
     return Signature(
         dt=kept.dt,
         state_labels=kept.states,
