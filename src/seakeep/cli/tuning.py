@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import fields
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
 
 __all__ = ["tune"]
 
-COMMENTED = ("ridge", "state_delays", "input_delays", "lead", "rank", "observables")
-"""Keys of a tuned file after which it says where they come from."""
+PLAIN = ("preset", "ridge_scale", "delay_rows", "readouts")
+"""Keys of a tuned file that go with a choice, and tables: no comment says where they come from."""
 
 
 def tune(
@@ -81,13 +82,15 @@ def tune(
     for path, kind in ((target, "tuned campaign"), (picture, "figure"), (tried, "table")):
         check_output(path, kind, read_files(read), "state_delays,input_delays,lead,observables,")
     settings = read.model(model)
-    with progress_bar("Preparing") as progress:
-        spec, _, runs, stop = read_training(read, model, progress)
-    if not isinstance(spec, HankelDMDc):
+    if settings.kind != "hankel_dmdc":
         raise RequestError(
             f"kind = '{settings.kind}' cannot be tuned: a Hankel model is. Name another model with "
-            "--model, or set kind = 'hankel_dmdc'."
+            "--model, or set kind = 'hankel_dmdc'. An ensemble chooses by itself: preset = "
+            "'recommended'."
         )
+    with progress_bar("Preparing") as progress:
+        spec, _, runs, stop = read_training(read, model, progress)
+    assert isinstance(spec, HankelDMDc)
     period = read.encounter_period() if counts_in_periods(settings) else None
     kept = target.with_suffix(".scores.json")
     chosen = spec.select or Select()
@@ -163,7 +166,7 @@ def _tuned(
         if table.get(key) == value:
             continue
         table[key] = value
-        if key in COMMENTED:
+        if key not in PLAIN:
             table[key].comment("chosen by seakeep tune, by free runs on held-out training runs")
     if between:
         _end(table).extend(between)
@@ -212,7 +215,11 @@ def _observables(chosen: Sequence[Observable]) -> Any:
     rows = tomlkit.array()
     for each in chosen:
         row = tomlkit.inline_table()
-        row.update({k: v for k, v in to_json(each).items() if v not in (None, "")})
+        made: Any = each  # mypy takes no Protocol for a dataclass
+        defaults = {field.name: field.default for field in fields(made)}
+        for key, value in to_json(each).items():
+            if key == "kind" or getattr(each, key) != defaults[key]:
+                row[key] = value
         rows.append(row)
     return rows.multiline(bool(chosen))
 

@@ -712,6 +712,11 @@ class Chain:
     kind: ClassVar[str] = "chain"
     maps: tuple[InputMap, ...] = ()
 
+    def __post_init__(self) -> None:
+        # An optional alignment that was left out is an empty chain.
+        flat = [m for each in self.maps for m in (each.maps if isinstance(each, Chain) else [each])]
+        object.__setattr__(self, "maps", tuple(flat))
+
     @classmethod
     def of(cls, input_map: InputMap) -> Chain:
         """An input map as a chain: itself, or of it alone."""

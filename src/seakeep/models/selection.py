@@ -703,13 +703,13 @@ def select(
     RequestError
         If `vary` names something else, or the delay rows are not exact.
     """
-    _check_asked(settings, vary)
+    labels = labelled.common_labels(runs, states)
+    readouts = readouts_asked(settings.readouts, labels)
+    _check_asked(settings, vary, readouts)
     if isinstance(folds, str) and len(runs) == 1:
         folds = 3
     step = labelled.common_step(runs)
     samples = mean_period(runs, list(inputs)) if period is None else period / step
-    labels = labelled.common_labels(runs, states)
-    readouts = readouts_asked(settings.readouts, labels)
     if "readouts" in vary:
         asked = readouts or readouts_asked("auto", labels)
         readouts = tuple(replace(each, kind="auto") for each in asked)
@@ -718,7 +718,12 @@ def select(
         alignments = _alignments(settings.alignment, runs, states, inputs)
     wanted = [settings.observables]
     if "observables" in vary and not settings.observables:
-        defaults = default_observables(inputs, samples * step, folds == "sea_state")
+        elevations = [
+            label.name
+            for label in labelled.common_labels(runs, inputs)
+            if label.units in ("", "m")  # not their rates
+        ]
+        defaults = default_observables(elevations, samples * step, folds == "sea_state")
         wanted = list(dict.fromkeys([defaults, defaults[1:], ()]))
     base = Candidate(
         settings.state_delays,
@@ -814,7 +819,9 @@ def select(
     return _with_readouts(complete, rows, note, fitted, "readouts" in vary)
 
 
-def _check_asked(settings: HankelSettings, vary: Sequence[str]) -> None:
+def _check_asked(
+    settings: HankelSettings, vary: Sequence[str], readouts: Sequence[ReadOut]
+) -> None:
     """Refuse what cannot be chosen."""
     for name in vary:
         if name not in VARIED:
@@ -825,12 +832,13 @@ def _check_asked(settings: HankelSettings, vary: Sequence[str]) -> None:
     if settings.delay_rows != "exact" or settings.rank is not None:
         raise RequestError(
             "choosing by free runs takes delay_rows = 'exact' and no rank; received delay_rows = "
-            f"'{settings.delay_rows}', rank = {settings.rank}. Change them, or state ridge."
+            f"'{settings.delay_rows}', rank = {settings.rank}. Change them, or fit without a "
+            "choice: state ridge, and no select."
         )
-    if "rank" in vary and (settings.readouts or "readouts" in vary):
+    if "rank" in vary and (readouts or "readouts" in vary):
         raise RequestError(
             "vary names 'rank', and read-outs learn from free runs of ridge regressions. Leave out "
-            "'rank', or the read-outs."
+            "'rank', or the read-outs: readouts = {} in a campaign file."
         )
 
 

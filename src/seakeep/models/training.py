@@ -211,7 +211,7 @@ def gather(
     dt = labelled.common_step(runs)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
     if maps:
-        runs = until(runs, stops)
+        runs, stops = until(runs, stops), dict.fromkeys(runs)
     input_map = Chain(tuple(each.fit(dict(runs), states, inputs, window) for each in maps))
     lead, reach = input_map.lead_samples, max(state_delays, input_map.history(input_delays))
     pieces = []
