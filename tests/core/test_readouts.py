@@ -55,7 +55,7 @@ def test_a_constant_is_not_regularised():
     np.testing.assert_allclose(fitted(states[:5]), 7.0, rtol=1e-12)  # rounding of a mean
 
 
-@pytest.mark.parametrize("taut", [0.5, 0.8])
+@pytest.mark.parametrize("taut", [0.5, 0.8, 0.98])
 def test_a_floor_is_found_where_a_line_rests_on_it(taut):
     rng = np.random.default_rng(3)
     states = rng.normal(size=(4000, 2))
@@ -63,8 +63,8 @@ def test_a_floor_is_found_where_a_line_rests_on_it(taut):
     slack = np.maximum(np.quantile(pull, 1 - taut), pull)
     noise = 0.05 * rng.normal(size=len(pull))
     floor = floor_of(states, slack + noise, [0, 1])
-    # The 0.002 quantile of all is that of 1 or 0.4 % of the slack ones.
-    assert -3 * 0.05 < floor - np.quantile(pull, 1 - taut) < -2 * 0.05
+    # The 0.002 quantile of all is that of 10 to 0.4 % of the slack ones.
+    assert -3 * 0.05 < floor - np.quantile(pull, 1 - taut) < -0.05
     assert floor_of(states, pull + noise, [0, 1]) == -np.inf
     regular = np.stack([np.sin(np.arange(4000) / 5), np.cos(np.arange(4000) / 5)], axis=1)
     assert floor_of(regular, 2.0 * regular[:, 0] + noise, [0, 1]) == -np.inf

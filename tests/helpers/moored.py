@@ -8,10 +8,12 @@ STATES, INPUTS = ["surge", "heave", "pitch", "mooring_bow", "mooring_stern"], ["
 FLOOR, NOISE = 2.0, 0.5  # N
 
 
-def moored_run(seed: int = 0, samples: int = 700, slack: bool = True) -> xr.Dataset:
+def moored_run(
+    seed: int = 0, samples: int = 700, slack: bool = True, floor: float = FLOOR
+) -> xr.Dataset:
     """Surge, heave and pitch are filters of the wave; the stern line is taut where they pull.
 
-    Its load is max(FLOOR, 8 + 20 surge + 4 pitch) with a noise of NOISE, or the same without the
+    Its load is max(floor, 8 + 20 surge + 4 pitch) with a noise of NOISE, or the same without the
     floor; the bow line is linear.
     """
     rng = np.random.default_rng(seed)
@@ -26,7 +28,7 @@ def moored_run(seed: int = 0, samples: int = 700, slack: bool = True) -> xr.Data
         pitch[k] = 1.4 * pitch[k - 1] - 0.7 * pitch[k - 2] + 0.3 * eta[k - 2]
     stern = 8.0 + 20.0 * surge + 4.0 * pitch
     if slack:
-        stern = np.maximum(FLOOR, stern)
+        stern = np.maximum(floor, stern)
     bow = 40.0 - 20.0 * surge
     channels = {
         "eta": (eta, "m"),

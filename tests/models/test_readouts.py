@@ -121,6 +121,22 @@ class TestTruth:
         lowest = min(float(run["mooring_stern"].min()) for run in moored_runs(slack=False).values())
         assert taut.forecast(high, START, STEPS)["mooring_stern"].values.min() < lowest
 
+    def test_a_line_that_is_seldom_slack_rests_on_its_floor_without_a_read_out_too(self):
+        low = -8.5  # N, of 2 % of the samples
+        given = {f"run{seed}": moored_run(seed, samples=2000, floor=low) for seed in range(3)}
+        share = np.mean([np.mean(run["mooring_stern"] < low + NOISE) for run in given.values()])
+        assert 0.01 < share < 0.04
+        model = replace(SPEC, readouts="auto").fit(given, STATES, INPUTS)
+        line = next(each for each in model.signature.readouts if each.channel == "mooring_stern")
+        high = moored_run(9)
+        high["eta"] = 2 * high["eta"]
+        load = model.forecast(high, START, STEPS)["mooring_stern"].values
+        assert line.kind == "none"
+        assert f"mooring_stern: none, floor {line.function.floor:.4g} N (NRMSE" in model.summary()
+        assert low - 3 * NOISE < line.function.floor == load.min() < low
+        linear = SPEC.fit(given, STATES, INPUTS).forecast(high, START, STEPS)["mooring_stern"]
+        np.testing.assert_array_equal(load, np.maximum(linear, line.function.floor))
+
 
 class TestOneEngine:
     @pytest.mark.parametrize("kind", ["hinge", "stacked", "auto"])
@@ -221,7 +237,7 @@ class TestFitting:
         short = runs["run0"].isel(time=slice(0, 300))
         model = stern("auto").fit(short, STATES, INPUTS)
         assert [each.kind for each in model.signature.readouts] == ["none"]
-        assert "none (no two runs could be held out to judge it)" in model.summary()
+        assert "(no two runs could be held out to judge it)" in model.summary()
         with pytest.raises(DataError, match="free runs of 15 encounter periods on training runs"):
             stern("stacked").fit(short, STATES, INPUTS)
 

@@ -13,16 +13,20 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 
-__all__ = ["LinearHinges", "fit_hinges", "floor_of", "hinges", "knots_of"]
+__all__ = ["LinearHinges", "fit_hinges", "floor_of", "hinges", "knots_of", "resting"]
 
 KNOTS = 6
 """Knots per state: quantiles from 0.05 to 0.95. Four to ten gave the same within 2 %."""
 FLOOR = 0.002
 """Quantile of a slack channel that is its floor: what it rests on, less its noise."""
 LOW, FLAT = 0.1, 0.3
-"""Part of the samples in which a slack channel is looked for, and the slope up to which it is one.
+"""Part of the samples in which a slack channel is looked for, and the slope up to which it is."""
+LOWEST, SURELY, LEAST = (0.03, 0.01), 4.0, 20
+"""Smaller parts, for lines that are seldom slack, the standard errors that are added to their
+slopes, and the least number of samples that show one.
 
-On the virtual tank the slope is 0.0 for the line that falls slack and 1.0 for the other."""
+In irregular waves of the virtual tank, seed 0, the lowest hundredth of the line that falls slack
+has a slope of 0.02 ± 0.04; in regular waves at λ/L 3 that of a taut line 0.22 ± 0.38."""
 
 
 def knots_of(states: FloatArray, columns: list[int]) -> FloatArray:
@@ -140,6 +144,11 @@ def fit_hinges(
     return LinearHinges(linear, columns, knots, np.concatenate([[constant], weights]), floor)
 
 
+def resting(column: int, floor: float) -> LinearHinges:
+    """A channel as it is, but never below its floor."""
+    return LinearHinges([column], [], np.empty((0, KNOTS)), np.array([0.0, 1.0]), floor)
+
+
 def floor_of(states: FloatArray, target: FloatArray, columns: list[int]) -> float:
     """Floor of a channel that rests on it, and −inf of one that does not.
 
@@ -163,11 +172,23 @@ def floor_of(states: FloatArray, target: FloatArray, columns: list[int]) -> floa
     """
     bending = np.concatenate([states[:, columns], np.ones((len(states), 1))], axis=1)
     linear = bending @ np.linalg.lstsq(bending, target, rcond=None)[0]
-    low = linear <= np.quantile(linear, LOW)
+    rests = _slope(linear, target, LOW)[0] < FLAT
+    for part in LOWEST:
+        slope, error = _slope(linear, target, part)
+        rests = rests or slope + SURELY * error < FLAT
+    return float(np.quantile(target, FLOOR)) if rests else -np.inf
+
+
+def _slope(linear: FloatArray, target: FloatArray, part: float) -> tuple[float, float]:
+    """Slope of a channel over its linear map where that is lowest, and its standard error."""
+    low = linear <= np.quantile(linear, part)
     across = linear[low] - linear[low].mean()
     spread = float(across @ across)
-    slope = float(across @ target[low]) / spread if spread > 0 else 1.0
-    return float(np.quantile(target, FLOOR)) if slope < FLAT else -np.inf
+    if not spread > 0 or len(across) < LEAST:
+        return 1.0, np.inf
+    slope = float(across @ target[low]) / spread
+    left = target[low] - target[low].mean() - slope * across
+    return slope, float(np.sqrt(left @ left / (len(across) - 2) / spread))
 
 
 def _features(

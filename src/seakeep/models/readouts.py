@@ -37,7 +37,8 @@ class ReadOut:
     A linear model cannot follow a load that stops at a floor. A read-out replaces the forecast
     of the channel by a function with hinges :math:`\max(0, x - q)` at six knots q per state, fitted
     by ridge regression (1e-2 per sample, standardised). A channel that rests on a floor in
-    training never falls below it by more than its noise: below the 0.002 quantile of its training.
+    training never falls below it by more than its noise, whichever kind is chosen: below the 0.002
+    quantile of its training. It must rest there in a hundredth of the samples or more.
 
     Parameters
     ----------
@@ -109,7 +110,8 @@ class FittedReadOut:
     scores : mapping of str to float
         NRMSE by kind in free runs on training runs that were held out, where kinds were compared.
     function : LinearHinges or None
-        The channel of forecast states, physical units; None where the forecast stays.
+        The channel of forecast states, physical units; None where the forecast stays as it is.
+        Without a kind, that of a channel which rests on a floor keeps it there.
     """
 
     channel: str
@@ -124,7 +126,8 @@ class FittedReadOut:
         """Line of a summary."""
         text = f"{self.channel}: {self.kind}"
         if self.function is not None:
-            text += f", of {', '.join(self.of)}"
+            if self.kind != "none":
+                text += f", of {', '.join(self.of)}"
             if np.isfinite(self.function.floor):
                 text += f", floor {self.function.floor:.4g} {self.units}".rstrip()
         if self.scores:

@@ -9,7 +9,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.core import metrics
-from seakeep.core.readouts import LinearHinges, fit_hinges, floor_of, knots_of
+from seakeep.core.readouts import LinearHinges, fit_hinges, floor_of, knots_of, resting
 from seakeep.errors import DataError
 from seakeep.models.readouts import FittedReadOut, ReadOut, ReadOutKind
 from seakeep.models.training import TrainingData
@@ -100,11 +100,8 @@ def _fitted(
             f"{PERIODS:g} encounter periods on training runs that are held out, and none fits. "
             "Give longer or more runs, or take kind = 'hinge' or 'auto'."
         )
-    function = None
-    if kind != "none":
-        found = _learnt(kind, target, columns, measured, held)
-        scale = data.state_scale
-        function = found.rescaled(scale.mean, scale.std, target)
+    found, scale = _learnt(kind, target, columns, measured, held), data.state_scale
+    function = None if found is None else found.rescaled(scale.mean, scale.std, target)
     units = data.state_labels[target].units
     return FittedReadOut(readout.channel, readout.of, kind, target, units, scores, function)
 
@@ -115,16 +112,18 @@ def _learnt(
     columns: list[int],
     measured: list[FloatArray],
     held: list[Held],
-) -> LinearHinges:
-    """Read-out of standardised states."""
+) -> LinearHinges | None:
+    """Read-out of standardised states; None where the forecast stays as it is."""
     seen = np.concatenate(measured)
+    floor = floor_of(seen, seen[:, target], columns)
+    if kind == "none":
+        return resting(target, floor) if np.isfinite(floor) else None
     states, channel, linear = seen, seen[:, target], columns
     if kind == "stacked":
         linear = list(range(seen.shape[1]))
         states = np.concatenate([each.predicted.reshape(-1, len(linear)) for each in held])
         channel = np.concatenate([each.measured[..., target].ravel() for each in held])
     knots = knots_of(states, columns)
-    floor = floor_of(seen, seen[:, target], columns)
     return fit_hinges(states, channel, linear, columns, knots, RIDGE, floor)
 
 
@@ -137,9 +136,8 @@ def _chosen(
         others = [values for run, values in enumerate(measured) if run != each.run]
         taught = [other for other in held if other.run != each.run]
         for kind in ORDER:
-            predicted = each.predicted[..., target]
-            if kind != "none":
-                predicted = _learnt(kind, target, columns, others, taught)(each.predicted)
+            read = _learnt(kind, target, columns, others, taught)
+            predicted = each.predicted[..., target] if read is None else read(each.predicted)
             error = metrics.nrmse(
                 predicted=predicted[..., None],
                 measured=each.measured[..., [target]],
