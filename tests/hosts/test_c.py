@@ -3,6 +3,7 @@
 import ctypes
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -139,6 +140,16 @@ def test_a_model_on_aligned_waves_says_so(tmp_path, make_run, channels):
         model = HankelDMDc(2, 2, 1.0, alignment=waves).fit(make_run(), **channels)
         header = write_c(model, tmp_path, f"rom_{number}")[0].read_text()
         assert ("Give it inputs carried likewise" in header) == (offset > 0)
+
+
+def test_an_alignment_that_was_left_out_leaves_nothing_to_be_carried(tmp_path, make_run, channels):
+    optional = ProbeAlignment(mode="dispersion", surge="predicted", optional=True)
+    spec = HankelDMDc(2, 2, 1.0, lead=2)
+    made, plain = (
+        write_c(replace(spec, alignment=each).fit(make_run(), **channels), tmp_path / str(number))
+        for number, each in enumerate((optional, None))  # the runs state no depth
+    )
+    assert [path.read_text() for path in made] == [path.read_text() for path in plain]
 
 
 class TestWhatCannotBeExported:

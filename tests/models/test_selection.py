@@ -273,6 +273,19 @@ def test_ranks_are_judged_as_plain_fits_are_and_one_may_be_chosen():
     assert found.settings.rank == (only[0]["rank"] or None)
 
 
+def test_a_rank_is_chosen_where_no_load_is_read_off_and_rates_are_not_squared():
+    given = {
+        name: run.assign(eta_rate=run["eta"].differentiate("time").assign_attrs(units="m/s"))
+        for name, run in runs().items()
+    }
+    spec = replace(SPEC, readouts="auto")  # no state is a load
+    found = select(
+        spec, given, STATES, ["eta", "eta_rate"], vary=("rank", "observables"), horizon=(15.0,)
+    )
+    assert any(row["rank"] for row in found.rows)
+    assert {each.of for each in found.settings.observables} == {("eta",)}
+
+
 def test_a_vessel_that_drifts_gets_an_alignment_and_the_measured_surge_is_no_choice():
     given = {f"run{seed}": drifting_run(seed, samples=600) for seed in (1, 2)}
     spec = HankelDMDc(4, 12, "rollout", delay_rows="exact")

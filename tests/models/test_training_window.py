@@ -50,8 +50,12 @@ def test_the_window_ends_at_the_stop_and_includes_it(run, channels):
 
 
 def test_a_stop_between_two_samples_takes_the_one_before(run, channels):
-    model = HankelDMDc(3, 8, 1.0, window=100).fit(run, stop=10.0 + 0.7 * DT, **channels)
-    assert model.training.stop[0] == pytest.approx(10.0)
+    for lead in (0, 2):
+        spec = HankelDMDc(3, 8, 1.0, window=100, lead=lead)
+        model = spec.fit(run, stop=10.0 + 0.7 * DT, **channels)
+        same = spec.fit(run, stop=10.0, **channels)
+        assert model.training.stop == same.training.stop == pytest.approx((10.0,))
+        np.testing.assert_array_equal(model.coefficients, same.coefficients)
 
 
 def test_a_stop_may_be_given_as_an_instant_of_the_run(run, channels):
