@@ -69,6 +69,28 @@ channel over the irregular runs, in the used part of each run. The keys on which
 runs, windows of clocks) can be in periods only if `encounter_period` is stated; a message says so. Lengths of
 models are rounded to the nearest number of samples. Priors of ensembles are always in periods.
 
+## Observables
+
+Observables are further inputs, computed from the measured ones. `recommended` chooses among them; to state them, list
+tables:
+
+```toml
+[model]
+observables = [
+    { kind = "slow_squares", of = "eta_cog" },
+    { kind = "powers", of = ["eta_fwd", "eta_cog"], powers = [2, 3] },
+    { kind = "expression", name = "wind_force", expression = "wind * abs(wind)", units = "m^2/s^2" },
+]
+```
+
+| `kind` | keys and defaults | columns |
+|---|---|---|
+| `"slow_squares"` | `of`; `orders = [0, 1, 2]` of the derivatives; `cutoff = "0.333 /T"`; `lead = "2 T"`; `lags = ["0 T", …, "5 T"]` | slow parts of the squares of elevations and their derivatives, which drive drift |
+| `"powers"` | `of`; `powers = [2, 3]`; `products = false`, or with those of different channels too | powers of inputs, with the input delays, which steep waves need |
+| `"expression"` | `name`, `expression`, `units = ""` | an expression of inputs, with the input delays |
+
+`cutoff`, `lead` and `lags` count in encounter periods, with or without `T`.
+
 ## Loads of lines that fall slack
 
 A linear model cannot follow a load that stops at a floor. A read-out replaces the forecast of such a channel by a
@@ -86,9 +108,9 @@ kind = "auto"
 | `"stacked"` | all forecast states and the hinges of those in `of` | forecasts of each training run by the model of the others, in free runs of 15 T̂ |
 | `"auto"` | the better of these on held-out runs if it beats no read-out by two standard errors, else none | – |
 
-Neither reads a measurement after the start of a forecast. If the load rests on a floor in the training runs, its forecast
-does not fall below their 0.002 quantile. A line that is never slack in training gets no floor, since it may fall slack in
-higher waves. `readouts = "auto"` applies `"auto"` to every channel in newtons, as a function of the motions among the
+Neither reads a measurement after the start of a forecast. If the load rests on a floor in a hundredth of the training
+samples or more, its forecast does not fall below their 0.002 quantile, whichever kind is chosen. A line that is never slack in
+training gets no floor, since it may fall slack in higher waves. `readouts = "auto"` applies `"auto"` to every channel in newtons, as a function of the motions among the
 states. `seakeep fit` prints the choice, and `seakeep tune --vary readouts` writes it into the file. An ensemble
 fits its read-outs once, with the medians of its priors, and applies them to every member. A model with read-outs
 cannot be exported as a linear system.
