@@ -3,7 +3,7 @@
 Each case runs in a forked process with a limit of time and memory. What is expected of it is an
 answer: a result, or an error of ours that says what was received. Anything else falls.
 
-``python tests/hardening/attack.py`` runs all cases (32 000: hours on one core) and prints how many
+``python tests/hardening/attack.py`` runs all cases (44 000: hours on one core) and prints how many
 there are and how many fall, by area; ``--every 30`` runs a sample (half an hour), ``--area`` one
 area, ``--show`` prints the cases that fall.
 """
