@@ -407,8 +407,12 @@ def test_a_bad_sample_leaves_the_state_as_it_was(models, run, message):
     assert live.consistency == untouched.consistency
 
 
-def test_what_cannot_be_is_refused(models, ensemble, run):
+def test_what_cannot_be_is_refused(models, ensemble, runs, run):
     model = models["plain"]
+    aligned = spec(alignment=ProbeAlignment(mode="dispersion", surge="measured"))
+    without = aligned.fit(runs, [name for name in STATES if name != "surge"], INPUTS)
+    with pytest.raises(RequestError, match="carries waves to the measured 'surge', which a live"):
+        without.live()
     with pytest.raises(RequestError, match=r"it is a member .* Use ensemble.hold\(\).live\(\)"):
         ensemble.member(1).live()
     live = model.live()

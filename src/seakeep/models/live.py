@@ -130,6 +130,14 @@ class Live:
         self._rig = _rig(signature, like)
         self._noise = _noise(signature, noise)
         self._alignment = Chain.of(signature.input_map).alignment
+        if (aligned := self._alignment) is not None and aligned.settings.surge == "measured":
+            channel = aligned.settings.surge_channel
+            if channel not in signature.states:
+                raise RequestError(
+                    f"the model carries waves to the measured '{channel}', which a live model "
+                    f"takes from its states, and these are {', '.join(signature.states)}. Fit it "
+                    f"with '{channel}' among them, or with surge = 'predicted' or 'none'."
+                )
         self._places, self._depth = _places(signature, self._alignment, self._rig)
         self._offset, self._a, self._b, self._d = _mean_predictor(members, signature)
         count, s = len(signature.states), signature.state_delays
