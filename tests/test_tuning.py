@@ -155,6 +155,7 @@ def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tmp_path, mon
     assert tried["chosen"].sum() == 1
     assert np.all((tried["lower"] <= tried["score"]) & (tried["score"] <= tried["upper"]))
     assert len(tried) > 9  # each λ of each lead
+    assert tuned.lead.value in (0, 0.5, 0.75, 1)  # of the campaign's period
     text = (tmp_path / "campaign_tuned.toml").read_text()
     changed = ("state_delays", "input_delays", "ridge", "lead")
     kept = [line for line in before.splitlines() if line.strip() and not line.startswith(changed)]

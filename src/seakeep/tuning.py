@@ -96,7 +96,7 @@ def tune(
     ----------
     spec : HankelDMDc
         Where the search starts, with exact delay rows; what `vary` does not name stays, but that
-        observables are chosen where ``spec.select`` says so.
+        observables are chosen where ``spec.select`` says so. Its period is that of the lengths.
     runs : Dataset, sequence of Dataset, or mapping of names to Datasets
         Training runs.
     states, inputs : sequence of str
@@ -162,6 +162,7 @@ def tune(
         vary=vary,
         horizon=horizon,
         folds=folds,
+        period=None if spec.select is None else spec.select.period,
         executor=executor,
         progress=progress,
         known=known,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -93,11 +93,11 @@ def tune(
     assert isinstance(spec, HankelDMDc)
     period = read.encounter_period() if counts_in_periods(settings) else None
     kept = target.with_suffix(".scores.json")
-    chosen = spec.select or Select()
+    chosen = replace(spec.select or Select(), period=period)
     varied = {*(vary or ["observables"]), *(["observables"] if chosen.observables else [])}
     with member_executor(workers, scheduler) as executor, progress_bar("Tuning") as progress:
         found = search(
-            spec,
+            replace(spec, select=chosen),
             runs,
             list(settings.states),
             list(settings.inputs),
