@@ -94,7 +94,7 @@ def existing_file(path: Path | str) -> Path:
     try:
         mode = place.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
-        raise _missing(Path(path)) from None
+        raise _missing(place) from None
     except (OSError, ValueError) as error:  # names with NUL raise ValueError
         raise _unreadable(path, error) from None
     if (found := _kind_of(mode)) is not None:

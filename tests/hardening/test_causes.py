@@ -347,3 +347,60 @@ def test_the_same_seed_gives_the_same_bytes_everywhere(tmp_path):
     assert len(cold) > 12
     assert {name for name in cold if warm[name] != cold[name]} == set()
     assert {name for name in cold if elsewhere[name] != cold[name]} == set()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("training_run", 7, "member 1: it learns from run 7, and there are 1"),
+        ("last_sample", 10**6, "member 1: its window is not one of the"),
+        ("last_sample", 0, "member 1: its window is not one of the"),
+        ("train_length_samples", 2**62, "member 1: its window is not one of the"),
+        ("train_length_samples", 1, "member 1: its window is not one of the"),
+        ("ridge", -1.0, "member 1: its ridge is -1.0"),
+        ("state_delay_samples", 10**7, "member 1: its window is not one of the"),
+        ("state_delay_samples", 11, "state_delays of the members reach 11, not those stated"),
+    ],
+)
+def test_a_member_that_its_runs_cannot_teach_is_named_when_a_file_is_loaded(
+    ensemble, tmp_path, name, value, said
+):
+    kept = ensemble.to_dataset()
+    kept[name] = kept[name].copy(data=[*kept[name].values[:1], value])
+    path = store.write(kept, tmp_path / "m.nc", ensemble.kind)
+    with pytest.raises(DataError) as refused:
+        load_model(path)
+    assert f"m.nc does not hold what seakeep writes: {said}" in str(refused.value)
+
+
+def test_a_kind_that_is_a_list_is_no_fault_of_seakeep(served, tmp_path):
+    dataset = served.to_dataset()
+    path = store.write(dataset, tmp_path / "m.nc", served.kind)
+    write_netcdf(path, store.read(path).assign_attrs(seakeep_kind=["hankel_dmdc", "x"]))
+    with pytest.raises(DataError, match="which this version does not know"):
+        load_model(path)
+
+
+@pytest.mark.parametrize(
+    ("rate", "said"),
+    [
+        ("1e308", r"sampling_rate = 1e\+308: .* samples of run 'one' .* at most 1907 are allowed"),
+        ("5e-324", r"is shorter than two steps of inf s\. Correct preparation\.sampling_rate = 4"),
+    ],
+)
+def test_a_rate_beyond_numbers_is_named(tmp_path, rate, said):
+    place = ground.write(tmp_path)
+    text = (place / "campaign.toml").read_text(encoding="utf-8")
+    assert "sampling_rate = " in text
+    (place / "campaign.toml").write_text(
+        re.sub(r"sampling_rate = \S+", f"sampling_rate = {rate}", text), encoding="utf-8"
+    )
+    with pytest.raises(RequestError, match=said):
+        read_campaign(place / "campaign.toml").prepare(["one"])
+
+
+def test_times_closer_than_numbers_tell_draft_no_rate(tmp_path, monkeypatch, capsys):
+    rows = "".join(f"{i}e-320,{i}\n" for i in range(20))
+    (tmp_path / "b.csv").write_text("t [s],a [m]\n" + rows, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "b.csv", "-o", "b.toml"]) == 0, capsys.readouterr().err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -336,7 +337,7 @@ def _preparation(
     """One step for all, no finer than that of the fastest logger, and what to do about gaps."""
     yield from ("", "[preparation]")
     several = bool(files[0].logger)
-    rates = [file.rate for file in files if file.rate]
+    rates = [file.rate for file in files if file.rate and math.isfinite(file.rate)]
     shortest = min((sea.period for sea in seas.values()), default=0.0)
     every = int(max(rates, default=0.0) * shortest / STEPS)
     if rates and not several:

@@ -586,21 +586,24 @@ def _axis(run: Run, dt: float) -> FloatArray:
             "reference's clock). Check the files of the run and the clocks."
         )
     origin = float(run.reference_time[0])
-    first = int(np.ceil((begin - origin) / dt - 1e-6))
-    last = int(np.floor((end - origin) / dt * (1 + 1e-9) + 1e-6))
-    if last - first < 1:
-        raise RequestError(
-            f"run '{run.name}' of {end - begin:g} s is shorter than two steps of {dt:g} s. Correct "
-            "[preparation]."
-        )
     stated = run.settings.preparation
     keys = ("sampling_rate", "dt", "steps_per_period")
     key = next((key for key in keys if getattr(stated, key) is not None), "dt")
+    asked = f"preparation.{key} = {getattr(stated, key) or dt:g}"
     channels = len(run.settings.channel_names)
+    samples: float = (end - begin) / dt  # may be beyond whole numbers
+    if (end - origin) / dt < 1e15:
+        first = int(np.ceil((begin - origin) / dt - 1e-6))
+        last = int(np.floor((end - origin) / dt * (1 + 1e-9) + 1e-6))
+        samples = last - first
+    if samples < 1:
+        raise RequestError(
+            f"run '{run.name}' of {end - begin:g} s is shorter than two steps of {dt:g} s. Correct "
+            f"{asked}."
+        )
     check_numbers(
-        f"preparation.{key} = {getattr(stated, key) or dt:g}: {last - first} samples of run "
-        f"'{run.name}' in {channels} channels take",
-        (last - first) * channels,
+        f"{asked}: {samples:.15g} samples of run '{run.name}' in {channels} channels take",
+        samples * channels,
         f"Take a larger step, or a part of the run (record in [runs.{run.name}]).",
         LONG_NUMBERS,
     )

@@ -51,6 +51,7 @@ from seakeep.models.linear import HankelDMDcModel, Kept
 from seakeep.models.live import Live
 from seakeep.models.members import (
     TrainingArrays,
+    check_draw,
     identify_member,
     spectral_radius,
     window_ends,
@@ -765,10 +766,24 @@ class HankelEnsemble(_Forecasts, store.Saved):
         )
         if len({len(arrays.names), len(arrays.offsets), len(arrays.begins)}) != 1:
             raise ValueError("runs, offsets and instants are of unequal number")
+        if min(arrays.offsets, default=0) < 0 or not np.all(np.isfinite(arrays.begins)):
+            raise ValueError("offsets or instants of the runs are none")
+        draws = _draws(dataset)
+        if origin.get("n_members", len(draws)) != len(draws):
+            raise ValueError(f"n_members is {origin['n_members']}, and {len(draws)} members follow")
+        for number, draw in enumerate(draws):
+            try:
+                check_draw(arrays, settings, signature.input_map, draw)
+            except ValueError as error:
+                raise ValueError(f"member {number}: {error}") from None
+        for key in ("state_delays", "input_delays"):
+            longest = max(getattr(draw, key) for draw in draws)
+            if longest != getattr(signature, key):
+                raise ValueError(f"{key} of the members reach {longest}, not those stated")
         return cls(
             settings=settings,
             origin=origin,
-            members=_draws(dataset),
+            members=draws,
             arrays=arrays,
             signature=signature,
             coverage=Coverage.from_dataset(dataset),

@@ -124,6 +124,26 @@ def identify_member(
     return Member(dynamics, solution, tuple(chosen), tuple(windows))
 
 
+def check_draw(
+    arrays: TrainingArrays, settings: HankelSettings, input_map: InputMap, draw: Draw
+) -> None:
+    """Refuse a draw, as a file holds it, that these runs cannot teach: a ValueError says why."""
+    if not (np.isfinite(draw.ridge) and draw.ridge >= 0):
+        raise ValueError(f"its ridge is {draw.ridge}")
+    if draw.run is not None and draw.run >= len(arrays.names):
+        raise ValueError(f"it learns from run {draw.run}, and there are {len(arrays.names)}")
+    back = max(draw.state_delays, input_map.history(draw.input_delays))
+    for run in range(len(arrays.names)) if draw.run is None else (draw.run,):
+        count = len(arrays.states[run])
+        end = count - 1 if draw.last is None else draw.last - arrays.offsets[run]
+        first = 0 if draw.window is None else end - draw.window + 1
+        inside = back if settings.history == "inside" else 0
+        place = max(first + inside, back)
+        final = end - max(input_map.lead_samples - 1, 0)
+        if not (first >= 0 and place < final and end < count and draw.window != 1):
+            raise ValueError(f"its window is not one of the {count} samples of {arrays.names[run]}")
+
+
 def spectral_radius(dynamics: Dynamics) -> float:
     """Largest modulus of an eigenvalue of Â."""
     top, _ = dynamics.matrices

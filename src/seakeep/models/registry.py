@@ -57,7 +57,7 @@ def load_model(path: str | Path, kind: type[Kind] | None = None) -> Model | Kind
     """
     dataset = store.read(path)
     word = dataset.attrs["seakeep_kind"]
-    if word not in KINDS:
+    if not isinstance(word, str) or word not in KINDS:
         raise DataError(
             f"{path} holds a model of kind '{word}', which this version does not know. Update "
             "seakeep."
