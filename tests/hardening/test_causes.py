@@ -12,8 +12,17 @@ import ground
 import h5py
 import numpy as np
 import pytest
+import xarray as xr
 
-from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, ProbeAlignment, load_model
+from seakeep import (
+    BayesianHankelDMDc,
+    Fixed,
+    HankelDMDc,
+    ProbeAlignment,
+    load_model,
+    signals,
+    statistics,
+)
 from seakeep.campaign import read_campaign
 from seakeep.cli import main
 from seakeep.errors import DataError, RequestError, SeakeepWarning
@@ -404,3 +413,24 @@ def test_times_closer_than_numbers_tell_draft_no_rate(tmp_path, monkeypatch, cap
     (tmp_path / "b.csv").write_text("t [s],a [m]\n" + rows, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     assert main(["init", "b.csv", "-o", "b.toml"]) == 0, capsys.readouterr().err
+
+
+X = np.random.default_rng(0).standard_normal(200)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda odd: signals.wave_spectrum(X, 0.1, segment=odd), "segment must be a whole number"),
+        (lambda odd: signals.zero_up_crossings(X, 0.1, hysteresis=odd), "hysteresis must be a num"),
+        (lambda odd: signals.integrate(X, 0.1, (0.1, 1.0), times=odd), "times must be 1 or 2"),
+        (lambda odd: signals.froude_factor("m", odd), "the scale factor must be a number"),
+        (lambda odd: signals.correlation_peak(X, X, 0.1, odd), "bounds"),
+        (lambda odd: statistics.kernel_bandwidth(X, odd), "bandwidth"),
+        (lambda odd: statistics.lag_one_correlation(X, odd), "segment"),
+    ],
+)
+@pytest.mark.parametrize("odd", ["abc", np.ones(3), xr.Dataset({"a": ("time", [1.0])}), 1j])
+def test_settings_of_array_functions_that_are_no_numbers_are_named(call, odd, said):
+    with pytest.raises(RequestError, match=said):
+        call(odd)

@@ -193,7 +193,6 @@ def test_noise_on_the_waves_is_not_counted_with_hysteresis():
 @pytest.mark.parametrize("key", ["hysteresis", "still"])
 @pytest.mark.parametrize("value", [-0.1, 1.0, float("nan")])
 def test_parts_of_a_deviation(key, value):
-    with pytest.raises(
-        RequestError, match=f"{key} is a fraction of a standard deviation, 0 or more"
-    ):
+    said = "is a fraction of a standard deviation, 0 or more"
+    with pytest.raises(RequestError, match=f"{key} ({said}|must be a number; received nan)"):
         encounter_period(np.sin(np.arange(100.0)), 0.1, **{key: value})

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -79,6 +79,8 @@ def _as_segments(segments: Sequence[int] | None, samples: int) -> IntArray:
     """Return the lengths of the pieces of which a series was joined; None is one piece."""
     if segments is None:
         return np.array([samples], dtype=np.intp)
+    if not isinstance(segments, Iterable):
+        raise RequestError(f"segments must be a list of lengths; received {segments!r}.")
     lengths = np.array([whole_number(item, "a segment") for item in segments], dtype=np.intp)
     if int(lengths.sum()) != samples:
         raise RequestError(

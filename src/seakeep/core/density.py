@@ -6,6 +6,7 @@ r"""Kernel densities of a series, and their interval over bootstrapped series (p
 from __future__ import annotations
 
 import math
+import numbers
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -101,9 +102,12 @@ def _bandwidths(x: FloatArray, bandwidth: Bandwidth) -> FloatArray:
         width = np.where(inner > 0, np.minimum(spread, inner), spread)
         h: FloatArray = factor * width * x.shape[-1] ** -0.2
         return h
-    if isinstance(bandwidth, bool) or not math.isfinite(bandwidth) or bandwidth <= 0:
+    given: object = bandwidth
+    real = isinstance(given, numbers.Real) and not isinstance(given, bool)
+    if not real or not 0 < bandwidth < math.inf:
         raise RequestError(
-            f"a bandwidth must be 'paper', 'silverman' or a positive number; received {bandwidth}."
+            "a bandwidth must be 'paper', 'silverman' or a positive number; received "
+            f"{bandwidth!r:.60}."
         )
     return np.full(x.shape[0], float(bandwidth))
 

@@ -233,7 +233,7 @@ def integrate(
     >>> bool(np.max(np.abs(heave - np.cos(omega * t))) < 0.01)  # to the very ends
     True
     """
-    if times not in (1, 2):
+    if not isinstance(times, int | np.integer) or times not in (1, 2):
         raise RequestError(f"integrate once or twice: times must be 1 or 2; received {times!r}.")
     return _integrated(series, dt, band, times)
 
@@ -381,7 +381,7 @@ def complementary_filter(
     >>> bool(np.max(np.abs(complementary_filter(x, a, 0.05, 0.2) - rate)[100:-100]) < 0.01)
     True
     """
-    if times not in (1, 2):
+    if not isinstance(times, int | np.integer) or times not in (1, 2):
         raise RequestError(
             f"complementary_filter gives a rate or a position: times is 1 or 2; received {times!r}."
         )

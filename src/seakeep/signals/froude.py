@@ -7,6 +7,7 @@ lengths go with :math:`\lambda`, times with :math:`\lambda^{1/2}`, masses with
 
 from __future__ import annotations
 
+from seakeep.arrays import number
 from seakeep.conventions import base_powers
 from seakeep.errors import RequestError
 
@@ -43,7 +44,7 @@ def froude_factor(units: str, scale: float, density_ratio: float = 1.0) -> float
     (1.0, 0.1414)
     """
     for name, value in (("the scale factor", scale), ("the density ratio", density_ratio)):
-        if not 0 < value < float("inf"):
+        if not 0 < number(value, name) < float("inf"):
             raise RequestError(f"{name} must be positive; received {value!r}.")
     length, time, mass, others = base_powers(units)
     if others:

@@ -168,13 +168,16 @@ def correlation_peak(
     """
     a, b = as_pair(first, second)
     step = positive(dt, "the time step", "s")
-    low, high = (int(np.floor(bounds[0] / step)), int(np.ceil(bounds[1] / step)))
+    limits = as_real(bounds, "bounds")
+    if limits.shape != (2,):
+        raise RequestError(f"bounds are a pair of lags, s; received {bounds!r}.")
+    low, high = float(np.floor(limits[0] / step)), float(np.ceil(limits[1] / step))
     if not low < high or max(abs(low), abs(high)) > a.size // 2:
         raise RequestError(
-            f"lags from {bounds[0]:g} to {bounds[1]:g} s cannot be sought in records of "
+            f"lags from {limits[0]:g} to {limits[1]:g} s cannot be sought in records of "
             f"{a.size * step:g} s: give a rising range within half their length."
         )
-    lags = np.arange(low - 1, high + 2)
+    lags = np.arange(int(low) - 1, int(high) + 2)
     values = _correlation(a, b, lags)
     inner = values[1:-1]
     peaks = np.flatnonzero((inner >= values[:-2]) & (inner >= values[2:]))

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import FloatArray, IntArray, as_series, positive
+from seakeep.arrays import FloatArray, IntArray, as_series, number, positive, whole_number
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import parabola_peak
 from seakeep.sizes import MOST_TRANSFORM, check_size
@@ -157,7 +157,7 @@ def zero_up_crossings(
     [1.0, 5.0, 9.0]
     """
     for name, value in (("hysteresis", hysteresis), ("still", still)):
-        if not 0 <= value < 1:
+        if not 0 <= number(value, name) < 1:
             raise RequestError(
                 f"{name} is a fraction of a standard deviation, 0 or more and less than 1; "
                 f"received {value!r}."
@@ -306,8 +306,9 @@ def welch_segments(
     samples: int, dt: float, segment: int | None, overlap: int | None
 ) -> tuple[int, int]:
     """Length and overlap of Welch's segments in samples; defaults and errors of `wave_spectrum`."""
-    length = min(samples, round(60.0 / dt)) if segment is None else segment
-    shared = length // 2 if overlap is None else overlap
+    most = round(min(samples, 60.0 / dt))
+    length = most if segment is None else whole_number(segment, "segment", least=0)
+    shared = length // 2 if overlap is None else whole_number(overlap, "overlap", least=0)
     if not 1 < length <= samples or not 0 <= shared < length:
         raise RequestError(
             f"Welch's method needs segments of 2 to {samples} samples and an overlap below one "
