@@ -22,6 +22,8 @@ MOST_NUMBERS = 250_000_000
 """Numbers that a run, or the redrawn series of a bootstrap, hold at once: 1907 MiB."""
 LONG_NUMBERS = 50_000_000
 """Numbers of a run that take some minutes to prepare."""
+LONG_MATRIX = 3000**2
+"""Numbers of a model's matrix whose eigenvalues take a minute."""
 MOST_CHANNELS = 1000
 """Channels of a campaign: each is checked, drawn and written, some hundredths of a second long."""
 MOST_MEMBERS, LONG_MEMBERS = 1_000_000, 100_000

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from seakeep import BayesianHankelDMDc, Fixed, read_campaign, signals, statistics
+from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, read_campaign, signals, statistics
 from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.models.training import gather
 from seakeep.study.settings import StudySettings
 from seakeep.toml import validated
 from seakeep.waves import wavenumber
@@ -76,3 +77,14 @@ def test_a_rate_that_fills_the_memory_is_refused_by_its_key(edited, key):
 def test_what_takes_long_is_said_before():
     with pytest.warns(SeakeepWarning, match=r"n_members = 2e\+05 members, which takes long"):
         ensemble(200_000)
+
+
+def test_delays_that_fill_the_memory_are_refused_and_long_ones_told(make_dataset):
+    noise = np.random.default_rng(0).standard_normal((2, 4000))
+    run = make_dataset(0.1 * np.arange(4000.0), heave=noise[0], eta=noise[1])
+    said = r"state_delays = 30000 of 1 states: a matrix of 30001 rows takes .* MiB; at most 1907"
+    with pytest.raises(RequestError, match=said):
+        HankelDMDc(30_000, 2, 1.0).fit(run, ["heave"], ["eta"])
+    long = HankelDMDc(3000, 2, 1.0)
+    with pytest.warns(SeakeepWarning, match=r"rows takes 68\.7 MiB, which takes long\. Take fewer"):
+        gather({"run": run}, ["heave"], ["eta"], None, long)

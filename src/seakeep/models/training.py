@@ -21,6 +21,7 @@ from seakeep.models.inputs import Chain, Measured
 from seakeep.models.interface import Json, Regressors, Scale, Signature, Span
 from seakeep.models.labelled import ChannelLabel, Stop
 from seakeep.models.settings import HankelSettings
+from seakeep.sizes import LONG_MATRIX, check_numbers
 
 __all__ = [
     "Training",
@@ -207,6 +208,13 @@ def gather(
     states, inputs = list(states), list(inputs)  # arrays of names are welcome too
     maps, window, history = settings.maps, settings.window, settings.history
     state_delays, input_delays = settings.state_delays, settings.input_delays
+    rows = len(states) * (state_delays + 1)
+    check_numbers(
+        f"state_delays = {state_delays} of {len(states)} states: a matrix of {rows} rows takes",
+        rows**2,
+        "Take fewer delays, or a larger step.",
+        LONG_MATRIX,
+    )
     stops = stop_instants(stop, list(runs))
     dt = labelled.common_step(runs)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
