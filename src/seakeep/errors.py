@@ -10,13 +10,18 @@ import difflib
 from collections.abc import Iterable
 
 __all__ = [
+    "SHOWN",
     "DataError",
     "MissingFileError",
     "RequestError",
     "SeakeepError",
     "SeakeepWarning",
     "did_you_mean",
+    "wanted",
 ]
+
+SHOWN = 60
+"""Characters of a received value that a message shows at most."""
 
 
 class SeakeepError(Exception):
@@ -69,3 +74,14 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     lowered = {candidate.lower(): candidate for candidate in candidates}
     near = difflib.get_close_matches(name.lower(), list(lowered), n=1, cutoff=0.6)
     return f" Did you mean '{lowered[near[0]]}'?" if near else ""
+
+
+def wanted(message: str) -> str:
+    """What pydantic says that a value should be, in our words."""
+    words = message.removeprefix("Input ").replace("valid ", "")
+    for theirs, ours in _WORDS:
+        words = words.replace(theirs, ours)
+    return words
+
+
+_WORDS = (("a array", "a list"), ("an object", "a table"), ("a integer", "an integer"))

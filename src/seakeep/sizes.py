@@ -24,6 +24,8 @@ LONG_NUMBERS = 50_000_000
 """Numbers of a run that take some minutes to prepare."""
 LONG_MATRIX = 3000**2
 """Numbers of a model's matrix whose eigenvalues take a minute."""
+LEAST_PERIODS, MOST_PERIODS = 1e-6, 1e6
+"""Encounter periods of a free run, and seconds of one: beyond them numbers of samples overflow."""
 MOST_CHANNELS = 1000
 """Channels of a campaign: each is checked, drawn and written, some hundredths of a second long."""
 MOST_MEMBERS, LONG_MEMBERS = 1_000_000, 100_000

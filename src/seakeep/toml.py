@@ -27,7 +27,7 @@ from pydantic import (
     ValidationError,
 )
 
-from seakeep.errors import MissingFileError, RequestError, did_you_mean
+from seakeep.errors import SHOWN, MissingFileError, RequestError, did_you_mean, wanted
 from seakeep.files import read_bytes
 
 __all__ = [
@@ -54,9 +54,6 @@ __all__ = [
     "unknown_key",
     "validated",
 ]
-
-SHOWN = 60
-"""Characters of a received value that a message shows at most."""
 
 KNOWN_BY = {
     "campaign": ("channels", "rig", "preparation"),
@@ -461,9 +458,7 @@ def _reason(item: Any, place: list[str], table: type[BaseModel] | None, descript
         return f"missing. Add it: {description}." if description else "missing. Add it."
     if kind == "value_error":
         return f"{item['ctx']['error']}; received {_shown(value)}."
-    message = str(item["msg"]).removeprefix("Input ").replace("valid ", "")
-    message = message.replace("a integer", "an integer")
-    return f"received {_shown(value)}, which {message}.{give}"
+    return f"received {_shown(value)}, which {wanted(str(item['msg']))}.{give}"
 
 
 def unknown_key(key: str, value: object, known: list[str]) -> str:

@@ -24,7 +24,7 @@ from pydantic import (
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.formats import Options
-from seakeep.sizes import MOST_MEMBERS
+from seakeep.sizes import LEAST_PERIODS, MOST_MEMBERS, MOST_PERIODS
 from seakeep.toml import (
     Count,
     Delay,
@@ -494,7 +494,7 @@ def _listed(value: object) -> object:
 
 def _horizons(given: tuple[float | Length, ...]) -> tuple[float | Length, ...]:
     values = [each.value if isinstance(each, Length) else each for each in given]
-    if not all(1e-6 < value < 1e6 for value in values):
+    if not all(LEAST_PERIODS < value < MOST_PERIODS for value in values):
         raise ValueError("free runs last 1e-6 to 1e6 encounter periods, such as '15 T'")
     return given
 

@@ -153,16 +153,11 @@ def _tuned(
     # Blank lines and comments there belong to the next table, if this one is in one place.
     between = _after(table) if isinstance(table, tomlkit.items.Table) else []
     values = _choice(found.spec, table, varied, preset, period)
-    stale = {
-        "select": True,  # nothing is left to be chosen
-        "rank": True,
-        "alignment": "alignment" in varied,
-        "readouts": "readouts" in values,
-        "preset": "preset" not in values,
-    }
-    for key in (key for key, yes in stale.items() if yes):
+    stale = {"select", "rank"}  # nothing is left to be chosen
+    stale |= ({"alignment"} & set(varied)) | ({"readouts"} & set(values)) | {"preset"} - set(values)
+    for key in stale:
         table.pop(key, None)
-    for key, value in sorted(values.items(), key=lambda each: each[0] == "readouts"):
+    for key, value in values.items():
         if table.get(key) == value:
             continue
         table[key] = value

@@ -11,12 +11,9 @@ from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import SHOWN, RequestError, did_you_mean, wanted
 
-__all__ = ["SHOWN", "check_choice", "check_integer", "check_keys", "settings_of", "typed"]
-
-SHOWN = 60
-"""Characters of a received value that a message shows at most."""
+__all__ = ["check_choice", "check_integer", "check_keys", "settings_of", "typed"]
 
 Settings = TypeVar("Settings")
 Made = TypeVar("Made")
@@ -148,14 +145,10 @@ def typed(kind: type[Made], content: object, place: str = "") -> Made:
             raise ValueError(f"{key} is missing") from None
         if first["type"] == "value_error":
             raise ValueError(f"{key}: {first['ctx']['error']}") from None
-        words = first["msg"].removeprefix("Input ").replace("valid ", "")
-        for theirs, ours in _WORDS:
-            words = words.replace(theirs, ours)
-        raise ValueError(f"{key}: received {first['input']!r:.{SHOWN}}, which {words}") from None
+        raise ValueError(
+            f"{key}: received {first['input']!r:.{SHOWN}}, which {wanted(first['msg'])}"
+        ) from None
     return made
-
-
-_WORDS = (("a array", "a list"), ("an object", "a table"), ("a integer", "an integer"))
 
 
 @functools.cache

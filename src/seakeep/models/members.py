@@ -88,7 +88,7 @@ def identify_member(
     back = max(draw.state_delays, input_map.history(draw.input_delays))
     windows, parts = [], []
     for run in chosen:
-        end = len(arrays.states[run]) - 1 if draw.last is None else draw.last - arrays.offsets[run]
+        end = _last_of(arrays, draw, run)
         place = training_window(end, draw.window, draw.state_delays, back, settings.history)
         begin = max(min(place.first, place.first_column - back), 0)
         final = end - max(input_map.lead_samples - 1, 0)
@@ -124,6 +124,11 @@ def identify_member(
     return Member(dynamics, solution, tuple(chosen), tuple(windows))
 
 
+def _last_of(arrays: TrainingArrays, draw: Draw, run: int) -> int:
+    """Last sample of a member's window in the arrays of a run."""
+    return len(arrays.states[run]) - 1 if draw.last is None else draw.last - arrays.offsets[run]
+
+
 def check_draw(
     arrays: TrainingArrays, settings: HankelSettings, input_map: InputMap, draw: Draw
 ) -> None:
@@ -134,13 +139,12 @@ def check_draw(
         raise ValueError(f"it learns from run {draw.run}, and there are {len(arrays.names)}")
     back = max(draw.state_delays, input_map.history(draw.input_delays))
     for run in range(len(arrays.names)) if draw.run is None else (draw.run,):
-        count = len(arrays.states[run])
-        end = count - 1 if draw.last is None else draw.last - arrays.offsets[run]
-        first = 0 if draw.window is None else end - draw.window + 1
-        inside = back if settings.history == "inside" else 0
-        place = max(first + inside, back)
-        final = end - max(input_map.lead_samples - 1, 0)
-        if not (first >= 0 and place < final and end < count and draw.window != 1):
+        count, end = len(arrays.states[run]), _last_of(arrays, draw, run)
+        fits = 0 <= end < count and (draw.window is None or 1 < draw.window <= end + 1)
+        if fits:
+            place = training_window(end, draw.window, draw.state_delays, back, settings.history)
+            fits = place.first_column < end - max(input_map.lead_samples - 1, 0)
+        if not fits:
             raise ValueError(f"its window is not one of the {count} samples of {arrays.names[run]}")
 
 
@@ -154,7 +158,7 @@ def spectral_radius(dynamics: Dynamics) -> float:
 
 def window_ends(arrays: TrainingArrays, draw: Draw, run: int, dt: float) -> tuple[float, float]:
     """First and last instant of a member's training window in a run, s."""
-    last = len(arrays.states[run]) - 1 if draw.last is None else draw.last - arrays.offsets[run]
+    last = _last_of(arrays, draw, run)
     stop = arrays.begins[run] + last * dt
     samples = last + 1 if draw.window is None else draw.window
     return stop - (samples - 1) * dt, stop

@@ -13,8 +13,8 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from seakeep.errors import DataError, RequestError
-from seakeep.models.checks import SHOWN, typed
+from seakeep.errors import SHOWN, DataError, RequestError
+from seakeep.models.checks import typed
 
 __all__ = ["Fixed", "LogUniform", "Prior", "Uniform", "check_prior", "describe", "from_description"]
 

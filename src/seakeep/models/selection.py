@@ -781,10 +781,11 @@ def select(
         replace(taken, observables=tuple(each for each in taken.observables if each != number))
         for number in taken.observables
     ]
-    untried = [each for each in without if each not in dict(found.trials)]
-    more = tuple(_judged(problems, untried, ridges, executor, progress, known))
-    found = replace(found, trials=found.trials + more)
-    best = dict(found.trials)[taken]
+    trials = dict(found.trials)
+    untried = [each for each in without if each not in trials]
+    trials |= dict(_judged(problems, untried, ridges, executor, progress, known))
+    found = replace(found, trials=tuple(trials.items()))
+    best = trials[taken]
     score = float(best.means[best.levels.index(found.level)])
     complete = replace(
         settings,
@@ -805,7 +806,7 @@ def select(
         f"{len(problems[0].folds())} parts held out in turn, mean NRMSE {score:.3f}"
     )
     note += "".join(
-        f"; without {named(chosen[number])} {dict(found.trials)[less].means.min():.3f}"
+        f"; without {named(chosen[number])} {trials[less].means.min():.3f}"
         for number, less in zip(taken.observables, without, strict=True)
     )
     if folds == "sea_state":

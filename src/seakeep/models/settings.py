@@ -19,6 +19,7 @@ from seakeep.models.interface import Fittable, Json, Needs, plain
 from seakeep.models.observables import Observable, Observing, observables_of
 from seakeep.models.observables import to_json as observable_json
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
+from seakeep.sizes import LEAST_PERIODS, MOST_PERIODS
 
 __all__ = [
     "DelayRows",
@@ -145,7 +146,7 @@ class Select:
         given = self.horizon if isinstance(self.horizon, tuple | list) else (self.horizon,)
         for value in (*given, *(() if self.period is None else (self.period,))):
             real = isinstance(value, numbers.Real) and not isinstance(value, bool)
-            if not real or not 1e-6 < value < 1e6:
+            if not real or not LEAST_PERIODS < value < MOST_PERIODS:
                 raise RequestError(
                     "select: horizon (encounter periods) and period (s) must lie between 1e-6 and "
                     f"1e6; received {value!r}."

@@ -10,9 +10,9 @@ from typing import Any, ClassVar, Literal, Self, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled, store
-from seakeep.models.checks import SHOWN, check_choice, check_keys, typed
+from seakeep.models.checks import check_choice, check_keys, typed
 from seakeep.models.draws import Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.executor import Progress

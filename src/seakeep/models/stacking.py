@@ -100,7 +100,9 @@ def _fitted(
             f"{PERIODS:g} encounter periods on training runs that are held out, and none fits. "
             "Give longer or more runs, or take kind = 'hinge' or 'auto'."
         )
-    found, scale = _learnt(kind, target, columns, measured, held), data.state_scale
+    seen, scale = np.concatenate(measured), data.state_scale
+    floor = floor_of(seen, seen[:, target], columns)
+    found = _learnt(kind, target, columns, seen, floor, held)
     function = None if found is None else found.rescaled(scale.mean, scale.std, target)
     units = data.state_labels[target].units
     return FittedReadOut(readout.channel, readout.of, kind, target, units, scores, function)
@@ -110,12 +112,11 @@ def _learnt(
     kind: ReadOutKind,
     target: int,
     columns: list[int],
-    measured: list[FloatArray],
+    seen: FloatArray,
+    floor: float,
     held: list[Held],
 ) -> LinearHinges | None:
     """Read-out of standardised states; None where the forecast stays as it is."""
-    seen = np.concatenate(measured)
-    floor = floor_of(seen, seen[:, target], columns)
     if kind == "none":
         return resting(target, floor) if np.isfinite(floor) else None
     states, channel, linear = seen, seen[:, target], columns
@@ -133,10 +134,11 @@ def _chosen(
     """The kind that is best on each run in turn, as the other runs teach it, and the scores."""
     found: dict[str, list[FloatArray]] = {kind: [] for kind in ORDER}
     for each in held if len(held) > 1 else ():
-        others = [values for run, values in enumerate(measured) if run != each.run]
+        others = np.concatenate([x for run, x in enumerate(measured) if run != each.run])
+        floor = floor_of(others, others[:, target], columns)
         taught = [other for other in held if other.run != each.run]
         for kind in ORDER:
-            read = _learnt(kind, target, columns, others, taught)
+            read = _learnt(kind, target, columns, others, floor, taught)
             predicted = each.predicted[..., target] if read is None else read(each.predicted)
             error = metrics.nrmse(
                 predicted=predicted[..., None],

@@ -13,9 +13,9 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import GREATEST, FloatArray
-from seakeep.errors import DataError, MissingFileError, RequestError
+from seakeep.errors import SHOWN, DataError, MissingFileError, RequestError
 from seakeep.files import MARK, check_output, read_sealed, replacing, write_netcdf
-from seakeep.models.checks import SHOWN, typed
+from seakeep.models.checks import typed
 from seakeep.models.inputs import Chain
 from seakeep.models.interface import Json, Scale, Signature
 from seakeep.models.labelled import ChannelLabel
