@@ -198,7 +198,27 @@ def test_a_file_with_broken_contents_is_incomplete(saved, attrs):
     ("attribute", "key", "value", "words"),
     [
         ("settings", "state_delays", 10**9, "state_delays is 1000000000 in its settings"),
+        ("settings", "lead", 3, "lead is 3 in its settings, and it was fitted with 0"),
+        (
+            "settings",
+            "observables",
+            [{"kind": "powers", "of": ["eta"]}],
+            "observables is .* fitted with ",
+        ),
+        (
+            "settings",
+            "readouts",
+            [{"channel": "heave", "of": ["pitch"], "kind": "hinge"}],
+            "readouts is .*heave",
+        ),
         ("signature", "dt", 1e-300, "dt is 1e-300"),
+        ("training", "columns", [0], "training takes 0 snapshot pairs of run, from"),
+        ("training", "columns", [10**6], "training takes 1000000 snapshot pairs of run, from"),
+        ("training", "stop", [-5.0], "training takes .* to -5 s, in steps of"),
+        ("training", "rank", -1, "training.rank is -1, and there are 26 regressors"),
+        ("training", "rank", 27, "training.rank is 27, and there are 26 regressors"),
+        ("training", "ridge", -1.0, "training.ridge is -1"),
+        ("training", "clipped", [-1.0], "training.clipped holds a modulus that is none"),
     ],
 )
 def test_a_number_that_does_not_fit_the_others_is_refused(saved, attribute, key, value, words):
@@ -208,10 +228,34 @@ def test_a_number_that_does_not_fit_the_others_is_refused(saved, attribute, key,
         load_model(saved)
 
 
-def test_a_scale_of_another_sign_is_refused(saved):
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("state_std", lambda x: -x, "reach of state channels is negative"),
+        ("state_std", lambda x: 1e-320 * x, "reach of state channels is negative"),
+        ("residual_covariance", lambda x: -x, "residual_covariance is no covariance"),
+        ("residual_covariance", lambda x: x * [[1, 0.5], [1, 1]], "is not symmetric"),
+        ("lead_errors", lambda x: -x, "lead_errors or ending_errors are negative"),
+        ("wave_shares", lambda x: 9 * x, "wave_shares are no parts of an energy"),
+        ("wave_shares", lambda x: x[:, 1:], "wave_shares has shape"),
+        ("wave_heights", lambda x: -x, "a wave height or steepness of the training is negative"),
+    ],
+)
+def test_numbers_that_no_training_gives_are_refused(saved, name, change, words):
     dataset = xr.load_dataset(saved, engine="h5netcdf")
-    write_netcdf(saved, dataset.assign(state_std=-dataset["state_std"]))
-    with pytest.raises(DataError, match=r"reach of state channels is negative"):
+    old = dataset[name]
+    new = change(old.values)
+    dims = [f"{dim}_{size}" for dim, size in zip(old.dims, new.shape, strict=True)]
+    write_netcdf(saved, dataset.assign({name: (dims, new, old.attrs)}))
+    with pytest.raises(DataError, match=words):
+        load_model(saved)
+
+
+def test_channels_that_are_named_twice_are_refused(saved):
+    kept = json.loads(xr.load_dataset(saved, engine="h5netcdf").attrs["signature"])
+    kept["states"] = [kept["states"][0]] * 2
+    edited(saved, signature=json.dumps(kept))
+    with pytest.raises(DataError, match="signature names the channel heave more than once"):
         load_model(saved)
 
 

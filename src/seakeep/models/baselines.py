@@ -431,6 +431,7 @@ class SubspaceModel(SingleModel, store.Saved):
     def from_dataset(cls, dataset: xr.Dataset, settings: Subspace) -> SubspaceModel:
         """Rebuild a model from what :meth:`save` wrote; it is equal to the last bit."""
         signature = store.unpack_signature(dataset)
+        store.check_settings(settings, signature)
         n, N = settings.order, len(signature.states)
         delayed, direct = signature.input_scale.mean.size, signature.direct_scale.mean.size
         past = N * (settings.state_delays + 1) + delayed * settings.input_delays
@@ -445,6 +446,6 @@ class SubspaceModel(SingleModel, store.Saved):
             settings=settings,
             space=StateSpace(*(store.numbers(dataset, key, at) for key, at in shapes.items())),
             signature=signature,
-            training=Training.from_json(store.content(dataset, "training")),
-            coverage=Coverage.from_dataset(dataset),
+            training=Training.from_json(store.content(dataset, "training"), signature.dt, n),
+            coverage=Coverage.from_dataset(dataset, signature),
         )

@@ -27,7 +27,7 @@ from seakeep.models.calibration import (
     widened,
 )
 from seakeep.models.checks import typed
-from seakeep.models.draws import Draw
+from seakeep.models.draws import MOST_REDRAWS, Draw
 from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
 from seakeep.models.executor import Progress, in_order, one_blas_thread
 from seakeep.models.forecasts import (
@@ -771,6 +771,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
         draws = _draws(dataset)
         if origin.get("n_members", len(draws)) != len(draws):
             raise ValueError(f"n_members is {origin['n_members']}, and {len(draws)} members follow")
+        store.check_settings(settings, signature, delays=False)
         for number, draw in enumerate(draws):
             try:
                 check_draw(arrays, settings, signature.input_map, draw)
@@ -786,7 +787,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
             members=draws,
             arrays=arrays,
             signature=signature,
-            coverage=Coverage.from_dataset(dataset),
+            coverage=Coverage.from_dataset(dataset, signature),
             calibration=Calibration.from_json(
                 store.document(dataset, "calibration"), len(signature.state_labels)
             ),
@@ -992,8 +993,10 @@ def _draws(dataset: xr.Dataset) -> tuple[Draw, ...]:
         columns[name] = found.values.tolist()
     for name, (attribute, _) in ROUNDED.items():
         values = columns.pop(name)
-        if attribute not in OPTIONAL and min(values) < 0:
-            raise ValueError(f"{name} of member {values.index(min(values))} is {min(values)}")
+        most = MOST_REDRAWS - 1 if name == "redrawn" else np.inf
+        for number, value in enumerate(values):
+            if value > most or (value < 0 and attribute not in OPTIONAL):
+                raise ValueError(f"{name} of member {number} is {value}")
         columns[attribute] = [
             None if each < 0 and attribute in OPTIONAL else each for each in values
         ]

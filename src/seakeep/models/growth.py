@@ -91,13 +91,22 @@ class LeadErrors:
         """Read what a file keeps; None where it was written before these were kept."""
         if "lead_errors" not in dataset:
             return None
-        return cls(
+        made = cls(
             store.numbers(dataset, "residual_covariance", (channels, channels)),
             store.numbers(dataset, "lead_errors", (None, channels)),
             store.numbers(dataset, "ending_errors", (None, channels))
             if "ending_errors" in dataset
             else np.zeros((0, channels)),
         )
+        # Of a covariance no correlation is beyond one; margins are of rounding.
+        bound = np.sqrt(np.maximum(np.diag(made.residual), 0.0))
+        if np.any(np.abs(made.residual) > 1.001 * np.outer(bound, bound)):
+            raise ValueError("residual_covariance is no covariance")
+        if not np.allclose(made.residual, made.residual.T, rtol=1e-6, atol=0.0):
+            raise ValueError("residual_covariance is not symmetric")
+        if np.any(made.rms < 0) or np.any(made.ending < 0):
+            raise ValueError("lead_errors or ending_errors are negative")
+        return made
 
 
 class Source(NamedTuple):

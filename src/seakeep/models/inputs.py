@@ -546,6 +546,8 @@ class FittedAlignment:
             len(counts) > 1
             or None in needed
             or any(each is not None and each <= 0 for each in positive)
+            or (made.celerity_spread is not None and made.celerity_spread < 0)
+            or made.surge_range[0] > made.surge_range[1]
         ):
             raise ValueError("the alignment of the inputs is not one of a vessel in waves")
         return made

@@ -512,14 +512,15 @@ class HankelDMDcModel(SingleModel, store.Saved):
         rows = states if settings.delay_rows == "ridge" else len(signature.states)
         width = states + signature.input_scale.mean.size * (signature.input_delays + 1)
         shape = (rows, width + signature.direct_scale.mean.size)
+        store.check_settings(settings, signature)
         return cls(
             settings=settings,
             coefficients=store.numbers(dataset, "coefficients", shape),
             signature=signature,
-            training=Training.from_json(store.content(dataset, "training")),
+            training=Training.from_json(store.content(dataset, "training"), signature.dt, shape[1]),
             selection=str(dataset.attrs["selection"]),
             learnt=Kept(
-                Coverage.from_dataset(dataset),
+                Coverage.from_dataset(dataset, signature),
                 LeadErrors.from_dataset(dataset, len(signature.states)),
             ),
         )

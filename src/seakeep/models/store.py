@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import metadata
 from pathlib import Path
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -21,13 +21,16 @@ from seakeep.models.interface import Json, Scale, Signature
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.readouts import FittedReadOut
 
+if TYPE_CHECKING:
+    from seakeep.models.settings import HankelSettings
+
 __all__ = [
     "FORMAT_VERSION",
     "Saved",
     "as_json",
+    "check_settings",
     "content",
     "document",
-    "labels",
     "numbers",
     "pack_signature",
     "read",
@@ -113,10 +116,13 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
         for group, size in sizes.items()
     }
     for group, scale in scales.items():
-        if np.any(scale.std <= 0) or np.any(scale.spread < 0) or np.any(scale.reach < 0):
+        if np.any(scale.std < 1 / GREATEST) or np.any(scale.spread < 0) or np.any(scale.reach < 0):
             raise ValueError(f"a standard deviation or a reach of {group} channels is negative")
     names = [label.name for label in kept.states]
     inputs = [label.name for label in kept.inputs]
+    for named in (names, inputs):
+        if twice := [each for each in named if named.count(each) > 1]:
+            raise ValueError(f"signature names the channel {twice[0]} more than once")
     aligned = input_map.alignment
     if aligned is not None and (list(aligned.inputs), list(aligned.states)) != (inputs, names):
         raise ValueError(
@@ -137,6 +143,33 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
     )
 
 
+def check_settings(settings: HankelSettings, signature: Signature, delays: bool = True) -> None:
+    """Refuse settings of a file that its matrices or input map contradict: a ValueError."""
+    maps: dict[str, Any] = {each.kind: each for each in Chain.of(signature.input_map).maps}
+    lead, aligned, observed = (
+        maps.get(kind) for kind in ("lead", "probe_alignment", "observables")
+    )
+    stated = {"lead": int(settings.lead), "observables": settings.observables}
+    fitted = {
+        "lead": 0 if lead is None else lead.samples,
+        "observables": () if observed is None else observed.observables,
+    }
+    if aligned is not None:  # an optional one may be left out
+        stated["alignment"] = settings.alignment and replace(settings.alignment, surge="none")
+        fitted["alignment"] = replace(aligned.settings, surge="none")
+    if settings.readouts != "auto":
+        stated["readouts"] = [each.channel for each in settings.readouts]
+        fitted["readouts"] = [each.channel for each in signature.readouts]
+    if delays:
+        for key in ("state_delays", "input_delays"):
+            stated[key], fitted[key] = getattr(settings, key), getattr(signature, key)
+    for key, value in fitted.items():
+        if stated[key] != value:
+            raise ValueError(
+                f"{key} is {stated[key]} in its settings, and it was fitted with {value}"
+            )
+
+
 @dataclass(frozen=True)
 class _Signature:
     """What the attribute ``signature`` of a file holds."""
@@ -148,11 +181,6 @@ class _Signature:
     input_delays: int
     input_map: Json
     readouts: list[Json]
-
-
-def labels(dataset: xr.Dataset, group: Literal["states", "inputs"]) -> tuple[ChannelLabel, ...]:
-    """Labels of the states or inputs that a file names."""
-    return typed(tuple[ChannelLabel, ...], content(dataset, "signature").get(group), group)
 
 
 def content(dataset: xr.Dataset, name: str) -> Json:

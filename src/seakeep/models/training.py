@@ -75,12 +75,26 @@ class Training:
         return asdict(self)
 
     @classmethod
-    def from_json(cls, content: Json) -> Self:
-        """Rebuild from :meth:`to_json`."""
+    def from_json(cls, content: Json, dt: float, regressors: int) -> Self:
+        """Rebuild from :meth:`to_json`, for a model of so many regressors; raises ValueErrors."""
         made = typed(cls, content)
         lengths = {len(made.runs), len(made.first), len(made.stop), len(made.columns)}
         if len(lengths) != 1:
             raise ValueError("training names runs, instants and columns of unequal number")
+        for run, first, stop, columns in zip(
+            made.runs, made.first, made.stop, made.columns, strict=True
+        ):
+            if not (abs(first) + abs(stop) < np.inf and 0 < columns <= (stop - first) / dt + 1.5):
+                raise ValueError(
+                    f"training takes {columns} snapshot pairs of {run}, from {first:g} to {stop:g} "
+                    f"s, in steps of {dt:g} s"
+                )
+        if not 0 <= made.ridge < np.inf:
+            raise ValueError(f"training.ridge is {made.ridge:g}")
+        if not 0 <= made.rank <= regressors:
+            raise ValueError(f"training.rank is {made.rank}, and there are {regressors} regressors")
+        if not all(0 < each < np.inf for each in made.clipped):
+            raise ValueError("training.clipped holds a modulus that is none")
         return made
 
 

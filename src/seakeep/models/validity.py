@@ -13,7 +13,8 @@ from scipy import fft
 from seakeep.arrays import BoolArray, FloatArray
 from seakeep.core.wave_bands import PER_OCTAVE, band_edges, band_energy
 from seakeep.models import labelled, store
-from seakeep.models.interface import Model
+from seakeep.models.checks import typed
+from seakeep.models.interface import Model, Signature, plain
 from seakeep.waves import GRAVITY
 
 __all__ = ["Coverage", "Waves", "compare_waves", "outside_training"]
@@ -21,6 +22,8 @@ __all__ = ["Coverage", "Waves", "compare_waves", "outside_training"]
 TRAINED = 0.01
 """Part of the training energy from which a band, or a neighbour of it, counts as trained: the
 leakage of a taper stays below it, and the tail of a sea above twice its peak frequency too."""
+MOST_BANDS = 100 * PER_OCTAVE
+"""Bands of a training record: a hundred octaves are more than any holds."""
 CYCLES = 5.0
 """Periods from which on a spectrum shows which waves it holds."""
 
@@ -128,7 +131,7 @@ class Coverage:
         """Coverage of the windows of several runs, each (time, channel)."""
         longest = max(len(each) for each in series)
         first = int(np.floor(PER_OCTAVE * np.log2(1.0 / (longest * dt))))
-        count = int(np.floor(PER_OCTAVE * np.log2(0.5 / dt))) + 1 - first
+        count = _last_band(dt) + 1 - first
         energy = sum(
             (band_energy(each, dt, first, count) for each in series),
             np.zeros((len(channels), count)),
@@ -191,15 +194,28 @@ class Coverage:
         return out
 
     @classmethod
-    def from_dataset(cls, dataset: xr.Dataset) -> Coverage:
-        """Rebuild from :meth:`to_variables`."""
-        channels = tuple(label.name for label in store.labels(dataset, "inputs"))
-        shares = store.numbers(dataset, "wave_shares", (len(channels), None))
+    def from_dataset(cls, dataset: xr.Dataset, signature: Signature) -> Coverage:
+        """Rebuild from :meth:`to_variables`; what no training gives raises a ValueError."""
+        channels = tuple(signature.inputs)
+        first = typed(int, plain(dataset["wave_shares"].attrs["first"]), "wave_shares.first")
+        bands = _last_band(signature.dt) + 1 - first
+        if not 0 < bands <= MOST_BANDS:
+            raise ValueError(f"wave_shares.first is {first}, and the last band {first + bands - 1}")
+        shares = store.numbers(dataset, "wave_shares", (len(channels), bands))
+        if np.any(shares < 0) or np.any(shares.sum(axis=1) > 1 + 1e-9):  # rounding of a sum
+            raise ValueError("wave_shares are no parts of an energy")
         most = [np.full(len(channels), np.nan)] * 2  # a file of an earlier version
         if "wave_heights" in dataset:
             keys = ("wave_heights", "wave_steepnesses")
             most = [store.numbers(dataset, key, (len(channels),)) for key in keys]
-        return cls(channels, int(dataset["wave_shares"].attrs["first"]), shares, *most)
+            if any(np.any(each < 0) for each in most):
+                raise ValueError("a wave height or steepness of the training is negative")
+        return cls(channels, first, shares, *most)
+
+
+def _last_band(dt: float) -> int:
+    """Number of the band that holds the highest frequency of a record."""
+    return int(np.floor(PER_OCTAVE * np.log2(0.5 / dt)))
 
 
 def compare_waves(model: Model, run: xr.Dataset, start: float, steps: int) -> list[Waves]:
