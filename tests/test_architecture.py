@@ -16,6 +16,7 @@ FLOORS = (
     ("errors",),
     ("sizes",),
     ("arrays",),
+    ("checked",),
     ("files",),
     ("conventions", "waves"),
     ("toml",),

@@ -22,13 +22,13 @@ __all__ = [
     "FloatArray",
     "IntArray",
     "as_bundle",
-    "as_generator",
     "as_real",
     "as_series",
     "as_table",
     "fraction",
     "number",
     "positive",
+    "time_step",
     "whole_number",
 ]
 
@@ -45,6 +45,9 @@ MOST_INTEGER = 2**63 - 1
 
 GREATEST = 1e150
 """Samples beyond this overflow when squared; no sensor reads them."""
+
+SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e9
+"""Seconds between samples: a nanosecond, and thirty years."""
 
 _REMEDIES = {
     "c": "Give its real part or its modulus",
@@ -250,6 +253,17 @@ def positive(value: object, name: str, unit: str) -> float:
     return found
 
 
+def time_step(value: object) -> float:
+    """Return a time step in seconds as a float; steps that no record has overflow elsewhere."""
+    found = positive(value, "the time step", "s")
+    if not SHORTEST_STEP <= found <= LONGEST_STEP:
+        raise RequestError(
+            f"the time step must lie between {SHORTEST_STEP:g} and {LONGEST_STEP:g} s; received "
+            f"{value!r}."
+        )
+    return found
+
+
 def fraction(value: object, name: str) -> float:
     """Return a number between 0 and 1, both excluded."""
     found = number(value, name)
@@ -274,13 +288,3 @@ def as_table(value: object, name: str) -> Mapping[Any, Any]:
     if not isinstance(value, Mapping):
         raise RequestError(f"{name} must be a mapping, such as a dict; received {value!r}.")
     return value
-
-
-def as_generator(rng: object) -> np.random.Generator:
-    """Return a source of random numbers; refuse a seed."""
-    if not isinstance(rng, np.random.Generator):
-        raise RequestError(
-            f"rng must be a numpy.random.Generator; received {type(rng).__name__}. Make one with "
-            "numpy.random.default_rng(seed)."
-        )
-    return rng

@@ -30,6 +30,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray, fraction
+from seakeep.checked import checked
 from seakeep.core import metrics as core
 from seakeep.core.bootstrap import block_length, bootstrap_indices, outer_tail
 from seakeep.errors import RequestError, SeakeepWarning
@@ -93,6 +94,7 @@ class Measure(Protocol[Labels, Numbers]):
     ) -> Any: ...
 
 
+@checked
 def labelled(
     measure: Callable[..., Any],
     keeps: Literal["channel", "time", "neither"],
@@ -117,6 +119,8 @@ def labelled(
     callable
         The measure, under the name and docstring of the one of arrays.
     """
+    if keeps not in ("channel", "time", "neither"):
+        raise RequestError(f"keeps must be 'channel', 'time' or 'neither'; received {keeps!r}.")
     name = label or measure.__name__
 
     @functools.wraps(measure)
@@ -231,6 +235,7 @@ def _bounds(found: FloatArray, blocks: float, level: float, axis: int) -> FloatA
     return out
 
 
+@checked
 def anrmse_differences(
     predicted: Sequence[Sequence[xr.Dataset]],
     measured: Sequence[xr.Dataset],
@@ -273,6 +278,12 @@ def anrmse_differences(
     True
     """
     level = fraction(interval, "interval")
+    counts = [len(of_model) for of_model in predicted]
+    if not counts or not measured or set(counts) != {len(measured)}:
+        raise RequestError(
+            f"predicted holds forecasts of {counts} runs, per model, and measured {len(measured)} "
+            "runs. Give every model one forecast of each run, and at least one of each."
+        )
     values, draws, blocks = [], [], 0.0
     bounds, own_bounds = [], []
     for seed, (each, *forecasts) in enumerate(zip(measured, *predicted, strict=True)):

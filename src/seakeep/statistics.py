@@ -18,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, as_generator
+from seakeep.arrays import FloatArray
+from seakeep.checked import checked
 from seakeep.core import bootstrap as _bootstrap
 from seakeep.core import coverage as _coverage
 from seakeep.core import divergence as _divergence
@@ -124,6 +125,7 @@ def moving_block_bootstrap(
     *,
     segments: Sequence[int] | None = None,
 ) -> FloatArray: ...
+@checked
 @functools.wraps(_bootstrap.moving_block_bootstrap)
 def moving_block_bootstrap(
     series: Any,
@@ -213,6 +215,7 @@ def jsd_interval(
     grid: npt.ArrayLike | None = None,
     segments: Sequence[int] | None = None,
 ) -> JsdInterval: ...
+@checked
 @functools.wraps(_divergence.jsd_interval)
 def jsd_interval(
     predicted: Any,
@@ -244,7 +247,7 @@ def jsd_interval(
             f"measured has the dimensions {measured[names[0]].dims}; ('time',) is needed. Select "
             "one run."
         )
-    children = as_generator(rng).spawn(len(names))
+    children = rng.spawn(len(names))
     found = [
         _divergence_of(
             name,
@@ -277,6 +280,7 @@ def coverage(lower: xr.Dataset, upper: xr.Dataset, measured: xr.Dataset) -> xr.D
 def coverage(
     lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
 ) -> BandCoverage: ...
+@checked
 @functools.wraps(_coverage.coverage)
 def coverage(lower: Any, upper: Any, measured: Any) -> Any:
     """Take Datasets too; the docstring shown is that of the array function."""
@@ -324,6 +328,7 @@ def coverage_table(
     level: float = 0.95,
     waves: npt.ArrayLike | None = None,
 ) -> CoverageTable: ...
+@checked
 @functools.wraps(_coverage.coverage_table)
 def coverage_table(
     lower: Any, upper: Any, measured: Any, level: float = 0.95, waves: Any = None

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import FloatArray, as_real
+from seakeep.checked import checked
 from seakeep.errors import RequestError
 
 __all__ = ["GRAVITY", "group_speed", "phase_speed", "wavelength_to_frequency", "wavenumber"]
@@ -54,6 +55,7 @@ def _side_by_side(first: FloatArray, depth: FloatArray) -> tuple[FloatArray, Flo
     return one, other
 
 
+@checked
 def wavenumber(
     frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf, gravity: float = GRAVITY
 ) -> FloatArray:
@@ -104,6 +106,7 @@ def wavenumber(
     return k
 
 
+@checked
 def phase_speed(
     frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf, gravity: float = GRAVITY
 ) -> FloatArray:
@@ -134,6 +137,7 @@ def phase_speed(
         return np.where(omega > 0, omega / k, np.sqrt(gravity * h))
 
 
+@checked
 def group_speed(
     frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf, gravity: float = GRAVITY
 ) -> FloatArray:
@@ -168,6 +172,7 @@ def group_speed(
     return 0.5 * phase_speed(omega, h, gravity) * (1.0 + ratio)
 
 
+@checked
 def wavelength_to_frequency(
     wavelength: npt.ArrayLike, depth: npt.ArrayLike = np.inf, gravity: float = GRAVITY
 ) -> FloatArray:

@@ -8,12 +8,15 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import FloatArray, as_real, number, positive
+from seakeep.arrays import FloatArray, as_real, number, time_step
+from seakeep.checked import checked
 from seakeep.core.metrics import over_channels, paired
 from seakeep.errors import RequestError
 
 __all__ = ["BandErrors", "band_error_over_time", "split_bands"]
 
+LEAST_SPLIT = 1e-6
+"""Split frequency over the sampling rate: below it the filter's coefficients are rounding."""
 ORDER = 4
 """Of the Butterworth filter; forwards and backwards its gain at the split frequency is one half."""
 
@@ -31,6 +34,7 @@ class BandErrors(NamedTuple):
     wave: FloatArray
 
 
+@checked
 def split_bands(
     series: npt.ArrayLike, dt: float, frequency: float
 ) -> tuple[FloatArray, FloatArray]:
@@ -69,11 +73,11 @@ def split_bands(
         raise RequestError(
             f"series has shape {x.shape}; (…, time, channel) with at least eight samples is needed."
         )
-    dt, frequency = positive(dt, "the time step", "s"), number(frequency, "the frequency")
-    if not (dt > 0 and 0 < frequency < 0.5 / dt):
+    dt, frequency = time_step(dt), number(frequency, "the frequency")
+    if not LEAST_SPLIT < frequency * dt < 0.5:
         raise RequestError(
             f"bands split at {frequency:g} Hz do not fit a time step of {dt:g} s; the split must "
-            "lie between 0 and half the sampling rate."
+            "lie between a millionth of the sampling rate and half the sampling rate."
         )
     sections = scipy.signal.butter(ORDER, frequency, fs=1.0 / dt, output="sos")
     reach = min(x.shape[-2] - 1, round(1.0 / (frequency * dt)))
@@ -82,6 +86,7 @@ def split_bands(
     return low, x - low
 
 
+@checked
 def band_error_over_time(
     *,
     predicted: npt.ArrayLike,

@@ -19,10 +19,10 @@ from scipy import special
 from seakeep.arrays import (
     FloatArray,
     IntArray,
-    as_generator,
     as_series,
     whole_number,
 )
+from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 from seakeep.sizes import check_numbers
 
@@ -108,6 +108,7 @@ def _autocovariance(x: FloatArray, lags: int, segments: IntArray) -> FloatArray:
     return np.array([apart[: apart.size - k] @ apart[k:] for k in range(lags + 1)]) / x.size
 
 
+@checked
 def lag_one_correlation(series: npt.ArrayLike, segments: Sequence[int] | None = None) -> float:
     r"""Lag-one correlation :math:`\varphi` of the paper, its denominator squared.
 
@@ -164,6 +165,7 @@ def _politis_white(x: FloatArray, kind: str, segments: IntArray) -> float:
     return float(np.cbrt(2.0 * slope**2 / variance * n))
 
 
+@checked
 def choose_block_length(
     series: npt.ArrayLike,
     rule: BlockRule = "carlstein",
@@ -215,6 +217,7 @@ def choose_block_length(
     return BlockChoice(samples=samples, optimum=optimum, cap=cap, rule=rule)
 
 
+@checked
 def block_length(
     series: npt.ArrayLike,
     rule: BlockRule = "carlstein",
@@ -315,7 +318,6 @@ def bootstrap_indices(
     whole_number(n_samples, "n_samples")
     whole_number(n_series, "n_series")
     whole_number(block_length, "block_length")
-    as_generator(rng)
     asked = f"n_series = {n_series} series of {n_samples} samples take"
     check_numbers(asked, n_series * n_samples, "Draw fewer.")
     lengths = _as_segments(segments, n_samples)
@@ -347,6 +349,7 @@ def outer_tail(blocks: float, level: float) -> float:
     return float(special.ndtr(np.sqrt(blocks / (blocks - 1.0)) * student))
 
 
+@checked
 def moving_block_bootstrap(
     series: npt.ArrayLike,
     n_series: int,

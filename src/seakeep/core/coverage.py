@@ -9,6 +9,7 @@ import numpy.typing as npt
 from scipy import special
 
 from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, fraction, number
+from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 
 __all__ = [
@@ -50,6 +51,7 @@ class BandCoverage:
     relative_width: FloatArray
 
 
+@checked
 def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike) -> BandCoverage:
     """Fraction of the instants at which a band holds the measurement, and its mean width.
 
@@ -147,6 +149,7 @@ class CoverageTable:
     crps: FloatArray
 
 
+@checked
 def winkler_score(
     lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike, level: float = 0.95
 ) -> FloatArray:
@@ -181,6 +184,7 @@ def winkler_score(
     return found
 
 
+@checked
 def band_crps(
     lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike, level: float = 0.95
 ) -> FloatArray:
@@ -237,6 +241,7 @@ def _triple(
     return low, high, y
 
 
+@checked
 def coverage_table(
     lower: npt.ArrayLike,
     upper: npt.ArrayLike,
@@ -376,6 +381,7 @@ class BoxStatistics:
         return self.upper_quartile - self.lower_quartile
 
 
+@checked
 def box_statistics(values: npt.ArrayLike, reach: float = 1.5) -> BoxStatistics:
     """Quartiles, whiskers and outliers of a sample (Tukey), as matplotlib draws them.
 

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from scipy import fft
 
 from seakeep.arrays import FloatArray, IntArray, as_bundle, as_real, fraction, whole_number
+from seakeep.checked import checked
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
 from seakeep.sizes import MOST_BINS, check_numbers, check_size
@@ -122,6 +123,7 @@ def _positive(h: FloatArray, x: FloatArray) -> FloatArray:
     return h
 
 
+@checked
 def kernel_bandwidth(series: npt.ArrayLike, bandwidth: Bandwidth = "paper") -> float:
     r"""Bandwidth of a normal kernel.
 
@@ -204,6 +206,7 @@ def _densities(x: FloatArray, grid: FloatArray, h: FloatArray) -> FloatArray:
     return out
 
 
+@checked
 def kernel_density(
     series: npt.ArrayLike, grid: npt.ArrayLike, bandwidth: Bandwidth = "paper"
 ) -> FloatArray:
@@ -250,6 +253,7 @@ def kernel_density(
     return out[0] if np.ndim(series) == 1 else out
 
 
+@checked
 def density_grid(
     *series: npt.ArrayLike, bandwidth: Bandwidth = "paper", points: int = 512, margin: float = 3.0
 ) -> FloatArray:
@@ -335,6 +339,7 @@ def bootstrapped_densities(
     return _densities(drawn, grid, np.where(h > 0, h, own))
 
 
+@checked
 def density_interval(
     series: npt.ArrayLike,
     *,

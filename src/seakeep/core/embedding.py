@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from seakeep.arrays import FloatArray, as_real, whole_number
+from seakeep.checked import checked
 from seakeep.errors import RequestError
 
 __all__ = ["History", "TrainingWindow", "embed", "snapshot_matrices", "training_window", "unembed"]
@@ -47,6 +48,7 @@ class TrainingWindow:
         return slice(self.first, self.last + 1)
 
 
+@checked
 def training_window(
     last: int, window: int | None, state_delays: int, input_delays: int, history: History
 ) -> TrainingWindow:
@@ -86,6 +88,7 @@ def training_window(
     return TrainingWindow(first, last, max(first, earliest))
 
 
+@checked
 def embed(series: FloatArray, delays: int, first: int, count: int) -> FloatArray:
     """Extended snapshots as columns.
 
@@ -116,7 +119,8 @@ def embed(series: FloatArray, delays: int, first: int, count: int) -> FloatArray
            [0., 1., 2., 3.]])
     """
     series = as_real(series, "the series")
-    whole_number(delays, "delays", least=0)
+    for value, name in ((delays, "delays"), (first, "first"), (count, "count")):
+        whole_number(value, name, least=0)
     if series.ndim != 2 or not 0 <= first - delays <= first + count <= series.shape[0]:
         raise RequestError(
             f"columns {first} to {first + count - 1} with {delays} delays do not lie in a series "
@@ -129,6 +133,7 @@ def embed(series: FloatArray, delays: int, first: int, count: int) -> FloatArray
     return out
 
 
+@checked
 def unembed(columns: FloatArray, channels: int) -> FloatArray:
     """Recover the series from its extended snapshots; the inverse of :func:`embed`.
 
@@ -164,6 +169,7 @@ def unembed(columns: FloatArray, channels: int) -> FloatArray:
     return np.concatenate([oldest_first, blocks[0].T])
 
 
+@checked
 def snapshot_matrices(
     states: FloatArray,
     inputs: FloatArray,

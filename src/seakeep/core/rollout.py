@@ -32,6 +32,7 @@ import numpy.typing as npt
 from scipy.linalg import blas
 
 from seakeep.arrays import BoolArray, FloatArray, as_real
+from seakeep.checked import checked
 from seakeep.errors import RequestError
 
 __all__ = ["rollout", "rollouts"]
@@ -61,6 +62,7 @@ MIRRORED_ENTRY = 0.065
 MOST_DOUBLINGS = 6
 
 
+@checked
 def rollout(
     A: npt.ArrayLike,
     B: npt.ArrayLike,
@@ -199,7 +201,8 @@ def _read(
             f"histories {np.shape(histories)} and inputs {driving.shape} do not fit A {a.shape}: "
             f"a history has {a.shape[1]} values, and both have one row per window."
         )
-    groups, further = [(b, driving)], () if direct is None else np.shape(direct)
+    direct = None if direct is None else as_real(direct, "direct", greatest=np.inf)
+    groups, further = [(b, driving)], () if direct is None else direct.shape
     if direct is not None:
         if len(further) != 3 or (len(further) and further[2] > b.shape[1]):
             raise RequestError(
@@ -209,7 +212,7 @@ def _read(
         split = b.shape[1] - further[2]
         groups = [
             (b[:, :split], driving),
-            (b[:, split:], as_real(direct, "direct", greatest=np.inf)),
+            (b[:, split:], direct),
         ]
     steps = _steps(groups[0][0], driving)
     if direct is not None and further[:2] != (len(start), steps):

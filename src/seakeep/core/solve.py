@@ -41,6 +41,7 @@ from scipy import linalg
 from scipy.linalg import blas, lapack
 
 from seakeep.arrays import FloatArray, as_real, number, whole_number
+from seakeep.checked import checked
 from seakeep.core.embedding import TrainingWindow, embed
 from seakeep.core.gram import (
     Piece,
@@ -95,6 +96,7 @@ class Solution:
     clipped: tuple[float, ...] = ()
 
 
+@checked
 def identify(
     states: Sequence[FloatArray],
     inputs: Sequence[FloatArray],
@@ -160,6 +162,8 @@ def identify(
         groups.append((_checked(direct, windows, 0, "direct"), 0))
     if not number(ridge, "ridge") >= 0 or ridge == np.inf:
         raise RequestError(f"ridge must be zero or positive, and finite; received {ridge!r}.")
+    if radius is not None and not 0 < radius < np.inf:
+        raise RequestError(f"radius must be positive and finite; received {radius!r}.")
     groups = [(runs, delays) for runs, delays in groups if runs[0].shape[1]]
     if not groups or (state_delays is None and all_rows):
         raise RequestError(

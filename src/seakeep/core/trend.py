@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.arrays import FloatArray, IntArray, as_generator, as_series, fraction, whole_number
+from seakeep.arrays import FloatArray, IntArray, as_series, fraction, whole_number
+from seakeep.checked import checked
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.errors import DataError, RequestError
 
@@ -54,6 +55,7 @@ def _instants(time: npt.ArrayLike | None, samples: int) -> FloatArray:
     return t
 
 
+@checked
 def trend_test(
     error_over_time: npt.ArrayLike,
     *,
@@ -114,7 +116,6 @@ def trend_test(
     t = _instants(time, x.size)
     whole_number(n_series, "n_series")
     level = fraction(level, "level")
-    as_generator(rng)
     centred = t - t.mean()
     weights = centred / (centred @ centred)
     slope = float(weights @ x)

@@ -16,7 +16,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.arrays import FloatArray, IntArray, as_generator, as_real, fraction, whole_number
+from seakeep.arrays import FloatArray, IntArray, as_real, fraction, whole_number
+from seakeep.checked import checked
 from seakeep.core.bootstrap import outer_tail
 from seakeep.errors import RequestError
 
@@ -28,6 +29,7 @@ AT_ONCE = 4_000_000
 """Values of redrawn cells at a time: 32 MB."""
 
 
+@checked
 def two_way_interval(
     statistic: Callable[..., FloatArray],
     *cells: npt.ArrayLike,
@@ -84,7 +86,6 @@ def two_way_interval(
             f"{', '.join(str(each.shape) for each in tables) or 'of none'}."
         )
     count, part = whole_number(n_series, "n_series"), fraction(level, "level")
-    as_generator(rng)
     shape = shapes.pop()
     rows, columns = (
         _positions(size, whole_number(block, "a block"), count, rng)
@@ -113,6 +114,7 @@ def _positions(size: int, block: int, count: int, rng: np.random.Generator) -> I
     return positions.reshape(count, -1)[:, :size].astype(np.intp, copy=False)
 
 
+@checked
 def overlap_block(spans: Sequence[tuple[str, float, float]]) -> int:
     """Block length for windows that overlap: one, and how many others a window shares on average.
 

@@ -7,7 +7,8 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import FloatArray, as_series, number, positive
+from seakeep.arrays import FloatArray, as_series, number, time_step
+from seakeep.checked import checked
 from seakeep.errors import RequestError
 
 __all__ = ["band_pass", "complementary_filter", "differentiate", "envelope_squared", "integrate"]
@@ -125,7 +126,7 @@ def _checked_band(band: tuple[float, float], dt: float, samples: int) -> tuple[f
         low, high = (number(edge, "an edge of the band") for edge in band)
     except (TypeError, ValueError) as error:
         raise RequestError(f"a band is (low, high) in Hz; received {band!r}.") from error
-    nyquist = 0.5 / positive(dt, "the time step", "s")
+    nyquist = 0.5 / time_step(dt)
     if not 0 < low < high <= nyquist:
         raise RequestError(
             f"a band needs 0 < low < high, and high at most the Nyquist frequency ({nyquist:g} "
@@ -165,6 +166,7 @@ def _integrated(
     return _filtered(extended, gain / (1j * omega) ** times, padding)
 
 
+@checked
 def band_pass(series: npt.ArrayLike, dt: float, band: tuple[float, float]) -> FloatArray:
     """Keep a band of frequencies, without phase shift.
 
@@ -190,6 +192,7 @@ def band_pass(series: npt.ArrayLike, dt: float, band: tuple[float, float]) -> Fl
     return _integrated(series, dt, band, 0)
 
 
+@checked
 def integrate(
     series: npt.ArrayLike, dt: float, band: tuple[float, float], times: int = 1
 ) -> FloatArray:
@@ -238,6 +241,7 @@ def integrate(
     return _integrated(series, dt, band, times)
 
 
+@checked
 def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
     """First derivative by fourth-order central differences.
 
@@ -272,7 +276,7 @@ def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
     True
     """
     x = as_series(series, minimum=5, channels=True)
-    step = positive(dt, "the time step", "s")
+    step = time_step(dt)
     out = np.empty_like(x)
     out[2:-2] = (x[:-4] - 8 * x[1:-3] + 8 * x[3:-1] - x[4:]) / 12
     first = np.array([-25.0, 48, -36, 16, -3]) / 12
@@ -283,6 +287,7 @@ def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
     return out / step
 
 
+@checked
 def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
     r"""Squared envelope of a narrow-banded series, :math:`|x + i\,\mathcal H x|^2`.
 
@@ -315,7 +320,7 @@ def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
     True
     """
     array = as_series(series, minimum=4, channels=True)
-    positive(dt, "the time step", "s")
+    time_step(dt)
     array = array - array.mean(axis=0)
     padding = array.shape[0] - 1
     extended = np.pad(array, [(padding, padding)] + [(0, 0)] * (array.ndim - 1), mode="reflect")
@@ -325,6 +330,7 @@ def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
     return squared
 
 
+@checked
 def complementary_filter(
     position: npt.ArrayLike,
     acceleration: npt.ArrayLike,
@@ -391,7 +397,7 @@ def complementary_filter(
             f"position and acceleration must be one channel each, of one length; received shapes "
             f"{x.shape} and {a.shape}."
         )
-    nyquist = 0.5 / positive(dt, "the time step", "s")
+    nyquist = 0.5 / time_step(dt)
     if not 0 < number(crossover, "the crossover") < 0.8 * nyquist:
         raise RequestError(
             f"the crossover must lie between 0 and {0.8 * nyquist:g} Hz (0.8 of the Nyquist "

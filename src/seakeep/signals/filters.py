@@ -6,12 +6,15 @@ array of the shape they were given.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 import scipy
 from scipy import special
 
-from seakeep.arrays import FloatArray, as_series, number, positive
+from seakeep.arrays import FloatArray, as_series, number, positive, time_step
+from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import as_seconds, span_text, uniform_step
 from seakeep.sizes import MOST_TAPS, check_size
@@ -19,6 +22,7 @@ from seakeep.sizes import MOST_TAPS, check_size
 __all__ = ["low_pass", "lowpass_taps", "resample"]
 
 
+@checked
 def lowpass_taps(
     sampling_rate: float, passband: float, stopband: float, attenuation: float = 60.0
 ) -> FloatArray:
@@ -52,7 +56,10 @@ def lowpass_taps(
     """
     positive(sampling_rate, "the sampling rate", "Hz")
     passband, stopband = number(passband, "passband"), number(stopband, "stopband")
-    positive(attenuation, "the attenuation", "dB")
+    if not LEAST_ATTENUATION <= number(attenuation, "the attenuation") < math.inf:
+        raise RequestError(
+            f"the attenuation must be at least {LEAST_ATTENUATION:g} dB; received {attenuation!r}."
+        )
     if not 0 < passband < stopband < sampling_rate / 2:
         raise RequestError(
             f"a low-pass filter needs 0 < passband < stopband < half the sampling rate; received "
@@ -108,6 +115,7 @@ def odd_extension(array: FloatArray, count: int) -> FloatArray:
     return np.pad(np.concatenate([head, array, tail]), rest, mode="edge")
 
 
+@checked
 def low_pass(
     series: npt.ArrayLike,
     dt: float,
@@ -154,7 +162,7 @@ def low_pass(
     """
     array = as_series(series, channels=True)
     edge = 1.25 * passband if stopband is None else stopband
-    taps = lowpass_taps(1.0 / positive(dt, "the time step", "s"), passband, edge, attenuation)
+    taps = lowpass_taps(1.0 / time_step(dt), passband, edge, attenuation)
     return apply_taps(array, taps)
 
 
@@ -167,10 +175,13 @@ def apply_taps(array: FloatArray, taps: FloatArray) -> FloatArray:
     return filtered
 
 
+LEAST_ATTENUATION = 8.0
+"""dB; Kaiser's formula holds from there on."""
 PASSBAND = 0.8
 """Part of the lower Nyquist frequency up to which resampling keeps what there is."""
 
 
+@checked
 def resample(
     series: npt.ArrayLike,
     time: npt.ArrayLike,

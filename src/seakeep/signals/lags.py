@@ -9,7 +9,15 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import FloatArray, IntArray, as_real, as_series, positive
+from seakeep.arrays import (
+    FloatArray,
+    IntArray,
+    as_real,
+    as_series,
+    positive,
+    time_step,
+)
+from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import check_order
 
@@ -45,6 +53,7 @@ class Lags:
     at_zero: FloatArray
 
 
+@checked
 def windowed_lags(
     series: npt.ArrayLike,
     reference: npt.ArrayLike,
@@ -90,11 +99,20 @@ def windowed_lags(
     True
     """
     a, b = as_series(series), as_series(reference)
-    positive(dt, "the time step", "s")
+    time_step(dt)
     if a.shape != b.shape or a.ndim != 1:
         raise RequestError(
             f"the two series must be one channel each, of one length; received shapes {a.shape} "
             f"and {b.shape}."
+        )
+    for value, name in ((window, "window"), (largest_lag, "largest_lag")):
+        positive(value, name, "s")
+    if not 0 <= overlap < 1:
+        raise RequestError(f"overlap must be at least 0 and less than 1; received {overlap!r}.")
+    if max(largest_lag, window) > a.size * dt:
+        raise RequestError(
+            f"the record lasts {a.size * dt:g} s, less than the window of {window:g} s or the "
+            f"largest lag of {largest_lag:g} s. Shorten them, in seconds."
         )
     reach = int(np.ceil(largest_lag / dt))
     length = round(window / dt)
@@ -131,6 +149,7 @@ def _peak(stretch: FloatArray, reference: FloatArray, reach: int) -> tuple[float
     return shift - reach, min(peak, 1.0), float(coefficient[reach])
 
 
+@checked
 def correlation_peak(
     first: npt.ArrayLike, second: npt.ArrayLike, dt: float, bounds: tuple[float, float]
 ) -> tuple[float, float]:
@@ -167,7 +186,7 @@ def correlation_peak(
     (0.333, 1.0)
     """
     a, b = as_pair(first, second)
-    step = positive(dt, "the time step", "s")
+    step = time_step(dt)
     limits = as_real(bounds, "bounds")
     if limits.shape != (2,):
         raise RequestError(f"bounds are a pair of lags, s; received {bounds!r}.")
@@ -307,6 +326,7 @@ class MotionAgreement:
         return rival < 2.0 * max(misfit, FINEST)
 
 
+@checked
 def compare_motion(
     series: npt.ArrayLike,
     time: npt.ArrayLike,

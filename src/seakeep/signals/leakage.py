@@ -10,7 +10,15 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import ComplexArray, FloatArray, as_series, fraction, positive
+from seakeep.arrays import (
+    ComplexArray,
+    FloatArray,
+    as_series,
+    fraction,
+    positive,
+    time_step,
+)
+from seakeep.checked import checked
 from seakeep.signals.waves import encounter_period, waves_part
 
 __all__ = ["Leakage", "find_leakage", "is_regular"]
@@ -48,6 +56,7 @@ class Leakage:
     phase: float
 
 
+@checked
 def find_leakage(
     training: Sequence[npt.ArrayLike],
     test: npt.ArrayLike,
@@ -107,7 +116,7 @@ def find_leakage(
     1.0
     """
     threshold = fraction(threshold, "threshold")
-    step = positive(dt, "the time step", "s")
+    step = time_step(dt)
     record = as_series(test, minimum=8)
     if np.ptp(record) == 0 or np.sum(np.diff(np.sign(record - record.mean())) > 0) < 2:
         return None
@@ -115,7 +124,7 @@ def find_leakage(
     record = record[part]
     waves = _analytic(record)
     length = round(positive(periods, "periods", "1") * encounter_period(record, step) / step)
-    length = min(length, record.size)
+    length = min(max(length, 1), record.size)
     if _even(waves):
         return None
     best: Leakage | None = None

@@ -25,7 +25,9 @@ from seakeep.arrays import (
     as_series,
     number,
     positive,
+    time_step,
 )
+from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.calculus import predicted_extension
 from seakeep.signals.lags import as_pair, correlation_peak, parabola_peak
@@ -103,6 +105,7 @@ class EffectiveCelerity:
     bounds: tuple[float, float]
 
 
+@checked
 def phase_celerity(
     upstream: npt.ArrayLike,
     downstream: npt.ArrayLike,
@@ -148,7 +151,7 @@ def phase_celerity(
     (Bendat and Piersol, Random Data).
     """
     first, second = as_pair(upstream, downstream)
-    step, apart = positive(dt, "the time step", "s"), positive(separation, "the separation", "m")
+    step, apart = time_step(dt), positive(separation, "the separation", "m")
     length = segment
     if length is None:
         length = min(round(60.0 / step), first.size // 2)
@@ -171,6 +174,7 @@ def phase_celerity(
     return PhaseCelerity(frequency, celerity, coherence, celerity * error / phase)
 
 
+@checked
 def effective_celerity(
     upstream: npt.ArrayLike,
     downstream: npt.ArrayLike,
@@ -218,7 +222,7 @@ def effective_celerity(
     bound; the highest peak of a narrow-banded sea can lie a period away.
     """
     first, second = as_pair(upstream, downstream)
-    step, apart = positive(dt, "the time step", "s"), positive(separation, "the separation", "m")
+    step, apart = time_step(dt), positive(separation, "the separation", "m")
     cycle = encounter_period(first, step) if period is None else positive(period, "period", "s")
     centre = apart / float(phase_speed(2 * np.pi / cycle, depth))
     bounds = (max(centre - 0.5 * cycle, 0.0), centre + 0.5 * cycle)
@@ -322,6 +326,7 @@ class Misplaced:
     sure: bool
 
 
+@checked
 def misplaced_probes(
     elevations: Mapping[str, npt.ArrayLike],
     positions: Mapping[str, float],
@@ -405,6 +410,7 @@ def _telling(series: FloatArray) -> bool:
     return int(rises.sum()) >= LEAST_WAVES and not is_regular(series)
 
 
+@checked
 def probe_separation(
     first: npt.ArrayLike, second: npt.ArrayLike, dt: float, depth: float, stated: float
 ) -> ProbeSeparation:
@@ -459,7 +465,7 @@ def probe_separation(
     3.85
     """
     a, b = as_pair(first, second, minimum=64)
-    interval, place = positive(dt, "the time step", "s"), number(stated, "the stated separation")
+    interval, place = time_step(dt), number(stated, "the stated separation")
     cross, power, k = _spectra(a, b, interval, depth)
     period = encounter_period(a, interval)
     reach = float(group_speed(2 * np.pi / period, depth)) * REACH * a.size * interval
@@ -599,7 +605,7 @@ def band_limit(series: npt.ArrayLike, dt: float, share: float = WAVE_SHARE) -> f
         raise DataError(
             "the elevation is constant: there are no waves in it. Look for a dead probe."
         )
-    frequency = fft.rfftfreq(flat.shape[0], positive(dt, "the time step", "s"))
+    frequency = fft.rfftfreq(flat.shape[0], time_step(dt))
     return float(frequency[np.searchsorted(grown, share * grown[-1])])
 
 
@@ -637,6 +643,7 @@ def carry_by_celerity(
     )
 
 
+@checked
 def delay_by_dispersion(
     series: npt.ArrayLike,
     dt: float,
@@ -693,6 +700,7 @@ def delay_by_dispersion(
     return carried.at(places).reshape(array.shape)
 
 
+@checked
 def delay_by_celerity(
     series: npt.ArrayLike, dt: float, distance: npt.ArrayLike, celerity: float
 ) -> FloatArray:
@@ -751,7 +759,7 @@ def _carried(
     A plane wave exp(−ikhξ) is Σ (2 − δ_p0) (−i)^p J_p(kh) T_p(ξ) (Jacobi and Anger), so that its
     coefficients vanish beyond p = kh faster than any power.
     """
-    step = positive(dt, "the time step", "s")
+    step = time_step(dt)
     lowest, highest = (number(value, "a distance") for value in distances)
     if not (np.isfinite(lowest) and np.isfinite(highest) and lowest <= highest):
         raise RequestError(

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import BoolArray, FloatArray, as_series, positive
+from seakeep.arrays import BoolArray, FloatArray, as_series, time_step
 from seakeep.errors import RequestError
 from seakeep.signals.filters import odd_extension
 from seakeep.signals.lags import Lags, windowed_lags
@@ -228,7 +228,7 @@ def find_stuck(
     array([300, 399])
     """
     x = as_series(series)
-    count = max(3, round(shortest / positive(dt, "the time step", "s")))
+    count = max(3, round(shortest / time_step(dt)))
     other = None if witness is None else as_series(witness)
     if other is not None and other.shape != x.shape:
         raise RequestError(
@@ -538,7 +538,7 @@ def energy_above(series: npt.ArrayLike, dt: float, edge: float) -> tuple[float, 
     (0.2, 1.0)
     """
     x = as_series(series)
-    positive(dt, "the time step", "s")
+    time_step(dt)
     period = dominant_period(x, dt) if np.ptp(x) else float("nan")
     if not np.isfinite(period):
         return float("nan"), float("nan")

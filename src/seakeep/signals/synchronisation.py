@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import FloatArray, IntArray, as_real, number, positive
+from seakeep.arrays import FloatArray, IntArray, as_real, positive
+from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import windowed_lags
 from seakeep.signals.time_axis import as_seconds, check_order, uniform_step
@@ -134,6 +135,7 @@ def _line(own: FloatArray, reference: FloatArray, errors: FloatArray | None) -> 
     )
 
 
+@checked
 def clock_from_pulses(
     trigger: npt.ArrayLike,
     time: npt.ArrayLike,
@@ -210,6 +212,7 @@ def clock_from_pulses(
     return replace(clock, method="trigger pulses", modulus=modulus)
 
 
+@checked
 def clock_from_correlation(
     series: npt.ArrayLike,
     time: npt.ArrayLike,
@@ -249,7 +252,8 @@ def clock_from_correlation(
     a, c = _record(series, time, "the logger")
     b, t = _record(reference, reference_time, "the reference")
     step = min(uniform_step(c, "the logger"), uniform_step(t, "the reference"))
-    window, largest_lag = positive(window, "window", "s"), number(largest_lag, "largest_lag")
+    window = positive(window, "window", "s")
+    largest_lag = positive(largest_lag, "largest_lag", "s")
     begin, end = max(c[0], t[0]), min(c[-1], t[-1])
     if end - begin < window + 2 * largest_lag:
         raise RequestError(
@@ -297,6 +301,7 @@ def _record(
     return x, check_order(t, owner)
 
 
+@checked
 def clock_from_shared(
     series: npt.ArrayLike,
     time: npt.ArrayLike,
@@ -383,6 +388,7 @@ def _refined(
     return (float(offset), float(drift)), (offset_error, drift_error), rms, int(t.size)
 
 
+@checked
 def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
     r"""Clocks of one logger in several runs, with one drift where the runs agree.
 

@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import BoolArray, FloatArray, as_real, positive
+from seakeep.arrays import BoolArray, FloatArray, as_real, time_step
+from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 
 __all__ = [
@@ -92,6 +93,7 @@ def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
     return t
 
 
+@checked
 def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
     """Time step of a uniformly sampled axis.
 
@@ -209,6 +211,7 @@ class TimeReport:
         return not self.gaps and not self.jittered
 
 
+@checked
 def inspect_times(time: npt.ArrayLike, name: str = "the run") -> TimeReport:
     """Look for gaps and jitter in a time axis.
 
@@ -258,6 +261,7 @@ def _grid(t: FloatArray) -> tuple[npt.NDArray[np.int64], float, float]:
     return place.astype(np.int64), float(step), float(begin)
 
 
+@checked
 def onto_uniform(
     time: npt.ArrayLike, series: npt.ArrayLike, name: str = "the run"
 ) -> tuple[FloatArray, FloatArray]:
@@ -363,6 +367,7 @@ class Bridged:
     long: BoolArray
 
 
+@checked
 def bridge(series: npt.ArrayLike, dt: float, longest: float) -> Bridged:
     """Fill gaps by a monotone cubic through the samples beside them.
 
@@ -393,7 +398,7 @@ def bridge(series: npt.ArrayLike, dt: float, longest: float) -> Bridged:
     array([0., 1., 2., 3.])
     """
     x = as_real(series, "the series")
-    positive(dt, "the time step", "s")
+    time_step(dt)
     if x.ndim != 1:
         raise RequestError(f"one series at a time is bridged; received shape {x.shape}.")
     missing = ~np.isfinite(x)

@@ -10,7 +10,15 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import FloatArray, IntArray, as_series, number, positive, whole_number
+from seakeep.arrays import (
+    FloatArray,
+    IntArray,
+    as_series,
+    number,
+    time_step,
+    whole_number,
+)
+from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import parabola_peak
 from seakeep.sizes import MOST_TRANSFORM, check_size
@@ -57,6 +65,7 @@ STILL = 0.2
 """Running standard deviation, as a part of the waves', below which water counts as still."""
 
 
+@checked
 def waves_part(series: npt.ArrayLike, dt: float, still: float = STILL) -> slice:
     """Part of a record in which there are waves: still water before and after them is left out.
 
@@ -120,6 +129,7 @@ def _dominant_period(x: FloatArray) -> float:
     return float(x.size / max(int(np.argmax(power)), 2))
 
 
+@checked
 def zero_up_crossings(
     series: npt.ArrayLike, dt: float, hysteresis: float = 0.0, still: float = STILL
 ) -> FloatArray:
@@ -169,7 +179,7 @@ def zero_up_crossings(
     if hysteresis > 0:
         before = _clear(x, before, hysteresis * float(x.std()))
     first = before - x[before] / (x[before + 1] - x[before])
-    crossings: FloatArray = (part.start + first) * positive(dt, "the time step", "s")
+    crossings: FloatArray = (part.start + first) * time_step(dt)
     return crossings
 
 
@@ -183,6 +193,7 @@ def _clear(x: FloatArray, before: IntArray, limit: float) -> IntArray:
     return middle
 
 
+@checked
 def encounter_period(
     series: npt.ArrayLike, dt: float, hysteresis: float = 0.0, still: float = STILL
 ) -> float:
@@ -248,10 +259,11 @@ def energy_period(series: npt.ArrayLike, dt: float) -> float:
     """
     x = as_series(series)
     power = tapered_power(x)[4:]
-    lines = np.fft.rfftfreq(x.size, positive(dt, "the time step", "s"))[4:]
+    lines = np.fft.rfftfreq(x.size, time_step(dt))[4:]
     return float((power / lines).sum() / power.sum()) if power.any() else float("nan")
 
 
+@checked
 def significant_height(series: npt.ArrayLike) -> float:
     """Significant wave height of a record, four times its standard deviation.
 
@@ -273,6 +285,7 @@ def significant_height(series: npt.ArrayLike) -> float:
     return 4.0 * float(np.std(as_series(series)))
 
 
+@checked
 def wave_heights(series: npt.ArrayLike, dt: float) -> FloatArray:
     """Heights of the single waves between successive zero-up-crossings.
 
@@ -318,6 +331,7 @@ def welch_segments(
     return length, shared
 
 
+@checked
 def wave_spectrum(
     series: npt.ArrayLike,
     dt: float,
@@ -367,7 +381,7 @@ def wave_spectrum(
     (0.5, 0.5)
     """
     x = as_series(series)
-    rate = 1.0 / positive(dt, "the time step", "s")
+    rate = 1.0 / time_step(dt)
     length, shared = welch_segments(x.shape[0], dt, segment, overlap)
     if padded is not None and padded < length:
         raise RequestError(
@@ -375,8 +389,14 @@ def wave_spectrum(
             f"{padded}. Lengthen it, or leave it out."
         )
     check_size("padded =", padded or 0, MOST_TRANSFORM, "points", "Pad less.")
+    try:
+        taper = scipy.signal.get_window(window, length)
+    except ValueError as error:
+        raise RequestError(
+            f"window: {str(error).rstrip('.!')}. Name one of scipy.signal.windows, such as 'hann'."
+        ) from None
     frequency, density = scipy.signal.welch(
-        x, rate, window=window, nperseg=length, noverlap=shared, nfft=padded
+        x, rate, window=taper, nperseg=length, noverlap=shared, nfft=padded
     )
     return frequency, density
 
@@ -391,11 +411,12 @@ def paper_welch(dt: float) -> tuple[int, int, int]:
     >>> paper_welch(0.002)
     (4096, 128, 65536)
     """
-    step = positive(dt, "the time step", "s")
+    step = time_step(dt)
     segment, overlap, padded = (max(round(n * 0.002 / step), 1) for n in (2**12, 2**7, 2**16))
     return segment, min(overlap, segment - 1), padded
 
 
+@checked
 def peak_period(
     series: npt.ArrayLike, dt: float, preset: Literal["paper", "recommended"] = "recommended"
 ) -> float:
@@ -447,6 +468,7 @@ def peak_period(
     return float(1.0 / (frequency[top] + shift * frequency[1]))
 
 
+@checked
 def wave_statistics(series: npt.ArrayLike, dt: float) -> WaveStatistics:
     r"""Height and periods of a wave record.
 
