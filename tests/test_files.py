@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.errors import RequestError
-from seakeep.files import MARK, check_output, replacing, write_netcdf
+from seakeep.errors import MissingFileError, RequestError
+from seakeep.files import MARK, check_output, existing_file, replacing, write_netcdf
 
 
 def test_a_file_appears_when_it_is_whole(tmp_path):
@@ -87,6 +87,16 @@ def test_a_link_stays_one(tmp_path):
         temporary.write_text("new")
     assert (tmp_path / "link.txt").is_symlink()
     assert (tmp_path / "a.txt").read_text() == "new"
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="Linux makes such files")
+def test_a_file_that_the_system_makes_is_not_read(tmp_path):
+    """Some of them, such as /proc/kmsg, never end."""
+    made = Path("/proc/self/status")
+    with pytest.raises(MissingFileError, match="is empty, or made by the system while it is read"):
+        existing_file(made)
+    (tmp_path / "empty").touch()
+    assert existing_file(tmp_path / "empty") == tmp_path / "empty"
 
 
 def test_a_folder_in_the_place_of_the_file_is_named(tmp_path):

@@ -92,14 +92,20 @@ def existing_file(path: Path | str) -> Path:
     """
     place = expanded(path)
     try:
-        mode = place.stat().st_mode
+        state = place.stat()
+        is_made = state.st_size == 0 and hasattr(os, "statvfs") and not os.statvfs(place).f_blocks
     except (FileNotFoundError, NotADirectoryError):
         raise _missing(place) from None
     except (OSError, ValueError) as error:  # names with NUL raise ValueError
         raise _unreadable(path, error) from None
-    if (found := _kind_of(mode)) is not None:
+    if (found := _kind_of(state.st_mode)) is not None:
         raise MissingFileError(
             f"{_shown(path)} is {found[0]}, and only regular files are read. {found[1]}"
+        )
+    if is_made:  # as in /proc, where some call themselves regular and never end
+        raise MissingFileError(
+            f"{_shown(path)} is empty, or made by the system while it is read, and only files on a "
+            "disk are read. Copy what it holds into a file first."
         )
     return place
 
@@ -509,7 +515,7 @@ def check_output(
             f"{path} is read by this command and would be overwritten by the {kind}. "
             "Choose another name."
         )
-    with path.open("rb") as file:
+    with existing_file(path).open("rb") as file:
         start = file.read(HEAD)
         file.seek(-min(HEAD, path.stat().st_size), os.SEEK_END)
         both = (start + file.read()).decode("utf-8", "replace")  # PDF keeps its mark at the end

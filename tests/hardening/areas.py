@@ -375,7 +375,8 @@ def odd_paths(folder: Path) -> dict[str, str]:
         "nothing": "",
         "zero toml": "zero.toml", "zero csv": "zero.csv", "zero nc": "zero.nc",
         "below a file": "campaign.toml/x.nc", "surrogate": "\udcff.nc",
-        "memory": "/proc/self/mem", "dash": "-", "dot": ".", "newline": "a\nb.nc",
+        "memory": "/proc/self/mem", "messages": "/proc/kmsg", "dash": "-", "dot": ".",
+        "newline": "a\nb.nc",
     }  # fmt: skip
 
 
