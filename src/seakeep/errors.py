@@ -78,7 +78,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 def wanted(message: str) -> str:
     """What pydantic says that a value should be, in our words."""
-    words = message.removeprefix("Input ").replace("valid ", "")
+    words = message.removeprefix("Input ").removeprefix("Dictionary ").replace("valid ", "")
     for theirs, ours in _WORDS:
         words = words.replace(theirs, ours)
     return words

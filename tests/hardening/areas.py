@@ -500,7 +500,7 @@ def contents(place: Path) -> Iterator[Case]:
               "history", "innovation", "running", "noise"]  # fmt: skip
     yield from mutations("contents", "live", attrs, arrays, spoil_live)
     if (place / "results").exists():
-        yield from _study_contents(place)
+        yield from study_contents(place, spoil_study)
     with xr.open_dataset(
         place / "prepared" / "one.nc", engine="h5netcdf", decode_times=False
     ) as kept:
@@ -508,16 +508,17 @@ def contents(place: Path) -> Iterator[Case]:
     yield from mutations("contents", "prepared", attrs, variables, spoil_prepared)
 
 
-def _study_contents(place: Path) -> Iterator[Case]:
+def study_contents(place: Path, spoil: Callable[..., object]) -> Iterator[Case]:
+    """Each attribute of a study, each value in its JSON, and each variable as another one."""
     from seakeep.study import read_result
 
     result = read_result(place / "results")
-    yield from mutations("contents", "study", result.attrs, [], spoil_study)
+    yield from mutations("contents", "study", result.attrs, [], spoil)
     for group in result.groups:
         for each in [None, *result.groups[group].variables]:
             for change in CHANGES:
                 yield Case("contents", f"study {group} {each} {change}",
-                           functools.partial(spoil_study, variable=(group, each),
+                           functools.partial(spoil, variable=(group, each),
                                              change=change))  # fmt: skip
 
 
@@ -652,25 +653,31 @@ def spoil_prepared(**how: Any) -> object:
     return command("fit", "campaign.toml", "--model", "arx", "-o", "o.nc")()
 
 
+def spoiled_study(
+    attrs: Any, groups: Any, attribute: Any = None, value: Any = None, variable: Any = None,
+    change: str = "",
+) -> tuple[dict[str, Any], dict[str, xr.Dataset]]:  # fmt: skip
+    """Attributes and groups of a study of which one thing is another."""
+    attrs, groups = dict(attrs), dict(groups)
+    if attribute is not None:
+        return changed_attrs(attrs, attribute, value), groups
+    group, name = variable
+    if name is not None:
+        groups[group] = spoiled(groups[group], variable=name, change=change)
+    elif change == "drop":
+        del groups[group]
+    elif change == "empty":
+        groups[group] = xr.Dataset()
+    return attrs, groups
+
+
 def spoil_study(**how: Any) -> object:
     """Report a study of which one thing is another."""
     from seakeep.study import read_result
     from seakeep.study.store import write_result
 
     result = read_result("results")
-    attrs, groups = dict(result.attrs), dict(result.groups)
-    if "attribute" in how:
-        attrs = changed_attrs(attrs, how["attribute"], how["value"])
-    else:
-        group, variable = how["variable"]
-        if variable is None:
-            if how["change"] == "drop":
-                del groups[group]
-            elif how["change"] == "empty":
-                groups[group] = xr.Dataset()
-        else:
-            groups[group] = spoiled(groups[group], variable=variable, change=how["change"])
-    write_result(Path("results"), attrs, groups)
+    write_result(Path("results"), *spoiled_study(result.attrs, result.groups, **how))
     return command("report", "results")()
 
 

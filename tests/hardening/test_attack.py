@@ -9,11 +9,14 @@ pytest.importorskip("matplotlib")
 
 import ground
 import xarray as xr
-from areas import AREAS, MODELS, mutations, spoiled
+from areas import AREAS, MODELS, mutations, spoiled, spoiled_study, study_contents
 from attack import judged, sample
 
 from seakeep.errors import SeakeepError
 from seakeep.models import KINDS, store
+from seakeep.study import read_result
+from seakeep.study.schema import check_contents
+from seakeep.study.store import MEND
 
 SAMPLED = {
     "settings": 1400, "texts": 25, "names": 90, "paths": 150, "options": 401, "contents": 1100,
@@ -60,6 +63,17 @@ PYTHONS = re.compile(
 """Words of Python and NumPy, which tell nobody what to mend."""
 
 
+def refusals(cases):
+    """What is said to the cases that are refused; those that are taken say nothing."""
+    words = {}
+    for case in cases:
+        try:
+            case.call()
+        except SeakeepError as error:
+            words[case.name] = str(error)
+    return words
+
+
 @pytest.mark.hardening
 @pytest.mark.parametrize("name", MODELS)
 def test_whatever_a_model_file_holds_is_taken_or_named(name, whole):
@@ -70,11 +84,21 @@ def test_whatever_a_model_file_holds_is_taken_or_named(name, whole):
         made = spoiled(kept, **how)
         store.rebuilt("m.nc", lambda: KINDS[kept.attrs["seakeep_kind"]].restore(made))
 
-    words = {}
-    for case in mutations("contents", name, dict(kept.attrs), list(kept.variables), load):
-        try:
-            case.call()
-        except SeakeepError as error:
-            words[case.name] = str(error)
+    cases = mutations("contents", name, dict(kept.attrs), list(kept.variables), load)
+    words = refusals(cases)
     assert len(words) > 400
     assert {each: said for each, said in words.items() if PYTHONS.search(said)} == {}
+
+
+@pytest.mark.hardening
+@pytest.mark.filterwarnings("ignore:invalid value encountered in cast")
+def test_whatever_a_study_file_holds_is_taken_or_named(whole):
+    result = read_result(whole / "results")
+
+    def check(**how):
+        attrs, groups = spoiled_study(result.attrs, result.groups, **how)
+        store.rebuilt("study.nc", lambda: check_contents(attrs, groups), MEND)
+
+    words = refusals(study_contents(whole, check))
+    assert len(words) > 4000
+    assert {k: said for k, said in words.items() if PYTHONS.search(said) or len(said) > 400} == {}

@@ -387,9 +387,13 @@ def test_contents_that_no_study_writes_are_told(finished):
     assert json.loads(filled) == json.loads(attrs["settings"])
     others = {key: each for key, each in groups.items() if key != "statistics/densities"}
     store.write_result(finished.folder, attrs | {"groups": json.dumps(list(others))}, others)
-    message = "does not hold what a study writes.*the group statistics/densities is missing"
+    message = "does not hold what seakeep writes.*the group statistics/densities is missing"
     with pytest.raises(DataError, match=message):
         read_result(finished.folder)
+    for told, words in {'["x"]': "the group 'x' cannot be", "x": "groups: received 'x'"}.items():
+        store.write_result(finished.folder, attrs | {"groups": told}, groups)
+        with pytest.raises(DataError, match=f"{words}.*Remove it and run the study again"):
+            read_result(finished.folder)
 
 
 def test_words_of_a_result_come_back_in_any_alphabet(finished):

@@ -25,7 +25,7 @@ import xarray as xr
 from scipy import signal
 
 from seakeep.arrays import FloatArray
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice, check_integer, settings_of, typed
 from seakeep.models.interface import Drive, InputMap, Json, Regressors, Span, plain
@@ -226,7 +226,7 @@ class ProbeAlignment:
         check_integer("alignment: passes", self.passes, 1)
         if not isinstance(self.optional, bool):
             raise RequestError(
-                f"alignment: optional must be True or False; received {self.optional!r}."
+                f"alignment: optional must be True or False; received {self.optional!r:.{SHOWN}}."
             )
         check_choice("alignment: mode", self.mode, ("effective", "dispersion"))
         check_choice("alignment: surge", self.surge, ("measured", "predicted", "none"))
@@ -239,7 +239,7 @@ class ProbeAlignment:
         if not _is_number(self.offset):
             raise RequestError(
                 f"alignment: offset must be a number (m, positive downstream); received "
-                f"{self.offset!r}."
+                f"{self.offset!r:.{SHOWN}}."
             )
         for key, mode in (("celerity", "effective"), ("highest_frequency", "dispersion")):
             if getattr(self, key) is not None and self.mode != mode:
@@ -251,7 +251,8 @@ class ProbeAlignment:
         if names is not None:
             if isinstance(names, str) or not isinstance(names, Iterable):
                 raise RequestError(
-                    f"alignment: channels must be a list of names; received {names!r}. Write "
+                    "alignment: channels must be a list of names; "
+                    f"received {names!r:.{SHOWN}}. Write "
                     f"channels=['{names}']."
                 )
             object.__setattr__(self, "channels", tuple(names))
@@ -826,7 +827,9 @@ def _is_number(value: object) -> bool:
 
 def _check_number(name: str, value: object, unit: str, meant: str) -> None:
     if value is not None and not (_is_number(value) and value > 0):  # type: ignore[operator]
-        raise RequestError(f"alignment: {name} must be {meant} ({unit}); received {value!r}.")
+        raise RequestError(
+            f"alignment: {name} must be {meant} ({unit}); received {value!r:.{SHOWN}}."
+        )
 
 
 def _elevations(

@@ -18,7 +18,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.core.observables import slow_kernel, slow_squares
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice, check_keys, typed
 from seakeep.models.interface import Drive, Regressors, Span
@@ -137,7 +137,8 @@ def _names(value: object, what: str) -> tuple[str, ...]:
         names = tuple(value)
     if not names or not all(isinstance(name, str) for name in names):
         raise RequestError(
-            f"{what}: of must name one or more inputs; received {value!r}. Write of='eta_fwd'."
+            f"{what}: of must name one or more inputs; "
+            f"received {value!r:.{SHOWN}}. Write of='eta_fwd'."
         )
     return names
 
@@ -148,9 +149,9 @@ def _numbers(value: object, what: str, meant: str, fits: Callable[[Any], bool]) 
     for number in numbers:
         real = isinstance(number, int | float) and not isinstance(number, bool)
         if not real or not math.isfinite(number) or not fits(number):
-            raise RequestError(f"{what} must be {meant}; received {number!r}.")
+            raise RequestError(f"{what} must be {meant}; received {number!r:.{SHOWN}}.")
     if not numbers or len(set(numbers)) < len(numbers):
-        raise RequestError(f"{what} must be {meant}, each once; received {value!r}.")
+        raise RequestError(f"{what} must be {meant}, each once; received {value!r:.{SHOWN}}.")
     return numbers
 
 
@@ -300,7 +301,7 @@ class Powers:
         object.__setattr__(self, "powers", tuple(int(power) for power in powers))
         if not isinstance(self.products, bool):
             raise RequestError(
-                f"powers: products must be true or false; received {self.products!r}."
+                f"powers: products must be true or false; received {self.products!r:.{SHOWN}}."
             )
 
     def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
@@ -365,7 +366,7 @@ class Expression:
     def __post_init__(self) -> None:
         for key in ("name", "expression"):
             if not isinstance(text := getattr(self, key), str) or not text:
-                raise RequestError(f"expression: {key} must be a text; received {text!r}.")
+                raise RequestError(f"expression: {key} must be a text; received {text!r:.{SHOWN}}.")
         if "mean(" in self.expression.replace(" ", ""):
             raise RequestError(
                 f"expression {self.expression!r}: mean is over all of a record, which a row must "
@@ -434,14 +435,14 @@ def observables_of(value: object) -> tuple[Observable, ...]:
     """Observables as they are, or made of tables of their keys."""
     if isinstance(value, str | Mapping) or not isinstance(value, Iterable):
         raise RequestError(
-            f"observables must be a list; received {value!r}. Write "
+            f"observables must be a list; received {value!r:.{SHOWN}}. Write "
             "observables=[seakeep.SlowSquares('eta_cog')]."
         )
     made = [from_json(each) if isinstance(each, Mapping) else each for each in value]
     if strange := [each for each in made if not hasattr(each, "bind")]:
         raise RequestError(
             f"observables must hold observables, such as seakeep.SlowSquares; received "
-            f"{strange[0]!r}."
+            f"{strange[0]!r:.{SHOWN}}."
         )
     return tuple(made)
 

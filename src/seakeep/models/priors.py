@@ -31,7 +31,9 @@ class Prior(Protocol):
 def _check_bounds(name: str, low: object, high: object, least: float) -> None:
     numbers = [value for value in (low, high) if isinstance(value, int | float | np.number)]
     if len(numbers) < 2 or not all(math.isfinite(value) for value in numbers):
-        raise RequestError(f"{name} needs two finite numbers; received {low!r} and {high!r}.")
+        raise RequestError(
+            f"{name} needs two finite numbers; received {low!r:.{SHOWN}} and {high!r:.{SHOWN}}."
+        )
     if not numbers[0] < numbers[1]:
         raise RequestError(
             f"{name} needs its lower bound below the upper one; received {low!r} and {high!r}. "
@@ -124,7 +126,7 @@ class Fixed:
 
     def __post_init__(self) -> None:
         if not isinstance(self.value, int | float | np.number) or not math.isfinite(self.value):
-            raise RequestError(f"Fixed needs a finite number; received {self.value!r}.")
+            raise RequestError(f"Fixed needs a finite number; received {self.value!r:.{SHOWN}}.")
 
     def ppf(self, q: float) -> float:
         """Quantile function: the value, for any probability."""
@@ -135,9 +137,9 @@ def check_prior(name: str, prior: object) -> None:
     """Refuse what is not a prior; `name` is the setting it is for."""
     if not isinstance(prior, Prior):
         raise RequestError(
-            f"{name} must be a prior; received {prior!r}. Pass seakeep.Uniform(low, high), "
-            "seakeep.LogUniform(low, high), seakeep.Fixed(value), or a frozen distribution such "
-            "as scipy.stats.norm(20, 2)."
+            f"{name} must be a prior; received {prior!r:.{SHOWN}}. Pass "
+            "seakeep.Uniform(low, high), seakeep.LogUniform(low, high), seakeep.Fixed(value), or a "
+            "frozen distribution such as scipy.stats.norm(20, 2)."
         )
 
 
@@ -201,7 +203,7 @@ def from_description(setting: str, content: object) -> Prior | None:
     distribution = getattr(stats, name.removeprefix("scipy.stats."), None)
     if not isinstance(distribution, stats.rv_continuous | stats.rv_discrete):
         raise DataError(
-            f"{setting}: the prior '{name}' is not known here. Update seakeep or SciPy."
+            f"{setting}: the prior '{name:.{SHOWN}}' is not known here. Update seakeep or SciPy."
         )
     kept = typed(_Frozen, content, setting)
     try:

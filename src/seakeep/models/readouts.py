@@ -10,7 +10,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.core.readouts import LinearHinges
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models.checks import check_choice, check_keys, typed
 from seakeep.models.labelled import ChannelLabel
 
@@ -70,13 +70,16 @@ class ReadOut:
 
     def __post_init__(self) -> None:
         if not isinstance(self.channel, str) or not self.channel:
-            raise RequestError(f"readouts: channel must be a name; received {self.channel!r}.")
+            raise RequestError(
+                f"readouts: channel must be a name; received {self.channel!r:.{SHOWN}}."
+            )
         what = f"readouts: {self.channel}"
         check_choice(f"{what}: kind", self.kind, get_args(Asked))
         names: Any = self.of
         if isinstance(names, str) or not isinstance(names, Iterable):
             raise RequestError(
-                f"{what}: of must be a list of states; received {names!r}. Write of = ['surge', "
+                f"{what}: of must be a list of states; "
+                f"received {names!r:.{SHOWN}}. Write of = ['surge', "
                 "'heave', 'pitch']."
             )
         names = tuple(names)
@@ -231,14 +234,14 @@ def readouts_of(value: object) -> ReadOuts:
         return "auto"
     if isinstance(value, str | Mapping) or not isinstance(value, Iterable):
         raise RequestError(
-            f"readouts must be a list or 'auto'; received {value!r}. Write "
+            f"readouts must be a list or 'auto'; received {value!r:.{SHOWN}}. Write "
             "readouts=[seakeep.ReadOut('mooring_stern', of=('surge', 'heave', 'pitch'))]."
         )
     made = tuple(_of_table(each) if isinstance(each, Mapping) else each for each in value)
     names = []
     for each in made:
         if not isinstance(each, ReadOut):
-            raise RequestError(f"readouts must hold seakeep.ReadOut; received {each!r}.")
+            raise RequestError(f"readouts must hold seakeep.ReadOut; received {each!r:.{SHOWN}}.")
         names.append(each.channel)
     if double := {name for name in names if names.count(name) > 1}:
         raise RequestError(

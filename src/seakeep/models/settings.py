@@ -11,7 +11,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 
 from seakeep.core.embedding import History
-from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.errors import SHOWN, RequestError, SeakeepWarning
 from seakeep.models.checks import check_choice, check_integer, check_keys, settings_of
 from seakeep.models.html import settings_html
 from seakeep.models.inputs import Lead, ProbeAlignment
@@ -79,7 +79,9 @@ def check_seconds(name: str, value: object) -> None:
     """Refuse a period or a step that is not a positive number."""
     real = isinstance(value, numbers.Real) and not isinstance(value, bool)
     if not (real and math.isfinite(value) and value > 0):  # type: ignore[arg-type,operator]
-        raise RequestError(f"{name} must be a positive number of seconds; received {value!r}.")
+        raise RequestError(
+            f"{name} must be a positive number of seconds; received {value!r:.{SHOWN}}."
+        )
 
 
 def check_ridge(value: object, may_choose: bool = False) -> None:
@@ -90,7 +92,8 @@ def check_ridge(value: object, may_choose: bool = False) -> None:
     if not real or not math.isfinite(value) or value < 0:  # type: ignore[arg-type,operator]
         raise RequestError(
             f"ridge must be a number, zero or positive{', or the word rollout' * may_choose}; "
-            f"received {value!r}. The paper uses 100; 0 asks for the solution of least norm."
+            f"received {value!r:.{SHOWN}}. The paper uses 100; 0 asks for the solution of least "
+            "norm."
         )
 
 
@@ -105,7 +108,7 @@ def check_stable(value: object) -> None:
     if not isinstance(value, bool) and not (real and 0 < value < 1):  # type: ignore[operator]
         raise RequestError(
             "stable must be True, False or a radius above 0 and below 1, to which eigenvalues are "
-            f"clipped; received {value!r}. True is {STABLE_RADIUS:g}."
+            f"clipped; received {value!r:.{SHOWN}}. True is {STABLE_RADIUS:g}."
         )
 
 
@@ -141,7 +144,8 @@ class Select:
         check_choice("select: folds", self.folds, ("run", "sea_state"))
         if not isinstance(self.observables, bool):
             raise RequestError(
-                f"select: observables must be True or False; received {self.observables!r}."
+                "select: observables must be True or False; received "
+                f"{self.observables!r:.{SHOWN}}."
             )
         given = self.horizon if isinstance(self.horizon, tuple | list) else (self.horizon,)
         for value in (*given, *(() if self.period is None else (self.period,))):
@@ -149,7 +153,7 @@ class Select:
             if not real or not LEAST_PERIODS < value < MOST_PERIODS:
                 raise RequestError(
                     "select: horizon (encounter periods) and period (s) must lie between 1e-6 and "
-                    f"1e6; received {value!r}."
+                    f"1e6; received {value!r:.{SHOWN}}."
                 )
         if not given:
             raise RequestError("select: horizon is empty. Write horizon=(15, 45).")
@@ -197,7 +201,9 @@ class HankelSettings:
         check_choice("delay_rows", self.delay_rows, ("ridge", "exact"))
         check_choice("ridge_scale", self.ridge_scale, ("absolute", "per_snapshot"))
         if not isinstance(self.standardize, bool | np.bool_):
-            raise RequestError(f"standardize must be True or False; received {self.standardize!r}.")
+            raise RequestError(
+                f"standardize must be True or False; received {self.standardize!r:.{SHOWN}}."
+            )
         check_integer("lead", self.lead, 0)
         check_stable(self.stable)
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))

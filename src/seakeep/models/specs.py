@@ -564,7 +564,7 @@ class BayesianHankelDMDc:
         stated = dict(content)
         spawn_key = typed(list[int], stated.pop("spawn_key", None), "spawn_key")
         check_keys(cls, stated)
-        entropy = str(stated.pop("seed"))
+        entropy = str(stated.pop("seed", None))
         if not (entropy.isdecimal() and len(entropy) <= LONGEST_SEED):
             raise RequestError(
                 f"seed: received {entropy!r:.{SHOWN}}, which should be a whole number"
@@ -852,7 +852,7 @@ def _seed_sequence(seed: object) -> np.random.SeedSequence:
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise RequestError(
             f"seed must be an integer, zero or more, a SeedSequence or a Generator of numpy; "
-            f"received {seed!r}."
+            f"received {seed!r:.{SHOWN}}."
         )
     return np.random.SeedSequence(int(seed))
 
@@ -874,7 +874,7 @@ def _check_lead(lead: object) -> None:
     if isinstance(lead, bool) or not isinstance(lead, int | float) or not 0 <= lead < np.inf:
         raise RequestError(
             f"lead must be zero or more, an integer of samples or a float of encounter periods; "
-            f"received {lead!r}."
+            f"received {lead!r:.{SHOWN}}."
         )
 
 

@@ -13,9 +13,9 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import GREATEST, FloatArray
-from seakeep.errors import SHOWN, DataError, MissingFileError, RequestError
+from seakeep.errors import DataError, MissingFileError, RequestError
 from seakeep.files import MARK, check_output, read_sealed, replacing, write_netcdf
-from seakeep.models.checks import typed
+from seakeep.models.checks import parsed, typed
 from seakeep.models.inputs import Chain
 from seakeep.models.interface import Json, Scale, Signature
 from seakeep.models.labelled import ChannelLabel
@@ -192,45 +192,8 @@ def content(dataset: xr.Dataset, name: str) -> Json:
 
 
 def document(dataset: xr.Dataset, name: str) -> Any:
-    """JSON value that a file keeps in an attribute; numbers that nothing measures are refused."""
-    text = str(dataset.attrs[name])
-    try:
-        found = json.loads(
-            text, parse_constant=_constant, parse_float=_bounded, parse_int=_bounded_integer
-        )
-    except json.JSONDecodeError:
-        raise ValueError(f"{name}: received {text!r:.{SHOWN}}, which is no JSON") from None
-    except RecursionError:
-        raise ValueError(f"{name} is nested hundreds of levels deep") from None
-    _refuse_odd(found, name)
-    return found
-
-
-@dataclass(frozen=True)
-class _Odd:
-    """A number that nothing measures, until its key is known."""
-
-    text: str
-
-
-def _constant(text: str) -> float | _Odd:
-    return _Odd(text) if text == "NaN" else float(text)
-
-
-def _bounded(text: str) -> float | _Odd:
-    return value if abs(value := float(text)) <= GREATEST else _Odd(text)
-
-
-def _bounded_integer(text: str) -> int | _Odd:
-    return int(text) if abs(float(text)) <= GREATEST else _Odd(text)
-
-
-def _refuse_odd(value: object, place: str) -> None:
-    if isinstance(value, _Odd):
-        raise ValueError(f"{place}: received {value.text:.{SHOWN}}, which nothing measures")
-    if isinstance(value, dict | list):
-        for key, each in value.items() if isinstance(value, dict) else enumerate(value):
-            _refuse_odd(each, f"{place}.{key}")
+    """JSON value that a file keeps in an attribute."""
+    return parsed(str(dataset.attrs[name]), name)
 
 
 def numbers(dataset: xr.Dataset, name: str, shape: Sequence[int | None]) -> FloatArray:

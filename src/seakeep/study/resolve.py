@@ -15,7 +15,7 @@ from typing import Any, Literal, cast
 
 from seakeep.campaign import ModelSettings, PriorSettings
 from seakeep.campaign.settings import CampaignSettings
-from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
+from seakeep.errors import SHOWN, RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import KINDS, ProbeAlignment, Select, Spec
 from seakeep.models.checks import typed
 from seakeep.models.observables import Observable, SlowSquares, observables_of
@@ -104,7 +104,7 @@ def check_settings(kind: str, values: Mapping[str, Any], period: float, dt: floa
     for name, inner in TABLES.items():
         keys = {key.partition(".")[2]: values[key] for key in values if key.startswith(f"{name}.")}
         if keys:
-            typed(inner, keys)
+            typed(inner, keys, name)
             table[name] = keys
     data = {"encounter_period": period, "dt": dt}
     table |= {each.name: data[each.name] for each in fields(cast("Any", made)) if each.name in data}
@@ -116,7 +116,10 @@ def check_settings(kind: str, values: Mapping[str, Any], period: float, dt: floa
     taken = _values(spec)
     for key, value in values.items():
         if json.dumps(taken.get(key)) != json.dumps(value):
-            raise ValueError(f"{key} is {value!r}, and would be taken for {taken.get(key)!r}")
+            raise ValueError(
+                f"{key}: received {value!r:.{SHOWN}}, which would be taken for "
+                f"{taken.get(key)!r:.{SHOWN}}"
+            )
     return spec
 
 

@@ -6,8 +6,8 @@ therefore compared with this table once, so that figures, tables and pages need 
 
 from __future__ import annotations
 
-import functools
 import json
+import sys
 import types
 import typing
 from collections.abc import Callable, Iterator, Mapping
@@ -16,12 +16,13 @@ from typing import Annotated, Any, get_args, get_origin
 
 import numpy as np
 import xarray as xr
-from pydantic import BaseModel, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, Field, TypeAdapter
 
 from seakeep.arrays import GREATEST
 from seakeep.campaign.settings import PreparationSettings
-from seakeep.errors import SeakeepError
+from seakeep.errors import SHOWN, SeakeepError
 from seakeep.models import KINDS
+from seakeep.models.checks import parsed, typed
 from seakeep.models.observables import OBSERVABLES
 from seakeep.study.resolve import Source, check_settings
 from seakeep.study.settings import Preset, StudySettings
@@ -43,14 +44,23 @@ class _Model(Table):
     settings: dict[str, _Value]
 
 
-Time = Annotated[float, Field(gt=0, le=GREATEST)]
+def _instant(text: str) -> str:
+    try:
+        datetime.fromisoformat(text)
+    except ValueError:
+        raise ValueError("an instant is written like 2026-01-31T12:00:00+00:00") from None
+    return text
+
+
+Time = Annotated[float, Field(gt=0, le=1e9)]
 ATTRIBUTES: dict[str, Any] = {
     **dict.fromkeys(("study", "description", "campaign", "digest", "campaign_digest"), str),
     **dict.fromkeys(("encounter_period", "dt", "longest_training"), Time),
     "preset": Preset,
     "seed": Annotated[int, Field(ge=0, lt=2**64)],
     "conditional_on": str,
-    "created": str,
+    "created": Annotated[str, AfterValidator(_instant)],
+    "format": int,
 }
 """Types of the attributes that are no JSON."""
 DOCUMENTS: dict[str, Any] = {
@@ -247,17 +257,16 @@ def check_contents(attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]) -
     ValueError
         If anything is missing, of another type or shape, or does not fit to the rest.
     """
-    told = {}
-    for key, kind in (ATTRIBUTES | DOCUMENTS).items():
-        value = attrs.get(key)
-        if key in DOCUMENTS:
-            value = told[key] = json.loads(str(value))
-        _check_value(kind, value, key)
-    datetime.fromisoformat(attrs["created"])
+    told = _check_attrs(attrs)
     models, tests = told["models"], told["settings"]["tests"]
-    stated = {name: each["kind"] for name, each in told["settings"]["models"].items()}
-    if stated != {name: each["kind"] for name, each in models.items()}:
-        raise ValueError("models are others than those of the settings")
+    stated, kinds = (
+        {name: each["kind"] for name, each in held.items()}
+        for held in (told["settings"]["models"], models)
+    )
+    if kinds != stated:
+        raise ValueError(
+            f"models: received {kinds!s:.{SHOWN}}, and the settings have {stated!s:.{SHOWN}}"
+        )
     for name, each in models.items():
         _check_model(each, f"models.{name}", attrs["encounter_period"], attrs["dt"])
     _check_group("runs", groups, models, {})
@@ -283,6 +292,19 @@ def check_contents(attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]) -
     return {**attrs, "settings": json.dumps(told["settings"])}
 
 
+def _check_attrs(attrs: Mapping[str, Any]) -> dict[str, Any]:
+    """Check the types of the attributes; return those that are JSON."""
+    told = {}
+    for key, kind in (ATTRIBUTES | DOCUMENTS).items():
+        if key not in attrs:
+            raise ValueError(f"{key} is missing")
+        value = attrs[key]
+        if key in DOCUMENTS:
+            value = told[key] = parsed(str(value), key, sys.float_info.max)
+        _check_value(kind, value, key)
+    return told
+
+
 def _check_model(told: Mapping[str, Any], place: str, period: float, dt: float) -> None:
     """Let the class of a kind judge the settings; kinds that were added elsewhere are not known."""
     values = {key: each["value"] for key, each in told["settings"].items()}
@@ -297,8 +319,10 @@ def _check_model(told: Mapping[str, Any], place: str, period: float, dt: float) 
         spec = check_settings(told["kind"], values, period, dt)
     except (SeakeepError, LookupError, TypeError, ValueError, ArithmeticError) as error:
         raise ValueError(f"{place}: {error}") from error
-    if (told["ensemble"], told["n_members"]) != (spec.is_ensemble, getattr(spec, "n_members", 1)):
-        raise ValueError(f"{place} has another number of members than its settings")
+    made = {"ensemble": spec.is_ensemble, "n_members": getattr(spec, "n_members", 1)}
+    for key, value in made.items():
+        if told[key] != value:
+            raise ValueError(f"{place}.{key}: received {told[key]!r}, and its settings say {value}")
 
 
 def _texts(group: xr.Dataset, name: str) -> list[str]:
@@ -325,8 +349,8 @@ def _check_group(
                 if x.dims != dims or not SOUND[kind.rstrip("?")](x.values):
                     held = " ".join(map(str, x.dims))
                     raise ValueError(
-                        f"{place} holds {x.dtype} over ({held}), not each a sound {kind} over "
-                        f"({' '.join(dims)})"
+                        f"{place} holds {x.dtype} over ({held}), not each a sound "
+                        f"{kind.rstrip('?')} over ({' '.join(dims)})"
                     )
                 _check_labels(place, each, x.values, known)
             elif not kind.endswith("?"):
@@ -336,7 +360,9 @@ def _check_group(
 def _check_labels(place: str, name: str, values: Any, known: Mapping[str, set[str]]) -> None:
     of = {"other": "model", "of_run": "run"}.get(name, name)
     if of in known and (strange := {str(each) for each in values} - known[of] - {""}):
-        raise ValueError(f"{place} names {sorted(strange)[0]!r}, which the study does not have")
+        raise ValueError(
+            f"{place} names {sorted(strange)[0]!r:.{SHOWN}}, which the study does not have"
+        )
     if name == "time" and not np.all(np.diff(values) > 0):
         raise ValueError(f"{place} does not increase")
 
@@ -366,15 +392,19 @@ def _check_value(kind: Any, value: Any, place: str) -> None:
     """Compare a value with the type of a key; keys that are newer than the file are filled in."""
     bare = get_args(kind)[0] if get_origin(kind) is Annotated else kind
     if isinstance(kind, type) and issubclass(kind, BaseModel):
-        if not isinstance(value, dict) or set(value) - set(kind.model_fields):
-            raise ValueError(f"{place} does not have the keys of {kind.__name__}")
-        for name, each in kind.model_fields.items():
-            if name not in value and not each.is_required():
-                default = each.get_default(call_default_factory=True)
-                value[name] = _adapter(Any).dump_python(default, mode="json")
+        for name, each in typed(dict[str, Any], value, place).items():
+            if name not in kind.model_fields:
+                raise ValueError(
+                    f"{place}.{name:.{SHOWN}}: received {each!r:.{SHOWN}}, and there is no such key"
+                )
+        for name, field in kind.model_fields.items():
+            if name not in value and not field.is_required():
+                default = field.get_default(call_default_factory=True)
+                value[name] = TypeAdapter(Any).dump_python(default, mode="json")
             if name not in value:
                 raise ValueError(f"{place}.{name} is missing")
-            inner = Annotated[each.annotation, *each.metadata] if each.metadata else each.annotation
+            inner: Any = field.annotation
+            inner = Annotated[inner, *field.metadata] if field.metadata else inner
             _check_value(inner, value[name], f"{place}.{name}")
     elif get_origin(bare) is dict and isinstance(value, dict) and value:
         for name, each in value.items():
@@ -383,13 +413,7 @@ def _check_value(kind: Any, value: Any, place: str) -> None:
                     and issubclass(each, BaseModel) and isinstance(value, dict)]:  # fmt: skip
         _check_value(tables[0], value, place)
     else:
-        try:
-            _adapter(kind).validate_json(json.dumps(value), strict=True)
-        except ValidationError as error:
-            raise ValueError(f"{place}: {error.errors(include_url=False)[0]['msg']}") from None
-
-
-_adapter = functools.cache(TypeAdapter)
+        typed(kind, value, place)
 
 
 def _choices(kind: Any) -> tuple[Any, ...]:

@@ -21,8 +21,10 @@ import numpy.typing as npt
 import xarray as xr
 from filelock import FileLock, Timeout
 
-from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
+from seakeep.errors import SHOWN, DataError, RequestError, SeakeepError, SeakeepWarning
 from seakeep.files import check_report, is_there, read_bytes, read_sealed, replacing, write_netcdf
+from seakeep.models.checks import parsed, typed
+from seakeep.models.store import rebuilt
 from seakeep.study.schema import check_contents
 from seakeep.study.settings import FORMAT
 
@@ -42,6 +44,7 @@ RESULT = "study.nc"
 HEADER = "study.json"
 LOCK = "study.lock"
 UNITS = "units"
+MEND = "Remove it and run the study again."
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 FORBIDDEN = (errno.EACCES, errno.EPERM, errno.EROFS)
@@ -407,29 +410,32 @@ def read_result(folder: Path | str) -> StudyResult:
     import h5netcdf
     from xarray.backends import H5NetCDFStore
 
+    part, groups = "the attributes", {}
     try:
         with h5netcdf.File(read_sealed(path), "r", decode_vlen_strings=True) as file:
             attrs = {key: _plain(value) for key, value in file.attrs.items()}
-            if attrs["format"] != FORMAT:
+            if attrs.get("format", FORMAT) != FORMAT:
                 raise RequestError(
-                    f"{path} was written in format {attrs['format']}, and this version of seakeep "
-                    f"reads format {FORMAT}. Run the study again in another folder."
+                    f"{path} was written in format {attrs['format']!s:.{SHOWN}}, and this version "
+                    f"of seakeep reads format {FORMAT}. Run the study again in another folder."
                 )
-            groups = {
-                name: xr.open_dataset(H5NetCDFStore(file, group=name), decode_times=False).load()
-                for name in json.loads(attrs["groups"])
-            }
-        attrs = check_contents(attrs, groups)
+            for name in rebuilt(path, lambda: _names(attrs), MEND):
+                part = f"the group {name!r:.{SHOWN}}"
+                opened = xr.open_dataset(H5NetCDFStore(file, group=name), decode_times=False)
+                groups[name] = opened.load()
     except SeakeepError:
         raise
     except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError) as error:
-        missing = "a part is missing: " if isinstance(error, LookupError) else ""
         raise DataError(
-            f"{path} does not hold what a study writes: {missing}{error}. Remove it and run the "
-            "study again."
+            f"{path} does not hold what seakeep writes: {part} cannot be read. {MEND}"
         ) from error
+    attrs = rebuilt(path, lambda: check_contents(attrs, groups), MEND)
     return StudyResult(folder, attrs, groups)
 
 
+def _names(attrs: Mapping[str, Any]) -> list[str]:
+    return typed(list[str], parsed(str(attrs["groups"]), "groups"), "groups")
+
+
 def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
