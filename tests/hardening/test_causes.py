@@ -421,10 +421,10 @@ X = np.random.default_rng(0).standard_normal(200)
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda odd: signals.wave_spectrum(X, 0.1, segment=odd), "segment must be a whole number"),
+        (lambda odd: signals.wave_spectrum(X, 0.1, segment=odd), "segment must be an integer"),
         (lambda odd: signals.zero_up_crossings(X, 0.1, hysteresis=odd), "hysteresis must be a num"),
-        (lambda odd: signals.integrate(X, 0.1, (0.1, 1.0), times=odd), "times must be 1 or 2"),
-        (lambda odd: signals.froude_factor("m", odd), "the scale factor must be a number"),
+        (lambda odd: signals.integrate(X, 0.1, (0.1, 1.0), times=odd), "times must be an integer"),
+        (lambda odd: signals.froude_factor("m", odd), "scale must be a number"),
         (lambda odd: signals.correlation_peak(X, X, 0.1, odd), "bounds"),
         (lambda odd: statistics.kernel_bandwidth(X, odd), "bandwidth"),
         (lambda odd: statistics.lag_one_correlation(X, odd), "segment"),
