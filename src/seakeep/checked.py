@@ -1,13 +1,13 @@
-"""Arguments of public functions, compared with their annotations before the functions run.
+"""Arguments of public functions, compared with their annotations.
 
-:func:`checked` is the door of the Python API: what is not of the annotated type is refused with the
-argument's name, what was received, and what is wanted. Arrays pass: :mod:`seakeep.arrays` judges
-their shapes and values.
+:func:`checked` does so before a function of arrays runs, :func:`explained` where another function
+ended in an error of Python: what is not of the annotated type is refused with the argument's name,
+what was received, and what is wanted. Arrays pass: :mod:`seakeep.arrays` judges their shapes and
+values.
 """
 
 from __future__ import annotations
 
-import collections.abc
 import functools
 import inspect
 import math
@@ -15,16 +15,18 @@ import numbers
 import os
 import types
 import typing
+from collections import abc
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal, TypeVar, Union
 
 import numpy as np
 
 from seakeep.arrays import LARGEST
-from seakeep.errors import SHOWN, RequestError
+from seakeep.errors import SHOWN, RequestError, SeakeepError
 
-__all__ = ["checked"]
+__all__ = ["checked", "explained"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Fits = Callable[[object], bool]
@@ -52,58 +54,113 @@ def checked(function: Function) -> Function:
     Traceback (most recent call last):
     seakeep.errors.RequestError: by must be a number; received '2 s'.
     """
+    misfit = _misfit(function)
+
+    @functools.wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        if words := misfit(args, kwargs):
+            raise RequestError(words)
+        return function(*args, **kwargs)
+
+    return typing.cast(Function, call)
+
+
+def explained(function: Function) -> Function:
+    """Compare the arguments of a function with its annotations where a call ends in an error.
+
+    For functions and methods whose own checks are more telling than types: they run first. An error
+    that is none of ours becomes a :class:`seakeep.RequestError` if an argument is of another type
+    than its annotation, and is raised as it is if none is.
+
+    Parameters
+    ----------
+    function : callable
+        A function, a method, or a class that is made with such arguments.
+
+    Returns
+    -------
+    callable
+        The same function or class.
+    """
+    if inspect.isclass(function):
+        made: Any = function
+        made.__init__ = explained(made.__init__)
+        return function
+    misfit = _misfit(function)
+
+    def explain(error: Exception, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
+        words = ""
+        with suppress(TypeError):  # arguments that are missing or too many
+            words = "" if isinstance(error, SeakeepError) else misfit(args, kwargs)
+        if words:
+            raise RequestError(words) from error
+
+    @functools.wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return function(*args, **kwargs)
+        except Exception as error:
+            explain(error, args, kwargs)
+            raise
+
+    @functools.wraps(function)
+    def iterate(*args: Any, **kwargs: Any) -> Any:
+        try:
+            yield from function(*args, **kwargs)
+        except Exception as error:
+            explain(error, args, kwargs)
+            raise
+
+    return typing.cast(Function, iterate if inspect.isgeneratorfunction(function) else call)
+
+
+def _misfit(function: Callable[..., Any]) -> Callable[[tuple[Any, ...], dict[str, Any]], str]:
+    """Return a function that says which argument of a call is of another type; empty for none."""
     signature = inspect.signature(function)
 
     @functools.cache
     def doors() -> dict[str, tuple[Fits, str]]:
-        hints = typing.get_type_hints(function)
+        hints = _hints(function)
         return {
             name: (_fits(hints[name]), _words(hints[name]))
             for name, each in signature.parameters.items()
             if name in hints and each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)
         }
 
-    @functools.wraps(function)
-    def call(*args: Any, **kwargs: Any) -> Any:
+    def words_of(args: tuple[Any, ...], kwargs: dict[str, Any]) -> str:
         given = signature.bind(*args, **kwargs).arguments
         for name, (fits, words) in doors().items():
             if name in given and not fits(given[name]):
-                raise RequestError(f"{name} must be {words}; received {_shown(given[name])}.")
-        return function(*args, **kwargs)
+                return f"{name} must be {words}; received {_shown(given[name])}."
+        return ""
 
-    return typing.cast(Function, call)
+    return words_of
+
+
+def _hints(function: Callable[..., Any]) -> dict[str, Any]:
+    """Annotations but those of an extra, which are imported for type checkers alone."""
+    inner = inspect.unwrap(function)
+    found: dict[str, Any] = {}
+    for name, text in inner.__annotations__.items():
+        one = types.SimpleNamespace(__annotations__={name: text})
+        with suppress(NameError):
+            found |= typing.get_type_hints(one, inner.__globals__)
+    return found
 
 
 def _fits(hint: Any) -> Fits:
     """Test of whether a value is of a type; what cannot be tested passes."""
     origin, parts = typing.get_origin(hint), typing.get_args(hint)
-    if origin in (Union, types.UnionType):
-        either = [_fits(each) for each in parts]
-        return lambda value: any(each(value) for each in either)
-    if origin is Literal:
-        return _PLAIN[str][0]  # the function knows the words, and which is near
     if hint in _PLAIN:
         return _PLAIN[hint][0]
-    if origin is tuple and Ellipsis not in parts:
-        inner = [_fits(each) for each in parts]
-        return lambda value: (
-            _is_sequence(value)
-            and len(value) == len(inner)
-            and all(each(one) for each, one in zip(inner, value, strict=True))
-        )
-    if origin in (collections.abc.Sequence, list, tuple):
-        of = _fits(parts[0])
-        return lambda value: _is_sequence(value) and all(map(of, value))
-    if origin in (collections.abc.Mapping, dict):
-        keys, values = map(_fits, parts)
-        return lambda value: (
-            isinstance(value, Mapping)
-            and all(map(keys, value))
-            and all(map(values, value.values()))
-        )
-    if origin is collections.abc.Callable:
-        return callable
-    if inspect.isclass(hint) and not getattr(hint, "_is_protocol", False):
+    if origin in _GENERIC:
+        return _GENERIC[origin][0](parts)
+    if getattr(hint, "_is_protocol", False):
+        members = [
+            name for name in (*vars(hint), *getattr(hint, "__annotations__", ())) if name[0] != "_"
+        ]
+        return lambda value: all(hasattr(value, name) for name in members)
+    if inspect.isclass(hint):
         return lambda value: isinstance(value, hint)
     return lambda value: True
 
@@ -111,22 +168,83 @@ def _fits(hint: Any) -> Fits:
 def _words(hint: Any) -> str:
     """What a message calls a type."""
     origin, parts = typing.get_origin(hint), typing.get_args(hint)
-    if origin in (Union, types.UnionType):
-        return " or ".join(dict.fromkeys(map(_words, parts)))
-    if origin is Literal:
-        return " or ".join(f"'{each}'" for each in parts)
     if hint in _PLAIN:
         return _PLAIN[hint][1]
-    if origin is tuple and Ellipsis not in parts:
-        return f"{len(parts)} values ({', '.join(map(_words, parts))})"
-    if origin in (collections.abc.Sequence, list, tuple):
-        return f"a list (of each: {_words(parts[0])})"
-    if origin in (collections.abc.Mapping, dict):
-        return f"a mapping, such as a dict, of {_words(parts[0])} to {_words(parts[1])}"
-    if origin is collections.abc.Callable:
-        return "a function"
-    name = getattr(hint, "__name__", "")
-    return f"a {name}" if inspect.isclass(hint) else "an array"
+    if origin in _GENERIC:
+        return _GENERIC[origin][1](parts)
+    if not inspect.isclass(hint):
+        return "an array"
+    return f"{'an' if hint.__name__[0] in 'AEIOU' else 'a'} {hint.__name__}"
+
+
+def _either(parts: tuple[Any, ...]) -> Fits:
+    tests = [_fits(each) for each in parts]
+    return lambda value: any(each(value) for each in tests)
+
+
+def _many(parts: tuple[Any, ...]) -> Fits:
+    of = _fits(parts[0])
+    return lambda value: _is_sequence(value) and all(map(of, value))
+
+
+def _several(parts: tuple[Any, ...]) -> Fits:
+    of = _fits(parts[0])
+    return lambda value: (
+        isinstance(value, abc.Iterable)
+        and not isinstance(value, str | bytes)
+        and getattr(value, "ndim", 1) > 0
+        and (not isinstance(value, abc.Sized) or all(map(of, value)))
+    )
+
+
+def _row(parts: tuple[Any, ...]) -> Fits:
+    if Ellipsis in parts:
+        return _many(parts)
+    tests = [_fits(each) for each in parts]
+    return lambda value: (
+        _is_sequence(value)
+        and len(value) == len(tests)
+        and all(each(one) for each, one in zip(tests, value, strict=True))
+    )
+
+
+def _table(parts: tuple[Any, ...]) -> Fits:
+    keys, values = map(_fits, parts)
+    return lambda value: (
+        isinstance(value, Mapping) and all(map(keys, value)) and all(map(values, value.values()))
+    )
+
+
+def _join(parts: tuple[Any, ...]) -> str:
+    return " or ".join(dict.fromkeys(map(_words, parts)))
+
+
+def _list_words(parts: tuple[Any, ...]) -> str:
+    return f"a list, each item {_words(parts[0])}"
+
+
+def _row_words(parts: tuple[Any, ...]) -> str:
+    if Ellipsis in parts:
+        return _list_words(parts)
+    return f"{len(parts)} values ({', '.join(map(_words, parts))})"
+
+
+def _table_words(parts: tuple[Any, ...]) -> str:
+    return f"a mapping, such as a dict, of {_words(parts[0])} to {_words(parts[1])}"
+
+
+_GENERIC: dict[Any, tuple[Callable[[Any], Fits], Callable[[Any], str]]] = {
+    Union: (_either, _join),
+    types.UnionType: (_either, _join),
+    # The function knows the words, and which is near.
+    Literal: (lambda parts: _PLAIN[str][0], lambda parts: " or ".join(f"'{e}'" for e in parts)),
+    tuple: (_row, _row_words),
+    **dict.fromkeys((abc.Sequence, list), (_many, _list_words)),
+    **dict.fromkeys((abc.Mapping, dict), (_table, _table_words)),
+    abc.Iterable: (_several, _list_words),
+    abc.Callable: (lambda parts: callable, lambda parts: "a function"),
+    type: (lambda parts: inspect.isclass, lambda parts: "a class"),
+}
 
 
 def _is_sequence(value: Any) -> typing.TypeGuard[Sequence[Any]]:

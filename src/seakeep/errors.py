@@ -7,6 +7,8 @@ the message alone; ``exit_status`` is what it returns to the shell.
 from __future__ import annotations
 
 import difflib
+import sys
+import warnings
 from collections.abc import Iterable
 
 __all__ = [
@@ -18,6 +20,7 @@ __all__ = [
     "SeakeepWarning",
     "did_you_mean",
     "wanted",
+    "warn",
 ]
 
 SHOWN = 60
@@ -48,6 +51,17 @@ class DataError(SeakeepError, ValueError):
 
 class SeakeepWarning(UserWarning):
     """A result was produced, but something about it needs attention."""
+
+
+def warn(message: str) -> None:
+    """Give a SeakeepWarning whose place is the line outside seakeep that led to it."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in _WITHIN:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, SeakeepWarning, stacklevel=level)
+
+
+_WITHIN = ("seakeep", "functools", "contextlib")
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

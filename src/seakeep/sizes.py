@@ -7,11 +7,10 @@ everywhere.
 from __future__ import annotations
 
 import math
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.errors import DataError, RequestError, warn
 
 if TYPE_CHECKING:
     import h5py
@@ -95,9 +94,7 @@ def check_size(
     if words := too_large(asked, count, most, what, mend):
         raise RequestError(words)
     if count > long:
-        warnings.warn(
-            f"{asked} {count:.3g} {what}, which takes long. {mend}", SeakeepWarning, stacklevel=3
-        )
+        warn(f"{asked} {count:.3g} {what}, which takes long. {mend}")
 
 
 def check_numbers(asked: str, count: float, mend: str, long: float = math.inf) -> None:

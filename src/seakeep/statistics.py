@@ -9,7 +9,6 @@ by channel; text, such as the status of an ensemble's members, is left out. All 
 from __future__ import annotations
 
 import functools
-import warnings
 from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any, overload
@@ -51,7 +50,7 @@ from seakeep.core.density import (
 from seakeep.core.divergence import JsdInterval, jensen_shannon
 from seakeep.core.trend import TrendTest, trend_test
 from seakeep.core.two_way import overlap_block, two_way_interval
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.errors import DataError, RequestError, warn
 from seakeep.pairing import channel_names, pair
 
 __all__ = [
@@ -183,7 +182,7 @@ def _divergence_of(
             block = choice.samples
             if choice.capped:
                 message = f"channel '{name}': {_bootstrap.too_long(choice, measured.size)}"
-                warnings.warn(message, SeakeepWarning, stacklevel=4)
+                warn(message)
         return _divergence.jsd_interval(
             p.reshape(-1, p.shape[-1]), measured, block_length=block, rng=rng, **settings
         )

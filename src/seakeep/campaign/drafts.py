@@ -27,11 +27,13 @@ from seakeep.campaign.guesses import (
 )
 from seakeep.campaign.readers import time_column, time_step_of, time_unit_of
 from seakeep.campaign.settings import FileSettings
+from seakeep.checked import explained
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
 from seakeep.files import MARK, expanded
 from seakeep.formats import Columns, read_columns
 from seakeep.formats.columns import named_unit
+from seakeep.toml import validated
 
 __all__ = ["draft_campaign"]
 
@@ -47,6 +49,7 @@ LIKE = 1.25
 _REMOVE = "prepare warns of it: remove it"
 
 
+@explained
 def draft_campaign(
     files: Sequence[Path | str],
     folder: Path | str | None = None,
@@ -85,7 +88,7 @@ def draft_campaign(
         )
     paths = [Path(file) for file in files]
     known = {key: value for key, value in (options or {}).items() if value is not None}
-    settings = FileSettings.model_validate(known).known()
+    settings = validated(FileSettings, known, "options", "draft").known()
     tables = [read_columns(path, settings) for path in paths]
     read = arranged(paths, tables, _times(tables))
     guesses = guess_channels(read)

@@ -484,6 +484,10 @@ class PreparationSettings(Table):
         """Take the filters of a preset, unless one is stated; keys that are stated stay."""
         if self.preset is not None or preset is None:
             return self
+        if preset not in _FILTERS:
+            raise RequestError(
+                f"preset must be {' or '.join(map(repr, _FILTERS))}; received {preset!r}."
+            )
         filters = {k: v for k, v in _FILTERS[preset].items() if k not in self.model_fields_set}
         return self.model_copy(update={**filters, "preset": preset})
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -15,7 +14,8 @@ from pydantic import TypeAdapter, create_model
 from seakeep.campaign.pipeline import version
 from seakeep.campaign.prepare import Campaign, Progress
 from seakeep.campaign.survey import Failures, as_one
-from seakeep.errors import SeakeepError, SeakeepWarning
+from seakeep.checked import explained
+from seakeep.errors import SeakeepError, warn
 from seakeep.files import (
     MARK,
     check_output,
@@ -35,6 +35,7 @@ NUMBERS = (*POSITIVE, "celerity", "wave_direction", "probe_offset")
 """Attributes that are numbers, those that are positive first."""
 
 
+@explained
 def write_prepared(
     campaign: Campaign,
     out_dir: Path | str | None = None,
@@ -110,6 +111,7 @@ def _fresh_step(campaign: Campaign, name: str, file: Path) -> float | None:
     return None if run is None else float(run.attrs["dt"])
 
 
+@explained
 def load_prepared(
     campaign: Campaign,
     out_dir: Path | str | None = None,
@@ -165,11 +167,9 @@ def _fresh(campaign: Campaign, name: str, file: Path) -> xr.Dataset | None:
         if run.attrs.get(MARK) == PREPARED:
             _check_contents(run)
     except (SeakeepError, OSError, ValueError, LookupError, TypeError, RuntimeError):
-        warnings.warn(
+        warn(
             f"{file} was altered since it was written, or cannot be read; the run is prepared "
-            "anew. Remove the file, and 'seakeep prepare' writes it again.",
-            SeakeepWarning,
-            stacklevel=3,
+            "anew. Remove the file, and 'seakeep prepare' writes it again."
         )
         return None
     if MARK not in run.attrs:

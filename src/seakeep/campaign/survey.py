@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,7 +21,7 @@ from seakeep.campaign.pipeline import (
     used_span,
 )
 from seakeep.campaign.settings import CampaignSettings
-from seakeep.errors import DataError, MissingFileError, SeakeepError, SeakeepWarning
+from seakeep.errors import DataError, MissingFileError, SeakeepError, warn
 from seakeep.quality import Finding, warn_of
 from seakeep.quality.clocks import ClocksKind
 from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step, waves_part
@@ -137,7 +136,7 @@ def _warn(
     left_out: Mapping[str, str], doubts: Mapping[str, tuple[float, float]], channel: str
 ) -> None:
     for words in left_out.values():
-        warnings.warn(words, SeakeepWarning, stacklevel=4)
+        warn(words)
     found = [Finding(ClocksKind.PERIOD, run, channel, *two, "s") for run, two in doubts.items()]
     warn_of(found, set())
 

@@ -20,6 +20,7 @@ from seakeep.check.parts import (
     regressors,
     used_parts,
 )
+from seakeep.checked import explained
 from seakeep.core.harmonics import dominant_frequency
 from seakeep.core.spectra import Spectra, cross_spectra
 from seakeep.errors import DataError, RequestError
@@ -33,6 +34,7 @@ AVERAGES = 10
 """Independent segments per input, and one more, that are kept where the records are long enough."""
 
 
+@explained
 def coherence(
     model: Model,
     runs: Mapping[str, xr.Dataset],

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray
-from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
+from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, SlowSquares, is_ensemble
 from seakeep.models.engine import Windows
 from seakeep.models.inputs import Chain, Lead, Measured
@@ -135,18 +135,14 @@ def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
                 aligned = model.aligned_inputs(run)
                 inputs = channel_matrix(aligned, model.inputs, name)
         except DataError as error:
-            warnings.warn(f"{name} is left out: {error}", SeakeepWarning, stacklevel=3)
+            warn(f"{name} is left out: {error}")
             continue
         begin, end = _span(run)
         whole = np.isfinite(states).all(axis=1) & np.isfinite(inputs).all(axis=1)
         inside = whole & (time >= begin - 1e-6) & (time <= end + 1e-6)
         pieces = stretches(inside)
         if not pieces:
-            warnings.warn(
-                f"{name} is left out: no sample of it has all channels of the model.",
-                SeakeepWarning,
-                stacklevel=3,
-            )
+            warn(f"{name} is left out: no sample of it has all channels of the model.")
             continue
         first, stop = max(pieces, key=lambda piece: piece[1] - piece[0])
         found[name] = Part(run, time[first:stop], states[first:stop], inputs[first:stop])
@@ -182,7 +178,7 @@ def free_runs(
     if not found:
         raise DataError("no run can be forecast. " + " ".join(reasons))
     for reason in reasons:
-        warnings.warn(f"left out: {reason}", SeakeepWarning, stacklevel=3)
+        warn(f"left out: {reason}")
     return found
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 
 import numpy as np
@@ -19,9 +18,10 @@ from seakeep.check.parts import (
     one_step,
     window_of,
 )
+from seakeep.checked import explained
 from seakeep.core.spectra import cross_spectra
 from seakeep.core.whiteness import autocorrelation, input_correlation, ljung_box
-from seakeep.errors import DataError, SeakeepError, SeakeepWarning
+from seakeep.errors import DataError, SeakeepError, warn
 from seakeep.models import Model
 from seakeep.models.labelled import channel_matrix
 
@@ -35,6 +35,7 @@ AGES = 15
 """Encounter periods over which a forecast grows old."""
 
 
+@explained
 def residuals(
     model: Model, runs: Mapping[str, xr.Dataset], free: Known | None = None
 ) -> xr.Dataset:
@@ -86,7 +87,7 @@ def residuals(
     if not steps:
         raise DataError("no run can be judged. " + " ".join(reasons))
     for reason in reasons:
-        warnings.warn(f"left out: {reason}", SeakeepWarning, stacklevel=2)
+        warn(f"left out: {reason}")
     errors = [(error, inputs) for error, inputs, _ in steps]
     count = sum(len(error) for error, _ in errors)
     if count <= 2 * lags:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 
 import numpy as np
@@ -21,10 +20,11 @@ from seakeep.check.parts import (
     used_parts,
     wave_turns,
 )
+from seakeep.checked import explained
 from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
 from seakeep.core.response import frequency_response
 from seakeep.core.spectra import Spectra, cross_spectra
-from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
+from seakeep.errors import DataError, RequestError, SeakeepError, warn
 from seakeep.models import HankelDMDcModel, HankelEnsemble, Model
 from seakeep.models.engine import Dynamics
 from seakeep.models.inputs import Chain, Lead
@@ -43,6 +43,7 @@ FREQUENCIES = 120
 LEVEL = 0.95
 
 
+@explained
 def response(
     model: Model,
     frequencies: npt.ArrayLike | None = None,
@@ -95,6 +96,8 @@ def response(
         raise RequestError("the model has no input: it answers no wave. Check its modes instead.")
     wanted = _default_frequencies(model) if frequencies is None else frequencies
     frequency = np.atleast_1d(as_real(wanted, "frequencies"))
+    if frequency.size == 0:
+        raise RequestError("frequencies is empty. Give at least one, in Hz, or leave it out.")
     if frequency.min() <= 0 or frequency.max() > 0.5 / model.dt:
         raise RequestError(
             f"frequencies must lie above 0 and up to half the sampling rate ({0.5 / model.dt:.4g} "
@@ -217,6 +220,7 @@ def _ratio(units: str, per: str) -> str:
     return f"{units or '1'}/{per}" if per and per != "1" else units
 
 
+@explained
 def measured_response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Measured response per wave amplitude: points with expanded uncertainty.
 
@@ -271,7 +275,7 @@ def measured_response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Datase
     if not points:
         raise DataError("no run gives a measured response. " + " ".join(reasons))
     for reason in reasons:
-        warnings.warn(f"no measured response from {reason}", SeakeepWarning, stacklevel=2)
+        warn(f"no measured response from {reason}")
     out = xr.concat(points, dim="point", coords="minimal", join="outer")
     out["phase"].attrs = {"units": "deg", "long_name": "phase before the wave"}
     return out.assign_attrs(reference=model.inputs[reference])
@@ -372,6 +376,7 @@ def _points(
     )
 
 
+@explained
 def validation(
     model: Model, runs: Mapping[str, xr.Dataset], measured: xr.Dataset | None = None
 ) -> xr.Dataset:
@@ -403,6 +408,11 @@ def validation(
         If the model reads several probes and no run states where they stand.
     """
     measured = measured_response(model, runs) if measured is None else measured
+    if "amplitude" not in measured:
+        raise RequestError(
+            "measured must be a result of measured_response; received a Dataset of "
+            f"{', '.join(map(str, measured.data_vars)) or 'nothing'}."
+        )
     frequency, place = np.unique(measured["frequency"].values, return_inverse=True)
     found = response(model, frequency, runs)
     if WAVE not in found["input"] and elevations(model).sum() > 1:

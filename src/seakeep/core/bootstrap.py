@@ -7,7 +7,6 @@ samples, which keeps its dependence within a block (Künsch 1989).
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -23,7 +22,7 @@ from seakeep.arrays import (
     whole_number,
 )
 from seakeep.checked import checked
-from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.sizes import check_numbers
 
 __all__ = [
@@ -285,7 +284,7 @@ def block_length(
         segments=segments,
     )
     if choice.capped:
-        warnings.warn(too_long(choice, np.size(series)), SeakeepWarning, stacklevel=2)
+        warn(too_long(choice, np.size(series)))
     return choice.samples
 
 

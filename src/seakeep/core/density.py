@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import numbers
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -19,7 +18,7 @@ from scipy import fft
 from seakeep.arrays import FloatArray, IntArray, as_bundle, as_real, fraction, whole_number
 from seakeep.checked import checked
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
-from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.sizes import MOST_BINS, check_numbers, check_size
 
 __all__ = [
@@ -299,12 +298,10 @@ def density_grid(
     narrow = min(float(h.min()) for h in widths)
     step = (high - low) / (points - 1)
     if step > COARSE * narrow:
-        warnings.warn(
+        warn(
             f"the grid of {points} points over {low:.4g} to {high:.4g} has a step of {step:.3g}, "
             f"and the narrowest kernel a bandwidth of {narrow:.3g}. Look for a forecast that ran "
-            "away or a spike in the measurement, or take more points.",
-            SeakeepWarning,
-            stacklevel=2,
+            "away or a spike in the measurement, or take more points."
         )
     return np.linspace(low, high, points)
 

@@ -6,7 +6,6 @@ A topic is a table: one row per message, one column per number in it. Needs rosb
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from seakeep.arrays import FloatArray
-from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.formats.columns import Columns
 from seakeep.formats.reader import Options
 
@@ -181,11 +180,9 @@ def _columns(path: Path, rows: _Rows, begin: int) -> Columns:
             f"'{rows.topic}' have no stamp in their header. Correct the node that publishes them."
         )
     elif rows.kind.endswith("Stamped") or rows.kind.startswith("sensor_msgs/"):
-        warnings.warn(
+        warn(
             f"{path}: the headers of the topic '{rows.topic}' are not stamped; the times are those "
-            "of reception, late by what the transport took.",
-            SeakeepWarning,
-            stacklevel=2,
+            "of reception, late by what the transport took."
         )
     units = {name: unit for name in values if (unit := _unit(rows.kind, name)) is not None}
     units |= dict.fromkeys(times, "s")

@@ -20,7 +20,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from seakeep.arrays import FloatArray
-from seakeep.errors import DataError, SeakeepWarning
+from seakeep.errors import DataError, warn
 from seakeep.formats.columns import Columns, is_unit, unique_names
 from seakeep.formats.reader import Options
 from seakeep.sizes import EXPANSION, most_bytes
@@ -98,11 +98,9 @@ def _warn_of_a_short_end(path: Path, raw: bytes, layout: _Layout) -> None:
     cells = [_cells(row, layout.delimiter)[-1] for _, row in _rows(raw, start, layout.marks)]
     if len(cells) > 2 and len(cells[-1]) < min(map(len, cells[:-1])):
         line = raw.count(b"\n") + 1
-        warnings.warn(
+        warn(
             f"{path} ends within line {line}, at {cells[-1]!r}: it seems to be cut "
-            "off. Export it again, or end the last line if it is whole.",
-            SeakeepWarning,
-            stacklevel=3,
+            "off. Export it again, or end the last line if it is whole."
         )
 
 
@@ -177,11 +175,9 @@ _SIGNS = frozenset("°µ²³·".encode("latin-1"))
 def _western(path: Path, raw: bytes) -> str:
     letters = {byte for byte in set(raw) if byte >= 0x80}
     if not letters <= _SIGNS:
-        warnings.warn(
+        warn(
             f"{path} is not UTF-8 and was read as Windows-1252 (Latin-1); check the letters of its "
-            "header, or state encoding in [files].",
-            SeakeepWarning,
-            stacklevel=2,
+            "header, or state encoding in [files]."
         )
     # Five bytes are not letters of Windows-1252; Latin-1 has control characters there.
     return raw.decode("latin-1" if _UNUSED & letters else "cp1252")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -24,7 +23,7 @@ from seakeep.core.calibration import (
     spread_floor,
     wave_envelope,
 )
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice, typed
 from seakeep.models.engine import Runs as FreeRuns
@@ -471,17 +470,13 @@ def check_band(calibration: Calibration | None, level: float, band: Band) -> Non
         )
 
 
-def warn_of_horizon(
-    calibration: Calibration | None, name: str, steps: int, stacklevel: int = 4
-) -> None:
+def warn_of_horizon(calibration: Calibration | None, name: str, steps: int) -> None:
     """Warn where a forecast is longer than those that its calibrated band was made from."""
     if calibration is not None and steps > calibration.steps:
-        warnings.warn(
+        warn(
             f"the forecast of {name} is longer than the {calibration.steps} instants that "
             "the band was calibrated for: its coverage is not guaranteed there. Calibrate with "
-            "longer windows.",
-            SeakeepWarning,
-            stacklevel=stacklevel,
+            "longer windows."
         )
 
 

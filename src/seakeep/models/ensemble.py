@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -15,7 +14,8 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, fraction
-from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.checked import explained
+from seakeep.errors import RequestError, warn
 from seakeep.models import engine, store
 from seakeep.models.calibration import (
     Band,
@@ -111,6 +111,7 @@ class _Forecasts(Forecaster):
         """Standard deviation of the states over all that members learn from, shape (N,)."""
         return self.signature.state_scale.spread
 
+    @explained
     def forecast(
         self,
         run: xr.Dataset,
@@ -157,6 +158,7 @@ class _Forecasts(Forecaster):
             | {"start": windows.places[0][1]},
         )
 
+    @explained
     def forecast_summary(
         self,
         run: xr.Dataset,
@@ -209,6 +211,7 @@ class _Forecasts(Forecaster):
             attrs=self._notes(windows) | counts,
         )
 
+    @explained
     def forecast_windows(
         self,
         run: xr.Dataset,
@@ -249,6 +252,7 @@ class _Forecasts(Forecaster):
         coords = window_coords(windows, self.dt) | {"member": np.arange(self.n_members)}
         return xr.Dataset(variables, coords=coords, attrs=self._notes(windows))
 
+    @explained
     def summarize_windows(
         self,
         run: xr.Dataset,
@@ -431,11 +435,21 @@ class HankelEnsemble(_Forecasts, store.Saved):
         """Â of each member."""
         return (self.member(number).A for number in range(self.n_members))
 
+    @explained
     def dynamics(self, number: int) -> Dynamics:
         """A member identified: what a free run of it needs."""
-        draw, input_map = self.members[number], self.signature.input_map
+        draw, input_map = self._draw(number), self.signature.input_map
         return identify_member(self.arrays, self.settings, input_map, draw).dynamics
 
+    def _draw(self, number: int) -> Draw:
+        if not 0 <= number < self.n_members:
+            raise RequestError(
+                f"there is no member {number!r}: the ensemble has {self.n_members}, counted from "
+                f"0 to {self.n_members - 1}."
+            )
+        return self.members[number]
+
+    @explained
     def member(self, number: int) -> HankelDMDcModel:
         """One member as a model of its own.
 
@@ -454,12 +468,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
         RequestError
             If there is no such member.
         """
-        if not 0 <= number < self.n_members:
-            raise RequestError(
-                f"there is no member {number!r}: the ensemble has {self.n_members}, counted from "
-                f"0 to {self.n_members - 1}."
-            )
-        draw, signature = self.members[number], self.signature
+        draw, signature = self._draw(number), self.signature
         found = identify_member(self.arrays, self.settings, signature.input_map, draw)
         ends = [window_ends(self.arrays, draw, run, self.dt) for run in found.runs]
         return HankelDMDcModel(
@@ -492,6 +501,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
             learnt=Kept(self.coverage),
         )
 
+    @explained
     def spectral_radii(
         self, *, executor: Executor | None = None, progress: Progress | None = None
     ) -> FloatArray:
@@ -593,6 +603,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
         )
         return "\n".join(lines)
 
+    @explained
     def hold(
         self,
         *,
@@ -616,6 +627,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
         found = in_order(_identify, self, range(self.n_members), executor, progress)
         return HeldEnsemble(self, tuple(found))
 
+    @explained
     def calibrate(
         self,
         runs: Runs,
@@ -673,6 +685,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
         found = calibrate(self, runs, steps, level, scale, folds, executor, progress)
         return replace(self, calibration=found)
 
+    @explained
     def without(self, run: str) -> HankelEnsemble:
         """The same draws as they learn from the other runs, to forecast a run that trained.
 
@@ -886,6 +899,7 @@ class HeldEnsemble(_Forecasts):
         found = [self.members[number] for number in members]
         return linear_runs(found, groups, self.signature.readouts)
 
+    @explained
     def forecast_arrays(
         self,
         x_history: npt.ArrayLike,
@@ -932,7 +946,7 @@ class HeldEnsemble(_Forecasts):
         check_band(self.calibration, level, band)
         windows = check_arrays(self.signature, x_history, u_history, u_future, steps, ahead)
         if band == "calibrated":
-            warn_of_horizon(self.calibration, "these arrays", int(steps), stacklevel=3)
+            warn_of_horizon(self.calibration, "these arrays", int(steps))
         with one_blas_thread():
             out = self.free_runs([windows], range(self.n_members))[0][:, 0]
         kept = out[engine.first_lost(out) < 0]
@@ -942,6 +956,7 @@ class HeldEnsemble(_Forecasts):
         ]
         return BandForecast(mean, std, lower, upper, len(out) - len(kept))
 
+    @explained
     def live(
         self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
     ) -> Live:
@@ -1009,13 +1024,11 @@ def _draws(dataset: xr.Dataset) -> tuple[Draw, ...]:
 def _warn_of_unstable(radii: FloatArray) -> None:
     """Warn of members whose spectral radius is one or more, with what to do."""
     if unstable := int(np.count_nonzero(radii >= 1.0)):
-        warnings.warn(
+        warn(
             f"{unstable} of {counted(radii.size, 'member')} have a spectral radius of one or more "
             f"(up to {radii.max():.6f}): a free run of theirs grows, and once it is lost it is "
             "left out of mean and band. Raise the ridge, train on more data, use shorter state "
-            "delays, or look for transients at the ends of the training runs.",
-            SeakeepWarning,
-            stacklevel=4,  # past spectral_radii, to its caller
+            "delays, or look for transients at the ends of the training runs."
         )
 
 

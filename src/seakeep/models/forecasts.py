@@ -12,6 +12,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, as_real, whole_number
+from seakeep.checked import explained
 from seakeep.errors import RequestError
 from seakeep.models import engine
 from seakeep.models.checks import check_choice
@@ -96,6 +97,7 @@ class Forecaster:
         """Samples of input after the one a step starts from that drive the step."""
         return self.signature.lead_samples
 
+    @explained
     def read_windows(
         self,
         runs: Mapping[str, xr.Dataset],
@@ -135,6 +137,7 @@ class SingleModel(Forecaster):
         spans = zip(training.first, training.stop, strict=True)
         return dict(zip(training.runs, spans, strict=True))
 
+    @explained
     def lines(self, regression: str = "") -> list[str]:
         """Lines of a summary: channels, delays, history, regression, input map and training."""
         signature, training, dt = self.signature, self.training, self.dt
@@ -161,6 +164,7 @@ class SingleModel(Forecaster):
             )
         ]
 
+    @explained
     def forecast(
         self, run: xr.Dataset, start: float, steps: int | None = None, *, ahead: str = "refuse"
     ) -> xr.Dataset:
@@ -213,6 +217,7 @@ class SingleModel(Forecaster):
         # The instants stand among the variables: given as coords, xarray would merge twice.
         return xr.Dataset({"time": windows.time[0], **variables}, attrs=attrs | {"status": status})
 
+    @explained
     def forecast_windows(
         self,
         run: xr.Dataset,
@@ -406,7 +411,8 @@ def check_arrays(
         return engine.array_windows(signature, x[None], np.zeros((1, z + count, 0)), count)
     past = rows_by_name("u_history", u_history, z + 1, inputs, "z + 1")
     u = _finite("u_history", past[-z - 1 :])
-    future = np.zeros((0, len(inputs))) if np.size(u_future) == 0 else u_future
+    is_empty = as_real(u_future, "u_future").size == 0
+    future = np.zeros((0, len(inputs))) if is_empty else u_future
     needed = count - 1 + signature.lead_samples
     meaning = "steps − 1 + lead_samples" if signature.lead_samples else "steps − 1"
     least = needed if ahead == "refuse" else 0

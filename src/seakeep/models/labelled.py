@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
@@ -12,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import GREATEST, FloatArray
-from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.signals import uniform_step
 from seakeep.signals.time_axis import instant_text, span_text
 from seakeep.signals.waves import encounter_period
@@ -269,12 +268,10 @@ def common_labels(runs: Mapping[str, xr.Dataset], names: Sequence[str]) -> tuple
             )
         if stated and len(stated) < len(runs):
             silent = next(name for name in runs if name not in stated)
-            warnings.warn(
+            warn(
                 f"channel '{label.name}' of {silent} states no unit; it is taken to be in "
                 f"'{next(iter(stated.values()))}', as in {next(iter(stated))}. Set its units "
-                "attribute.",
-                SeakeepWarning,
-                stacklevel=4,
+                "attribute."
             )
         if stated:
             labels = (
@@ -302,11 +299,9 @@ def check_units(run: xr.Dataset, labels: Sequence[ChannelLabel], name: str) -> N
     if silent:
         listed = ", ".join(f"'{label.name}'" for label in silent)
         units = ", ".join(dict.fromkeys(f"'{label.units}'" for label in silent))
-        warnings.warn(
+        warn(
             f"channel {listed} of {name} states no unit; it is taken to be in the model's {units}. "
-            "Set its units attribute.",
-            SeakeepWarning,
-            stacklevel=5,
+            "Set its units attribute."
         )
 
 

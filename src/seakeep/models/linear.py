@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,9 +12,10 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import ComplexArray, FloatArray
+from seakeep.arrays import ComplexArray, FloatArray, as_real
+from seakeep.checked import explained
 from seakeep.core.solve import Solution
-from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.errors import RequestError, warn
 from seakeep.models import export, labelled, store
 from seakeep.models.engine import Dynamics, Windows, linear_runs
 from seakeep.models.forecasts import SingleModel, check_arrays, counted, one_run
@@ -191,13 +191,11 @@ class HankelDMDcModel(SingleModel, store.Saved):
         values = values[np.argsort(-np.abs(values), kind="stable")]
         values.flags.writeable = False
         if abs(values[0]) >= 1.0:
-            warnings.warn(
+            warn(
                 f"the spectral radius of the model is {abs(values[0]):.6f}: a free run grows by "
                 f"{100 * (abs(values[0]) - 1):.2g} % per step in its worst mode and will diverge "
                 "if it is long. Raise ridge, train on more data, use fewer state delays, look for "
-                "transients at the ends of the training runs, or set stable = True.",
-                SeakeepWarning,
-                stacklevel=3,  # past the cached property
+                "transients at the ends of the training runs, or set stable = True."
             )
         return values
 
@@ -241,6 +239,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
             signature.direct_scale,
         )
 
+    @explained
     def aligned_inputs(self, run: xr.Dataset) -> xr.Dataset:
         """Inputs of a run as the model wants them: carried to the measured position.
 
@@ -276,6 +275,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
         }
         return xr.Dataset(variables, coords={"time": run["time"]}, attrs=run.attrs)
 
+    @explained
     def forecast_arrays(
         self,
         x_history: npt.ArrayLike,
@@ -319,6 +319,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
         values: FloatArray = self.free_runs([windows])[0][0, 0]
         return values
 
+    @explained
     def live(
         self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
     ) -> Live:
@@ -372,6 +373,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
         """
         return export.to_control(self._system(), self.signature)
 
+    @explained
     def to_mat(self, path: str | Path) -> Path:
         """Write A, B, C, D, Ts, offsets, names (of the state's entries too) and units for MATLAB.
 
@@ -388,6 +390,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
         """
         return export.to_mat(self._system(), self.signature, path)
 
+    @explained
     def initial_state(self, run: xr.Dataset, start: float) -> FloatArray:
         """State of the exported system that continues a measured run.
 
@@ -412,6 +415,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
         windows = self.read_windows(*one_run(run, [start]), 1)
         return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
 
+    @explained
     def initial_state_arrays(
         self, x_history: npt.ArrayLike, u_history: npt.ArrayLike
     ) -> FloatArray:
@@ -434,7 +438,8 @@ class HankelDMDcModel(SingleModel, store.Saved):
         """
         lead: npt.ArrayLike = []
         if self.inputs:  # what comes later is not part of the state
-            lead = np.asarray(u_history)[-1:].repeat(self.lead_samples, axis=0)
+            given = as_real(u_history, "u_history")
+            lead = given[-1:].repeat(self.lead_samples, axis=0) if given.ndim else given
         windows = check_arrays(self.signature, x_history, u_history, lead, 1)
         return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
 

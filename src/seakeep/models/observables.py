@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
+from seakeep.checked import explained
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models import labelled
@@ -161,6 +162,7 @@ def _power(unit: str, power: int) -> str:
     return f"({unit})^{power}" if any(sign in unit for sign in "/*· ") else f"{unit}^{power}"
 
 
+@explained
 @dataclass(frozen=True)
 class SlowSquares:
     """Slow parts of squares of an elevation and of its derivatives.
@@ -267,6 +269,7 @@ class SlowSquares:
         return kernel, reach, round(self.lead * period), [round(lag * period) for lag in self.lags]
 
 
+@explained
 @dataclass(frozen=True)
 class Powers:
     """Powers of inputs, and products of pairs of them, with the input delays of the model.
@@ -340,6 +343,7 @@ class Powers:
         return 0, 0
 
 
+@explained
 @dataclass(frozen=True)
 class Expression:
     """An expression of inputs, with the input delays of the model.

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.arrays import FloatArray, whole_number
+from seakeep.checked import explained
+from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import labelled
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.signals import encounter_period
@@ -51,6 +51,7 @@ class ProbeOffset:
     span: tuple[float, float]
 
 
+@explained
 def estimate_probe_offset(
     model: HankelDMDcModel,
     run: xr.Dataset,
@@ -112,13 +113,11 @@ def estimate_probe_offset(
     errors = np.array([_errors(model, part, distance) for distance in fine])
     offset, at = _least(fine, errors.mean(axis=1))
     if best in (0, coarse.size - 1):
-        warnings.warn(
+        warn(
             f"the offset found, {offset:.3g} m, lies at the end of the distances tried, {low:.3g} "
-            f"to {high:.3g} m. Widen bounds, or check the run: another sea or another probe.",
-            SeakeepWarning,
-            stacklevel=2,
+            f"to {high:.3g} m. Widen bounds, or check the run: another sea or another probe."
         )
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(whole_number(seed, "seed", least=0))
     blocks = np.stack([block.mean(axis=1) for block in np.array_split(errors, BLOCKS, axis=1)])
     drawn = rng.integers(0, BLOCKS, (RESAMPLES, BLOCKS))
     found = np.array([_least(fine, blocks[rows].mean(axis=0))[0] for rows in drawn])

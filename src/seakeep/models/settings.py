@@ -10,8 +10,9 @@ from typing import ClassVar, Literal, Self
 
 import numpy as np
 
+from seakeep.checked import explained
 from seakeep.core.embedding import History
-from seakeep.errors import SHOWN, RequestError, SeakeepWarning
+from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
 from seakeep.models.checks import check_choice, check_integer, check_keys, settings_of
 from seakeep.models.html import settings_html
 from seakeep.models.inputs import Lead, ProbeAlignment
@@ -112,6 +113,7 @@ def check_stable(value: object) -> None:
         )
 
 
+@explained
 @dataclass(frozen=True)
 class Select:
     """What free runs on held-out training runs choose, beside λ.
@@ -212,11 +214,9 @@ class HankelSettings:
         self._check_readouts()
         if self.rank is not None and self.ridge != 0:
             ridge = self.ridge if isinstance(self.ridge, str) else f"{self.ridge:g}"
-            warnings.warn(
+            warn(
                 f"rank = {self.rank} truncates singular values instead of regularising, so "
-                f"ridge = {ridge} is not used. Set ridge=0 to say so.",
-                SeakeepWarning,
-                stacklevel=4,
+                f"ridge = {ridge} is not used. Set ridge=0 to say so."
             )
 
     def _check_readouts(self) -> None:
@@ -254,6 +254,7 @@ class HankelSettings:
         observed = (Observing(self.observables, int(self.lead)),) if self.observables else ()
         return (*alignment, *lead, *observed)
 
+    @explained
     def around(self, dt: float, input_delays: int | None = None) -> tuple[int, int]:
         """Samples of input before and after the start that the rows of a forecast read.
 
@@ -267,6 +268,7 @@ class HankelSettings:
         before = max([delays, *(before for before, _ in reach)])
         return before, max([int(self.lead), *(ahead for _, ahead in reach)])
 
+    @explained
     def needs(self, dt: float) -> Needs:
         """Samples that it asks of its runs."""
         before, after = self.around(dt)
@@ -295,6 +297,7 @@ class HankelSettings:
         return made
 
     @classmethod
+    @explained
     def from_json(cls, content: Json) -> Self:
         """Settings from JSON values; an unknown key or a value out of range raises an error."""
         check_keys(cls, content)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.core.bands import split_bands
-from seakeep.errors import SeakeepWarning
+from seakeep.errors import warn
 from seakeep.models import labelled
 
 __all__ = ["FEWEST", "SlowMotion", "slow_motions", "warn_of_slow_motions"]
@@ -122,11 +121,9 @@ def warn_of_slow_motions(
     worst = few[0]
     others = ", ".join(each.channel for each in few[1:])
     length = "longer than the record" if np.isinf(worst.period) else f"{worst.period:.3g} s"
-    warnings.warn(
+    warn(
         f"{what}, {trained:.4g} s in all, hold {worst.cycles:.1f} periods of the slow motion of "
         f"{worst.channel} (period {length}, {100 * worst.share:.0f} % of its variance), fewer than "
         f"{FEWEST}{f'; the same holds for {others}' if others else ''}. Means and standard "
-        "deviations are then those of single cycles. Lengthen the window, or train on more runs.",
-        SeakeepWarning,
-        stacklevel=3,
+        "deviations are then those of single cycles. Lengthen the window, or train on more runs."
     )

@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import GREATEST, FloatArray
+from seakeep.checked import explained
 from seakeep.errors import DataError, MissingFileError, RequestError
 from seakeep.files import MARK, check_output, read_sealed, replacing, write_netcdf
 from seakeep.models.checks import parsed, typed
@@ -57,6 +58,7 @@ class Saved:
         """All that :meth:`save` writes."""
         raise NotImplementedError
 
+    @explained
     def save(self, path: str | Path) -> Path:
         """Write the model as NetCDF, to a temporary name first.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import reprlib
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Self, cast
@@ -14,7 +13,7 @@ import xarray as xr
 from seakeep.arrays import BoolArray, FloatArray
 from seakeep.core.embedding import History, TrainingWindow, training_window
 from seakeep.core.solve import Method, Solution, identify
-from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.models import labelled
 from seakeep.models.checks import typed
 from seakeep.models.inputs import Chain, Measured
@@ -427,12 +426,10 @@ def _warn_of_dead(
     for run, values, window in zip(runs, series, windows, strict=True):
         seen = values[window.samples]
         for column in np.flatnonzero(is_constant(seen) & (scale.spread > 0)).tolist():
-            warnings.warn(
+            warn(
                 f"channel '{names[column]}' of {run} is constant ({seen[0, column]:.6g}) over its "
                 "training window, and moves in other runs. If its sensor was dead, leave this run "
-                "out: the model would learn that nothing moves.",
-                SeakeepWarning,
-                stacklevel=4,
+                "out: the model would learn that nothing moves."
             )
 
 

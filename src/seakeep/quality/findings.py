@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import warnings
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -13,7 +12,7 @@ from typing import Any
 import xarray as xr
 
 from seakeep.conventions import displayed
-from seakeep.errors import SeakeepWarning
+from seakeep.errors import warn
 
 __all__ = ["Finding", "Kind", "as_json", "findings_of", "warn_of"]
 
@@ -171,4 +170,4 @@ def warn_of(
         others = f" ({', '.join(more)} likewise)" if more else ""
         remedy = f" {each.remedy}" if each.remedy else ""
         words = f"{each.run}: {each.channel} {each.text}{others}.{remedy}"
-        warnings.warn(words, SeakeepWarning, stacklevel=3)
+        warn(words)

@@ -13,7 +13,6 @@ downstream to the left it stands on the other side of the tank.
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -26,7 +25,7 @@ import scipy
 
 from seakeep.arrays import BoolArray, FloatArray, IntArray
 from seakeep.checked import checked
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.errors import DataError, RequestError, warn
 from seakeep.files import existing_file
 from seakeep.signals.filters import low_pass
 from seakeep.signals.panel import CORNERS, FIELDS, Image, TrackingSettings, find_panel, opencv
@@ -159,11 +158,9 @@ class _Video:
             raise DataError(f"{self.path} holds no frame that can be decoded. Export it again.")
         # Headers of some containers are off by a frame or two.
         if self.announced - count > max(2, 0.01 * self.announced):
-            warnings.warn(
+            warn(
                 f"{self.path} announces {self.announced} frames and ends after {count}: it was cut "
-                "off or is damaged. What is there was used; copy the file again.",
-                SeakeepWarning,
-                stacklevel=2,
+                "off or is damaged. What is there was used; copy the file again."
             )
 
 
@@ -347,12 +344,10 @@ def _warn_of_flags(path: Path | str, flag: IntArray) -> None:
         counts = ", ".join(
             f"{np.sum(flag == code)} {name}" for name, code in FLAGS.items() if np.any(flag == code)
         )
-        warnings.warn(
+        warn(
             f"{path}: {bad} of {flag.size} frames are flagged ({counts}). Look at the contact "
             "sheet; correct the thresholds, state a region, or raise tolerance for a lens that "
-            "distorts.",
-            SeakeepWarning,
-            stacklevel=3,
+            "distorts."
         )
 
 

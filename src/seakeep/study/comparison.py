@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import reprlib
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -16,8 +15,9 @@ from seakeep import metrics, statistics
 from seakeep.arrays import whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
+from seakeep.checked import explained
 from seakeep.conventions import displayed
-from seakeep.errors import DataError, RequestError, SeakeepWarning, did_you_mean
+from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasts import status_at_clock
@@ -97,6 +97,7 @@ class Comparison:
         return float(metrics.anrmse(predicted=self.forecast, measured=self.measured))
 
 
+@explained
 def in_degrees(comparison: Comparison) -> Comparison:
     """Turn the angles of a comparison into degrees, for tables and figures that people read.
 
@@ -119,6 +120,7 @@ def in_degrees(comparison: Comparison) -> Comparison:
     )
 
 
+@explained
 def at_full_scale(comparison: Comparison, scale: float) -> Comparison:
     """Convert a comparison to full scale by Froude's law.
 
@@ -148,6 +150,7 @@ def at_full_scale(comparison: Comparison, scale: float) -> Comparison:
     )
 
 
+@explained
 def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
     """Convert a forecast to full scale by Froude's law, its status with it.
 
@@ -168,6 +171,11 @@ def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
     RequestError
         If the unit of a channel does not scale.
     """
+    if "status" not in forecast.attrs:
+        raise RequestError(
+            "forecast must be what model.forecast or summarize returns, whose attributes hold a "
+            f"status; received a Dataset of {', '.join(map(str, forecast.data_vars)) or 'nothing'}."
+        )
     clock = froude_factor("s", scale)
     out = to_full_scale(forecast.drop_vars("status", errors="ignore"), scale)
     out.attrs["status"] = status_at_clock(str(forecast.attrs["status"]), clock)
@@ -178,6 +186,7 @@ def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
     return out
 
 
+@explained
 def with_degrees(run: xr.Dataset) -> xr.Dataset:
     """Turn the angles of a run or a forecast, and their rates, into degrees.
 
@@ -203,6 +212,7 @@ def with_degrees(run: xr.Dataset) -> xr.Dataset:
     return out
 
 
+@explained
 def compare(
     model: Model,
     campaign: Campaign,
@@ -277,6 +287,7 @@ def compare(
     return several["model"]
 
 
+@explained
 def compare_models(
     models: Mapping[str, Model],
     campaign: Campaign,
@@ -396,17 +407,15 @@ def _warn_of_known(model: Model, compared: Comparison) -> None:
     if compared.forecast.attrs.get("band") == "calibrated" and (part := part_in(known)):
         told.append(f"the band was calibrated on a part of this forecast {part}: {memory}")
     for text in told:
-        warnings.warn(text, SeakeepWarning, stacklevel=3)
+        warn(text)
 
 
 def _warn_of_look_ahead(compared: Comparison) -> None:
     until = float(compared.forecast.attrs.get("reads_input_until", -1.0))
     if until > 0.0:
-        warnings.warn(
+        warn(
             f"the forecast of {compared.run} reads the waves up to {until:.3g} s after the instant "
-            "that it forecasts: the model needs these waves ahead of time.",
-            SeakeepWarning,
-            stacklevel=4,
+            "that it forecasts: the model needs these waves ahead of time."
         )
 
 
@@ -463,15 +472,14 @@ def _warn_of_dead(run: xr.Dataset, name: str) -> None:
     names = [str(channel) for channel in run.data_vars]
     values = np.stack([run[channel].values for channel in names], axis=-1)
     for column in np.flatnonzero(is_constant(values)):
-        warnings.warn(
+        warn(
             f"channel '{names[column]}' of {name} is constant ({values[0, column]:.6g}) over the "
             "forecast. Look for a dead sensor: a state that stands still is not judged, and an "
-            "input that does gives a forecast without waves.",
-            SeakeepWarning,
-            stacklevel=3,
+            "input that does gives a forecast without waves."
         )
 
 
+@explained
 def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = True) -> xr.Dataset:
     """Judge forecasts channel by channel.
 
@@ -501,6 +509,10 @@ def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = Tru
         ``level`` and ``band`` ("members" or "calibrated"). At full scale ``scale`` ("full") and
         ``scale_factor`` over ``run``.
     """
+    if not comparisons:
+        raise RequestError(
+            "there is no comparison to tabulate. Give those of seakeep.study.compare."
+        )
     rows = [_row(comparison, intervals) for comparison in comparisons]
     table = xr.concat(rows, dim="run")
     for name, (units, label) in _COLUMNS.items():
@@ -510,6 +522,7 @@ def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = Tru
     return table
 
 
+@explained
 def difference_table(found: Mapping[str, Sequence[Comparison]]) -> xr.Dataset:
     """Compare the errors of several models, run by run and over all runs.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -13,7 +12,8 @@ import xarray as xr
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.campaign.store import prepared_folder
-from seakeep.errors import RequestError, SeakeepError, SeakeepWarning
+from seakeep.checked import explained
+from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, outside_training
 from seakeep.models.slow import warn_of_slow_motions
 from seakeep.quality import warn_of_runs
@@ -40,6 +40,7 @@ NOTHING_TRAINS = (
 )
 
 
+@explained
 def training_runs(
     prepared: Mapping[str, xr.Dataset], window: int | None = None
 ) -> dict[str, xr.Dataset]:
@@ -77,6 +78,7 @@ def training_runs(
     return runs
 
 
+@explained
 def fit_campaign(
     campaign: Campaign,
     model: str | None = None,
@@ -136,11 +138,9 @@ def fit_campaign(
         warn_of_waves(identified, run, name, float(begin), round((end - begin) / dt))
     until = max(_reads_ahead(identified, run) for run in runs.values())
     if until > 0.5 * dt:
-        warnings.warn(
+        warn(
             f"forecasts of this model read the waves up to {until:.3g} s after the instant that "
-            "they forecast: it needs these waves ahead of time.",
-            SeakeepWarning,
-            stacklevel=2,
+            "they forecast: it needs these waves ahead of time."
         )
     if getattr(spec, "standardize", False):
         _warn_of_slow_model(identified, runs)
@@ -178,6 +178,7 @@ def read_training(
     return spec, prepared, training_runs(prepared, _longest_window(spec, dt)), stop
 
 
+@explained
 def fit_baselines(
     campaign: Campaign,
     states: Sequence[str],
@@ -226,7 +227,7 @@ def fit_baselines(
         try:
             found[kind] = spec.fit(runs, states, inputs)
         except SeakeepError as error:
-            warnings.warn(f"baseline '{kind}' is left out: {error}", SeakeepWarning, stacklevel=2)
+            warn(f"baseline '{kind}' is left out: {error}")
     return found
 
 
@@ -247,11 +248,7 @@ def _prepared_tests(campaign: Campaign, known: Collection[str]) -> dict[str, xr.
 def warn_of_waves(model: Model, run: xr.Dataset, name: str, start: float, steps: int) -> None:
     """Warn of each respect in which a test lies outside what trained the model."""
     for text in outside_training(model, run, start, steps):
-        warnings.warn(
-            f"{name}: {text}. Train in such waves too: errors may be large.",
-            SeakeepWarning,
-            stacklevel=3,
-        )
+        warn(f"{name}: {text}. Train in such waves too: errors may be large.")
 
 
 def _longest_window(spec: Spec, dt: float) -> int | None:
@@ -312,11 +309,7 @@ def repeats_of(
 def warn_of_repeats(model: Model, campaign: Campaign, tested: Mapping[str, xr.Dataset]) -> None:
     """Warn where a test run's input repeats the model's training input."""
     for repeat in repeats_of(model, campaign, tested).values():
-        warnings.warn(
-            f"{repeat} This test shows memory, not skill: test on another run.",
-            SeakeepWarning,
-            stacklevel=3,
-        )
+        warn(f"{repeat} This test shows memory, not skill: test on another run.")
 
 
 def _test_part(run: xr.Dataset, trained: xr.Dataset | None) -> xr.Dataset:

@@ -21,7 +21,7 @@ from seakeep import statistics
 from seakeep.arrays import FloatArray
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.coverage import CoverageTable
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
 from seakeep.models.executor import in_order
 from seakeep.models.summaries import STATISTICS
 from seakeep.study.plan import random_stream
@@ -496,11 +496,9 @@ def _divergences(
     found = in_order(_channel_densities, (settings, name, segments), items, executor)
     for c, each in zip(judged, found, strict=True):
         if isinstance(each, str):  # a series that stands still has no density
-            warnings.warn(
+            warn(
                 f"the densities of {channels[c]} as forecast by '{model}' and as measured, over "
-                f"the windows of '{name}', cannot be compared and are left out: {each}",
-                SeakeepWarning,
-                stacklevel=4,
+                f"the windows of '{name}', cannot be compared and are left out: {each}"
             )
         else:
             table[:, :, c], curves[:, c] = each

@@ -8,9 +8,10 @@ from typing import cast
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
+from seakeep.checked import explained
 from seakeep.errors import RequestError
 from seakeep.models import Model, is_ensemble
 from seakeep.models.labelled import channel_matrix
@@ -28,6 +29,7 @@ SHARE = 0.5
 """Part of the training SD below which the error is to stay, where none is stated."""
 
 
+@explained
 def nowcasts(
     models: Mapping[str, Model],
     campaign: Campaign,
@@ -84,6 +86,7 @@ def nowcasts(
     return {name: xr.concat(each, "run") for name, each in out.items()}
 
 
+@explained
 def nowcast(
     model: Servable, run: xr.Dataset, steps: int, *, share: float = SHARE, level: float = 0.95
 ) -> xr.Dataset:
@@ -113,6 +116,7 @@ def nowcast(
     RequestError
         If no forecast of so many steps fits into the run.
     """
+    whole_number(steps, "steps")
     signature = model.signature
     time, name = run["time"].values, str(run.attrs.get("run", "the run"))
     begin, end = run.attrs.get("test_span", (time[0], time[-1]))

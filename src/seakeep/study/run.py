@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
@@ -12,7 +11,8 @@ from pathlib import Path
 import xarray as xr
 
 from seakeep.campaign.prepare import Progress
-from seakeep.errors import SeakeepError, SeakeepWarning
+from seakeep.checked import explained
+from seakeep.errors import SeakeepError, warn
 from seakeep.models.executor import WorkerLostError, as_finished
 from seakeep.sizes import LONG_CELLS, MOST_CELLS, check_size
 from seakeep.study.describe import describe_study, words_of_repeats
@@ -34,6 +34,7 @@ from seakeep.study.units import Unit, choice_of, choose, collect, compute, units
 __all__ = ["run_study"]
 
 
+@explained
 def run_study(
     study: Study,
     out: Path | str,
@@ -111,12 +112,12 @@ def run_study(
             report(len(units), len(units), "statistics and densities")
             groups = describe_study(study, plan, runs)
             if "repeats" in groups:
-                warnings.warn(words_of_repeats(groups["repeats"]), SeakeepWarning, stacklevel=2)
+                warn(words_of_repeats(groups["repeats"]))
             groups |= collect(study, plan, runs, lambda unit: _arrays(folder, unit))
             groups |= judge(groups, study.settings, list(plan.states), executor)
             if "statistics/lost" in groups:
                 words = words_of_lost(groups["statistics/lost"])
-                warnings.warn(words, SeakeepWarning, stacklevel=2)
+                warn(words)
             groups |= extra or {}
             attributes = {**_attributes(study, plan, groups), **(notes or {})}
             found = write_result(out, attributes, groups, hand_on)

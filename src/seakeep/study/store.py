@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import json
 import tempfile
-import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -21,7 +20,8 @@ import numpy.typing as npt
 import xarray as xr
 from filelock import FileLock, Timeout
 
-from seakeep.errors import SHOWN, DataError, RequestError, SeakeepError, SeakeepWarning
+from seakeep.checked import explained
+from seakeep.errors import SHOWN, DataError, RequestError, SeakeepError, warn
 from seakeep.files import check_report, is_there, read_bytes, read_sealed, replacing, write_netcdf
 from seakeep.models.checks import parsed, typed
 from seakeep.models.store import rebuilt
@@ -173,11 +173,7 @@ class UnitFolder:
         for each in litter:
             each.unlink(missing_ok=True)
         if litter:
-            warnings.warn(
-                f"{self.folder}: removed {len(litter)} unfinished file(s) of a killed run.",
-                SeakeepWarning,
-                stacklevel=2,
-            )
+            warn(f"{self.folder}: removed {len(litter)} unfinished file(s) of a killed run.")
 
     def _header(self) -> dict[str, Any]:
         return {"digest": self.digest, "versions": versions()}
@@ -374,6 +370,7 @@ def relabel(result: StudyResult, words: Mapping[str, str]) -> StudyResult:
     return replace(result, attrs={**result.attrs, **changed})
 
 
+@explained
 def read_result(folder: Path | str) -> StudyResult:
     """Read the result of a finished study.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from seakeep.checked import explained
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError
 from seakeep.report.figures.common import grid_of_axes, short_label
@@ -49,18 +50,35 @@ def panels(
     axes: Sequence[Axes] | Axes | None, count: int, most: int, size: tuple[float, float]
 ) -> tuple[Figure, list[Any]]:
     """Axes that are given, as many as needed, or those of a new figure; `size` is that of one."""
+    if count == 0:
+        raise RequestError("there is nothing to draw. Name at least one channel or state.")
     if axes is None:
         columns = -(-count // -(-count // most))
         rows = -(-count // columns)
         figure = new_figure(max(size[0] * columns, NARROWEST), 0.5 + size[1] * rows)
         return figure, grid_of_axes(figure, count, most)
-    given = list(np.ravel(np.asarray(axes, dtype=object)))
+    several = isinstance(axes, Sequence | np.ndarray)
+    given: list[Any] = list(np.ravel(np.array(axes, dtype=object))) if several else [axes]
+    if strange := [each for each in given if not hasattr(each, "get_figure")]:
+        raise RequestError(
+            f"axes must be Axes of matplotlib, or a list of them; received a "
+            f"{type(strange[0]).__name__}. Make them with matplotlib.pyplot.subplots()."
+        )
     if len(given) != count:
         raise RequestError(
             f"axes holds {len(given)} Axes and the figure draws {count} panels. Give as many, or "
             "none."
         )
     return given[0].figure, given
+
+
+def check_result(found: xr.Dataset, variable: str, source: str) -> None:
+    """Refuse a Dataset that is none of the results that a figure draws."""
+    if variable not in found:
+        raise RequestError(
+            f"a result of {source} is drawn; received a Dataset of "
+            f"{', '.join(map(str, found.data_vars)) or 'nothing'}."
+        )
 
 
 def _chosen(found: xr.Dataset, states: Sequence[str] | None) -> list[str]:
@@ -71,6 +89,7 @@ def _chosen(found: xr.Dataset, states: Sequence[str] | None) -> list[str]:
     return known if states is None else list(states)
 
 
+@explained
 def response(
     found: xr.Dataset,
     measured: xr.Dataset | None = None,
@@ -95,6 +114,8 @@ def response(
     -------
     Figure
     """
+    for data in (found,) if measured is None else (found, measured):
+        check_result(data, "amplitude", "seakeep.check.response or measured_response")
     known = [
         str(s) for s in found["state"].values if found["amplitude"].sel(state=s).notnull().any()
     ]
@@ -172,6 +193,7 @@ def legend_outside(figure: Any, *places: Any, side: str = "lower") -> None:
     )
 
 
+@explained
 def coherence(
     found: xr.Dataset,
     *,
@@ -193,6 +215,7 @@ def coherence(
     -------
     Figure
     """
+    check_result(found, "spectrum", "seakeep.check.coherence")
     chosen = _chosen(found, states)
     frequency = found["frequency"].values
     with figure_style():
@@ -222,6 +245,7 @@ def coherence(
     return figure
 
 
+@explained
 def modes(
     found: xr.Dataset, *, most: int = 12, axes: Sequence[Axes] | Axes | None = None
 ) -> Figure:
@@ -240,6 +264,7 @@ def modes(
     -------
     Figure
     """
+    check_result(found, "participation", "seakeep.check.modes")
     at = found.isel(mode=slice(0, most))
     states = [str(name) for name in at["state"].values]
     with figure_style():
@@ -269,6 +294,7 @@ def _mode_words(mode: xr.Dataset) -> str:
     return f"{period:.3g} s, {ratio:.3f}"
 
 
+@explained
 def decay(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Figure:
     """Draw what is left of an offset after its release, motion by motion.
 
@@ -283,6 +309,7 @@ def decay(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Fi
     -------
     Figure
     """
+    check_result(found, "displacement", "seakeep.check.decay")
     motions = [str(name) for name in found["motion"].values]
     with figure_style():
         figure, places = panels(axes, len(motions), 3, (3.0, 1.8))
@@ -298,6 +325,7 @@ def decay(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Fi
     return figure
 
 
+@explained
 def residuals(
     found: xr.Dataset,
     *,
@@ -319,6 +347,7 @@ def residuals(
     -------
     Figure
     """
+    check_result(found, "autocorrelation", "seakeep.check.residuals")
     chosen = _chosen(found, states)
     grey = {"color": "#BBBBBB", "linewidth": 0.8}
     with figure_style():
@@ -383,6 +412,7 @@ def by_state(
     return figure
 
 
+@explained
 def exceedance(
     found: xr.Dataset,
     *,
@@ -404,6 +434,7 @@ def exceedance(
     -------
     Figure
     """
+    check_result(found, "exceedance", "seakeep.check.statistics")
     return by_state(found, states, axes, 2.0, _exceedance)
 
 
@@ -433,6 +464,7 @@ def _exceedance(place: Any, own: xr.Dataset, factor: float, unit: str) -> None:
     place.set_ylabel("exceeded by [1]")
 
 
+@explained
 def density(
     found: xr.Dataset,
     *,
@@ -440,6 +472,7 @@ def density(
     axes: Sequence[Axes] | Axes | None = None,
 ) -> Figure:
     """Draw the densities of states, measured and forecast; arguments as :func:`exceedance`."""
+    check_result(found, "density", "seakeep.check.statistics")
     return by_state(found, states, axes, 1.9, _density)
 
 
@@ -452,6 +485,7 @@ def _density(place: Any, own: xr.Dataset, factor: float, unit: str) -> None:
     place.set_ylabel(f"density [1/{unit}]")
 
 
+@explained
 def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Figure:
     """Draw height against period of the waves, and steepness against mean surge where it is known.
 
@@ -466,6 +500,7 @@ def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) ->
     -------
     Figure
     """
+    check_result(found, "steepness", "seakeep.check.validity")
     maps = [("period", "mean zero-crossing period [s]", "height", "wave height [m]")]
     if (found["drift"].notnull() & found["steepness"].notnull()).any():
         maps.append(("drift", "mean surge [m]", "steepness", "wave steepness [1]"))
@@ -495,6 +530,7 @@ def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) ->
     return figure
 
 
+@explained
 def drift(
     found: xr.Dataset,
     *,
@@ -516,6 +552,7 @@ def drift(
     -------
     Figure
     """
+    check_result(found, "slow_response", "seakeep.check.drift")
     known = found["state"].values[found["slow_response"].notnull().any(["difference", "frequency"])]
     chosen = _chosen(found, states or [str(name) for name in known])
     with figure_style():

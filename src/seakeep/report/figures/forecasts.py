@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from seakeep.checked import explained
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError
 from seakeep.models import summarize
-from seakeep.report.figures.checks import legend_outside, panels
+from seakeep.report.figures.checks import check_result, legend_outside, panels
 from seakeep.report.figures.common import FURTHER, short_label
 from seakeep.report.style import COLOURS, LINES, THIN, axis_label, figure_style
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["band", "errors", "overlay"]
 
 
+@explained
 def overlay(
     forecast: xr.Dataset,
     measured: xr.Dataset,
@@ -49,6 +51,7 @@ def overlay(
     return _histories(forecast, None, measured, channels, axes)
 
 
+@explained
 def band(
     forecast: xr.Dataset,
     measured: xr.Dataset,
@@ -126,6 +129,7 @@ def _histories(
     return figure
 
 
+@explained
 def errors(table: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Figure:
     """Draw the NRMSE of each channel with its interval, run by run.
 
@@ -140,6 +144,7 @@ def errors(table: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> F
     -------
     Figure
     """
+    check_result(table, "nrmse", "seakeep.study.comparison_table")
     channels = [str(name) for name in table["channel"].values]
     runs = [str(run) for run in table["run"].values]
     width = 0.6 / max(len(runs), 1)
