@@ -391,7 +391,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "study": ("study", "study.toml", "-o", "o", "--workers", "1"),
     "tank": ("tank", "--settings", "tank.toml", "--out", "o"),
     "tune": ("tune", "campaign.toml", "--vary", "ridge", "-o", "o.toml"),
-    "track": ("track", "video.mp4", "--metres-per-pixel", "0.01", "--panel", "0.3", "0.1", "-o",
+    "track": ("track", "video.avi", "--metres-per-pixel", "0.005", "--panel", "0.3", "0.1", "-o",
               "o.csv"),
     "report": ("report", "results"),
     "reproduce": ("reproduce", "--quick", "-o", "o"),
@@ -686,7 +686,7 @@ def flips(place: Path) -> Iterator[Case]:
     rng = np.random.default_rng(7)
     for name, count in (("model.nc", 400), ("ensemble.nc", 200), ("prepared/one.nc", 200),
                         ("results/study.nc", 300), ("foreign.nc", 300), ("foreign.mat", 300),
-                        ("foreign.h5", 900), ("one_mru.csv", 60)):  # fmt: skip
+                        ("foreign.h5", 900), ("one_mru.csv", 60), ("video.avi", 60)):  # fmt: skip
         if not name.startswith("foreign") and not (place / name).exists():
             continue
         for _ in range(count):
@@ -719,6 +719,8 @@ def flip(name: str, at: float, change: int) -> object:
         return command("fit", "campaign.toml", "--model", "arx", "-o", "o.nc")()
     if name.startswith("results"):
         return command("report", "results")()
+    if name == "video.avi":
+        return command(*COMMANDS["track"])()
     read_columns(path)
     return command("init", name, "-o", "new.toml", "--force")()
 

@@ -221,6 +221,22 @@ def _write_raw(folder: Path, run: str, seed: int) -> None:
          pulses(t))  # fmt: skip
 
 
+def _write_video(path: Path) -> None:
+    """A white panel of 60 by 20 pixels that moves on grey, where OpenCV is installed."""
+    try:
+        import cv2
+    except ImportError:
+        return
+    cv2.setNumThreads(1)  # threads do not survive a fork
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 20.0, (320, 240))
+    for number in range(24):
+        frame = np.full((240, 320, 3), 90, np.uint8)
+        corner = (100 + number, 100 + round(10 * np.sin(0.4 * number)))
+        cv2.rectangle(frame, corner, (corner[0] + 60, corner[1] + 20), (250, 250, 250), -1)
+        writer.write(frame)
+    writer.release()
+
+
 def read(what: str) -> dict[str, Any]:
     """Settings as TOML gives them: campaign, study or tank."""
     return tomllib.loads({"campaign": CAMPAIGN, "study": STUDY, "tank": TANK}[what])
@@ -233,6 +249,7 @@ def write(folder: Path) -> Path:
     for name, text in (("campaign", CAMPAIGN), ("study", STUDY), ("tank", TANK)):
         (place / f"{name}.toml").write_text(text, encoding="utf-8")
     _write_raw(place, "one", 1)
+    _write_video(place / "video.avi")
     return place
 
 
