@@ -1,8 +1,8 @@
 """Every command and every Python block of the tutorial runs and prints what the page shows."""
 
 import re
-import sys
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
