@@ -23,7 +23,7 @@ SAMPLED = {
     "flips": 400, "arrays": 500, "sizes": 9,
 }  # fmt: skip
 """One case of so many in the default run: some ten per area, in half a minute."""
-PART = {"sizes": 1, "contents": 110, "settings": 40}
+PART = {"sizes": 1, "contents": 220, "settings": 40}
 """One case of so many where the attack is asked for; 30 in other areas. Files take longest: each
 case of a study draws its report anew."""
 
