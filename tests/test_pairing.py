@@ -68,6 +68,8 @@ def test_words_are_no_channels():
         channel_names(told[["status"]], "told")
     with pytest.raises(DataError, match=r"channel 'diverged' \(dimensions: window\)"):
         channel_names(told.assign(diverged=("window", [0, 0, 1])), "told")
+    with pytest.raises(RequestError, match="told has a channel named 0, which is no text"):
+        channel_names(told.rename(heave=0), "told")
     spoilt = MEASURED.assign(heave=("time", np.array(list("abcdef"))))
     with pytest.raises(DataError, match="channel 'heave' of measured is of type <U1, not a real"):
         pair(predicted=MEASURED, measured=spoilt)

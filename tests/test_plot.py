@@ -55,6 +55,10 @@ def test_band_takes_members_or_their_statistics(run, model):
     for forecast in (members, ensemble.forecast_summary(run, start=10.0, steps=50)):
         figure = seakeep.plot.band(forecast, run)
         assert len(figure.axes[0].collections) == 1
+    with pytest.raises(RequestError, match=r"over \(member, time\), .*with seakeep\.plot\.band"):
+        seakeep.plot.overlay(members, run)
+    with pytest.raises(RequestError, match="measured has no instants in seconds in a coordinate"):
+        seakeep.plot.band(members, run.drop_vars("time"))
     with pytest.raises(RequestError, match=r"it has no band\. Draw it with seakeep\.plot\.overlay"):
         seakeep.plot.band(model.forecast(run, start=10.0, steps=50), run)
 

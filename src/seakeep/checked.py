@@ -24,7 +24,7 @@ from typing import Any, Literal, TypeVar, Union
 import numpy as np
 
 from seakeep.arrays import LARGEST
-from seakeep.errors import SHOWN, RequestError, SeakeepError
+from seakeep.errors import SHOWN, DataError, RequestError, SeakeepError
 
 __all__ = ["checked", "explained"]
 
@@ -88,12 +88,19 @@ def explained(function: Function) -> Function:
         return function
     misfit = _misfit(function)
 
+    signature = inspect.signature(function)
+
     def explain(error: Exception, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
-        words = ""
+        if isinstance(error, SeakeepError):
+            return
+        words = unsound = ""
         with suppress(TypeError):  # arguments that are missing or too many
-            words = "" if isinstance(error, SeakeepError) else misfit(args, kwargs)
+            words = misfit(args, kwargs)
+            unsound = _unsound(signature.bind(*args, **kwargs).arguments)
         if words:
             raise RequestError(words) from error
+        if unsound:
+            raise DataError(unsound) from error
 
     @functools.wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
@@ -112,6 +119,46 @@ def explained(function: Function) -> Function:
             raise
 
     return typing.cast(Function, iterate if inspect.isgeneratorfunction(function) else call)
+
+
+def _unsound(given: Mapping[str, Any]) -> str:
+    """What the first run among arguments lacks; empty for nothing."""
+    model = given.get("model", given.get("self"))
+    wanted = [*getattr(model, "states", ()), *getattr(model, "inputs", ())]
+    for name in ("run", "runs", "prepared", "like"):
+        value = given.get(name)
+        runs = value if isinstance(value, dict) else {name: value}
+        for run, data in runs.items():
+            if hasattr(data, "data_vars") and (words := _lacking(data, wanted)):
+                return f"'{run}' {words}"
+    return ""
+
+
+def _lacking(run: Any, wanted: Sequence[str]) -> str:
+    """What is wrong with a Dataset that should be a run; empty for nothing."""
+    if "time" not in run.coords:
+        return "has no coordinate 'time'. Name its axis so, and give the instants in seconds."
+    time = np.asarray(run["time"].values)
+    if time.dtype.kind not in "fiu":
+        return (
+            f"has times of type {time.dtype}, and seconds are needed: (t - t[0]) / "
+            "numpy.timedelta64(1, 's')."
+        )
+    if time.size < 2 or not np.all(np.isfinite(time)):
+        finite = int(np.count_nonzero(np.isfinite(time)))
+        return f"has {finite} finite instant(s) in time. Give two samples or more, and no NaN."
+    if missing := [name for name in wanted if name not in run]:
+        return (
+            f"has no channel '{missing[0]}', which the model takes. Channels: "
+            f"{', '.join(map(str, run.data_vars)) or 'none'}."
+        )
+    for key, (fits, words) in _ATTRIBUTES.items():
+        if key in run.attrs and not fits(run.attrs[key]):
+            return f"has the attribute {key} = {_shown(run.attrs[key])}, which should be {words}."
+    for name, channel in run.data_vars.items():
+        if not isinstance(channel.attrs.get("units", ""), str):
+            return f"has a channel {name} whose attribute 'units' is no text. Write 'm' or 'rad'."
+    return ""
 
 
 def _misfit(function: Callable[..., Any]) -> Callable[[tuple[Any, ...], dict[str, Any]], str]:
@@ -286,6 +333,15 @@ _PLAIN: dict[Any, tuple[Fits, str]] = {
         "a numpy.random.Generator, such as numpy.random.default_rng(0)",
     ),
 }
+
+
+_NUMBER = (_is_number, "a number")
+_SPAN = (_row((float, float)), "two instants in seconds")
+_ATTRIBUTES: dict[str, tuple[Fits, str]] = {
+    **dict.fromkeys(("encounter_period", "water_depth", "probe_offset", "celerity"), _NUMBER),
+    **dict.fromkeys(("train_span", "test_span"), _SPAN),
+}
+"""Attributes of a run that functions read."""
 
 
 def _shown(value: object) -> str:

@@ -47,6 +47,8 @@ MOST_PADDING = 10_000_000
 """Samples by which a record is continued at either end: 80 MB each."""
 MOST_AHEAD = 1_000_000
 """Samples of waves that are predicted: the prediction fades within some periods."""
+MOST_UNROLLED = 100_000
+"""Steps of an ONNX graph, which holds each of them: 30 MB, and 0.1 GB while it is made."""
 MOST_STEPS = 10_000_000
 """Samples per column of a raw file of the tank, and steps of a simulated run: 80 MB per column."""
 MOST_PRODUCTS = 2e10

@@ -462,7 +462,7 @@ def test_probes_behind_the_vessel_are_no_inputs(tmp_path):
 
 def test_no_depth_is_made_up(tmp_path):
     text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", tank_columns())])
-    assert "# water_depth = …  # m, or 'inf' for deep water; needed where probes are" in text
+    assert "# water_depth = …  # m, or inf for deep water; needed where probes are" in text
     assert campaign.settings.rig.water_depth is None
 
 

@@ -219,6 +219,7 @@ def test_a_file_with_broken_contents_is_incomplete(saved, attrs):
         ("training", "rank", 27, "training.rank is 27, and there are 26 regressors"),
         ("training", "ridge", -1.0, "training.ridge is -1"),
         ("training", "clipped", [-1.0], "training.clipped holds a modulus that is none"),
+        ("training", "clipped", [1.1], "training.clipped holds eigenvalues, and settings.stable"),
     ],
 )
 def test_a_number_that_does_not_fit_the_others_is_refused(saved, attribute, key, value, words):
@@ -233,6 +234,7 @@ def test_a_number_that_does_not_fit_the_others_is_refused(saved, attribute, key,
     [
         ("state_std", lambda x: -x, "reach of state channels is negative"),
         ("state_std", lambda x: 1e-320 * x, "reach of state channels is negative"),
+        ("state_spread", lambda x: 0 * x, "state_spread of a state is zero"),
         ("residual_covariance", lambda x: -x, "residual_covariance is no covariance"),
         ("residual_covariance", lambda x: x * [[1, 0.5], [1, 1]], "is not symmetric"),
         ("lead_errors", lambda x: -x, "lead_errors or ending_errors are negative"),

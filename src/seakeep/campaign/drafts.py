@@ -82,7 +82,7 @@ def draft_campaign(
     DataError
         If a file cannot be read.
     """
-    if not files:
+    if not len(files):
         raise RequestError(
             "no file was given. Name the runs' files: seakeep init RUN1.csv RUN2.csv"
         )
@@ -173,7 +173,7 @@ def _general(files: Sequence[File], seas: Mapping[str, Sea], wave: Guess | None)
     else:
         yield "# encounter_period = …  # s; STATE IT: no wave was found"
     yield from ("", "[rig]")
-    yield "# water_depth = …  # m, or 'inf' for deep water; needed where probes are aligned"
+    yield "# water_depth = …  # m, or inf for deep water; needed where probes are aligned"
     yield "# [rig.positions]  # channel = x in m along the waves"
 
 

@@ -88,7 +88,7 @@ class RigSettings(Table):
     """``[rig]``: the basin and where things stand in it."""
 
     water_depth: Annotated[float, AfterValidator(_depth)] | None = Field(
-        default=None, description="water depth in metres; 'inf' for deep water"
+        default=None, description="water depth in metres; inf, without quotes, for deep water"
     )
     wave_direction: Finite | None = Field(
         default=None, description="direction in which the waves run, degrees from the x axis"

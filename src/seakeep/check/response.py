@@ -408,7 +408,7 @@ def validation(
         If the model reads several probes and no run states where they stand.
     """
     measured = measured_response(model, runs) if measured is None else measured
-    if "amplitude" not in measured:
+    if "kind" not in measured:
         raise RequestError(
             "measured must be a result of measured_response; received a Dataset of "
             f"{', '.join(map(str, measured.data_vars)) or 'nothing'}."

@@ -549,6 +549,7 @@ class FittedAlignment:
             len(counts) > 1
             or None in needed
             or any(each is not None and each <= 0 for each in positive)
+            or (made.period is not None and made.period <= 2 * SURGE_CUTOFF)
             or (made.celerity_spread is not None and made.celerity_spread < 0)
             or made.surge_range[0] > made.surge_range[1]
         ):

@@ -518,6 +518,9 @@ class HankelDMDcModel(SingleModel, store.Saved):
         width = states + signature.input_scale.mean.size * (signature.input_delays + 1)
         shape = (rows, width + signature.direct_scale.mean.size)
         store.check_settings(settings, signature)
+        training = Training.from_json(store.content(dataset, "training"), signature.dt, shape[1])
+        if training.clipped and settings.radius is None:
+            raise ValueError("training.clipped holds eigenvalues, and settings.stable is false")
         return cls(
             settings=settings,
             coefficients=store.numbers(dataset, "coefficients", shape),

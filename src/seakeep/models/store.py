@@ -120,6 +120,8 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
     for group, scale in scales.items():
         if np.any(scale.std < 1 / GREATEST) or np.any(scale.spread < 0) or np.any(scale.reach < 0):
             raise ValueError(f"a standard deviation or a reach of {group} channels is negative")
+    if np.any(scales["state"].spread < 1 / GREATEST):
+        raise ValueError("state_spread of a state is zero: it was constant in training")
     names = [label.name for label in kept.states]
     inputs = [label.name for label in kept.inputs]
     for named in (names, inputs):

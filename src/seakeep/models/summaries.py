@@ -141,15 +141,16 @@ def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
     array([2., 3.])
     """
     level = fraction(level, "level")
-    if not isinstance(forecast, xr.Dataset) or "member" not in forecast.dims:
+    is_forecast = isinstance(forecast, xr.Dataset) and "member" in forecast.dims
+    if not is_forecast or len(forecast.dims) < 2:
         received = (
             f"dimensions {', '.join(map(str, forecast.dims))}"
             if isinstance(forecast, xr.Dataset)
             else type(forecast).__name__
         )
         raise RequestError(
-            f"summarize needs an ensemble forecast with the dimension 'member'; received "
-            f"{received}. Pass what BayesianHankelDMDc(...).fit(...).forecast(...) returns."
+            "summarize needs an ensemble forecast with the dimension 'member' and one of instants; "
+            f"received {received}. Pass what ensemble.forecast(...) returns."
         )
     channels = [
         name

@@ -83,7 +83,7 @@ def check_result(found: xr.Dataset, variable: str, source: str) -> None:
 
 def _chosen(found: xr.Dataset, states: Sequence[str] | None) -> list[str]:
     known = [str(name) for name in found["state"].values]
-    for name in states or ():
+    for name in () if states is None else states:
         if name not in known:
             raise RequestError(f"there is no state '{name}'. States: {', '.join(known)}.")
     return known if states is None else list(states)
@@ -114,12 +114,13 @@ def response(
     -------
     Figure
     """
-    for data in (found,) if measured is None else (found, measured):
-        check_result(data, "amplitude", "seakeep.check.response or measured_response")
+    check_result(found, "trained", "seakeep.check.response")
+    if measured is not None:
+        check_result(measured, "kind", "seakeep.check.measured_response")
     known = [
         str(s) for s in found["state"].values if found["amplitude"].sel(state=s).notnull().any()
     ]
-    chosen = _chosen(found, states or known)
+    chosen = _chosen(found, known if states is None else states)
     entry = "wave" if "wave" in found["input"] else str(found.attrs["reference"])
     at = found.sel(input=entry)
     with figure_style():
@@ -554,7 +555,7 @@ def drift(
     """
     check_result(found, "slow_response", "seakeep.check.drift")
     known = found["state"].values[found["slow_response"].notnull().any(["difference", "frequency"])]
-    chosen = _chosen(found, states or [str(name) for name in known])
+    chosen = _chosen(found, [str(name) for name in known] if states is None else states)
     with figure_style():
         figure, places = panels(axes, len(chosen), 3, (3.0, 2.0))
         for name, place in zip(chosen, places, strict=True):

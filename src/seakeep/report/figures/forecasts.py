@@ -97,6 +97,16 @@ def _histories(
     channels: Sequence[str] | None,
     axes: Sequence[Axes] | Axes | None,
 ) -> Figure:
+    for data, what in ((forecast, "forecast"), (measured, "measured")):
+        if (
+            "time" not in data.coords
+            or data["time"].dtype.kind not in "fiu"
+            or not data["time"].size
+        ):
+            raise RequestError(
+                f"{what} has no instants in seconds in a coordinate 'time'. Coordinates: "
+                f"{', '.join(map(str, data.coords)) or 'none'}."
+            )
     known = [str(name) for name, each in forecast.data_vars.items() if "time" in each.dims]
     chosen = known if channels is None else list(channels)
     for name in chosen:
@@ -104,6 +114,12 @@ def _histories(
             if name not in data:
                 listed = ", ".join(map(str, data.data_vars))
                 raise RequestError(f"{what} has no channel '{name}'. Channels: {listed}.")
+            if data[name].dims != ("time",) or data[name].dtype.kind not in "fiub":
+                raise RequestError(
+                    f"channel '{name}' of {what} holds {data[name].dtype} over "
+                    f"({', '.join(map(str, data[name].dims))}), and numbers over time are drawn. "
+                    "Draw an ensemble with seakeep.plot.band, and windows one by one."
+                )
     time = forecast["time"].values
     at = measured.sel(time=slice(time[0] - 1e-6, time[-1] + 1e-6))
     key = "forecast" if bounds is None else "ensemble"
