@@ -464,7 +464,10 @@ def _bridged(data: xr.Dataset, preparation: PreparationSettings) -> xr.Dataset:
         values = data[name].to_numpy()
         if np.isfinite(values).all():
             continue
-        filled = bridge(values, step, longest)
+        try:
+            filled = bridge(values, step, longest)
+        except DataError as error:
+            raise DataError(f"channel '{name}': {error}") from None
         flags = (MISSING * filled.long + BRIDGED * filled.short).astype(np.int16)
         data[name] = data[name].copy(data=filled.values)
         data.coords[f"{name}_flags"] = ("time", flags, flag_attributes(str(name)))

@@ -480,7 +480,8 @@ class Campaign:
                     channel.attrs["noise_std"] = noise_floor(channel.to_numpy())
                 data.attrs.update(self._attributes(name, data, dt, found, settings))
             except SeakeepError as error:
-                spare(failures, name, error)
+                is_named = f"'{name}'" in str(error)
+                spare(failures, name, error if is_named else type(error)(f"run '{name}': {error}"))
                 if progress is not None:
                     progress(done, len(wanted), f"{name} cannot be prepared")
                 continue

@@ -190,7 +190,7 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
     if name is None and options.time is not None:
         raise RequestError(
             f"{path} has no time column '{options.time}'.{did_you_mean(options.time, table.names)} "
-            f"Its columns: {', '.join(table.names)}."
+            f"Its columns: {', '.join(table.names)}. State one of them as time in [files]."
         )
     if name is None and rate is None:
         raise RequestError(

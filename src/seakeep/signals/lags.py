@@ -9,14 +9,7 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import (
-    FloatArray,
-    IntArray,
-    as_real,
-    as_series,
-    positive,
-    time_step,
-)
+from seakeep.arrays import FloatArray, IntArray, as_real, as_series, positive, time_step
 from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import check_order
@@ -119,7 +112,7 @@ def windowed_lags(
     if length < 4 or a.size < length + 2 * reach:
         raise RequestError(
             f"{a.size} samples are too few for windows of {length} and lags of ±{reach} samples. "
-            "Shorten the window or the largest lag."
+            "Shorten the window or the largest lag, or sample at a higher rate."
         )
     hop = max(1, round(length * (1.0 - overlap)))
     starts = np.arange(reach, a.size - length - reach + 1, hop)

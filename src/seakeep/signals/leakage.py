@@ -10,14 +10,7 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import (
-    ComplexArray,
-    FloatArray,
-    as_series,
-    fraction,
-    positive,
-    time_step,
-)
+from seakeep.arrays import ComplexArray, FloatArray, as_series, fraction, positive, time_step
 from seakeep.checked import checked
 from seakeep.signals.waves import encounter_period, waves_part
 

@@ -18,15 +18,7 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import (
-    ComplexArray,
-    FloatArray,
-    as_real,
-    as_series,
-    number,
-    positive,
-    time_step,
-)
+from seakeep.arrays import ComplexArray, FloatArray, as_real, as_series, number, positive, time_step
 from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.calculus import predicted_extension

@@ -64,7 +64,10 @@ def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
     """Return the times as floats; refuse values that are not finite, repeated or unsorted."""
     t = as_seconds(time, name)
     if t.ndim != 1 or t.size < 2:
-        raise DataError(f"{name} has {t.size} instant(s); a time axis needs at least two.")
+        raise DataError(
+            f"{name} has {t.size} instant(s); a time axis needs at least two. "
+            "Give the whole record."
+        )
     if not np.all(np.isfinite(t)):
         at = int(np.flatnonzero(~np.isfinite(t))[0])
         raise DataError(

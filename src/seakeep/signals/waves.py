@@ -10,14 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import (
-    FloatArray,
-    IntArray,
-    as_series,
-    number,
-    time_step,
-    whole_number,
-)
+from seakeep.arrays import FloatArray, IntArray, as_series, number, time_step, whole_number
 from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import parabola_peak
