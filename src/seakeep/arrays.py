@@ -27,6 +27,7 @@ __all__ = [
     "as_table",
     "fraction",
     "number",
+    "plain_number",
     "positive",
     "time_step",
     "whole_number",
@@ -235,11 +236,16 @@ def _finite(array: FloatArray, name: str) -> FloatArray:
     return array
 
 
+def plain_number(value: Any) -> Any:
+    """Return a number of NumPy, or of an array of one value, as one of Python; others as is."""
+    if not hasattr(value, "item") or value is np.ma.masked or np.size(value) != 1:
+        return value
+    return value.item()
+
+
 def number(value: object, name: str) -> float:
     """Return a real number as a float; refuse text, dates, arrays, NaN and what is masked."""
-    plain: Any = value
-    if hasattr(plain, "item"):
-        plain = plain.item() if np.size(plain) == 1 and plain is not np.ma.masked else None
+    plain = plain_number(value)
     if isinstance(plain, bool) or not isinstance(plain, int | float) or plain != plain:
         raise RequestError(f"{name} must be a number; received {value!r}.")
     return float(min(max(plain, -LARGEST), LARGEST)) if isinstance(plain, int) else float(plain)

@@ -23,13 +23,14 @@ from typing import Any, Literal, TypeVar, Union
 
 import numpy as np
 
-from seakeep.arrays import LARGEST
+from seakeep.arrays import LARGEST, plain_number
 from seakeep.errors import SHOWN, DataError, RequestError, SeakeepError
 
 __all__ = ["checked", "explained"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-Fits = Callable[[object], bool]
+Door = tuple[Callable[[object], bool], str]
+"""Test of a value, and what a message calls values that pass it."""
 
 
 def checked(function: Function) -> Function:
@@ -54,11 +55,11 @@ def checked(function: Function) -> Function:
     Traceback (most recent call last):
     seakeep.errors.RequestError: by must be a number; received '2 s'.
     """
-    misfit = _misfit(function)
+    signature, misfit = inspect.signature(function), _misfit(function)
 
     @functools.wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
-        if words := misfit(args, kwargs):
+        if words := misfit(signature.bind(*args, **kwargs).arguments):
             raise RequestError(words)
         return function(*args, **kwargs)
 
@@ -86,21 +87,18 @@ def explained(function: Function) -> Function:
         made: Any = function
         made.__init__ = explained(made.__init__)
         return function
-    misfit = _misfit(function)
-
-    signature = inspect.signature(function)
+    signature, misfit = inspect.signature(function), _misfit(function)
 
     def explain(error: Exception, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
         if isinstance(error, SeakeepError):
             return
-        words = unsound = ""
+        given: Mapping[str, Any] = {}
         with suppress(TypeError):  # arguments that are missing or too many
-            words = misfit(args, kwargs)
-            unsound = _unsound(signature.bind(*args, **kwargs).arguments)
-        if words:
+            given = signature.bind(*args, **kwargs).arguments
+        if words := misfit(given):
             raise RequestError(words) from error
-        if unsound:
-            raise DataError(unsound) from error
+        if words := _unsound(given):
+            raise DataError(words) from error
 
     @functools.wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
@@ -161,21 +159,19 @@ def _lacking(run: Any, wanted: Sequence[str]) -> str:
     return ""
 
 
-def _misfit(function: Callable[..., Any]) -> Callable[[tuple[Any, ...], dict[str, Any]], str]:
+def _misfit(function: Callable[..., Any]) -> Callable[[Mapping[str, Any]], str]:
     """Return a function that says which argument of a call is of another type; empty for none."""
-    signature = inspect.signature(function)
 
     @functools.cache
-    def doors() -> dict[str, tuple[Fits, str]]:
+    def doors() -> dict[str, Door]:
         hints = _hints(function)
         return {
-            name: (_fits(hints[name]), _words(hints[name]))
-            for name, each in signature.parameters.items()
+            name: _door(hints[name])
+            for name, each in inspect.signature(function).parameters.items()
             if name in hints and each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)
         }
 
-    def words_of(args: tuple[Any, ...], kwargs: dict[str, Any]) -> str:
-        given = signature.bind(*args, **kwargs).arguments
+    def words_of(given: Mapping[str, Any]) -> str:
         for name, (fits, words) in doors().items():
             if name in given and not fits(given[name]):
                 return f"{name} must be {words}; received {_shown(given[name])}."
@@ -195,102 +191,85 @@ def _hints(function: Callable[..., Any]) -> dict[str, Any]:
     return found
 
 
-def _fits(hint: Any) -> Fits:
-    """Test of whether a value is of a type; what cannot be tested passes."""
+def _door(hint: Any) -> Door:
+    """Test of whether a value is of a type, and words for it; what cannot be tested passes."""
     origin, parts = typing.get_origin(hint), typing.get_args(hint)
     if hint in _PLAIN:
-        return _PLAIN[hint][0]
+        return _PLAIN[hint]
     if origin in _GENERIC:
-        return _GENERIC[origin][0](parts)
-    if getattr(hint, "_is_protocol", False):
-        members = [
-            name for name in (*vars(hint), *getattr(hint, "__annotations__", ())) if name[0] != "_"
-        ]
-        return lambda value: all(hasattr(value, name) for name in members)
-    if inspect.isclass(hint):
-        return lambda value: isinstance(value, hint)
-    return lambda value: True
-
-
-def _words(hint: Any) -> str:
-    """What a message calls a type."""
-    origin, parts = typing.get_origin(hint), typing.get_args(hint)
-    if hint in _PLAIN:
-        return _PLAIN[hint][1]
-    if origin in _GENERIC:
-        return _GENERIC[origin][1](parts)
+        return _GENERIC[origin](parts)
     if not inspect.isclass(hint):
-        return "an array"
-    return f"{'an' if hint.__name__[0] in 'AEIOU' else 'a'} {hint.__name__}"
+        return lambda value: True, "an array"
+    words = f"{'an' if hint.__name__[0] in 'AEIOU' else 'a'} {hint.__name__}"
+    if getattr(hint, "_is_protocol", False):
+        members = [name for name in (*vars(hint), *hint.__annotations__) if name[0] != "_"]
+        return lambda value: all(hasattr(value, name) for name in members), words
+    return lambda value: isinstance(value, hint), words
 
 
-def _either(parts: tuple[Any, ...]) -> Fits:
-    tests = [_fits(each) for each in parts]
-    return lambda value: any(each(value) for each in tests)
+def _either(parts: tuple[Any, ...]) -> Door:
+    tests, words = zip(*map(_door, parts), strict=True)
+    return lambda value: any(each(value) for each in tests), " or ".join(dict.fromkeys(words))
 
 
-def _many(parts: tuple[Any, ...]) -> Fits:
-    of = _fits(parts[0])
-    return lambda value: _is_sequence(value) and all(map(of, value))
+def _many(parts: tuple[Any, ...]) -> Door:
+    of, words = _door(parts[0])
+    return lambda value: _is_sequence(value) and all(map(of, value)), f"a list, each item {words}"
 
 
-def _several(parts: tuple[Any, ...]) -> Fits:
-    of = _fits(parts[0])
-    return lambda value: (
-        isinstance(value, abc.Iterable)
-        and not isinstance(value, str | bytes)
-        and getattr(value, "ndim", 1) > 0
-        and (not isinstance(value, abc.Sized) or all(map(of, value)))
+def _several(parts: tuple[Any, ...]) -> Door:
+    of, words = _door(parts[0])
+    return (
+        lambda value: (
+            isinstance(value, abc.Iterable)
+            and not isinstance(value, str | bytes)
+            and getattr(value, "ndim", 1) > 0
+            and (not isinstance(value, abc.Sized) or all(map(of, value)))
+        ),
+        f"a list, each item {words}",
     )
 
 
-def _row(parts: tuple[Any, ...]) -> Fits:
+def _row(parts: tuple[Any, ...]) -> Door:
     if Ellipsis in parts:
         return _many(parts)
-    tests = [_fits(each) for each in parts]
-    return lambda value: (
-        _is_sequence(value)
-        and len(value) == len(tests)
-        and all(each(one) for each, one in zip(tests, value, strict=True))
+    tests, words = zip(*map(_door, parts), strict=True)
+    return (
+        lambda value: (
+            _is_sequence(value)
+            and len(value) == len(tests)
+            and all(each(one) for each, one in zip(tests, value, strict=True))
+        ),
+        f"{len(parts)} values ({', '.join(words)})",
     )
 
 
-def _table(parts: tuple[Any, ...]) -> Fits:
-    keys, values = map(_fits, parts)
-    return lambda value: (
-        isinstance(value, Mapping) and all(map(keys, value)) and all(map(values, value.values()))
+def _table(parts: tuple[Any, ...]) -> Door:
+    (keys, of), (values, to) = map(_door, parts)
+    return (
+        lambda value: (
+            isinstance(value, Mapping)
+            and all(map(keys, value))
+            and all(map(values, value.values()))
+        ),
+        f"a mapping, such as a dict, of {of} to {to}",
     )
 
 
-def _join(parts: tuple[Any, ...]) -> str:
-    return " or ".join(dict.fromkeys(map(_words, parts)))
+def _words(parts: tuple[Any, ...]) -> Door:
+    """One of several words: any text passes, as the function knows them, and which is near."""
+    return _PLAIN[str][0], " or ".join(f"'{each}'" for each in parts)
 
 
-def _list_words(parts: tuple[Any, ...]) -> str:
-    return f"a list, each item {_words(parts[0])}"
-
-
-def _row_words(parts: tuple[Any, ...]) -> str:
-    if Ellipsis in parts:
-        return _list_words(parts)
-    return f"{len(parts)} values ({', '.join(map(_words, parts))})"
-
-
-def _table_words(parts: tuple[Any, ...]) -> str:
-    return f"a mapping, such as a dict, of {_words(parts[0])} to {_words(parts[1])}"
-
-
-_GENERIC: dict[Any, tuple[Callable[[Any], Fits], Callable[[Any], str]]] = {
-    Union: (_either, _join),
-    types.UnionType: (_either, _join),
-    # The function knows the words, and which is near.
-    Literal: (lambda parts: _PLAIN[str][0], lambda parts: " or ".join(f"'{e}'" for e in parts)),
-    tuple: (_row, _row_words),
-    **dict.fromkeys((abc.Sequence, list), (_many, _list_words)),
-    **dict.fromkeys((abc.Mapping, dict), (_table, _table_words)),
-    abc.Iterable: (_several, _list_words),
-    abc.Callable: (lambda parts: callable, lambda parts: "a function"),
-    type: (lambda parts: inspect.isclass, lambda parts: "a class"),
+_GENERIC: dict[Any, Callable[[tuple[Any, ...]], Door]] = {
+    **dict.fromkeys((Union, types.UnionType), _either),
+    **dict.fromkeys((abc.Sequence, list), _many),
+    **dict.fromkeys((abc.Mapping, dict), _table),
+    Literal: _words,
+    tuple: _row,
+    abc.Iterable: _several,
+    abc.Callable: lambda parts: (callable, "a function"),
+    type: lambda parts: (inspect.isclass, "a class"),
 }
 
 
@@ -299,27 +278,20 @@ def _is_sequence(value: Any) -> typing.TypeGuard[Sequence[Any]]:
     return is_array or (isinstance(value, Sequence) and not isinstance(value, str | bytes))
 
 
-def _plain(value: Any) -> object:
-    """Number of numpy, or of an array of one value, as one of Python."""
-    if not hasattr(value, "item") or value is np.ma.masked or np.size(value) != 1:
-        return value
-    return value.item()
-
-
 def _is_number(value: object) -> bool:
-    plain = _plain(value)
+    plain = plain_number(value)
     is_real = isinstance(plain, numbers.Real) and not isinstance(plain, bool)
     real: Any = plain if is_real else math.nan
     return real == real and not LARGEST < abs(real) < math.inf
 
 
 def _is_integer(value: object) -> bool:
-    plain = _plain(value)
+    plain = plain_number(value)
     is_integer = isinstance(plain, numbers.Integral) and not isinstance(plain, bool)
     return is_integer and _is_number(plain)
 
 
-_PLAIN: dict[Any, tuple[Fits, str]] = {
+_PLAIN: dict[Any, Door] = {
     float: (_is_number, "a number"),
     int: (_is_integer, "an integer"),
     bool: (lambda value: isinstance(value, bool | np.bool_), "True or False"),
@@ -336,8 +308,8 @@ _PLAIN: dict[Any, tuple[Fits, str]] = {
 
 
 _NUMBER = (_is_number, "a number")
-_SPAN = (_row((float, float)), "two instants in seconds")
-_ATTRIBUTES: dict[str, tuple[Fits, str]] = {
+_SPAN = (_row((float, float))[0], "two instants in seconds")
+_ATTRIBUTES: dict[str, Door] = {
     **dict.fromkeys(("encounter_period", "water_depth", "probe_offset", "celerity"), _NUMBER),
     **dict.fromkeys(("train_span", "test_span"), _SPAN),
 }

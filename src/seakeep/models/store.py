@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import GREATEST, FloatArray
+from seakeep.arrays import GREATEST, LONGEST_STEP, SHORTEST_STEP, FloatArray
 from seakeep.checked import explained
 from seakeep.errors import DataError, MissingFileError, RequestError
 from seakeep.files import MARK, check_output, read_sealed, replacing, write_netcdf
@@ -109,7 +109,7 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
     for key in ("state_delays", "input_delays"):
         if (value := getattr(kept, key)) < 0:
             raise ValueError(f"{key} is {value!r}, not a number of samples")
-    if not 1e-9 < kept.dt < 1e9 or not kept.states:
+    if not SHORTEST_STEP < kept.dt < LONGEST_STEP or not kept.states:
         raise ValueError(f"dt is {kept.dt!r} and there are {len(kept.states)} states")
     delayed, direct = input_map.regressors(kept.inputs)
     sizes = {"state": len(kept.states), "input": len(delayed), "direct": len(direct)}

@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 from pydantic import AfterValidator, BaseModel, Field, TypeAdapter
 
-from seakeep.arrays import GREATEST
+from seakeep.arrays import GREATEST, LONGEST_STEP
 from seakeep.campaign.settings import PreparationSettings
 from seakeep.errors import SHOWN, SeakeepError
 from seakeep.models import KINDS
@@ -52,7 +52,7 @@ def _instant(text: str) -> str:
     return text
 
 
-Time = Annotated[float, Field(gt=0, le=1e9)]
+Time = Annotated[float, Field(gt=0, le=LONGEST_STEP)]
 ATTRIBUTES: dict[str, Any] = {
     **dict.fromkeys(("study", "description", "campaign", "digest", "campaign_digest"), str),
     **dict.fromkeys(("encounter_period", "dt", "longest_training"), Time),
