@@ -16,7 +16,6 @@ FLOORS = (
     ("errors",),
     ("sizes",),
     ("arrays",),
-    ("checked",),
     ("files",),
     ("conventions", "waves"),
     ("toml",),

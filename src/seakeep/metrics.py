@@ -30,7 +30,6 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray, fraction
-from seakeep.checked import checked
 from seakeep.core import metrics as core
 from seakeep.core.bootstrap import block_length, bootstrap_indices, outer_tail
 from seakeep.errors import RequestError, SeakeepWarning
@@ -94,7 +93,6 @@ class Measure(Protocol[Labels, Numbers]):
     ) -> Any: ...
 
 
-@checked
 def labelled(
     measure: Callable[..., Any],
     keeps: Literal["channel", "time", "neither"],
@@ -235,7 +233,6 @@ def _bounds(found: FloatArray, blocks: float, level: float, axis: int) -> FloatA
     return out
 
 
-@checked
 def anrmse_differences(
     predicted: Sequence[Sequence[xr.Dataset]],
     measured: Sequence[xr.Dataset],

@@ -18,7 +18,6 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.checked import checked
 from seakeep.core import bootstrap as _bootstrap
 from seakeep.core import coverage as _coverage
 from seakeep.core import divergence as _divergence
@@ -124,7 +123,6 @@ def moving_block_bootstrap(
     *,
     segments: Sequence[int] | None = None,
 ) -> FloatArray: ...
-@checked
 @functools.wraps(_bootstrap.moving_block_bootstrap)
 def moving_block_bootstrap(
     series: Any,
@@ -214,7 +212,6 @@ def jsd_interval(
     grid: npt.ArrayLike | None = None,
     segments: Sequence[int] | None = None,
 ) -> JsdInterval: ...
-@checked
 @functools.wraps(_divergence.jsd_interval)
 def jsd_interval(
     predicted: Any,
@@ -279,7 +276,6 @@ def coverage(lower: xr.Dataset, upper: xr.Dataset, measured: xr.Dataset) -> xr.D
 def coverage(
     lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
 ) -> BandCoverage: ...
-@checked
 @functools.wraps(_coverage.coverage)
 def coverage(lower: Any, upper: Any, measured: Any) -> Any:
     """Take Datasets too; the docstring shown is that of the array function."""
@@ -327,7 +323,6 @@ def coverage_table(
     level: float = 0.95,
     waves: npt.ArrayLike | None = None,
 ) -> CoverageTable: ...
-@checked
 @functools.wraps(_coverage.coverage_table)
 def coverage_table(
     lower: Any, upper: Any, measured: Any, level: float = 0.95, waves: Any = None

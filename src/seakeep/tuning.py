@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import xarray as xr
 
-from seakeep.checked import explained
 from seakeep.errors import RequestError
 from seakeep.files import read_bytes, replacing
 from seakeep.models import HankelDMDc
@@ -76,7 +75,6 @@ class TuneResult:
         return tuning_figure(self.table)
 
 
-@explained
 def tune(
     spec: HankelDMDc,
     runs: Runs,

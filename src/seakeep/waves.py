@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import FloatArray, as_real
-from seakeep.checked import checked
 from seakeep.errors import RequestError
 
 __all__ = ["GRAVITY", "group_speed", "phase_speed", "wavelength_to_frequency", "wavenumber"]
@@ -55,7 +54,6 @@ def _side_by_side(first: FloatArray, depth: FloatArray) -> tuple[FloatArray, Flo
     return one, other
 
 
-@checked
 def wavenumber(
     frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf, gravity: float = GRAVITY
 ) -> FloatArray:
@@ -106,7 +104,6 @@ def wavenumber(
     return k
 
 
-@checked
 def phase_speed(
     frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf, gravity: float = GRAVITY
 ) -> FloatArray:
@@ -137,7 +134,6 @@ def phase_speed(
         return np.where(omega > 0, omega / k, np.sqrt(gravity * h))
 
 
-@checked
 def group_speed(
     frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf, gravity: float = GRAVITY
 ) -> FloatArray:
@@ -172,7 +168,6 @@ def group_speed(
     return 0.5 * phase_speed(omega, h, gravity) * (1.0 + ratio)
 
 
-@checked
 def wavelength_to_frequency(
     wavelength: npt.ArrayLike, depth: npt.ArrayLike = np.inf, gravity: float = GRAVITY
 ) -> FloatArray:

@@ -27,7 +27,6 @@ from seakeep.campaign.guesses import (
 )
 from seakeep.campaign.readers import time_column, time_step_of, time_unit_of
 from seakeep.campaign.settings import FileSettings
-from seakeep.checked import explained
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
 from seakeep.files import MARK, expanded
@@ -49,7 +48,6 @@ LIKE = 1.25
 _REMOVE = "prepare warns of it: remove it"
 
 
-@explained
 def draft_campaign(
     files: Sequence[Path | str],
     folder: Path | str | None = None,

@@ -19,7 +19,6 @@ from seakeep.arrays import FloatArray, as_real, as_table
 from seakeep.campaign.pipeline import cleaned, derived, mapped, read, resampled, sync
 from seakeep.campaign.readers import find_column, time_column, time_unit_of
 from seakeep.campaign.settings import CampaignSettings
-from seakeep.checked import explained
 from seakeep.conventions import conversion
 from seakeep.errors import RequestError, SeakeepError, did_you_mean
 from seakeep.formats import Columns, Options
@@ -99,7 +98,6 @@ class LiveChain:
             )
         return name, conversion(time_unit_of(columns, name, own.time_unit), "s")
 
-    @explained
     def push(self, samples: Mapping[str, Mapping[str, npt.ArrayLike]]) -> xr.Dataset:
         """Take raw samples, and give the model samples that are ready.
 

@@ -32,7 +32,6 @@ from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
 from seakeep.campaign.survey import Failures, Survey, spare, survey
 from seakeep.campaign.validation import read_settings
-from seakeep.checked import explained
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
 from seakeep.files import expanded
 from seakeep.formats import Columns, Options, read_columns
@@ -108,7 +107,6 @@ class Campaign:
         """Names of the models in ``[models.NAME]``."""
         return list(self.settings.models)
 
-    @explained
     def model(self, name: str | None = None) -> ModelSettings:
         """Return the settings of a model.
 
@@ -176,7 +174,6 @@ class Campaign:
         bare = self.settings.model_copy(update={"model": None, "models": {}})
         return in_seconds(bare, period).model_copy(update=models)
 
-    @explained
     def files_of(self, name: str) -> dict[str, Path]:
         """Paths of a run's files.
 
@@ -199,13 +196,11 @@ class Campaign:
         files = {"": run.file} if run.file is not None else run.files
         return {key: expand(file, self.path.parent) for key, file in files.items()}
 
-    @explained
     def checksum_of(self, name: str) -> str:
         """SHA-256 of a run's file; of the list of them where there are several."""
         sums = [checksum(path) for path in self.files_of(name).values()]
         return sums[0] if len(sums) == 1 else hashlib.sha256(" ".join(sums).encode()).hexdigest()
 
-    @explained
     def basis_of(self, name: str) -> str:
         """SHA-256 of all files on which a prepared run depends, through period and clocks too."""
         settings = self.settings
@@ -229,7 +224,6 @@ class Campaign:
             )
         return runs[name]
 
-    @explained
     def read_run(self, name: str) -> xr.Dataset:
         """Read a run as it was measured: named channels in SI units, at the file's own rate.
 
@@ -267,7 +261,6 @@ class Campaign:
         run = sync(read(name, settings, self.files_of(name), reader), found.clocks[name])
         return derived(cleaned(mapped(run)))
 
-    @explained
     def clocks(self, names: Iterable[str] | None = None) -> dict[str, dict[str, Clock]]:
         """Clocks of the loggers of each run against the reference.
 
@@ -362,7 +355,6 @@ class Campaign:
             return stated
         return self._mean_period(self._survey([], True, _ReadOnce()))
 
-    @explained
     def seconds(self, stated: float | str) -> float:
         """Seconds of a length or an instant that may be stated in encounter periods.
 
@@ -393,7 +385,6 @@ class Campaign:
             raise RequestError(f"{self.path} has no run in use. Give a run another role.")
         return float(np.mean(list(found.periods.values())))
 
-    @explained
     def prepare(
         self, names: Iterable[str] | None = None, progress: Progress | None = None
     ) -> dict[str, xr.Dataset]:
@@ -426,7 +417,6 @@ class Campaign:
         """
         return dict(self.each_prepared(names, progress))
 
-    @explained
     def each_prepared(
         self,
         names: Iterable[str] | None = None,
@@ -491,7 +481,6 @@ class Campaign:
                 progress(done, len(wanted), name)
             yield name, data
 
-    @explained
     def live_chain(
         self,
         run: str,
@@ -608,7 +597,6 @@ class _ReadOnce:
         return columns
 
 
-@explained
 def read_campaign(path: Path | str, preset: str | None = None) -> Campaign:
     """Read a campaign file.
 

@@ -13,7 +13,6 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.campaign.settings import FileSettings
-from seakeep.checked import explained
 from seakeep.conventions import conversion, si_unit
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.files import expanded, sha256_of
@@ -70,7 +69,6 @@ def checksum(path: Path) -> str:
     return digest.hexdigest()
 
 
-@explained
 def read_table(
     path: Path | str, options: FileSettings | None = None, columns: Iterable[str] | None = None
 ) -> xr.Dataset:

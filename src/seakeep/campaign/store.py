@@ -14,7 +14,6 @@ from pydantic import TypeAdapter, create_model
 from seakeep.campaign.pipeline import version
 from seakeep.campaign.prepare import Campaign, Progress
 from seakeep.campaign.survey import Failures, as_one
-from seakeep.checked import explained
 from seakeep.errors import SeakeepError, warn
 from seakeep.files import (
     MARK,
@@ -35,7 +34,6 @@ NUMBERS = (*POSITIVE, "celerity", "wave_direction", "probe_offset")
 """Attributes that are numbers, those that are positive first."""
 
 
-@explained
 def write_prepared(
     campaign: Campaign,
     out_dir: Path | str | None = None,
@@ -111,7 +109,6 @@ def _fresh_step(campaign: Campaign, name: str, file: Path) -> float | None:
     return None if run is None else float(run.attrs["dt"])
 
 
-@explained
 def load_prepared(
     campaign: Campaign,
     out_dir: Path | str | None = None,

@@ -20,7 +20,6 @@ from seakeep.check.parts import (
     regressors,
     used_parts,
 )
-from seakeep.checked import explained
 from seakeep.core.harmonics import dominant_frequency
 from seakeep.core.spectra import Spectra, cross_spectra
 from seakeep.errors import DataError, RequestError
@@ -34,7 +33,6 @@ AVERAGES = 10
 """Independent segments per input, and one more, that are kept where the records are long enough."""
 
 
-@explained
 def coherence(
     model: Model,
     runs: Mapping[str, xr.Dataset],

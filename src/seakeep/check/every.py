@@ -19,7 +19,6 @@ from seakeep.check.response import measured_response, response, validation
 from seakeep.check.sea import validity
 from seakeep.check.second_order import drift
 from seakeep.check.worth import worth
-from seakeep.checked import explained
 from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models import Model
 from seakeep.models.labelled import check_channels
@@ -79,7 +78,6 @@ class Checked:
     repeats: dict[str, str] = field(default_factory=dict)
 
 
-@explained
 def check_model(
     model: Model,
     runs: Mapping[str, xr.Dataset],

@@ -10,7 +10,6 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.check.parts import single_model
-from seakeep.checked import explained
 from seakeep.core.decay import free_decay
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Model
@@ -24,7 +23,6 @@ LONGEST, SHORTEST = 20000, 200
 """Samples of a decay."""
 
 
-@explained
 def modes(model: Model) -> xr.Dataset:
     r"""Modes of a model, slowest decay first, and which states take part in each.
 
@@ -57,7 +55,6 @@ def modes(model: Model) -> xr.Dataset:
     return out.assign_coords(state=single.states)
 
 
-@explained
 def decay(model: Model) -> xr.Dataset:
     """Release a model from an offset of each rigid motion, in still water.
 
@@ -127,7 +124,6 @@ def decay(model: Model) -> xr.Dataset:
     )
 
 
-@explained
 def measured_decay(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     r"""Period and damping of measured decay runs, :math:`\delta = p + q a`.
 

@@ -9,7 +9,6 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.check.parts import FreeRun, Known, free_runs, irregular, judged
-from seakeep.checked import explained
 from seakeep.core.density import kernel_density
 from seakeep.core.divergence import jensen_shannon
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
@@ -24,7 +23,6 @@ KINDS = ("measured", "forecast")
 PLACES = 161
 
 
-@explained
 def statistics(
     model: Model,
     runs: Mapping[str, xr.Dataset],

@@ -18,7 +18,6 @@ from seakeep.check.parts import (
     one_step,
     window_of,
 )
-from seakeep.checked import explained
 from seakeep.core.spectra import cross_spectra
 from seakeep.core.whiteness import autocorrelation, input_correlation, ljung_box
 from seakeep.errors import DataError, SeakeepError, warn
@@ -35,7 +34,6 @@ AGES = 15
 """Encounter periods over which a forecast grows old."""
 
 
-@explained
 def residuals(
     model: Model, runs: Mapping[str, xr.Dataset], free: Known | None = None
 ) -> xr.Dataset:

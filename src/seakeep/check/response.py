@@ -20,7 +20,6 @@ from seakeep.check.parts import (
     used_parts,
     wave_turns,
 )
-from seakeep.checked import explained
 from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
 from seakeep.core.response import frequency_response
 from seakeep.core.spectra import Spectra, cross_spectra
@@ -43,7 +42,6 @@ FREQUENCIES = 120
 LEVEL = 0.95
 
 
-@explained
 def response(
     model: Model,
     frequencies: npt.ArrayLike | None = None,
@@ -220,7 +218,6 @@ def _ratio(units: str, per: str) -> str:
     return f"{units or '1'}/{per}" if per and per != "1" else units
 
 
-@explained
 def measured_response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Measured response per wave amplitude: points with expanded uncertainty.
 
@@ -376,7 +373,6 @@ def _points(
     )
 
 
-@explained
 def validation(
     model: Model, runs: Mapping[str, xr.Dataset], measured: xr.Dataset | None = None
 ) -> xr.Dataset:

@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 
 from seakeep.check.parts import is_regular, reference_probe, used_parts
-from seakeep.checked import explained
 from seakeep.core.harmonics import dominant_frequency
 from seakeep.errors import DataError
 from seakeep.models import Model, outside_training
@@ -18,7 +17,6 @@ from seakeep.waves import wavenumber
 __all__ = ["validity"]
 
 
-@explained
 def validity(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Height, period, steepness and drift of each run, and what lies outside the training.
 

@@ -17,7 +17,6 @@ from seakeep.check.parts import (
     wave_turns,
 )
 from seakeep.check.response import measured_response, transfer
-from seakeep.checked import explained
 from seakeep.errors import DataError, RequestError
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.inputs import Chain, Measured
@@ -31,7 +30,6 @@ DIFFERENCES = 4
 """Difference frequencies, besides zero."""
 
 
-@explained
 def drift(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     r"""Probe the observables of a model by one and by two waves: mean drift and slow response.
 

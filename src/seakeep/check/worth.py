@@ -9,7 +9,6 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.check.parts import FreeRun, Known, beside, free_runs, is_regular, judged
-from seakeep.checked import explained
 from seakeep.metrics import anrmse_differences
 from seakeep.models import Model
 
@@ -19,7 +18,6 @@ LIMITS = (0.1, 0.3, 0.7)
 """NRMSE at which the use of a forecast changes: 99, 91 and 51 % of the variance are explained."""
 
 
-@explained
 def worth(
     model: Model,
     runs: Mapping[str, xr.Dataset],

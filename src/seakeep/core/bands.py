@@ -9,7 +9,6 @@ import numpy.typing as npt
 import scipy
 
 from seakeep.arrays import FloatArray, as_real, number, time_step
-from seakeep.checked import checked
 from seakeep.core.metrics import over_channels, paired
 from seakeep.errors import RequestError
 
@@ -34,7 +33,6 @@ class BandErrors(NamedTuple):
     wave: FloatArray
 
 
-@checked
 def split_bands(
     series: npt.ArrayLike, dt: float, frequency: float
 ) -> tuple[FloatArray, FloatArray]:
@@ -86,7 +84,6 @@ def split_bands(
     return low, x - low
 
 
-@checked
 def band_error_over_time(
     *,
     predicted: npt.ArrayLike,

@@ -21,7 +21,6 @@ from seakeep.arrays import (
     as_series,
     whole_number,
 )
-from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.sizes import check_numbers
 
@@ -107,7 +106,6 @@ def _autocovariance(x: FloatArray, lags: int, segments: IntArray) -> FloatArray:
     return np.array([apart[: apart.size - k] @ apart[k:] for k in range(lags + 1)]) / x.size
 
 
-@checked
 def lag_one_correlation(series: npt.ArrayLike, segments: Sequence[int] | None = None) -> float:
     r"""Lag-one correlation :math:`\varphi` of the paper, its denominator squared.
 
@@ -164,7 +162,6 @@ def _politis_white(x: FloatArray, kind: str, segments: IntArray) -> float:
     return float(np.cbrt(2.0 * slope**2 / variance * n))
 
 
-@checked
 def choose_block_length(
     series: npt.ArrayLike,
     rule: BlockRule = "carlstein",
@@ -216,7 +213,6 @@ def choose_block_length(
     return BlockChoice(samples=samples, optimum=optimum, cap=cap, rule=rule)
 
 
-@checked
 def block_length(
     series: npt.ArrayLike,
     rule: BlockRule = "carlstein",
@@ -348,7 +344,6 @@ def outer_tail(blocks: float, level: float) -> float:
     return float(special.ndtr(np.sqrt(blocks / (blocks - 1.0)) * student))
 
 
-@checked
 def moving_block_bootstrap(
     series: npt.ArrayLike,
     n_series: int,

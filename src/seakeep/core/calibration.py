@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import FloatArray, as_real, fraction
-from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 
 __all__ = [
@@ -61,7 +60,6 @@ class ConformalMargin:
     level: float
 
 
-@checked
 def band_scores(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike) -> FloatArray:
     r"""How far a measurement lies outside of a band; negative inside.
 
@@ -269,7 +267,6 @@ def calibrated_bounds(
     return mean - half, mean + half
 
 
-@checked
 def conformal_margin(
     scores: npt.ArrayLike, level: float = 0.95, block_length: float | None = None
 ) -> ConformalMargin:

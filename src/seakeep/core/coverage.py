@@ -9,7 +9,6 @@ import numpy.typing as npt
 from scipy import special
 
 from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, fraction, number
-from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 
 __all__ = [
@@ -51,7 +50,6 @@ class BandCoverage:
     relative_width: FloatArray
 
 
-@checked
 def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike) -> BandCoverage:
     """Fraction of the instants at which a band holds the measurement, and its mean width.
 
@@ -149,7 +147,6 @@ class CoverageTable:
     crps: FloatArray
 
 
-@checked
 def winkler_score(
     lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike, level: float = 0.95
 ) -> FloatArray:
@@ -184,7 +181,6 @@ def winkler_score(
     return found
 
 
-@checked
 def band_crps(
     lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike, level: float = 0.95
 ) -> FloatArray:
@@ -241,7 +237,6 @@ def _triple(
     return low, high, y
 
 
-@checked
 def coverage_table(
     lower: npt.ArrayLike,
     upper: npt.ArrayLike,
@@ -381,7 +376,6 @@ class BoxStatistics:
         return self.upper_quartile - self.lower_quartile
 
 
-@checked
 def box_statistics(values: npt.ArrayLike, reach: float = 1.5) -> BoxStatistics:
     """Quartiles, whiskers and outliers of a sample (Tukey), as matplotlib draws them.
 

@@ -16,7 +16,6 @@ import numpy.typing as npt
 from scipy import fft
 
 from seakeep.arrays import FloatArray, IntArray, as_bundle, as_real, fraction, whole_number
-from seakeep.checked import checked
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.sizes import MOST_BINS, check_numbers, check_size
@@ -122,7 +121,6 @@ def _positive(h: FloatArray, x: FloatArray) -> FloatArray:
     return h
 
 
-@checked
 def kernel_bandwidth(series: npt.ArrayLike, bandwidth: Bandwidth = "paper") -> float:
     r"""Bandwidth of a normal kernel.
 
@@ -205,7 +203,6 @@ def _densities(x: FloatArray, grid: FloatArray, h: FloatArray) -> FloatArray:
     return out
 
 
-@checked
 def kernel_density(
     series: npt.ArrayLike, grid: npt.ArrayLike, bandwidth: Bandwidth = "paper"
 ) -> FloatArray:
@@ -252,7 +249,6 @@ def kernel_density(
     return out[0] if np.ndim(series) == 1 else out
 
 
-@checked
 def density_grid(
     *series: npt.ArrayLike, bandwidth: Bandwidth = "paper", points: int = 512, margin: float = 3.0
 ) -> FloatArray:
@@ -336,7 +332,6 @@ def bootstrapped_densities(
     return _densities(drawn, grid, np.where(h > 0, h, own))
 
 
-@checked
 def density_interval(
     series: npt.ArrayLike,
     *,

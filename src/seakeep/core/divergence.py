@@ -11,7 +11,6 @@ import numpy.typing as npt
 from scipy.special import rel_entr
 
 from seakeep.arrays import FloatArray, as_bundle, as_real, as_series
-from seakeep.checked import checked
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.core.density import Bandwidth, bootstrapped_densities, checked_grid, kernel_density
 from seakeep.errors import RequestError
@@ -65,7 +64,6 @@ class JsdInterval:
         return self.upper - self.lower
 
 
-@checked
 def jensen_shannon(p: npt.ArrayLike, q: npt.ArrayLike) -> FloatArray:
     r"""Jensen–Shannon divergence of two distributions on one grid.
 
@@ -113,7 +111,6 @@ def jensen_shannon(p: npt.ArrayLike, q: npt.ArrayLike) -> FloatArray:
     return out
 
 
-@checked
 def jsd_interval(
     predicted: npt.ArrayLike,
     measured: npt.ArrayLike,

@@ -13,7 +13,6 @@ from typing import Literal
 import numpy as np
 
 from seakeep.arrays import FloatArray, as_real, whole_number
-from seakeep.checked import checked
 from seakeep.errors import RequestError
 
 __all__ = ["History", "TrainingWindow", "embed", "snapshot_matrices", "training_window", "unembed"]
@@ -48,7 +47,6 @@ class TrainingWindow:
         return slice(self.first, self.last + 1)
 
 
-@checked
 def training_window(
     last: int, window: int | None, state_delays: int, input_delays: int, history: History
 ) -> TrainingWindow:
@@ -88,7 +86,6 @@ def training_window(
     return TrainingWindow(first, last, max(first, earliest))
 
 
-@checked
 def embed(series: FloatArray, delays: int, first: int, count: int) -> FloatArray:
     """Extended snapshots as columns.
 
@@ -133,7 +130,6 @@ def embed(series: FloatArray, delays: int, first: int, count: int) -> FloatArray
     return out
 
 
-@checked
 def unembed(columns: FloatArray, channels: int) -> FloatArray:
     """Recover the series from its extended snapshots; the inverse of :func:`embed`.
 
@@ -169,7 +165,6 @@ def unembed(columns: FloatArray, channels: int) -> FloatArray:
     return np.concatenate([oldest_first, blocks[0].T])
 
 
-@checked
 def snapshot_matrices(
     states: FloatArray,
     inputs: FloatArray,

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import BoolArray, FloatArray, as_real
-from seakeep.checked import checked
 from seakeep.errors import RequestError
 
 __all__ = [
@@ -87,7 +86,6 @@ def paired(
     return p, m, np.where(slack, np.nan, spread), ~slack
 
 
-@checked
 def is_slack(
     *,
     predicted: npt.ArrayLike,
@@ -123,7 +121,6 @@ def is_slack(
     return ~paired(predicted, measured, training_std, noise_std)[3]
 
 
-@checked
 def nrmse(
     *,
     predicted: npt.ArrayLike,
@@ -170,7 +167,6 @@ def nrmse(
     return root_mean_square(p - m) / spread
 
 
-@checked
 def anrmse(
     *,
     predicted: npt.ArrayLike,
@@ -199,7 +195,6 @@ def anrmse(
     return over_channels(root_mean_square(p - m) / spread, judged)
 
 
-@checked
 def error_over_time(
     *,
     predicted: npt.ArrayLike,
@@ -227,7 +222,6 @@ def error_over_time(
     return over_channels(np.abs(p - m) / spread[..., None, :], judged[..., None, :])
 
 
-@checked
 def normalised_extremes_error(
     *,
     predicted: npt.ArrayLike,
@@ -256,7 +250,6 @@ def normalised_extremes_error(
     return extremes_error(p, m) / spread
 
 
-@checked
 def nammae(
     *,
     predicted: npt.ArrayLike,
@@ -285,7 +278,6 @@ def nammae(
     return over_channels(extremes_error(p, m) / spread, judged)
 
 
-@checked
 def fit_percent(
     *,
     predicted: npt.ArrayLike,

@@ -32,7 +32,6 @@ import numpy.typing as npt
 from scipy.linalg import blas
 
 from seakeep.arrays import BoolArray, FloatArray, as_real
-from seakeep.checked import checked
 from seakeep.errors import RequestError
 
 __all__ = ["rollout", "rollouts"]
@@ -62,7 +61,6 @@ MIRRORED_ENTRY = 0.065
 MOST_DOUBLINGS = 6
 
 
-@checked
 def rollout(
     A: npt.ArrayLike,
     B: npt.ArrayLike,

@@ -41,7 +41,6 @@ from scipy import linalg
 from scipy.linalg import blas, lapack
 
 from seakeep.arrays import FloatArray, as_real, number, whole_number
-from seakeep.checked import checked
 from seakeep.core.embedding import TrainingWindow, embed
 from seakeep.core.gram import (
     Piece,
@@ -96,7 +95,6 @@ class Solution:
     clipped: tuple[float, ...] = ()
 
 
-@checked
 def identify(
     states: Sequence[FloatArray],
     inputs: Sequence[FloatArray],

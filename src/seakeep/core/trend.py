@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import FloatArray, IntArray, as_series, fraction, whole_number
-from seakeep.checked import checked
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.errors import DataError, RequestError
 
@@ -55,7 +54,6 @@ def _instants(time: npt.ArrayLike | None, samples: int) -> FloatArray:
     return t
 
 
-@checked
 def trend_test(
     error_over_time: npt.ArrayLike,
     *,

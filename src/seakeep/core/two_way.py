@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import FloatArray, IntArray, as_real, fraction, whole_number
-from seakeep.checked import checked
 from seakeep.core.bootstrap import outer_tail
 from seakeep.errors import RequestError
 
@@ -29,7 +28,6 @@ AT_ONCE = 4_000_000
 """Values of redrawn cells at a time: 32 MB."""
 
 
-@checked
 def two_way_interval(
     statistic: Callable[..., FloatArray],
     *cells: npt.ArrayLike,
@@ -114,7 +112,6 @@ def _positions(size: int, block: int, count: int, rng: np.random.Generator) -> I
     return positions.reshape(count, -1)[:, :size].astype(np.intp, copy=False)
 
 
-@checked
 def overlap_block(spans: Sequence[tuple[str, float, float]]) -> int:
     """Block length for windows that overlap: one, and how many others a window shares on average.
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from seakeep.checked import explained
 from seakeep.errors import DataError
 from seakeep.files import reading
 from seakeep.formats.columns import Columns
@@ -39,7 +38,6 @@ HEAD = 600
 """Bytes from which a kind is recognised."""
 
 
-@explained
 def read_columns(path: Path | str, options: Options | None = None) -> Columns:
     """Read the columns of a file, without a look at its time axis.
 
@@ -73,7 +71,6 @@ def read_columns(path: Path | str, options: Options | None = None) -> Columns:
         return _reader_of(place, head).read(place, options)
 
 
-@explained
 def is_recording_folder(path: Path) -> bool:
     """Whether a folder is read as one recording."""
     return _folder_reader(path) is not None

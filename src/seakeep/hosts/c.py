@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from seakeep.arrays import FloatArray
-from seakeep.checked import explained
 from seakeep.core.readouts import LinearHinges
 from seakeep.files import MARK, check_output, make_folder, replacing
 from seakeep.hosts.program import Program, program_of
@@ -29,7 +28,6 @@ OPERATORS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
 FUNCTIONS = {"power": "pow", "abs": "fabs"}
 
 
-@explained
 def write_c(model: Model, folder: str | Path, name: str = "rom") -> list[Path]:
     """Write a model as C99: ``NAME.c`` and ``NAME.h``.
 

@@ -14,7 +14,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from seakeep.checked import explained
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing, working_folder
 from seakeep.hosts.c import identifier, rendered, sources
@@ -33,7 +32,6 @@ PLATFORMS = {
 """Folder of a binary in an FMU and its suffix, by system and processor."""
 
 
-@explained
 def write_fmu(model: Model, path: str | Path) -> Path:
     """Write a model as an FMU 2.0 for co-simulation.
 

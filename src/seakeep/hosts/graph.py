@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from seakeep.arrays import whole_number
-from seakeep.checked import explained
 from seakeep.core.readouts import LinearHinges
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing
@@ -40,7 +39,6 @@ OPERATORS = {
 }
 
 
-@explained
 def write_onnx(model: Model, path: str | Path, steps: int = 1) -> Path:
     """Write a forecast of a fixed number of steps as an ONNX graph in double precision.
 

@@ -13,7 +13,6 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.checked import explained
 from seakeep.errors import RequestError
 from seakeep.models import FittedAlignment, HankelDMDcModel, Model, is_ensemble, labelled
 from seakeep.models.inputs import Chain, Lead
@@ -145,7 +144,6 @@ def program_of(model: Model) -> Program:
     return program
 
 
-@explained
 def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray, FloatArray]:
     """Measured rows from which an exported model starts.
 

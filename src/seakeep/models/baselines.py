@@ -14,7 +14,6 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.checked import explained
 from seakeep.core.solve import Solution
 from seakeep.core.subspace import StateSpace, identify_subspace
 from seakeep.errors import RequestError
@@ -91,7 +90,6 @@ class LinearSpec(HankelSettings):
     readouts: ReadOuts = field(default=(), init=False, repr=False)
     stable: bool | float = field(default=False, init=False, repr=False)
 
-    @explained
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
     ) -> LinearModel:
@@ -143,7 +141,6 @@ class Mean(LinearSpec):
     lead: int = field(default=0, init=False, repr=False)
     observables: tuple[Observable, ...] = field(default=(), init=False, repr=False)
 
-    @explained
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str] = (), stop: Stop = None
     ) -> LinearModel:
@@ -202,7 +199,6 @@ class ARX(LinearSpec):
     ridge: float = 0.0
 
     @classmethod
-    @explained
     def recommended(cls, encounter_period: float, dt: float) -> Self:
         """One encounter period of the states, three of the inputs, λ = 1e-3 per snapshot pair.
 
@@ -242,7 +238,6 @@ class FIR(LinearSpec):
     ridge_scale: RidgeScale = "per_snapshot"
 
     @classmethod
-    @explained
     def recommended(cls, encounter_period: float, dt: float) -> Self:
         """Three encounter periods of the inputs."""
         return cls(input_delays=periods_to_samples(3, encounter_period, dt))
@@ -303,13 +298,11 @@ class Subspace(HankelSettings):
             )
 
     @classmethod
-    @explained
     def recommended(cls, encounter_period: float, dt: float) -> Self:
         """One encounter period of the states, three of the inputs, 40 latent states, λ = 0.1."""
         s, z = (periods_to_samples(periods, encounter_period, dt) for periods in (1, 3))
         return cls(state_delays=s, input_delays=z, order=40, ridge=0.1)
 
-    @explained
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
     ) -> SubspaceModel:

@@ -14,7 +14,6 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, fraction
-from seakeep.checked import explained
 from seakeep.errors import RequestError, warn
 from seakeep.models import engine, store
 from seakeep.models.calibration import (
@@ -111,7 +110,6 @@ class _Forecasts(Forecaster):
         """Standard deviation of the states over all that members learn from, shape (N,)."""
         return self.signature.state_scale.spread
 
-    @explained
     def forecast(
         self,
         run: xr.Dataset,
@@ -158,7 +156,6 @@ class _Forecasts(Forecaster):
             | {"start": windows.places[0][1]},
         )
 
-    @explained
     def forecast_summary(
         self,
         run: xr.Dataset,
@@ -211,7 +208,6 @@ class _Forecasts(Forecaster):
             attrs=self._notes(windows) | counts,
         )
 
-    @explained
     def forecast_windows(
         self,
         run: xr.Dataset,
@@ -252,7 +248,6 @@ class _Forecasts(Forecaster):
         coords = window_coords(windows, self.dt) | {"member": np.arange(self.n_members)}
         return xr.Dataset(variables, coords=coords, attrs=self._notes(windows))
 
-    @explained
     def summarize_windows(
         self,
         run: xr.Dataset,
@@ -435,7 +430,6 @@ class HankelEnsemble(_Forecasts, store.Saved):
         """Â of each member."""
         return (self.member(number).A for number in range(self.n_members))
 
-    @explained
     def dynamics(self, number: int) -> Dynamics:
         """A member identified: what a free run of it needs."""
         draw, input_map = self._draw(number), self.signature.input_map
@@ -449,7 +443,6 @@ class HankelEnsemble(_Forecasts, store.Saved):
             )
         return self.members[number]
 
-    @explained
     def member(self, number: int) -> HankelDMDcModel:
         """One member as a model of its own.
 
@@ -501,7 +494,6 @@ class HankelEnsemble(_Forecasts, store.Saved):
             learnt=Kept(self.coverage),
         )
 
-    @explained
     def spectral_radii(
         self, *, executor: Executor | None = None, progress: Progress | None = None
     ) -> FloatArray:
@@ -603,7 +595,6 @@ class HankelEnsemble(_Forecasts, store.Saved):
         )
         return "\n".join(lines)
 
-    @explained
     def hold(
         self,
         *,
@@ -627,7 +618,6 @@ class HankelEnsemble(_Forecasts, store.Saved):
         found = in_order(_identify, self, range(self.n_members), executor, progress)
         return HeldEnsemble(self, tuple(found))
 
-    @explained
     def calibrate(
         self,
         runs: Runs,
@@ -685,7 +675,6 @@ class HankelEnsemble(_Forecasts, store.Saved):
         found = calibrate(self, runs, steps, level, scale, folds, executor, progress)
         return replace(self, calibration=found)
 
-    @explained
     def without(self, run: str) -> HankelEnsemble:
         """The same draws as they learn from the other runs, to forecast a run that trained.
 
@@ -899,7 +888,6 @@ class HeldEnsemble(_Forecasts):
         found = [self.members[number] for number in members]
         return linear_runs(found, groups, self.signature.readouts)
 
-    @explained
     def forecast_arrays(
         self,
         x_history: npt.ArrayLike,
@@ -956,7 +944,6 @@ class HeldEnsemble(_Forecasts):
         ]
         return BandForecast(mean, std, lower, upper, len(out) - len(kept))
 
-    @explained
     def live(
         self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
     ) -> Live:

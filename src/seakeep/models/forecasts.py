@@ -12,7 +12,6 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, as_real, whole_number
-from seakeep.checked import explained
 from seakeep.errors import RequestError
 from seakeep.models import engine
 from seakeep.models.checks import check_choice
@@ -97,7 +96,6 @@ class Forecaster:
         """Samples of input after the one a step starts from that drive the step."""
         return self.signature.lead_samples
 
-    @explained
     def read_windows(
         self,
         runs: Mapping[str, xr.Dataset],
@@ -137,7 +135,6 @@ class SingleModel(Forecaster):
         spans = zip(training.first, training.stop, strict=True)
         return dict(zip(training.runs, spans, strict=True))
 
-    @explained
     def lines(self, regression: str = "") -> list[str]:
         """Lines of a summary: channels, delays, history, regression, input map and training."""
         signature, training, dt = self.signature, self.training, self.dt
@@ -164,7 +161,6 @@ class SingleModel(Forecaster):
             )
         ]
 
-    @explained
     def forecast(
         self, run: xr.Dataset, start: float, steps: int | None = None, *, ahead: str = "refuse"
     ) -> xr.Dataset:
@@ -217,7 +213,6 @@ class SingleModel(Forecaster):
         # The instants stand among the variables: given as coords, xarray would merge twice.
         return xr.Dataset({"time": windows.time[0], **variables}, attrs=attrs | {"status": status})
 
-    @explained
     def forecast_windows(
         self,
         run: xr.Dataset,

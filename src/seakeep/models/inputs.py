@@ -25,7 +25,6 @@ import xarray as xr
 from scipy import signal
 
 from seakeep.arrays import FloatArray
-from seakeep.checked import explained
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice, check_integer, settings_of, typed
@@ -164,7 +163,6 @@ class _Ahead:
         return self.inner.rows(first + self.samples, stop + self.samples, known, states)
 
 
-@explained
 @dataclass(frozen=True)
 class ProbeAlignment:
     r"""How the wave input is aligned to the vessel.

@@ -13,7 +13,6 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import ComplexArray, FloatArray, as_real
-from seakeep.checked import explained
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.models import export, labelled, store
@@ -239,7 +238,6 @@ class HankelDMDcModel(SingleModel, store.Saved):
             signature.direct_scale,
         )
 
-    @explained
     def aligned_inputs(self, run: xr.Dataset) -> xr.Dataset:
         """Inputs of a run as the model wants them: carried to the measured position.
 
@@ -275,7 +273,6 @@ class HankelDMDcModel(SingleModel, store.Saved):
         }
         return xr.Dataset(variables, coords={"time": run["time"]}, attrs=run.attrs)
 
-    @explained
     def forecast_arrays(
         self,
         x_history: npt.ArrayLike,
@@ -319,7 +316,6 @@ class HankelDMDcModel(SingleModel, store.Saved):
         values: FloatArray = self.free_runs([windows])[0][0, 0]
         return values
 
-    @explained
     def live(
         self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
     ) -> Live:
@@ -373,7 +369,6 @@ class HankelDMDcModel(SingleModel, store.Saved):
         """
         return export.to_control(self._system(), self.signature)
 
-    @explained
     def to_mat(self, path: str | Path) -> Path:
         """Write A, B, C, D, Ts, offsets, names (of the state's entries too) and units for MATLAB.
 
@@ -390,7 +385,6 @@ class HankelDMDcModel(SingleModel, store.Saved):
         """
         return export.to_mat(self._system(), self.signature, path)
 
-    @explained
     def initial_state(self, run: xr.Dataset, start: float) -> FloatArray:
         """State of the exported system that continues a measured run.
 
@@ -415,7 +409,6 @@ class HankelDMDcModel(SingleModel, store.Saved):
         windows = self.read_windows(*one_run(run, [start]), 1)
         return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
 
-    @explained
     def initial_state_arrays(
         self, x_history: npt.ArrayLike, u_history: npt.ArrayLike
     ) -> FloatArray:

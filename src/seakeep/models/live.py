@@ -29,7 +29,6 @@ from seakeep.arrays import (
     positive,
     whole_number,
 )
-from seakeep.checked import explained
 from seakeep.core.kalman import DelayFilter, process_noise
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.models import engine, store
@@ -236,7 +235,6 @@ class Live:
     def _x(self) -> FloatArray:
         return self._kept["x"]
 
-    @explained
     def step(
         self,
         u: npt.ArrayLike | Mapping[str, float] | None = None,
@@ -498,7 +496,6 @@ class Live:
             run[name].attrs["x_position"] = position
         return run
 
-    @explained
     def forecast(
         self,
         steps: int,
@@ -645,7 +642,6 @@ class Live:
         result: FloatArray = np.minimum(own + self._filter.ahead(steps), bound)
         return result
 
-    @explained
     def save(self, path: str | Path) -> Path:
         """Write all that the object holds as plain arrays (NetCDF), to a temporary name first.
 
@@ -726,7 +722,6 @@ class Live:
         )
 
 
-@explained
 def load_live(model: Servable, path: str | Path) -> Live:
     """Continue from a state that :meth:`Live.save` wrote, as if the process had never stopped.
 

@@ -17,7 +17,6 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.checked import explained
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models import labelled
@@ -162,7 +161,6 @@ def _power(unit: str, power: int) -> str:
     return f"({unit})^{power}" if any(sign in unit for sign in "/*· ") else f"{unit}^{power}"
 
 
-@explained
 @dataclass(frozen=True)
 class SlowSquares:
     """Slow parts of squares of an elevation and of its derivatives.
@@ -269,7 +267,6 @@ class SlowSquares:
         return kernel, reach, round(self.lead * period), [round(lag * period) for lag in self.lags]
 
 
-@explained
 @dataclass(frozen=True)
 class Powers:
     """Powers of inputs, and products of pairs of them, with the input delays of the model.
@@ -343,7 +340,6 @@ class Powers:
         return 0, 0
 
 
-@explained
 @dataclass(frozen=True)
 class Expression:
     """An expression of inputs, with the input delays of the model.

@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray, whole_number
-from seakeep.checked import explained
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import labelled
 from seakeep.models.linear import HankelDMDcModel
@@ -51,7 +50,6 @@ class ProbeOffset:
     span: tuple[float, float]
 
 
-@explained
 def estimate_probe_offset(
     model: HankelDMDcModel,
     run: xr.Dataset,

@@ -13,7 +13,6 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from seakeep.checked import explained
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models.checks import typed
 
@@ -46,7 +45,6 @@ def _check_bounds(name: str, low: object, high: object, least: float) -> None:
         )
 
 
-@explained
 @dataclass(frozen=True)
 class Uniform:
     """Uniform between two bounds, as in the paper.
@@ -78,7 +76,6 @@ class Uniform:
         return float(self.low + (self.high - self.low) * q)
 
 
-@explained
 @dataclass(frozen=True)
 class LogUniform:
     """Uniform in the logarithm between two positive bounds.
@@ -110,7 +107,6 @@ class LogUniform:
         return float(self.low * (self.high / self.low) ** q)
 
 
-@explained
 @dataclass(frozen=True)
 class Fixed:
     """One value, the same for every member.

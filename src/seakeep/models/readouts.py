@@ -9,7 +9,6 @@ from typing import Any, Literal, Self, get_args
 import numpy as np
 
 from seakeep.arrays import FloatArray
-from seakeep.checked import explained
 from seakeep.core.readouts import LinearHinges
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models.checks import check_choice, check_keys, typed
@@ -31,7 +30,6 @@ Asked = Literal["hinge", "stacked", "auto"]
 MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
-@explained
 @dataclass(frozen=True)
 class ReadOut:
     r"""A channel that is read off the forecast states, such as the load of a line that falls slack.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeGuard, TypeVar, overload
 
-from seakeep.checked import explained
 from seakeep.errors import DataError, RequestError
 from seakeep.models import store
 from seakeep.models.baselines import ARX, FIR, HoldLast, Mean, Subspace
@@ -23,7 +22,6 @@ KINDS: dict[str, type[Spec]] = {
 Kind = TypeVar("Kind")
 
 
-@explained
 def is_ensemble(model: Model) -> TypeGuard[HankelEnsemble]:
     """Whether a model has members, and so a band, as its kind in :data:`KINDS` states."""
     return KINDS[model.kind].is_ensemble
@@ -33,7 +31,6 @@ def is_ensemble(model: Model) -> TypeGuard[HankelEnsemble]:
 def load_model(path: str | Path) -> Model: ...
 @overload
 def load_model(path: str | Path, kind: type[Kind]) -> Kind: ...
-@explained
 def load_model(path: str | Path, kind: type[Kind] | None = None) -> Model | Kind:
     """Read a model or an ensemble that was saved; no code from the file is run.
 

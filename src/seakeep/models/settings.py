@@ -10,7 +10,6 @@ from typing import ClassVar, Literal, Self
 
 import numpy as np
 
-from seakeep.checked import explained
 from seakeep.core.embedding import History
 from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
 from seakeep.models.checks import check_choice, check_integer, check_keys, settings_of
@@ -113,7 +112,6 @@ def check_stable(value: object) -> None:
         )
 
 
-@explained
 @dataclass(frozen=True)
 class Select:
     """What free runs on held-out training runs choose, beside λ.
@@ -254,7 +252,6 @@ class HankelSettings:
         observed = (Observing(self.observables, int(self.lead)),) if self.observables else ()
         return (*alignment, *lead, *observed)
 
-    @explained
     def around(self, dt: float, input_delays: int | None = None) -> tuple[int, int]:
         """Samples of input before and after the start that the rows of a forecast read.
 
@@ -268,7 +265,6 @@ class HankelSettings:
         before = max([delays, *(before for before, _ in reach)])
         return before, max([int(self.lead), *(ahead for _, ahead in reach)])
 
-    @explained
     def needs(self, dt: float) -> Needs:
         """Samples that it asks of its runs."""
         before, after = self.around(dt)
@@ -297,7 +293,6 @@ class HankelSettings:
         return made
 
     @classmethod
-    @explained
     def from_json(cls, content: Json) -> Self:
         """Settings from JSON values; an unknown key or a value out of range raises an error."""
         check_keys(cls, content)

@@ -10,7 +10,6 @@ from typing import Any, ClassVar, Literal, Self, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.checked import explained
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled, store
 from seakeep.models.checks import check_choice, check_keys, typed
@@ -69,7 +68,6 @@ STATED = "nothing: all is stated; seakeep tune finds the error without each obse
 """How the settings of a model were chosen that leave nothing open, where it has observables."""
 
 
-@explained
 @dataclass(frozen=True)
 class HankelDMDc(HankelSettings):
     r"""Settings of a Hankel dynamic mode decomposition with control.
@@ -153,7 +151,6 @@ class HankelDMDc(HankelSettings):
         super().__post_init__()
         object.__setattr__(self, "select", Select.of(self.select))
 
-    @explained
     def around(self, dt: float, input_delays: int | None = None) -> tuple[int, int]:
         """Samples around the start that a forecast reads, whichever observables are chosen."""
         return _around_any(super().around(dt, input_delays), self.select, self.observables, dt)
@@ -165,7 +162,6 @@ class HankelDMDc(HankelSettings):
         return HankelDMDcModel.from_dataset(dataset, settings)
 
     @classmethod
-    @explained
     def paper(cls, encounter_period: float, dt: float) -> Self:
         """Settings of the paper: m 20, s 1 and z 5 encounter periods, λ = 100.
 
@@ -189,7 +185,6 @@ class HankelDMDc(HankelSettings):
         )
 
     @classmethod
-    @explained
     def recommended(
         cls, encounter_period: float, dt: float | None = None, runs: Runs | None = None
     ) -> Self:
@@ -232,12 +227,10 @@ class HankelDMDc(HankelSettings):
             select=Select(observables=True, period=encounter_period),
         )
 
-    @explained
     def central(self, dt: float) -> HankelDMDc:
         """Itself: the single model at the middle of what is fitted."""
         return self
 
-    @explained
     def settled(
         self,
         runs: Runs,
@@ -275,7 +268,6 @@ class HankelDMDc(HankelSettings):
         found = settle(self, self.select, named, *channels, executor=executor, progress=progress)
         return replace(found, settings=replace(found.settings, select=None))
 
-    @explained
     def fit(
         self,
         runs: Runs,
@@ -382,7 +374,6 @@ Members that learn from windows of one run each differ most where the waves are 
 training (docs/howto/bands.md)."""
 
 
-@explained
 @dataclass(frozen=True)
 class BayesianHankelDMDc:
     r"""Settings of a Bayesian ensemble of Hankel models (paper, section UQ through ensembling).
@@ -491,7 +482,6 @@ class BayesianHankelDMDc:
         """Settings as a table, for notebooks."""
         return settings_html(type(self).__name__, self.to_json())
 
-    @explained
     def shared(self, dt: float) -> HankelSettings:
         """What all members share; its delays, window and λ are not used."""
         lead = self.lead
@@ -513,7 +503,6 @@ class BayesianHankelDMDc:
             stable=self.stable,
         )
 
-    @explained
     def central(self, dt: float) -> HankelDMDc:
         """The single model at the medians of the priors."""
 
@@ -529,7 +518,6 @@ class BayesianHankelDMDc:
         }
         return HankelDMDc(**values, select=self.select)
 
-    @explained
     def needs(self, dt: float) -> Needs:
         """Samples that its largest draw asks of its runs: the upper ends of the priors count."""
         shared = self.shared(dt)
@@ -571,7 +559,6 @@ class BayesianHankelDMDc:
         return made
 
     @classmethod
-    @explained
     def from_json(cls, content: Json) -> Self:
         """Settings from :meth:`to_json`; an unknown key or a value out of range raises an error."""
         stated = dict(content)
@@ -602,7 +589,6 @@ class BayesianHankelDMDc:
         )
 
     @classmethod
-    @explained
     def paper(
         cls,
         encounter_period: float,
@@ -639,7 +625,6 @@ class BayesianHankelDMDc:
         )
 
     @classmethod
-    @explained
     def recommended(
         cls,
         encounter_period: float,
@@ -682,7 +667,6 @@ class BayesianHankelDMDc:
             select=Select(observables=True, period=encounter_period),
         )
 
-    @explained
     def settled(
         self,
         runs: Runs,
@@ -732,7 +716,6 @@ class BayesianHankelDMDc:
         )
         return Selected(spec, found.rows, found.note, found.readouts)
 
-    @explained
     def fit(
         self,
         runs: Runs,

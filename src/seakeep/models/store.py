@@ -13,7 +13,6 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import GREATEST, LONGEST_STEP, SHORTEST_STEP, FloatArray
-from seakeep.checked import explained
 from seakeep.errors import DataError, MissingFileError, RequestError
 from seakeep.files import MARK, check_output, read_sealed, replacing, write_netcdf
 from seakeep.models.checks import parsed, typed
@@ -58,7 +57,6 @@ class Saved:
         """All that :meth:`save` writes."""
         raise NotImplementedError
 
-    @explained
     def save(self, path: str | Path) -> Path:
         """Write the model as NetCDF, to a temporary name first.
 

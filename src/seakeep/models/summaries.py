@@ -9,7 +9,6 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, fraction
-from seakeep.checked import explained
 from seakeep.errors import RequestError
 
 __all__ = ["STATISTICS", "reduce_members", "summarize"]
@@ -110,7 +109,6 @@ def reduce_members(series: FloatArray, lost: npt.NDArray[np.int64], level: float
     return out
 
 
-@explained
 def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
     """Mean, standard deviation and band of an ensemble forecast.
 

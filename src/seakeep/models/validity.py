@@ -11,7 +11,6 @@ import xarray as xr
 from scipy import fft
 
 from seakeep.arrays import BoolArray, FloatArray
-from seakeep.checked import explained
 from seakeep.core.wave_bands import PER_OCTAVE, band_edges, band_energy
 from seakeep.models import labelled, store
 from seakeep.models.checks import typed
@@ -219,7 +218,6 @@ def _last_band(dt: float) -> int:
     return int(np.floor(PER_OCTAVE * np.log2(0.5 / dt)))
 
 
-@explained
 def compare_waves(model: Model, run: xr.Dataset, start: float, steps: int) -> list[Waves]:
     """Compare the waves that drive a forecast with those that trained the model.
 
@@ -254,7 +252,6 @@ def compare_waves(model: Model, run: xr.Dataset, start: float, steps: int) -> li
     return [replace(each, units=units[each.channel]) for each in found]
 
 
-@explained
 def outside_training(model: Model, run: xr.Dataset, start: float, steps: int) -> list[str]:
     """Say in what a forecast lies outside the training: period, height, steepness, mean surge.
 

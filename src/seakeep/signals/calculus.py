@@ -8,7 +8,6 @@ import scipy
 from scipy import fft
 
 from seakeep.arrays import FloatArray, as_series, number, time_step
-from seakeep.checked import checked
 from seakeep.errors import RequestError
 
 __all__ = ["band_pass", "complementary_filter", "differentiate", "envelope_squared", "integrate"]
@@ -166,7 +165,6 @@ def _integrated(
     return _filtered(extended, gain / (1j * omega) ** times, padding)
 
 
-@checked
 def band_pass(series: npt.ArrayLike, dt: float, band: tuple[float, float]) -> FloatArray:
     """Keep a band of frequencies, without phase shift.
 
@@ -192,7 +190,6 @@ def band_pass(series: npt.ArrayLike, dt: float, band: tuple[float, float]) -> Fl
     return _integrated(series, dt, band, 0)
 
 
-@checked
 def integrate(
     series: npt.ArrayLike, dt: float, band: tuple[float, float], times: int = 1
 ) -> FloatArray:
@@ -241,7 +238,6 @@ def integrate(
     return _integrated(series, dt, band, times)
 
 
-@checked
 def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
     """First derivative by fourth-order central differences.
 
@@ -287,7 +283,6 @@ def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
     return out / step
 
 
-@checked
 def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
     r"""Squared envelope of a narrow-banded series, :math:`|x + i\,\mathcal H x|^2`.
 
@@ -330,7 +325,6 @@ def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
     return squared
 
 
-@checked
 def complementary_filter(
     position: npt.ArrayLike,
     acceleration: npt.ArrayLike,

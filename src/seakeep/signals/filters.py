@@ -14,7 +14,6 @@ import scipy
 from scipy import special
 
 from seakeep.arrays import FloatArray, as_series, number, positive, time_step
-from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import as_seconds, span_text, uniform_step
 from seakeep.sizes import MOST_TAPS, check_size
@@ -22,7 +21,6 @@ from seakeep.sizes import MOST_TAPS, check_size
 __all__ = ["low_pass", "lowpass_taps", "resample"]
 
 
-@checked
 def lowpass_taps(
     sampling_rate: float, passband: float, stopband: float, attenuation: float = 60.0
 ) -> FloatArray:
@@ -115,7 +113,6 @@ def odd_extension(array: FloatArray, count: int) -> FloatArray:
     return np.pad(np.concatenate([head, array, tail]), rest, mode="edge")
 
 
-@checked
 def low_pass(
     series: npt.ArrayLike,
     dt: float,
@@ -181,7 +178,6 @@ PASSBAND = 0.8
 """Part of the lower Nyquist frequency up to which resampling keeps what there is."""
 
 
-@checked
 def resample(
     series: npt.ArrayLike,
     time: npt.ArrayLike,

@@ -8,14 +8,12 @@ lengths go with :math:`\lambda`, times with :math:`\lambda^{1/2}`, masses with
 from __future__ import annotations
 
 from seakeep.arrays import number
-from seakeep.checked import checked
 from seakeep.conventions import base_powers
 from seakeep.errors import RequestError
 
 __all__ = ["froude_factor"]
 
 
-@checked
 def froude_factor(units: str, scale: float, density_ratio: float = 1.0) -> float:
     """Factor from a model's value to the full-scale one.
 

@@ -10,7 +10,6 @@ import scipy
 from scipy import fft
 
 from seakeep.arrays import FloatArray, IntArray, as_real, as_series, positive, time_step
-from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import check_order
 
@@ -46,7 +45,6 @@ class Lags:
     at_zero: FloatArray
 
 
-@checked
 def windowed_lags(
     series: npt.ArrayLike,
     reference: npt.ArrayLike,
@@ -142,7 +140,6 @@ def _peak(stretch: FloatArray, reference: FloatArray, reach: int) -> tuple[float
     return shift - reach, min(peak, 1.0), float(coefficient[reach])
 
 
-@checked
 def correlation_peak(
     first: npt.ArrayLike, second: npt.ArrayLike, dt: float, bounds: tuple[float, float]
 ) -> tuple[float, float]:
@@ -319,7 +316,6 @@ class MotionAgreement:
         return rival < 2.0 * max(misfit, FINEST)
 
 
-@checked
 def compare_motion(
     series: npt.ArrayLike,
     time: npt.ArrayLike,

@@ -11,7 +11,6 @@ import scipy
 from scipy import fft
 
 from seakeep.arrays import ComplexArray, FloatArray, as_series, fraction, positive, time_step
-from seakeep.checked import checked
 from seakeep.signals.waves import encounter_period, waves_part
 
 __all__ = ["Leakage", "find_leakage", "is_regular"]
@@ -49,7 +48,6 @@ class Leakage:
     phase: float
 
 
-@checked
 def find_leakage(
     training: Sequence[npt.ArrayLike],
     test: npt.ArrayLike,

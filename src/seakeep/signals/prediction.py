@@ -10,7 +10,6 @@ import numpy.typing as npt
 import scipy
 
 from seakeep.arrays import FloatArray, as_series, whole_number
-from seakeep.checked import checked
 from seakeep.signals.calculus import continued, predicted, reflections, whitening
 from seakeep.signals.propagation import LEAST_CORRELATION, band_limit, carry_by_dispersion
 from seakeep.sizes import MOST_AHEAD, check_size
@@ -30,7 +29,6 @@ SLOWLY, QUICKLY = 0.99, 0.05
 """Shares of a record's variance below the waves that arrive last, and below the first ones."""
 
 
-@checked
 def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     """Continue elevations by linear prediction, each from its own record.
 

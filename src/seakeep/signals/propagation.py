@@ -19,7 +19,6 @@ import scipy
 from scipy import fft
 
 from seakeep.arrays import ComplexArray, FloatArray, as_real, as_series, number, positive, time_step
-from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.calculus import predicted_extension
 from seakeep.signals.lags import as_pair, correlation_peak, parabola_peak
@@ -97,7 +96,6 @@ class EffectiveCelerity:
     bounds: tuple[float, float]
 
 
-@checked
 def phase_celerity(
     upstream: npt.ArrayLike,
     downstream: npt.ArrayLike,
@@ -166,7 +164,6 @@ def phase_celerity(
     return PhaseCelerity(frequency, celerity, coherence, celerity * error / phase)
 
 
-@checked
 def effective_celerity(
     upstream: npt.ArrayLike,
     downstream: npt.ArrayLike,
@@ -318,7 +315,6 @@ class Misplaced:
     sure: bool
 
 
-@checked
 def misplaced_probes(
     elevations: Mapping[str, npt.ArrayLike],
     positions: Mapping[str, float],
@@ -402,7 +398,6 @@ def _telling(series: FloatArray) -> bool:
     return int(rises.sum()) >= LEAST_WAVES and not is_regular(series)
 
 
-@checked
 def probe_separation(
     first: npt.ArrayLike, second: npt.ArrayLike, dt: float, depth: float, stated: float
 ) -> ProbeSeparation:
@@ -635,7 +630,6 @@ def carry_by_celerity(
     )
 
 
-@checked
 def delay_by_dispersion(
     series: npt.ArrayLike,
     dt: float,
@@ -692,7 +686,6 @@ def delay_by_dispersion(
     return carried.at(places).reshape(array.shape)
 
 
-@checked
 def delay_by_celerity(
     series: npt.ArrayLike, dt: float, distance: npt.ArrayLike, celerity: float
 ) -> FloatArray:

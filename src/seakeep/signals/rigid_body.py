@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import FloatArray, as_real
-from seakeep.checked import checked
 from seakeep.errors import RequestError
 from seakeep.waves import GRAVITY
 
@@ -46,7 +45,6 @@ def _offset(offset: npt.ArrayLike) -> FloatArray:
     return array
 
 
-@checked
 def rotation_matrix(angles: npt.ArrayLike) -> FloatArray:
     """Rotation from the body's axes to those of space.
 
@@ -83,7 +81,6 @@ def rotation_matrix(angles: npt.ArrayLike) -> FloatArray:
     return np.moveaxis(np.array(rows), -1, 0)
 
 
-@checked
 def transfer_position(
     position: npt.ArrayLike, angles: npt.ArrayLike, offset: npt.ArrayLike
 ) -> FloatArray:
@@ -121,7 +118,6 @@ def transfer_position(
     return turned
 
 
-@checked
 def transfer_velocity(
     velocity: npt.ArrayLike,
     angles: npt.ArrayLike,
@@ -155,7 +151,6 @@ def transfer_velocity(
     return moved
 
 
-@checked
 def transfer_acceleration(
     acceleration: npt.ArrayLike,
     angles: npt.ArrayLike,
@@ -197,7 +192,6 @@ def transfer_acceleration(
     return moved
 
 
-@checked
 def remove_gravity(
     specific_force: npt.ArrayLike,
     angles: npt.ArrayLike,

@@ -15,7 +15,6 @@ import numpy.typing as npt
 import scipy
 
 from seakeep.arrays import FloatArray, IntArray, as_real, positive
-from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import windowed_lags
 from seakeep.signals.time_axis import as_seconds, check_order, uniform_step
@@ -135,7 +134,6 @@ def _line(own: FloatArray, reference: FloatArray, errors: FloatArray | None) -> 
     )
 
 
-@checked
 def clock_from_pulses(
     trigger: npt.ArrayLike,
     time: npt.ArrayLike,
@@ -212,7 +210,6 @@ def clock_from_pulses(
     return replace(clock, method="trigger pulses", modulus=modulus)
 
 
-@checked
 def clock_from_correlation(
     series: npt.ArrayLike,
     time: npt.ArrayLike,
@@ -301,7 +298,6 @@ def _record(
     return x, check_order(t, owner)
 
 
-@checked
 def clock_from_shared(
     series: npt.ArrayLike,
     time: npt.ArrayLike,
@@ -388,7 +384,6 @@ def _refined(
     return (float(offset), float(drift)), (offset_error, drift_error), rms, int(t.size)
 
 
-@checked
 def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
     r"""Clocks of one logger in several runs, with one drift where the runs agree.
 

@@ -11,7 +11,6 @@ import numpy.typing as npt
 import scipy
 
 from seakeep.arrays import BoolArray, FloatArray, as_real, time_step
-from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 
 __all__ = [
@@ -96,7 +95,6 @@ def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
     return t
 
 
-@checked
 def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
     """Time step of a uniformly sampled axis.
 
@@ -214,7 +212,6 @@ class TimeReport:
         return not self.gaps and not self.jittered
 
 
-@checked
 def inspect_times(time: npt.ArrayLike, name: str = "the run") -> TimeReport:
     """Look for gaps and jitter in a time axis.
 
@@ -264,7 +261,6 @@ def _grid(t: FloatArray) -> tuple[npt.NDArray[np.int64], float, float]:
     return place.astype(np.int64), float(step), float(begin)
 
 
-@checked
 def onto_uniform(
     time: npt.ArrayLike, series: npt.ArrayLike, name: str = "the run"
 ) -> tuple[FloatArray, FloatArray]:
@@ -370,7 +366,6 @@ class Bridged:
     long: BoolArray
 
 
-@checked
 def bridge(series: npt.ArrayLike, dt: float, longest: float) -> Bridged:
     """Fill gaps by a monotone cubic through the samples beside them.
 

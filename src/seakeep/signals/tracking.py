@@ -24,7 +24,6 @@ import numpy.typing as npt
 import scipy
 
 from seakeep.arrays import BoolArray, FloatArray, IntArray
-from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.files import existing_file
 from seakeep.signals.filters import low_pass
@@ -195,7 +194,6 @@ def _open_video(path: Path | str) -> Iterator[_Video]:
         capture.release()
 
 
-@checked
 def track_video(
     path: Path | str,
     settings: TrackingSettings | None = None,
@@ -496,7 +494,6 @@ def _motions(
     return dict(zip(("surge", "heave", "pitch"), table.T, strict=True)), filled
 
 
-@checked
 def contact_sheet(path: Path | str, track: Track, frames: int = 12, columns: int = 3) -> bytes:
     """Frames of a video with the tracked panel outlined, the worst ones among them, as PNG.
 

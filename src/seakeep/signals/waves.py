@@ -11,7 +11,6 @@ import numpy.typing as npt
 import scipy
 
 from seakeep.arrays import FloatArray, IntArray, as_series, number, time_step, whole_number
-from seakeep.checked import checked
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import parabola_peak
 from seakeep.sizes import MOST_TRANSFORM, check_size
@@ -58,7 +57,6 @@ STILL = 0.2
 """Running standard deviation, as a part of the waves', below which water counts as still."""
 
 
-@checked
 def waves_part(series: npt.ArrayLike, dt: float, still: float = STILL) -> slice:
     """Part of a record in which there are waves: still water before and after them is left out.
 
@@ -122,7 +120,6 @@ def _dominant_period(x: FloatArray) -> float:
     return float(x.size / max(int(np.argmax(power)), 2))
 
 
-@checked
 def zero_up_crossings(
     series: npt.ArrayLike, dt: float, hysteresis: float = 0.0, still: float = STILL
 ) -> FloatArray:
@@ -186,7 +183,6 @@ def _clear(x: FloatArray, before: IntArray, limit: float) -> IntArray:
     return middle
 
 
-@checked
 def encounter_period(
     series: npt.ArrayLike, dt: float, hysteresis: float = 0.0, still: float = STILL
 ) -> float:
@@ -256,7 +252,6 @@ def energy_period(series: npt.ArrayLike, dt: float) -> float:
     return float((power / lines).sum() / power.sum()) if power.any() else float("nan")
 
 
-@checked
 def significant_height(series: npt.ArrayLike) -> float:
     """Significant wave height of a record, four times its standard deviation.
 
@@ -278,7 +273,6 @@ def significant_height(series: npt.ArrayLike) -> float:
     return 4.0 * float(np.std(as_series(series)))
 
 
-@checked
 def wave_heights(series: npt.ArrayLike, dt: float) -> FloatArray:
     """Heights of the single waves between successive zero-up-crossings.
 
@@ -324,7 +318,6 @@ def welch_segments(
     return length, shared
 
 
-@checked
 def wave_spectrum(
     series: npt.ArrayLike,
     dt: float,
@@ -409,7 +402,6 @@ def paper_welch(dt: float) -> tuple[int, int, int]:
     return segment, min(overlap, segment - 1), padded
 
 
-@checked
 def peak_period(
     series: npt.ArrayLike, dt: float, preset: Literal["paper", "recommended"] = "recommended"
 ) -> float:
@@ -461,7 +453,6 @@ def peak_period(
     return float(1.0 / (frequency[top] + shift * frequency[1]))
 
 
-@checked
 def wave_statistics(series: npt.ArrayLike, dt: float) -> WaveStatistics:
     r"""Height and periods of a wave record.
 

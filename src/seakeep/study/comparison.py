@@ -15,7 +15,6 @@ from seakeep import metrics, statistics
 from seakeep.arrays import whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
-from seakeep.checked import explained
 from seakeep.conventions import displayed
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.models import Model, is_ensemble
@@ -97,7 +96,6 @@ class Comparison:
         return float(metrics.anrmse(predicted=self.forecast, measured=self.measured))
 
 
-@explained
 def in_degrees(comparison: Comparison) -> Comparison:
     """Turn the angles of a comparison into degrees, for tables and figures that people read.
 
@@ -120,7 +118,6 @@ def in_degrees(comparison: Comparison) -> Comparison:
     )
 
 
-@explained
 def at_full_scale(comparison: Comparison, scale: float) -> Comparison:
     """Convert a comparison to full scale by Froude's law.
 
@@ -150,7 +147,6 @@ def at_full_scale(comparison: Comparison, scale: float) -> Comparison:
     )
 
 
-@explained
 def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
     """Convert a forecast to full scale by Froude's law, its status with it.
 
@@ -186,7 +182,6 @@ def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
     return out
 
 
-@explained
 def with_degrees(run: xr.Dataset) -> xr.Dataset:
     """Turn the angles of a run or a forecast, and their rates, into degrees.
 
@@ -212,7 +207,6 @@ def with_degrees(run: xr.Dataset) -> xr.Dataset:
     return out
 
 
-@explained
 def compare(
     model: Model,
     campaign: Campaign,
@@ -287,7 +281,6 @@ def compare(
     return several["model"]
 
 
-@explained
 def compare_models(
     models: Mapping[str, Model],
     campaign: Campaign,
@@ -479,7 +472,6 @@ def _warn_of_dead(run: xr.Dataset, name: str) -> None:
         )
 
 
-@explained
 def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = True) -> xr.Dataset:
     """Judge forecasts channel by channel.
 
@@ -522,7 +514,6 @@ def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = Tru
     return table
 
 
-@explained
 def difference_table(found: Mapping[str, Sequence[Comparison]]) -> xr.Dataset:
     """Compare the errors of several models, run by run and over all runs.
 

@@ -12,7 +12,6 @@ import xarray as xr
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.campaign.store import prepared_folder
-from seakeep.checked import explained
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, outside_training
 from seakeep.models.slow import warn_of_slow_motions
@@ -40,7 +39,6 @@ NOTHING_TRAINS = (
 )
 
 
-@explained
 def training_runs(
     prepared: Mapping[str, xr.Dataset], window: int | None = None
 ) -> dict[str, xr.Dataset]:
@@ -78,7 +76,6 @@ def training_runs(
     return runs
 
 
-@explained
 def fit_campaign(
     campaign: Campaign,
     model: str | None = None,
@@ -178,7 +175,6 @@ def read_training(
     return spec, prepared, training_runs(prepared, _longest_window(spec, dt)), stop
 
 
-@explained
 def fit_baselines(
     campaign: Campaign,
     states: Sequence[str],

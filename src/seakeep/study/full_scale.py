@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import xarray as xr
 
-from seakeep.checked import explained
 from seakeep.errors import RequestError
 from seakeep.signals.froude import froude_factor
 
@@ -17,7 +16,6 @@ ATTRIBUTES = {"dt": "s", "start": "s", "encounter_period": "s", "train_span": "s
 """Times and lengths among the attributes of a run, with their units."""
 
 
-@explained
 def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> xr.Dataset:
     """Convert a run, or a forecast, from model to full scale.
 

@@ -11,7 +11,6 @@ import xarray as xr
 from seakeep.arrays import FloatArray, whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
-from seakeep.checked import explained
 from seakeep.errors import RequestError
 from seakeep.models import Model, is_ensemble
 from seakeep.models.labelled import channel_matrix
@@ -29,7 +28,6 @@ SHARE = 0.5
 """Part of the training SD below which the error is to stay, where none is stated."""
 
 
-@explained
 def nowcasts(
     models: Mapping[str, Model],
     campaign: Campaign,
@@ -86,7 +84,6 @@ def nowcasts(
     return {name: xr.concat(each, "run") for name, each in out.items()}
 
 
-@explained
 def nowcast(
     model: Servable, run: xr.Dataset, steps: int, *, share: float = SHARE, level: float = 0.95
 ) -> xr.Dataset:

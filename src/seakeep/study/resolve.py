@@ -15,7 +15,6 @@ from typing import Any, Literal, cast
 
 from seakeep.campaign import ModelSettings, PriorSettings
 from seakeep.campaign.settings import CampaignSettings
-from seakeep.checked import explained
 from seakeep.errors import SHOWN, RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import KINDS, ProbeAlignment, Select, Spec
 from seakeep.models.checks import typed
@@ -158,7 +157,6 @@ def can_align(campaign: CampaignSettings, inputs: Sequence[str]) -> bool:
     return surge and campaign.rig.water_depth is not None and len(places) > 1
 
 
-@explained
 def build_spec(
     settings: ModelSettings, encounter_period: float | None, dt: float, *, aligned: bool = False
 ) -> Spec:

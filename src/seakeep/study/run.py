@@ -11,7 +11,6 @@ from pathlib import Path
 import xarray as xr
 
 from seakeep.campaign.prepare import Progress
-from seakeep.checked import explained
 from seakeep.errors import SeakeepError, warn
 from seakeep.models.executor import WorkerLostError, as_finished
 from seakeep.sizes import LONG_CELLS, MOST_CELLS, check_size
@@ -34,7 +33,6 @@ from seakeep.study.units import Unit, choice_of, choose, collect, compute, units
 __all__ = ["run_study"]
 
 
-@explained
 def run_study(
     study: Study,
     out: Path | str,

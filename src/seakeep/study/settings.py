@@ -18,7 +18,6 @@ from pydantic import Field, model_validator
 from seakeep.campaign import Campaign, read_campaign
 from seakeep.campaign.readers import expand
 from seakeep.campaign.settings import ModelSettings
-from seakeep.checked import explained
 from seakeep.errors import did_you_mean
 from seakeep.files import expanded, is_there, sha256_of
 from seakeep.sizes import MOST_SERIES
@@ -299,7 +298,6 @@ def _checksums(folder: Path) -> dict[str, str]:
     return {path.relative_to(folder).as_posix(): sha256_of(path) for path in files}
 
 
-@explained
 def read_study(path: Path | str) -> Study:
     """Read a study file and the campaign file that it names.
 

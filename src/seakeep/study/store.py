@@ -20,7 +20,6 @@ import numpy.typing as npt
 import xarray as xr
 from filelock import FileLock, Timeout
 
-from seakeep.checked import explained
 from seakeep.errors import SHOWN, DataError, RequestError, SeakeepError, warn
 from seakeep.files import check_report, is_there, read_bytes, read_sealed, replacing, write_netcdf
 from seakeep.models.checks import parsed, typed
@@ -370,7 +369,6 @@ def relabel(result: StudyResult, words: Mapping[str, str]) -> StudyResult:
     return replace(result, attrs={**result.attrs, **changed})
 
 
-@explained
 def read_result(folder: Path | str) -> StudyResult:
     """Read the result of a finished study.
 

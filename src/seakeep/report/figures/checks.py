@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from seakeep.checked import explained
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError
 from seakeep.report.figures.common import grid_of_axes, short_label
@@ -89,7 +88,6 @@ def _chosen(found: xr.Dataset, states: Sequence[str] | None) -> list[str]:
     return known if states is None else list(states)
 
 
-@explained
 def response(
     found: xr.Dataset,
     measured: xr.Dataset | None = None,
@@ -194,7 +192,6 @@ def legend_outside(figure: Any, *places: Any, side: str = "lower") -> None:
     )
 
 
-@explained
 def coherence(
     found: xr.Dataset,
     *,
@@ -246,7 +243,6 @@ def coherence(
     return figure
 
 
-@explained
 def modes(
     found: xr.Dataset, *, most: int = 12, axes: Sequence[Axes] | Axes | None = None
 ) -> Figure:
@@ -295,7 +291,6 @@ def _mode_words(mode: xr.Dataset) -> str:
     return f"{period:.3g} s, {ratio:.3f}"
 
 
-@explained
 def decay(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Figure:
     """Draw what is left of an offset after its release, motion by motion.
 
@@ -326,7 +321,6 @@ def decay(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Fi
     return figure
 
 
-@explained
 def residuals(
     found: xr.Dataset,
     *,
@@ -413,7 +407,6 @@ def by_state(
     return figure
 
 
-@explained
 def exceedance(
     found: xr.Dataset,
     *,
@@ -465,7 +458,6 @@ def _exceedance(place: Any, own: xr.Dataset, factor: float, unit: str) -> None:
     place.set_ylabel("exceeded by [1]")
 
 
-@explained
 def density(
     found: xr.Dataset,
     *,
@@ -486,7 +478,6 @@ def _density(place: Any, own: xr.Dataset, factor: float, unit: str) -> None:
     place.set_ylabel(f"density [1/{unit}]")
 
 
-@explained
 def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Figure:
     """Draw height against period of the waves, and steepness against mean surge where it is known.
 
@@ -531,7 +522,6 @@ def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) ->
     return figure
 
 
-@explained
 def drift(
     found: xr.Dataset,
     *,

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from seakeep.checked import explained
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError
 from seakeep.models import summarize
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 __all__ = ["band", "errors", "overlay"]
 
 
-@explained
 def overlay(
     forecast: xr.Dataset,
     measured: xr.Dataset,
@@ -51,7 +49,6 @@ def overlay(
     return _histories(forecast, None, measured, channels, axes)
 
 
-@explained
 def band(
     forecast: xr.Dataset,
     measured: xr.Dataset,
@@ -145,7 +142,6 @@ def _histories(
     return figure
 
 
-@explained
 def errors(table: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Figure:
     """Draw the NRMSE of each channel with its interval, run by run.
 
