@@ -12,7 +12,6 @@ import ground
 import h5py
 import numpy as np
 import pytest
-import xarray as xr
 
 from seakeep import (
     BayesianHankelDMDc,
@@ -20,8 +19,6 @@ from seakeep import (
     HankelDMDc,
     ProbeAlignment,
     load_model,
-    signals,
-    statistics,
 )
 from seakeep.campaign import read_campaign
 from seakeep.cli import main
@@ -416,21 +413,3 @@ def test_times_closer_than_numbers_tell_draft_no_rate(tmp_path, monkeypatch, cap
 
 
 X = np.random.default_rng(0).standard_normal(200)
-
-
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda odd: signals.wave_spectrum(X, 0.1, segment=odd), "segment must be an integer"),
-        (lambda odd: signals.zero_up_crossings(X, 0.1, hysteresis=odd), "hysteresis must be a num"),
-        (lambda odd: signals.integrate(X, 0.1, (0.1, 1.0), times=odd), "times must be an integer"),
-        (lambda odd: signals.froude_factor("m", odd), "scale must be a number"),
-        (lambda odd: signals.correlation_peak(X, X, 0.1, odd), "bounds"),
-        (lambda odd: statistics.kernel_bandwidth(X, odd), "bandwidth"),
-        (lambda odd: statistics.lag_one_correlation(X, odd), "segment"),
-    ],
-)
-@pytest.mark.parametrize("odd", ["abc", np.ones(3), xr.Dataset({"a": ("time", [1.0])}), 1j])
-def test_settings_of_array_functions_that_are_no_numbers_are_named(call, odd, said):
-    with pytest.raises(RequestError, match=said):
-        call(odd)
