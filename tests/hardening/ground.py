@@ -118,9 +118,9 @@ kind = "bayesian_hankel_dmdc"
 states = ["heave", "pitch"]
 inputs = ["eta_fwd"]
 n_members = 3
-train_length = { uniform = [10, 20] }
-state_delay = { uniform = [0.3, 0.6] }
-input_delay = 1.0
+window = { uniform = ["10 T", "20 T"] }
+state_delays = { uniform = ["0.3 T", "0.6 T"] }
+input_delays = 1.0
 ridge = { log_uniform = [0.05, 0.5] }
 seed = 1
 
@@ -170,7 +170,7 @@ n_members = 2
 ridge = { log_uniform = [0.05, 0.5] }
 observables = []
 readouts = {}
-train_length = { uniform = [10, 20] }
+window = { uniform = ["10 T", "20 T"] }
 
 [tests.same]
 windows = 2

@@ -37,7 +37,7 @@ from seakeep.models import store
 from seakeep.study.store import UnitFolder
 
 EVERY = BayesianHankelDMDc(
-    train_length=Fixed(4), state_delay=Fixed(0.2), input_delay=Fixed(0.3), ridge=Fixed(1.0),
+    window=Fixed("4 T"), state_delays=Fixed("0.2 T"), input_delays=Fixed("0.3 T"), ridge=Fixed(1.0),
     encounter_period=5.0, n_members=2, seed=1,
 )  # fmt: skip
 
@@ -361,11 +361,11 @@ def test_the_same_seed_gives_the_same_bytes_everywhere(tmp_path):
         ("training_run", 7, "member 1: it learns from run 7, and there are 1"),
         ("last_sample", 10**6, "member 1: its window is not one of the"),
         ("last_sample", 0, "member 1: its window is not one of the"),
-        ("train_length_samples", 2**62, "member 1: its window is not one of the"),
-        ("train_length_samples", 1, "member 1: its window is not one of the"),
+        ("window_samples", 2**62, "member 1: its window is not one of the"),
+        ("window_samples", 1, "member 1: its window is not one of the"),
         ("ridge", -1.0, "member 1: its ridge is -1.0"),
-        ("state_delay_samples", 10**7, "member 1: its window is not one of the"),
-        ("state_delay_samples", 11, "state_delays of the members reach 11, not those stated"),
+        ("state_delays_samples", 10**7, "member 1: its window is not one of the"),
+        ("state_delays_samples", 11, "state_delays of the members reach 11, not those stated"),
     ],
 )
 def test_a_member_that_its_runs_cannot_teach_is_named_when_a_file_is_loaded(

@@ -121,7 +121,6 @@ def _name_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
         wanted.append((("campaign", "period_channel"), settings.campaign.period_channel))
     for table, model in settings.all_models().items():
         place = tuple(table.split(".", 1))
-        yield from (Mistake((*place, k), words) for k, words in model.unknown_keys().items())
         wanted += [((*place, key), n) for key in ("states", "inputs") for n in getattr(model, key)]
     for key, pair in settings.redundant.items():
         wanted += [(("redundant", key, "channels"), name) for name in pair.channels]
