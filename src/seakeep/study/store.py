@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import errno
+import hashlib
+import io
 import json
 import tempfile
-import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -13,7 +14,7 @@ from datetime import UTC, datetime
 from functools import cached_property
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +22,15 @@ import xarray as xr
 from filelock import FileLock, Timeout
 
 from seakeep.errors import SHOWN, DataError, RequestError, SeakeepError, warn
-from seakeep.files import check_report, is_there, read_bytes, read_sealed, replacing, write_netcdf
+from seakeep.files import (
+    SEAL,
+    check_report,
+    is_there,
+    read_bytes,
+    read_sealed,
+    replacing,
+    write_netcdf,
+)
 from seakeep.models.checks import parsed, typed
 from seakeep.models.store import rebuilt
 from seakeep.study.schema import check_contents
@@ -191,30 +200,27 @@ class UnitFolder:
         StorageError
             If the disk is full or cannot be written.
         """
-        kept: dict[str, Any] = {key: np.asarray(value) for key, value in arrays.items()}
-        with (
-            storing(self.folder),
-            replacing(self._path(name)) as temporary,
-            temporary.open("wb") as file,
-        ):
-            np.savez(file, digest=np.array(self.digest), **kept)
+        content = io.BytesIO()
+        np.savez(content, digest=np.array(self.digest), **cast("dict[str, Any]", arrays))
+        with storing(self.folder), replacing(self._path(name)) as temporary:
+            seal = hashlib.sha256(content.getvalue()).hexdigest().encode()
+            temporary.write_bytes(content.getvalue() + SEAL + seal)
 
     def read(self, name: str) -> Arrays | None:
         """Arrays of a finished unit; None where it is not finished, or damaged."""
         try:
-            # numpy leaves a damaged file open that it opened itself
-            with (
-                self._path(name).open("rb") as opened,
-                np.load(opened, allow_pickle=False) as file,
-            ):
-                arrays = {key: file[key] for key in file.files}
-        except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile):
+            content, _, seal = self._path(name).read_bytes().rpartition(SEAL)
+        except OSError:
             return None
-        return arrays if str(arrays.pop("digest", "")) == self.digest else None
+        if hashlib.sha256(content).hexdigest().encode() != seal:
+            return None
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
+            arrays = {key: file[key] for key in file.files}
+        return arrays if str(arrays.pop("digest")) == self.digest else None
 
     def has(self, name: str) -> bool:
         """Whether a unit is finished."""
-        return self._path(name).exists() and self.read(name) is not None
+        return self.read(name) is not None
 
     def clear(self) -> None:
         """Remove the units; for when all of them are in the result."""
@@ -418,6 +424,7 @@ def read_result(folder: Path | str) -> StudyResult:
                 part = f"the group {name!r:.{SHOWN}}"
                 opened = xr.open_dataset(H5NetCDFStore(file, group=name), decode_times=False)
                 groups[name] = opened.load()
+                opened.set_close(None)  # or what was read could not be handed to a worker
     except SeakeepError:
         raise
     except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError) as error:
