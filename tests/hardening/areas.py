@@ -487,7 +487,7 @@ CHANGES = ("drop", "empty", "cut", "nan", "huge", "text", "whole", "axis", "zero
 
 
 def contents(place: Path) -> Iterator[Case]:
-    """Model, prepared and study files with a sound checksum and other contents."""
+    """Model and prepared files with a sound checksum and other contents."""
     for name in (each for each in MODELS if (place / f"{each}.nc").exists()):
         with xr.open_dataset(place / f"{name}.nc", engine="h5netcdf") as kept:
             attrs, variables = dict(kept.attrs), list(kept.variables)
@@ -499,27 +499,11 @@ def contents(place: Path) -> Iterator[Case]:
     arrays = ["u", "x", "y", "delayed", "direct", "gains", "precisions", "plain", "covariance",
               "history", "innovation", "running", "noise"]  # fmt: skip
     yield from mutations("contents", "live", attrs, arrays, spoil_live)
-    if (place / "results").exists():
-        yield from study_contents(place, spoil_study)
     with xr.open_dataset(
         place / "prepared" / "one.nc", engine="h5netcdf", decode_times=False
     ) as kept:
         attrs, variables = dict(kept.attrs), list(kept.variables)
     yield from mutations("contents", "prepared", attrs, variables, spoil_prepared)
-
-
-def study_contents(place: Path, spoil: Callable[..., object]) -> Iterator[Case]:
-    """Each attribute of a study, each value in its JSON, and each variable as another one."""
-    from seakeep.study import read_result
-
-    result = read_result(place / "results")
-    yield from mutations("contents", "study", result.attrs, [], spoil)
-    for group in result.groups:
-        for each in [None, *result.groups[group].variables]:
-            for change in CHANGES:
-                yield Case("contents", f"study {group} {each} {change}",
-                           functools.partial(spoil, variable=(group, each),
-                                             change=change))  # fmt: skip
 
 
 def mutations(area: str, name: str, attrs: dict[str, Any], variables: list[Any],
@@ -651,34 +635,6 @@ def spoil_prepared(**how: Any) -> object:
 
     load_prepared(read_campaign("campaign.toml"), names=["one"])
     return command("fit", "campaign.toml", "--model", "arx", "-o", "o.nc")()
-
-
-def spoiled_study(
-    attrs: Any, groups: Any, attribute: Any = None, value: Any = None, variable: Any = None,
-    change: str = "",
-) -> tuple[dict[str, Any], dict[str, xr.Dataset]]:  # fmt: skip
-    """Attributes and groups of a study of which one thing is another."""
-    attrs, groups = dict(attrs), dict(groups)
-    if attribute is not None:
-        return changed_attrs(attrs, attribute, value), groups
-    group, name = variable
-    if name is not None:
-        groups[group] = spoiled(groups[group], variable=name, change=change)
-    elif change == "drop":
-        del groups[group]
-    elif change == "empty":
-        groups[group] = xr.Dataset()
-    return attrs, groups
-
-
-def spoil_study(**how: Any) -> object:
-    """Report a study of which one thing is another."""
-    from seakeep.study import read_result
-    from seakeep.study.store import write_result
-
-    result = read_result("results")
-    write_result(Path("results"), *spoiled_study(result.attrs, result.groups, **how))
-    return command("report", "results")()
 
 
 def flips(place: Path) -> Iterator[Case]:

@@ -9,14 +9,11 @@ pytest.importorskip("matplotlib")
 
 import ground
 import xarray as xr
-from areas import AREAS, MODELS, mutations, spoiled, spoiled_study, study_contents
+from areas import AREAS, MODELS, mutations, spoiled
 from attack import judged, sample
 
 from seakeep.errors import SeakeepError
 from seakeep.models import KINDS, store
-from seakeep.study import read_result
-from seakeep.study.schema import check_contents
-from seakeep.study.store import MEND
 
 SAMPLED = {
     "settings": 1400, "texts": 25, "names": 90, "paths": 150, "options": 401, "contents": 1100,
@@ -88,17 +85,3 @@ def test_whatever_a_model_file_holds_is_taken_or_named(name, whole):
     words = refusals(cases)
     assert len(words) > 400
     assert {each: said for each, said in words.items() if PYTHONS.search(said)} == {}
-
-
-@pytest.mark.hardening
-@pytest.mark.filterwarnings("ignore:invalid value encountered in cast")
-def test_whatever_a_study_file_holds_is_taken_or_named(whole):
-    result = read_result(whole / "results")
-
-    def check(**how):
-        attrs, groups = spoiled_study(result.attrs, result.groups, **how)
-        store.rebuilt("study.nc", lambda: check_contents(attrs, groups), MEND)
-
-    words = refusals(study_contents(whole, check))
-    assert len(words) > 4000
-    assert {k: said for k, said in words.items() if PYTHONS.search(said) or len(said) > 400} == {}

@@ -14,6 +14,7 @@ from seakeep import BayesianHankelDMDc, Fixed, LogUniform, ProbeAlignment, Unifo
 from seakeep.campaign import ModelSettings
 from seakeep.campaign.store import write_prepared
 from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.models import KINDS
 from seakeep.study import (
     build_spec,
     compare,
@@ -549,11 +550,10 @@ def test_a_field_of_a_spec_is_a_key_of_files(monkeypatch, halves, tmp_path):
         damping: float = 0.5
 
     monkeypatch.setitem(KINDS, "damped", Damped)
-    text = EXACT.replace("[model]", '[model]\nkind = "damped"\ndamping = 0.7')
-    text = text if "damped" in text else f'kind = "damped"\ndamping = 0.7\n{EXACT}'
+    text = f'kind = "damped"\ndamping = 0.7\n{EXACT}'
     model = fit_campaign(campaign(halves, text))
     assert model.settings.damping == 0.7
     assert Damped.from_json(json.loads(json.dumps(model.settings.to_json()))) == model.settings
     wrong = campaign(halves, text.replace("damping", "dampign"))
-    with pytest.raises(RequestError, match="no key 'dampign'.*mean 'damping'"):
+    with pytest.raises(RequestError, match=r"no key 'dampign'.*mean 'damping'"):
         fit_campaign(wrong)
