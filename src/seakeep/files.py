@@ -94,8 +94,8 @@ def existing_file(path: Path | str) -> Path:
         )
     if not stat.S_ISREG(mode):
         raise MissingFileError(
-            f"{path} is a pipe or a device, and only regular files are read. Copy what comes out of "
-            "it into a file first."
+            f"{path} is a pipe or a device, and only regular files are read. Copy what comes out "
+            "of it into a file first."
         )
     return place
 
