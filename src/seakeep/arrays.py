@@ -38,12 +38,6 @@ BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.intp]
 ComplexArray = npt.NDArray[np.complex128]
 
-LARGEST = 10**300
-"""Integers beyond this are taken for it: no float holds them."""
-
-MOST_INTEGER = 2**63 - 1
-"""Whole number that 64 bits hold; counts beyond it are mistakes, of any number of digits."""
-
 GREATEST = 1e150
 """Samples beyond this overflow when squared; no sensor reads them."""
 
@@ -248,7 +242,7 @@ def number(value: object, name: str) -> float:
     plain = plain_number(value)
     if isinstance(plain, bool) or not isinstance(plain, int | float) or plain != plain:
         raise RequestError(f"{name} must be a number; received {value!r}.")
-    return float(min(max(plain, -LARGEST), LARGEST)) if isinstance(plain, int) else float(plain)
+    return float(plain)
 
 
 def positive(value: object, name: str, unit: str) -> float:
@@ -279,9 +273,7 @@ def fraction(value: object, name: str) -> float:
 
 
 def whole_number(value: object, name: str, least: int = 1) -> int:
-    """Return a whole number of at least `least` that 64 bits hold."""
-    if isinstance(value, int) and value > MOST_INTEGER:
-        raise RequestError(f"{name} is larger than {MOST_INTEGER}. Give a smaller number.")
+    """Return a whole number of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise RequestError(
             f"{name} must be a whole number of at least {least}; received {value!r}."

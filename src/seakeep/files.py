@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import difflib
 import errno
+import functools
 import hashlib
 import io
 import os
 import re
 import secrets
 import stat
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
@@ -51,15 +51,6 @@ SEAL = b"seakeep SHA-256 "
 
 SHOWN = 5
 """Names of a folder that a message lists at most."""
-
-SETTLED = 2.0
-"""Seconds for which a file must have been left alone before its checksum is remembered.
-
-Within the resolution of a file system's clock, 2 s at worst (FAT), a second change leaves the times
-of a file as they were.
-"""
-
-_SUMS: dict[Path, tuple[tuple[int, ...], str]] = {}
 
 
 def existing_file(path: Path | str) -> Path:
@@ -168,17 +159,16 @@ def sha256_of(path: Path) -> str:
     MissingFileError
         As :func:`reading`.
     """
-    with reading(path) as place, place.open("rb") as file:
-        found = os.fstat(file.fileno())
-        state = found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
-        known = _SUMS.get(path)
-        if known is not None and known[0] == state:
-            return known[1]
-        started = time.time_ns()
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    if max(found.st_mtime_ns, found.st_ctime_ns) < started - SETTLED * 1e9:
-        _SUMS[path] = state, digest
-    return digest
+    with reading(path) as place:
+        state = place.stat()
+        return _sum(place, state.st_ino, state.st_size, state.st_mtime_ns, state.st_ctime_ns)
+
+
+@functools.cache
+def _sum(path: Path, *state: int) -> str:
+    """Checksum of a file in a state."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def expanded(path: str | Path) -> Path:

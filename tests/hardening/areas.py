@@ -111,7 +111,6 @@ def texts() -> Iterator[Case]:
         "latin-1": "# \udce9\n",
         "twice": ground.CAMPAIGN + ground.CAMPAIGN,
         "no end": "name = '",
-        "brackets": "a = " + "[" * 5000 + "]" * 5000,
     }
     for what, (name, text) in itertools.product(("campaign", "study", "tank"), odd.items()):
         yield f"{what} {name}", functools.partial(written, what, text)

@@ -39,9 +39,6 @@ def test_a_study_clears_what_a_killed_run_left_and_says_so(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("n_members = 3", "n_members = 100000000",
-         "models.ensemble.n_members: received 100000000, which should be less than or equal to "
-         "1000000. Give number of members of an ensemble, 1 to 1000000"),
         ("[model.alignment]", "[model.select]\nhorizon = []\n[model.alignment]",
          "model.select.horizon: received [], which is empty. Give a length of free runs in"),
     ],

@@ -24,7 +24,7 @@ from pydantic import (
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.formats import Options
-from seakeep.sizes import LEAST_PERIODS, MOST_MEMBERS, MOST_PERIODS
+from seakeep.sizes import LEAST_PERIODS, MOST_PERIODS
 from seakeep.toml import (
     Count,
     Delay,
@@ -204,18 +204,11 @@ def _run_name(name: str) -> str:
     return name
 
 
-def _file_name(name: str) -> str:
-    if "\0" in name:
-        raise ValueError("no file has a name with a NUL character; correct it")
-    return name
-
-
 LONGEST_NAME = 100
 """Characters of a name: file systems allow 255 bytes, of which our own prefixes and suffixes take
 some."""
 ChannelName = Annotated[str, AfterValidator(_channel_name)]
 RunName = Annotated[str, AfterValidator(_run_name)]
-FileName = Annotated[str, AfterValidator(_file_name)]
 Band = Annotated[tuple[Positive, Positive], Field(strict=False), AfterValidator(_rising_band)]
 TwoColumns = Annotated[tuple[str, str], Field(strict=False)]
 Vector = Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]
@@ -577,10 +570,8 @@ class RunSettings(Table):
     used for both. `record` cuts the files before anything else is done with them.
     """
 
-    file: FileName | None = Field(
-        default=None, description="the file, relative to the campaign file"
-    )
-    files: dict[str, FileName] = Field(
+    file: str | None = Field(default=None, description="the file, relative to the campaign file")
+    files: dict[str, str] = Field(
         default_factory=dict, description="instrument = its file, relative to the campaign file"
     )
     sea_state: str = Field(default="", description="a name for the sea state")
@@ -841,8 +832,8 @@ class ModelSettings(Table):
     input_delay: NumberOrPrior | None = Field(
         default=None, description="a prior or a number, in encounter periods; for an ensemble"
     )
-    n_members: Annotated[int, Field(ge=1, le=MOST_MEMBERS)] | None = Field(
-        default=None, description=f"number of members of an ensemble, 1 to {MOST_MEMBERS}"
+    n_members: Annotated[int, Field(ge=1)] | None = Field(
+        default=None, description="number of members of an ensemble, 1 or more"
     )
     seed: Annotated[int, Field(ge=0)] | None = Field(
         default=None, description="an integer, 0 or more; for an ensemble"

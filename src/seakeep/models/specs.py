@@ -54,7 +54,6 @@ from seakeep.models.training import (
     until,
 )
 from seakeep.models.validity import Coverage
-from seakeep.sizes import LONG_MEMBERS, MOST_MEMBERS, check_size
 
 __all__ = ["BayesianHankelDMDc", "HankelDMDc"]
 
@@ -461,8 +460,6 @@ class BayesianHankelDMDc:
             if stated or (name, value) not in (("train_length", None), ("ridge", "rollout")):
                 check_prior(name, value)
         check_integer("n_members", self.n_members, 1)
-        check_size("n_members =", self.n_members, MOST_MEMBERS, "members",
-                   "A hundred show a band, ten thousand its tails.", LONG_MEMBERS)  # fmt: skip
         period = self.encounter_period
         check_seconds("encounter_period", period)
         # Without dt any step shorter than the period will do; the runs' own is checked at fit.
