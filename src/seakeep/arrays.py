@@ -57,7 +57,6 @@ def as_real(
     values: object,
     name: str,
     error: type[SeakeepError] = RequestError,
-    greatest: float = GREATEST,
 ) -> FloatArray:
     """Return real numbers as an array of floats.
 
@@ -69,8 +68,6 @@ def as_real(
         What messages call them.
     error : type, optional
         What is raised; a DataError where the values come from a file.
-    greatest : float, optional
-        Finite values beyond it are refused, since their squares overflow.
 
     Returns
     -------
@@ -81,8 +78,6 @@ def as_real(
     RequestError
         If they are not real numbers: masked values, complex, dates, text, a Dataset, or rows of
         unequal length.
-    DataError
-        If a finite value is so large that its square overflows.
 
     Examples
     --------
@@ -90,7 +85,7 @@ def as_real(
     array([1., 2.])
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
-        return _bounded(values, name, greatest)
+        return values
     if hasattr(values, "data_vars"):
         raise error(
             f"{name} must be an array; received a Dataset. Select one channel: data['heave']."
@@ -109,19 +104,7 @@ def as_real(
             f"{name} must be real numbers; received {type(values).__name__} of type "
             f"{array.dtype}. {remedy}."
         )
-    return _bounded(np.asarray(array, dtype=np.float64), name, greatest)
-
-
-def _bounded(array: FloatArray, name: str, greatest: float) -> FloatArray:
-    """Refuse finite values beyond a limit; NaN and infinite ones pass."""
-    if array.size and greatest < np.inf and not -greatest <= array.min() <= array.max() <= greatest:
-        finite = array[np.isfinite(array)]
-        if np.any(np.abs(finite) > greatest):
-            raise DataError(
-                f"{name} holds values beyond {greatest:g}, whose squares overflow. Look for a "
-                "damaged row or a wrong unit."
-            )
-    return array
+    return np.asarray(array, dtype=np.float64)
 
 
 def _check_mask(values: object, name: str, error: type[SeakeepError]) -> None:
