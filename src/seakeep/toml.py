@@ -317,15 +317,6 @@ def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
             f"{path} is not valid TOML: {error}. Write texts in quotes, lists in [ ], "
             "one 'key = value' per line, and each table and key once." + _if_no_toml(path, what)
         ) from None
-    except RecursionError:
-        raise RequestError(
-            f"{path} is not a {what} file: its lists or tables are nested hundreds of levels deep. "
-            "Remove the superfluous brackets."
-        ) from None
-    except ValueError as error:  # an integer of thousands of digits
-        raise RequestError(
-            f"{path} holds a value that cannot be read: {str(error).split(';')[0]}. Shorten it."
-        ) from None
     others = {kind: keys for kind, keys in KNOWN_BY.items() if kind != what}
     for other, keys in others.items():
         tables = [f"[{key}]" for key in keys if key in found]

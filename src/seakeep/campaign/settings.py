@@ -192,18 +192,11 @@ def _run_name(name: str) -> str:
     return name
 
 
-def _file_name(name: str) -> str:
-    if "\0" in name:
-        raise ValueError("no file has a name with a NUL character; correct it")
-    return name
-
-
 LONGEST_NAME = 100
 """Characters of a name: file systems allow 255 bytes, of which our own prefixes and suffixes take
 some."""
 ChannelName = Annotated[str, AfterValidator(_channel_name)]
 RunName = Annotated[str, AfterValidator(_run_name)]
-FileName = Annotated[str, AfterValidator(_file_name)]
 Band = Annotated[tuple[Positive, Positive], Field(strict=False), AfterValidator(_rising_band)]
 TwoColumns = Annotated[tuple[str, str], Field(strict=False)]
 Vector = Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]
@@ -488,10 +481,8 @@ class RunSettings(Table):
     used for both. `record` cuts the files before anything else is done with them.
     """
 
-    file: FileName | None = Field(
-        default=None, description="the file, relative to the campaign file"
-    )
-    files: dict[str, FileName] = Field(
+    file: str | None = Field(default=None, description="the file, relative to the campaign file")
+    files: dict[str, str] = Field(
         default_factory=dict, description="instrument = its file, relative to the campaign file"
     )
     sea_state: str = Field(default="", description="a name for the sea state")

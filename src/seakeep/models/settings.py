@@ -73,13 +73,7 @@ def periods_to_samples(periods: float, encounter_period: float, dt: float) -> in
             f"the time step dt = {dt:g} s is no shorter than the encounter period of "
             f"{encounter_period:g} s. Are the two swapped?"
         )
-    samples = periods * encounter_period / dt
-    if not math.isfinite(samples):
-        raise RequestError(
-            f"{periods:g} encounter periods of {encounter_period:g} s are countless steps of dt = "
-            f"{dt:g} s. Correct the step."
-        )
-    return math.floor(samples + 0.5)
+    return math.floor(periods * encounter_period / dt + 0.5)
 
 
 def in_samples(length: float | Length, dt: float, encounter_period: float | None) -> int:

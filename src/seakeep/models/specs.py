@@ -42,7 +42,6 @@ from seakeep.models.training import (
     until,
 )
 from seakeep.models.validity import Coverage
-from seakeep.sizes import LONG_MEMBERS, MOST_MEMBERS, check_size
 from seakeep.toml import Length
 
 __all__ = ["BayesianHankelDMDc", "HankelDMDc"]
@@ -437,8 +436,6 @@ class BayesianHankelDMDc(HankelSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_integer("n_members", self.n_members, 1)
-        check_size("n_members =", self.n_members, MOST_MEMBERS, "members",
-                   "A hundred show a band, ten thousand its tails.", LONG_MEMBERS)  # fmt: skip
         if (period := self.encounter_period) is not None:
             # Without dt any step shorter than the period will do; the runs' own is checked at fit.
             periods_to_samples(1, period, self.dt or 0.5 * period)
