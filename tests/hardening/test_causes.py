@@ -2,16 +2,14 @@
 
 import hashlib
 import os
-import re
 import subprocess
 import sys
 
 import ground
 import pytest
 
-from seakeep.campaign import read_campaign
 from seakeep.cli import main
-from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.errors import SeakeepWarning
 from seakeep.study.store import UnitFolder
 
 
@@ -34,20 +32,6 @@ def test_a_study_clears_what_a_killed_run_left_and_says_so(tmp_path):
     ):
         assert not list(tmp_path.glob("units/*"))
     assert (tmp_path / "notes.tmp").exists()
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("[model.alignment]", "[model.select]\nhorizon = []\n[model.alignment]",
-         "model.select.horizon: received [], which is empty. Give a length of free runs in"),
-    ],
-)  # fmt: skip
-def test_what_no_run_can_change_is_judged_before_a_run_is_read(tmp_path, old, new, said):
-    path = tmp_path / "campaign.toml"
-    path.write_text(ground.CAMPAIGN.replace(old, new), encoding="utf-8")
-    with pytest.raises(RequestError, match=re.escape(said)):
-        read_campaign(path)
 
 
 def test_a_command_keeps_blas_to_one_thread_and_prints_in_any_encoding(tmp_path):
