@@ -6,18 +6,15 @@ else the default of the kind.
 
 from __future__ import annotations
 
-import json
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, Literal, cast
 
 from seakeep.campaign import ModelSettings, PriorSettings
 from seakeep.campaign.settings import CampaignSettings
-from seakeep.errors import SHOWN, RequestError, SeakeepWarning, did_you_mean
+from seakeep.errors import RequestError, did_you_mean
 from seakeep.models import KINDS, ProbeAlignment, Select, Spec
-from seakeep.models.checks import typed
 from seakeep.models.observables import Observable, SlowSquares, observables_of
 from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform
 from seakeep.models.settings import periods_to_samples
@@ -29,7 +26,6 @@ __all__ = [
     "Spec",
     "build_spec",
     "can_align",
-    "check_settings",
     "counts_in_periods",
     "resolve_model",
 ]
@@ -89,38 +85,6 @@ class ResolvedModel:
                 key: {"value": value, "source": self.sources[key]} for key, value in values.items()
             },
         }
-
-
-def check_settings(kind: str, values: Mapping[str, Any], period: float, dt: float) -> Spec:
-    """Make a spec of the values that :meth:`ResolvedModel.to_json` keeps.
-
-    Raises
-    ------
-    SeakeepError, ValueError, TypeError, LookupError
-        If the classes of the settings refuse them, or take them for others.
-    """
-    made = KINDS[kind]
-    table: dict[str, Any] = {key: each for key, each in values.items() if "." not in key}
-    for name, inner in TABLES.items():
-        keys = {key.partition(".")[2]: values[key] for key in values if key.startswith(f"{name}.")}
-        if keys:
-            typed(inner, keys, name)
-            table[name] = keys
-    data = {"encounter_period": period, "dt": dt}
-    table |= {each.name: data[each.name] for each in fields(cast("Any", made)) if each.name in data}
-    if made.is_ensemble:
-        table["spawn_key"] = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SeakeepWarning)  # given when the settings were made
-        spec = made.from_json(table)
-    taken = _values(spec)
-    for key, value in values.items():
-        if json.dumps(taken.get(key)) != json.dumps(value):
-            raise ValueError(
-                f"{key}: received {value!r:.{SHOWN}}, which would be taken for "
-                f"{taken.get(key)!r:.{SHOWN}}"
-            )
-    return spec
 
 
 def _defaults(kind: type[Spec]) -> dict[str, Any]:

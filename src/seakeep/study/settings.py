@@ -32,7 +32,7 @@ __all__ = [
     "read_study",
 ]
 
-FORMAT = 6
+FORMAT = 7
 """Goes into digest and result: raise it when the same settings give other arrays than before."""
 
 Preset = Literal["paper", "recommended"]
