@@ -11,7 +11,7 @@ import os
 import re
 import secrets
 import stat
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
@@ -272,9 +272,7 @@ def replacing(path: Path) -> Iterator[Path]:
 def write_netcdf(
     path: Path,
     dataset: xr.Dataset,
-    groups: Mapping[str, xr.Dataset] | None = None,
-    packing: Callable[[xr.Dataset], Mapping[Any, Mapping[str, Any]]] | None = None,
-    onto: Path | None = None,
+    encoding: Mapping[Any, Mapping[str, Any]] | None = None,
 ) -> None:
     """Write a NetCDF file with a checksum at its end, which :func:`read_sealed` compares.
 
@@ -286,29 +284,22 @@ def write_netcdf(
     path : Path
         The file, such as :func:`replacing` gives it; overwritten.
     dataset : Dataset
-        What goes into the root of the file.
-    groups : mapping of str to Dataset, optional
-        What goes into groups, by their names.
-    packing : callable, optional
-        Gives the encoding of the variables of a Dataset, such as their compression.
-    onto : Path, optional
-        A NetCDF file whose content is copied first.
+        What goes into it.
+    encoding : mapping, optional
+        Encoding of variables by their names, such as their compression.
 
     Raises
     ------
     OSError
-        If a file cannot be read or written; :func:`replacing` puts it into words.
+        If it cannot be written; :func:`replacing` puts it into words.
     """
     # Here, so that commands that write no such file start without HDF5.
     import h5netcdf
     from xarray.backends import H5NetCDFStore
 
-    made = io.BytesIO(b"" if onto is None else _content(onto.read_bytes())[0])
-    parts = [(None, dataset), *(groups or {}).items()]
-    with h5netcdf.File(made, "w" if onto is None else "r+") as file:
-        for name, each in parts:
-            encoding = {} if packing is None else packing(each)
-            each.dump_to_store(H5NetCDFStore(file, group=name, mode="a"), encoding=encoding)
+    made = io.BytesIO()
+    with h5netcdf.File(made, "w") as file:
+        dataset.dump_to_store(H5NetCDFStore(file, mode="a"), encoding=encoding or {})
     with path.open("wb") as whole, made.getbuffer() as content:
         whole.write(content)
         whole.write(SEAL + hashlib.sha256(content).hexdigest().encode())
@@ -374,21 +365,17 @@ def write_sealed(
     dataset: xr.Dataset,
     path: Path | str,
     kind: str,
-    groups: Mapping[str, xr.Dataset] | None = None,
-    packing: Callable[[xr.Dataset], Mapping[Any, Mapping[str, Any]]] | None = None,
 ) -> Path:
     """Write a file of ours: NetCDF with its kind, its format and a checksum.
 
     Parameters
     ----------
     dataset : Dataset
-        What goes into the root of the file.
+        What goes into it.
     path : Path or str
         The file; an earlier one of the same kind is replaced.
     kind : str
         What it is, such as ``"model"``.
-    groups, packing
-        As in :func:`write_netcdf`.
 
     Returns
     -------
@@ -404,7 +391,7 @@ def write_sealed(
     check_output(target, kind)
     head = {MARK: kind, "seakeep_format": FORMAT, "seakeep_version": metadata.version("seakeep")}
     with replacing(target) as temporary:
-        write_netcdf(temporary, dataset.assign_attrs(head), groups, packing)
+        write_netcdf(temporary, dataset.assign_attrs(head))
     return target
 
 
@@ -423,7 +410,7 @@ def load_sealed(path: Path | str, kind: str) -> xr.Dataset:
     Returns
     -------
     Dataset
-        The root of the file, without kind and format.
+        What was written.
 
     Raises
     ------
