@@ -562,10 +562,10 @@ class SelectSettings(Table):
         default=(15.0, 45.0),
         description="a length of free runs in encounter periods, such as '15 T', or a list of them",
     )
-    folds: Literal["run", "sea_state"] = Field(
-        default="run",
-        description="'run', or 'sea_state': what is held out at a time, a run or all runs of its "
-        "sea state",
+    folds: Literal["auto", "run", "sea_state"] = Field(
+        default="auto",
+        description="what is held out at a time: 'auto', a run and those that repeat its waves; "
+        "'run', a run alone; 'sea_state', all runs of its sea state",
     )
 
 

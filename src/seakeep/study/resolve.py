@@ -20,7 +20,7 @@ from seakeep.models import KINDS, ProbeAlignment, Select, Spec
 from seakeep.models.checks import typed
 from seakeep.models.observables import Observable, SlowSquares, observables_of
 from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform
-from seakeep.models.settings import periods_to_samples
+from seakeep.models.settings import Folds, periods_to_samples
 from seakeep.models.specs import left_open
 from seakeep.toml import Length, lengths, parse_length
 
@@ -195,7 +195,7 @@ def resolve_model(
     preset: str | None = None,
     seed: int | None = None,
     aligned: bool = False,
-    folds: Literal["run", "sea_state"] = "run",
+    folds: Folds = "auto",
 ) -> ResolvedModel:
     """Fill in, key by key, what the table of a model does not state."""
     kind = _kind_of(settings)
@@ -242,7 +242,7 @@ def resolve_model(
     data = {"encounter_period": encounter_period, "dt": dt}
     spec = _made(kind, filled, {**from_study, **stated}, data)
     open_spec = left_open(spec)
-    if open_spec and folds != "run" and "folds" not in (stated.get("select") or {}):
+    if open_spec and folds != "auto" and "folds" not in (stated.get("select") or {}):
         spec = replace(open_spec, select=replace(open_spec.select or Select(), folds=folds))
         from_study["select.folds"] = folds
     return ResolvedModel(settings.kind, preset, spec, _sources(spec, filled, stated, from_study))
