@@ -1083,8 +1083,9 @@ def _words_of_groups(groups: Sequence[str], by_sea: bool) -> str:
     """What was held out beside each run."""
     seas = len(set(groups))
     if 1 < seas < len(groups):
-        which = "of its sea state" if by_sea else "that repeat its waves"
-        return f"held out with each: the runs {which}, of which there are {seas}"
+        if by_sea:
+            return f"held out with each: the runs of its sea state, of which there are {seas}"
+        return f"held out with each: the runs that repeat its waves; {seas} waves differ"
     shared = "no two runs share a sea state" if seas > 1 else "all runs have the same sea state"
     return f"{shared}, so each was held out alone"
 
