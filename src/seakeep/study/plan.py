@@ -123,7 +123,7 @@ def choose_training(
     runs: Runs,
     names: Sequence[str],
     needs: Needs,
-    inputs: Sequence[str] = (),
+    inputs: Sequence[str],
 ) -> tuple[TrainingSet, ...]:
     """Choose what the models learn from."""
     training = settings.training
