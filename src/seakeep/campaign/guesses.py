@@ -143,6 +143,7 @@ def _series(file: File, column: str) -> FloatArray | None:
     return np.interp(at, at[there], series[there])
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def seas_of(files: Sequence[File], guesses: Sequence[Guess], wave: Guess) -> dict[str, Sea]:
     """Waves, as one probe recorded them, of each run that has some; decay tests have none."""
     seas, waves, rates = {}, {}, {}
@@ -169,7 +170,6 @@ def seas_of(files: Sequence[File], guesses: Sequence[Guess], wave: Guess) -> dic
     }
 
 
-@np.errstate(over="ignore", invalid="ignore")
 def _sea(file: File, series: FloatArray) -> Sea | None:
     step = 1.0 / float(file.rate or 1.0)
     try:
@@ -205,11 +205,11 @@ def _start(run: str, files: Sequence[File], guesses: Sequence[Guess]) -> float:
 
 
 def _first(file: File) -> float:
-    """First instant of a file, s."""
-    if file.time is None:
-        return 0.0
-    unit = time_unit_of(file.table, file.time)
-    return float(file.table.values[file.time][0]) * (conversion(unit, "s") if is_unit(unit) else 1)
+    """First instant of a file, s; zero where it states none."""
+    times = file.table.values.get(file.time or "", np.zeros(1))
+    unit = time_unit_of(file.table, file.time or "")
+    factor = conversion(unit, "s") if is_unit(unit) else 1.0
+    return factor * float(times[0]) if np.isfinite(times[0]) else 0.0
 
 
 def waves_of_name(run: str) -> str | None:
