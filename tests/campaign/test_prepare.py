@@ -360,12 +360,13 @@ class TestBadRuns:
         ):
             campaign.prepare()
 
+    @pytest.mark.parametrize("key", ["span", "record"])
     @pytest.mark.parametrize("span", ["[2, 30]", "[-3, 10]", "[30, 40]"])
-    def test_span_outside_the_record(self, edited, span):
-        path = edited(("span = [2, 18]", f"span = {span}"))
+    def test_span_outside_the_record(self, edited, key, span):
+        path = edited(("span = [2, 18]", f"{key} = {span}"))
         with pytest.raises(
             RequestError,
-            match=r"runs\.second\.span: received \[.*\] s, and the record runs from 0 to 20 s\.",
+            match=rf"runs\.second\.{key}: received \[.*\] s, and the record runs from 0 to 20 s\.",
         ):
             read_campaign(path).prepare()
 
@@ -378,16 +379,12 @@ class TestBadRuns:
             read_campaign(path).prepare()
 
     def test_span_that_holds_nothing(self, edited):
-        path = edited(("span = [2, 18]", "span = [2.01, 2.05]"))
-        with pytest.raises(
-            RequestError, match=r"holds 0 sample\(s\) at a step of 0\.1 s\. Lengthen"
-        ):
-            read_campaign(path).prepare()
-        path = edited(("span = [2, 18]", "record = [90, 100]"))
-        with pytest.raises(
-            RequestError, match=r"runs\.second\.record: received \[90, 100\] s, and"
-        ):
-            read_campaign(path).prepare()
+        for span, step in (("span = [2.01, 2.05]", "0.1"), ("record = [2.001, 2.01]", "0.02")):
+            path = edited(("span = [2, 18]", span))
+            with pytest.raises(
+                RequestError, match=rf"holds 0 sample\(s\) at a step of {step} s\. Lengthen"
+            ):
+                read_campaign(path).prepare()
 
     def test_missing_file(self, edited):
         path = edited(('file = "second.csv"', 'file = "secnd.csv"'))

@@ -7,7 +7,7 @@ import numbers
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self, get_args
 
 import numpy as np
 import xarray as xr
@@ -169,6 +169,11 @@ def check_stable(value: object) -> None:
         )
 
 
+Folds = Literal["auto", "run", "sea_state"]
+FOLDS: tuple[Folds, ...] = get_args(Folds)
+"""What may be held out at a time; :func:`seakeep.models.selection.groups_of` tells them apart."""
+
+
 @dataclass(frozen=True)
 class Select:
     """What free runs on held-out training runs choose, beside λ.
@@ -182,9 +187,9 @@ class Select:
         Lengths of the free runs, encounter periods.
     period : float, optional
         Encounter period, s; by default that of the training runs.
-    folds : {"run", "sea_state"}, optional
-        What is held out at a time: a run, or all runs of its sea state, for a model that must
-        forecast seas that no training run holds.
+    folds : {"auto", "run", "sea_state"}, optional
+        What is held out at a time: a run and the runs that repeat its waves, a run alone, or all
+        runs of its sea state, for a model that must forecast seas that no training run holds.
 
     Raises
     ------
@@ -195,10 +200,10 @@ class Select:
     observables: bool = False
     horizon: tuple[float, ...] = (15.0, 45.0)
     period: float | None = None
-    folds: Literal["run", "sea_state"] = "run"
+    folds: Folds = "auto"
 
     def __post_init__(self) -> None:
-        check_choice("select: folds", self.folds, ("run", "sea_state"))
+        check_choice("select: folds", self.folds, FOLDS)
         if not isinstance(self.observables, bool):
             raise RequestError(
                 "select: observables must be True or False; received "

@@ -17,6 +17,7 @@ from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import KINDS, ProbeAlignment, Select, Spec
 from seakeep.models.checks import check_keys
 from seakeep.models.observables import Observable, SlowSquares, observables_of
+from seakeep.models.settings import Folds
 from seakeep.models.specs import left_open
 from seakeep.toml import Length, Mistake, lengths
 
@@ -157,7 +158,7 @@ def resolve_model(
     preset: str | None = None,
     seed: int | None = None,
     aligned: bool = False,
-    folds: Literal["run", "sea_state"] = "run",
+    folds: Folds = "auto",
 ) -> ResolvedModel:
     """Fill in, key by key, what the table of a model does not state."""
     kind = _kind_of(settings)
@@ -200,7 +201,7 @@ def resolve_model(
     data = {"encounter_period": encounter_period, "dt": dt}
     spec = _made(kind, filled, {**from_study, **stated}, data).resolved(dt, encounter_period)
     open_spec = left_open(spec)
-    if open_spec and folds != "run" and "folds" not in (stated.get("select") or {}):
+    if open_spec and folds != "auto" and "folds" not in (stated.get("select") or {}):
         spec = replace(open_spec, select=replace(open_spec.select or Select(), folds=folds))
         from_study["select.folds"] = folds
     return ResolvedModel(settings.kind, preset, spec, _sources(spec, filled, stated, from_study))

@@ -81,8 +81,10 @@ class TrainingSettings(Table):
         "once) or 'leave_out' (all runs but those that test)",
     )
     runs: Names = Field(default=(), description="list of runs; left out, the training runs")
-    leave_out: Literal["run", "sea_state"] = Field(
-        default="run", description="'run', or 'sea_state': all runs of one sea state at once"
+    leave_out: Literal["auto", "run", "sea_state"] = Field(
+        default="auto",
+        description="'auto', a run and those that repeat its waves; 'run', a run alone; "
+        "'sea_state', all runs of one sea state at once",
     )
     windows: Count | None = Field(
         default=10,
