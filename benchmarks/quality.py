@@ -20,19 +20,13 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.pipeline import flag_samples
+from seakeep.quality.agreement import FEWEST_STEPS, LATE, RUN_AWAY, compare_sensors
+from seakeep.quality.faults import MISSING, flag_attributes
 from seakeep.quality.record import Record, Redundant
 from seakeep.quality.samples import constant, flagged, levels
 from seakeep.quality.sensors import held, redundant
 from seakeep.signals import bridge, integrate
-from seakeep.signals.quality import (
-    FEWEST_STEPS,
-    LATE,
-    MISSING,
-    RUN_AWAY,
-    compare_sensors,
-    dominant_period,
-    flag_attributes,
-)
+from seakeep.signals.waves import dominant_period
 from seakeep.tank.instruments import record_run
 from seakeep.tank.play import check_settings, generator, play_run
 from seakeep.tank.settings import default_settings

@@ -18,6 +18,7 @@ from seakeep.errors import DataError
 from seakeep.formats import Columns
 from seakeep.formats.columns import is_unit, named_unit
 from seakeep.signals import encounter_period, uniform_step, waves_part
+from seakeep.signals.time_axis import over_gaps
 from seakeep.signals.waves import energy_period
 
 __all__ = [
@@ -133,8 +134,7 @@ def sea_of(file: File, column: str) -> Sea | None:
     there = np.isfinite(series)
     if file.rate is None or there.sum() < LONG or not np.ptp(series[there]):
         return None
-    at = np.arange(series.size)
-    series, step = np.interp(at, at[there], series[there]), 1.0 / file.rate
+    series, step = over_gaps(series), 1.0 / file.rate
     try:
         series = series[waves_part(series, step)]
         period = encounter_period(series, step)

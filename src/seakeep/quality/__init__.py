@@ -26,6 +26,7 @@ __all__ = [
 
 CHECKS: list[Callable[[Record], Iterable[Finding]]] = [
     samples.constant,
+    samples.noise,
     samples.flagged,
     samples.levels,
     sensors.redundant,

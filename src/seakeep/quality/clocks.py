@@ -6,15 +6,13 @@ from collections.abc import Iterator
 from statistics import median_high, median_low
 from typing import Any
 
-import numpy as np
-
-from seakeep.arrays import FloatArray
+from seakeep.quality.faults import noise_share
 from seakeep.quality.findings import Finding, Kind
-from seakeep.quality.record import Record, channels_of, step_of
+from seakeep.quality.record import Record, channels_of, sound, step_of
 from seakeep.quality.samples import is_elevation
 from seakeep.signals.filters import PASSBAND
-from seakeep.signals.quality import energy_above, noise_level
 from seakeep.signals.synchronisation import ASSUMED
+from seakeep.signals.waves import energy_above
 
 __all__ = ["ClocksKind", "clocks", "others", "periods", "rates", "records", "steps"]
 
@@ -174,18 +172,12 @@ def steps(record: Record) -> Iterator[Finding]:
             wanted = is_elevation(name, channel) or name in MOTIONS
             if not wanted or "derived_from" in channel.attrs or own[logger] >= dt:
                 continue
-            x = channel.to_numpy()
+            x = sound(group, name)
             share, period = energy_above(x, own[logger], edge)
-            if share > LOST_ENERGY and not is_noise(x):
+            if share > LOST_ENERGY and noise_share(x) < 0.5:
                 details = {"share": 100 * share, "period": period, "fate": fate}
                 kind = ClocksKind.COARSE_STEP
                 yield Finding(kind, record.run, name, 1 / dt, edge, "Hz", details=details)
-
-
-def is_noise(series: FloatArray) -> bool:
-    """Whether most of a channel's variance has no memory from one sample to the next."""
-    series = series[np.isfinite(series)]
-    return series.size > 2 and bool(noise_level(series) > np.sqrt(0.5) * float(series.std()) > 0)
 
 
 def periods(record: Record) -> Iterator[Finding]:

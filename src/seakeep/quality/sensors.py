@@ -7,21 +7,20 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 import xarray as xr
 
-from seakeep.quality.findings import Finding, Kind
-from seakeep.quality.record import Record, Redundant, channels_of, filled, step_of
-from seakeep.signals import misplaced_probes
-from seakeep.signals.quality import (
+from seakeep.quality.agreement import (
     FEWEST_STEPS,
     LARGEST_GAIN,
     LARGEST_NRMSE,
     LATE,
     LEAST_CORRELATION,
     RUN_AWAY,
-    STUCK,
     Agreement,
     compare_sensors,
-    find_stuck,
 )
+from seakeep.quality.faults import STUCK, find_held
+from seakeep.quality.findings import Finding, Kind
+from seakeep.quality.record import Record, Redundant, channels_of, filled, step_of
+from seakeep.signals import misplaced_probes
 
 __all__ = ["SensorsKind", "compared", "held", "positions", "redundant"]
 
@@ -130,7 +129,7 @@ def held(record: Record) -> Iterator[Finding]:
         x = filled(run[name])
         if not np.isfinite(found.period) or not np.ptp(x):
             continue
-        stuck = find_stuck(x, step_of(run), found.period, filled(run[other]))
+        stuck = find_held(x, step_of(run), filled(run[other]))
         if stuck.any():
             start = float(run["time"][int(np.argmax(stuck))])
             length = float(stuck.sum()) * step_of(run)

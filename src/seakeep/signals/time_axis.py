@@ -21,6 +21,7 @@ __all__ = [
     "inspect_times",
     "instant_text",
     "onto_uniform",
+    "over_gaps",
     "span_text",
     "stretches",
     "uniform_step",
@@ -344,6 +345,24 @@ def stretches(
         bounds = [begin, *breaks.tolist(), end]
         parts += list(itertools.pairwise(bounds))
     return parts
+
+
+def over_gaps(series: FloatArray, there: BoolArray | None = None) -> FloatArray:
+    """Series with straight lines across its gaps, and its first and last value before and after.
+
+    Gaps are samples that are not finite, or not `there`; a series without any value gets zeros.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> over_gaps(np.array([0.0, 1.0, np.nan, 3.0]))
+    array([0., 1., 2., 3.])
+    """
+    there = np.isfinite(series) if there is None else there
+    at = np.flatnonzero(there)
+    if at.size in (0, series.size):
+        return np.where(there, series, 0.0)
+    return np.interp(np.arange(series.size), at, series[at])
 
 
 @dataclass(frozen=True)
