@@ -31,6 +31,9 @@ TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorial" / "run1.csv"
 LONGEST = 30_000
 """Samples taken of a record at 500 Hz."""
 
+WAVES_FROM = 60.0
+"""Instant at which the tank's waves have grown, s: before it readings repeat in calm water."""
+
 TANK = {"mru": ("heave", "pitch"), "loads": ("mooring_bow",), "video": ("surge",)}
 
 
@@ -96,7 +99,7 @@ def channels() -> dict[str, tuple[np.ndarray, float]]:
     played = play_run(settings, "irregular_1", check_settings(settings))
     for record in record_run(played, generator(settings, "irregular_1", "instruments")):
         for name in TANK.get(record.name, ()):
-            values = record.columns[name].values[:LONGEST]
+            values = record.columns[name].values[record.time >= WAVES_FROM][:LONGEST]
             out[f"tank, {name}"] = over_gaps(values), float(record.time[1] - record.time[0])
     return out
 
@@ -112,8 +115,8 @@ def table(places: int) -> str:
         "",
         "- held: readings repeat the one before. Up to three repetitions occur by chance in sound "
         "records.",
-        "- zero: where readings are further from zero than 1.5 standard deviations; beside them a "
-        "zero is a plausible reading, and the step to it may be one that waves take.",
+        "- zero: where readings are further from zero than 1.5 standard deviations. Beside them it "
+        "is a plausible reading, as are two or three of them on a steep flank.",
         "- -99.9 and -999, in the unit of the file.",
         "- spiked: random readings up to 100 standard deviations from the mean.",
         "",

@@ -115,7 +115,7 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
     centre, lags = np.array([1.0, 2.0, 5.0, 6.0]), np.array([0.01, 0.02, 0.01, 0.02])
     found = Agreement(
         period=6.0, motion=0.7, step=np.nan, lag=0.015, lag_spread=0.005, growth=0.0,
-        correlation=1.0, nrmse=0.0, at_zero=1.0, gain=1.0, centre=centre, lags=lags,
+        correlation=1.0, nrmse=0.0, gain=1.0, centre=centre, lags=lags,
     )  # fmt: skip
     figure = quality_figure(run, {"heave": found})
     top, pitch, lag = figure.axes

@@ -30,7 +30,6 @@ CHECKS: list[Callable[[Record], Iterable[Finding]]] = [
     samples.flagged,
     samples.levels,
     sensors.redundant,
-    sensors.held,
     sensors.positions,
     clocks.clocks,
     clocks.others,

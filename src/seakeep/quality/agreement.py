@@ -65,8 +65,6 @@ class Agreement:
     nrmse : float
         RMS of the difference between the two, each less its mean, over the trusted one's standard
         deviation, in the windows with motion.
-    at_zero : float
-        Median correlation without a lag.
     gain : float
         Median over windows of the sensor's spread over the trusted one's; over the whole record
         where nothing can be compared.
@@ -82,7 +80,6 @@ class Agreement:
     growth: float
     correlation: float
     nrmse: float
-    at_zero: float
     gain: float
     centre: FloatArray
     lags: FloatArray
@@ -132,11 +129,11 @@ def compare_sensors(
         If a series has gaps.
     """
     x, y = as_series(series), as_series(trusted)
-    period = dominant_period(y, dt) if y.std() > 0 else float("nan")
+    period = dominant_period(y, dt)
     empty = np.zeros(0)
     gain = float(x.std() / y.std()) if y.std() > 0 else float("nan")
     gain = 0.0 if gain < 1e-6 else gain  # what resampling makes of a constant
-    nothing = Agreement(period, float("nan"), step, *(float("nan"),) * 6, gain, empty, empty)
+    nothing = Agreement(period, float("nan"), step, *(float("nan"),) * 5, gain, empty, empty)
     length = 4 * period if window is None else window
     if gain == 0 or not np.isfinite(gain) or x.size * dt < length + period:
         return nothing
@@ -155,7 +152,6 @@ def compare_sensors(
         growth=_growth(_windows(x, y, dt, 0.5 * length, period, stuck)[0], period),
         correlation=float(np.median(found.correlation)),
         nrmse=_nrmse(x, y, dt, length, found),
-        at_zero=float(np.median(found.at_zero)),
         gain=gain,
         centre=found.centre,
         lags=found.lag,
@@ -184,7 +180,7 @@ def _windows(
     free = np.array([not stuck[i : j + 1].any() for i, j in zip(begin, end, strict=True)])
     kept = (motion > 0.3 * motion.max()) & np.isfinite(found.lag)
     kept &= free | ~np.any(kept & free)  # a sensor that sticks all the time is judged all the same
-    clear = Lags(found.centre[kept], found.lag[kept], found.correlation[kept], found.at_zero[kept])
+    clear = Lags(found.centre[kept], found.lag[kept], found.correlation[kept])
     if not kept.any():
         return clear, float("nan"), float("nan")
     mean = float(np.sqrt(np.mean(motion[kept] ** 2)))

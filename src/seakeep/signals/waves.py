@@ -114,7 +114,7 @@ def waves_part(series: npt.ArrayLike, dt: float, still: float = STILL) -> slice:
 def dominant_period(series: npt.ArrayLike, dt: float) -> float:
     """Period at the peak of a series' spectrum, s (Hann window, three bins smoothed).
 
-    NaN for fewer than eight samples.
+    NaN for fewer than eight samples, and for a constant.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def dominant_period(series: npt.ArrayLike, dt: float) -> float:
     1.6
     """
     x = as_series(series)
-    if x.size < 8:
+    if x.size < 8 or not np.ptp(x):
         return float("nan")
     power = tapered_power(x)
     power = np.convolve(power, [0.25, 0.5, 0.25], mode="same")
@@ -544,7 +544,7 @@ def energy_above(series: npt.ArrayLike, dt: float, edge: float) -> tuple[float, 
     """
     x = as_series(series)
     time_step(dt)
-    period = dominant_period(x, dt) if np.ptp(x) else float("nan")
+    period = dominant_period(x, dt)
     if not np.isfinite(period):
         return float("nan"), float("nan")
     power = tapered_power(x)
