@@ -1,14 +1,19 @@
 """Faults of samples of every length are found, and sound series are left alone."""
 
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
 
+from seakeep.campaign import read_campaign
 from seakeep.campaign.pipeline import flag_samples
-from seakeep.quality import Record
+from seakeep.quality import Record, findings_of
 from seakeep.quality.faults import find_held, find_outliers, noise_share, saturated
 from seakeep.quality.samples import constant, flagged, level_drift, noise
 
+TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
 DT = 0.04
 T = DT * np.arange(3000)
 PERIOD = 1.6
@@ -149,3 +154,29 @@ def test_saturation_recurs_at_the_end_of_the_range():
     x[top : top + 12] = x[top]  # once, at its highest
     assert not saturated(x, find_held(x, DT)).any()
     assert reported(x) == {"STUCK"}
+
+
+@pytest.mark.filterwarnings("ignore:first. heave leaves its mean")
+@pytest.mark.parametrize(
+    ("length", "values", "kind"),
+    [
+        (3, [-999.0], "OUTLIERS"),
+        (3, [-99.9], "OUTLIERS"),
+        (10, [900.0, -700.0, 500.0, -300.0, 800.0], "OUTLIERS"),
+        (300, None, "STUCK"),
+        (2200, [900.0, -700.0, 500.0, -300.0, 800.0], "NOISE"),
+    ],
+)
+def test_findings_of_the_tutorial_s_heave(tmp_path, length, values, kind):
+    """In the file's unit; 300 samples are 12 s."""
+    shutil.copytree(TUTORIAL, tmp_path / "t")
+    path = tmp_path / "t" / "run1.csv"
+    header, *lines = path.read_text(encoding="utf-8").splitlines()
+    table = [line.split(";") for line in lines]
+    for row in range(600, 600 + length):
+        table[row][3] = table[599][3] if values is None else str(values[row % len(values)])
+    path.write_text("\n".join([header, *map(";".join, table)]), encoding="utf-8")
+    run = read_campaign(tmp_path / "t" / "campaign.toml").prepare(["first"])["first"]
+    found = {(each.channel, each.kind.name) for each in findings_of(run)}
+    assert ("heave", kind) in found
+    assert {channel for channel, _ in found} == {"heave"}
