@@ -269,8 +269,6 @@ def _longest(lengths: npt.NDArray[np.intp], frame: int) -> float:
     """
     frame = max(int(np.sort(lengths)[(lengths.size - 1) // 4]), frame)
     goes_on = max(float(np.mean(lengths >= 2 * frame)), 1 / lengths.size)
-    if goes_on >= 1:
-        return float("inf")
     return frame * float(1 + SURE * np.log(lengths.size) / np.log(1 / goes_on))
 
 
@@ -286,9 +284,9 @@ def saturated(series: FloatArray, held: BoolArray) -> BoolArray:
     """
     out = np.zeros(series.size, dtype=bool)
     for edge in (series.max(), series.min()):
-        plateaus = stretches(held & (series == edge))
-        for begin, end in plateaus if len(plateaus) > 1 else ():
-            out[begin:end] = True
+        plateaus = held & (series == edge)
+        if len(stretches(plateaus)) > 1:
+            out |= plateaus
     return out
 
 

@@ -188,7 +188,7 @@ class TimeReport:
         Instants of the grid that are not.
     gaps : tuple of (float, float)
         Last instant before each gap and its length, s.
-    jitter_rms, jitter_max : float
+    jitter_rms : float
         Distance of the instants from the grid, s.
     jittered : bool
         Whether that is more than a hundredth of a step and than the decimals explain.
@@ -204,7 +204,6 @@ class TimeReport:
     missing: int
     gaps: tuple[tuple[float, float], ...]
     jitter_rms: float
-    jitter_max: float
     jittered: bool
 
     @property
@@ -244,7 +243,6 @@ def inspect_times(time: npt.ArrayLike, name: str = "the run") -> TimeReport:
         missing=int(place[-1]) + 1 - t.size,
         gaps=tuple((float(t[i]), float(round(t[i + 1] - t[i], 9))) for i in at),
         jitter_rms=float(np.sqrt(np.mean(away**2))),
-        jitter_max=worst,
         jittered=worst > max(0.01 * step, printed_tolerance(t, step)),
     )
 
