@@ -278,7 +278,6 @@ def test_video_against_mru(tracked):
     for channel, true, limit in (("heave", heave, 1e-3), ("pitch", pitch, np.deg2rad(0.1))):
         found = compare_motion(tracked[channel], tracked.time, true, time, max_lag=0.4)
         assert found.correlation > 0.999
-        assert found.correlation_at_zero < 0.95
         # Ends of the low-pass filter weigh in a record of 3 s; a frame lasts 0.033 s.
         assert found.lag == pytest.approx(late, abs=2e-3)
         assert found.rms < limit

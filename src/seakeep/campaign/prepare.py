@@ -37,7 +37,7 @@ from seakeep.files import expanded
 from seakeep.formats import Columns, Options, read_columns
 from seakeep.quality import as_json, warn_of
 from seakeep.signals import Clock, uniform_step
-from seakeep.signals.quality import noise_floor
+from seakeep.signals.waves import noise_floor
 from seakeep.toml import in_seconds, lengths, parse_length
 
 __all__ = ["Campaign", "Progress", "read_campaign"]

@@ -16,10 +16,12 @@ from seakeep.campaign.settings import CampaignSettings, long_name_of
 from seakeep.conventions import displayed
 from seakeep.files import MARK, replacing
 from seakeep.quality import compared, findings_of
+from seakeep.quality.agreement import LATE, Agreement
+from seakeep.quality.faults import FLAGS
 from seakeep.report.html import inline_picture, rendered
 from seakeep.report.style import COLOURS, axis_label, figure_style, new_figure, shown_unit
-from seakeep.signals.quality import FLAGS, LATE, Agreement
 from seakeep.signals.synchronisation import ASSUMED, Clock
+from seakeep.signals.time_axis import over_gaps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -184,9 +186,7 @@ def _broken(instants: Any, lags: Any) -> tuple[Any, Any]:
 
 def _mark(at: Any, time: Any, x: Any, flags: Any) -> None:
     seen = False
-    there = np.isfinite(x)
-    # A sample that is not there stands between its neighbours.
-    filled = np.interp(time, time[there], x[there]) if there.any() else np.zeros_like(time)
+    filled = over_gaps(x)  # a sample that is not there stands between its neighbours
     for word, bit in FLAGS.items():
         hit = (flags & bit) > 0
         if hit.any():

@@ -14,6 +14,7 @@ from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
 from seakeep.models.inputs import FittedAlignment
 from seakeep.signals import significant_height, wave_spectrum
+from seakeep.signals.waves import paper_welch
 from seakeep.study.fit import find_repeat
 from seakeep.study.judge import wave_frequency
 from seakeep.study.plan import Plan, between, training_samples, whole_span
@@ -34,10 +35,6 @@ POSITIVE = {
 }
 SLACK = 1e-3
 """A load below this part of its largest value counts as slack."""
-LONGEST_SEGMENT = 60.0
-"""s, of the recommended Welch segments; half of them overlaps."""
-PAPER_SEGMENT, PAPER_OVERLAP, PAPER_PADDED = 2**12 / 500, 2**7 / 500, 2**16 / 500
-"""s, of the paper's Welch settings, which it states in samples at 500 Hz."""
 
 
 def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset]:
@@ -264,20 +261,12 @@ def _spectra(plan: Plan, runs: Runs) -> xr.Dataset | None:
         x = run[waves[0]].sel(time=slice(begin - 1e-6, None)).values
         heights.append(significant_height(x))
         for kind in ("paper", "recommended"):
-            segment, overlap, padded = _welch(kind, x.size, plan.dt)
+            welch = paper_welch(plan.dt) if kind == "paper" else ()
             try:
-                frequency, density = wave_spectrum(x, plan.dt, segment, overlap, padded)
+                frequency, density = wave_spectrum(x, plan.dt, *welch)
             except RequestError:  # a record shorter than one segment
                 continue
             variables[f"{run_name}_{kind}_frequency"] = (f"{run_name}_{kind}", frequency)
             variables[f"{run_name}_{kind}_density"] = (f"{run_name}_{kind}", density)
     variables["significant_height"] = ("run", np.array(heights))
     return xr.Dataset(variables, coords={"run": list(runs)}, attrs={"channel": waves[0]})
-
-
-def _welch(kind: str, samples: int, dt: float) -> tuple[int, int, int | None]:
-    if kind == "paper":
-        segment = round(PAPER_SEGMENT / dt)
-        return segment, round(PAPER_OVERLAP / dt), round(PAPER_PADDED / dt)
-    segment = min(samples, round(LONGEST_SEGMENT / dt))
-    return segment, segment // 2, None
