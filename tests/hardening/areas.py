@@ -496,7 +496,7 @@ def contents(place: Path) -> Iterator[Case]:
         )
     places = ("filled", "final", "rows", "begins", "taken", "since", "partly", "complete")
     attrs = {"places": json.dumps(dict.fromkeys(places, 0)), "rig": "{}", "model": "x"}
-    arrays = ["u", "x", "y", "delayed", "direct", "gains", "precisions", "plain", "covariance",
+    arrays = ["u", "x", "y", "delayed", "direct", "gains", "whitenings", "plain", "covariance",
               "history", "innovation", "running", "noise"]  # fmt: skip
     yield from mutations("contents", "live", attrs, arrays, spoil_live)
     if (place / "results").exists():

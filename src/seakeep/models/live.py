@@ -144,7 +144,7 @@ class Live:
         size, variances = count * (s + 1), self._noise**2
         process = process_noise(errors.residual, self._a, variances)
         self._filter = DelayFilter(self._a, process, variances, np.zeros((size, size)))
-        self._precision_known = np.linalg.inv(process)
+        self._whitening_known = np.linalg.inv(np.linalg.cholesky(process))
         # Samples after an instant whose input is needed before its estimate is final.
         self._time, self._sum, self._weight = math.nan, 0.0, 0.0
         none = self._run(0, np.zeros((0, len(signature.inputs))))
@@ -161,7 +161,7 @@ class Live:
         self._kept = {name: np.full((room, width), np.nan) for name, width in widths.items()}
         slots = self._ahead + self._block + 1
         self._gains = np.zeros((slots, size, count))
-        self._precisions = np.zeros((slots, count, count))
+        self._whitenings = np.zeros((slots, count, count))
         self._plain = np.zeros(slots, dtype=bool)
         self._history = np.tile(signature.state_scale.centre, (s + 1, 1))
         self._innovation = np.full(count, np.nan)
@@ -360,7 +360,7 @@ class Live:
         plain = is_exact and place["since"] == 0 and at >= place["begins"]
         self._plain[slot] = plain
         if not plain:
-            self._gains[slot], self._precisions[slot] = self._updated(at, seen)
+            self._gains[slot], self._whitenings[slot] = self._updated(at, seen)
         place["complete"] = place["complete"] + 1 if is_exact else 0
         if place["complete"] > self.signature.state_delays:
             place["since"] = place["partly"] = 0
@@ -442,14 +442,14 @@ class Live:
     def _judge(self, slot: int, innovation: FloatArray) -> None:
         """Running normalised innovation squared."""
         self._innovation = innovation
-        precision = self._precision_known if self._plain[slot] else self._precisions[slot]
+        whitening = self._whitening_known if self._plain[slot] else self._whitenings[slot]
         told = np.where(np.isfinite(innovation), innovation, 0.0)
         number = np.count_nonzero(np.isfinite(innovation))
         if number:
             fade = 1.0 - 1.0 / CONSISTENCY
+            # A sum of squares: it may overflow, and is never negative.
             with np.errstate(over="ignore", invalid="ignore"):
-                square = float(told @ precision @ told) / number
-            # Not a number where it overflows.
+                square = float(np.sum((whitening @ told) ** 2)) / number
             self._sum = fade * self._sum + (square if square < SPIKE else SPIKE)
             self._weight = fade * self._weight + 1.0
 
@@ -665,7 +665,7 @@ class Live:
         }
         arrays |= {
             "gains": (("slot", "entry", "state"), self._gains),
-            "precisions": (("slot", "state", "other_state"), self._precisions),
+            "whitenings": (("slot", "state", "other_state"), self._whitenings),
             "plain": (("slot",), self._plain.astype(float)),
             "covariance": (("entry", "other_entry"), self._filter.covariance),
             "history": (("delay", "state"), self._history),
@@ -689,7 +689,7 @@ class Live:
         kept = {
             **self._kept,
             "gains": self._gains,
-            "precisions": self._precisions,
+            "whitenings": self._whitenings,
             "plain": self._plain,
             "covariance": self._filter.covariance,
             "history": self._history,
