@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from drifting import INPUTS, STATES, drifting_run
 from scipy import signal, stats
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import seakeep
 from seakeep import DataError, HankelDMDc, ProbeAlignment, RequestError, load_live
 from seakeep.models import growth, store
 from seakeep.models.growth import LeadErrors
+from seakeep.signals import predict_waves
 from seakeep.waves import group_speed
 
 START, STEPS = 500, 60  # the record that is kept holds all samples up to there
@@ -307,6 +309,44 @@ def test_a_lost_sample_takes_predicted_inputs(models, run):
     assert np.all(np.abs(found - expected) < 0.02 * models["plain"].state_scale.spread)
 
 
+def test_of_a_sample_what_is_missing_is_predicted_and_what_is_there_taken(models, run):
+    measured = matrix(run, INPUTS)
+    part, filled = models["plain"].live(), models["plain"].live()
+    for live in (part, filled):
+        play(live, run, 0, START)
+    expected, given = predict_waves(measured[:START], 1)[0], measured[START]
+    part.step({INPUTS[0]: given[0]}, matrix(run, STATES)[START])
+    filled.step([given[0], *expected[1:]], matrix(run, STATES)[START])
+    for live in (part, filled):
+        play(live, run, START + 1, START + 20, lost=range(START + 1, START + 20))
+    # Their effect on the states: the estimates of lost states, to the last bit.
+    np.testing.assert_array_equal(part.state, filled.state)
+
+
+def test_a_step_and_a_forecast_run_on_one_thread(models, run):
+    seen = []
+
+    def seen_by(values):
+        threads = {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+        seen.append(threads)
+        return values
+
+    class Sample(dict):
+        def get(self, key, default=None):
+            return seen_by(default)
+
+    class Rows:
+        def __array__(self, dtype=None, copy=None):
+            return seen_by(matrix(run, INPUTS)[START : START + 5])
+
+    live = started(models["plain"], run)
+    with threadpool_limits(2, user_api="blas"):
+        live.step(Sample())
+        live.forecast(5, Rows())
+        assert len(seen) > 2
+        assert all(each == {1} for each in seen)
+
+
 def test_lost_waves_are_those_that_the_probe_up_wave_has_seen(models, run):
     errors, rough, rng = [], run.copy(deep=True), np.random.default_rng(6)
     for name in INPUTS:
@@ -387,7 +427,7 @@ def test_samples_have_names_and_instants(models, run):
 BAD = {
     "y has shape": {"y": [1.0]},
     "u has shape": {"u": [0.0, 0.0, 0.0, 0.0, 0.0]},
-    "u holds a value of 'eta_fwd' that is not finite": {"u": {"eta_cog": 0.0}},
+    "u holds an infinite value. Give NaN for what was not": {"u": {INPUTS[1]: -np.inf}},
     "y names 'heav', which the model does not know. Did you mean 'heave'": {"y": {"heav": 1.0}},
     "y holds an infinite value": {"y": {"heave": np.inf}},
     "is not after the last sample at": {"time": 1.0},
@@ -418,7 +458,7 @@ def test_what_cannot_be_is_refused(models, ensemble, runs, run):
     live = model.live()
     with pytest.raises(RequestError, match="there are 0 samples of history and the model needs 13"):
         live.forecast(5)
-    with pytest.raises(RequestError, match="Start with at least 4 samples of u"):
+    with pytest.raises(RequestError, match="Start with at least 4 samples of all of u"):
         live.step()
     with pytest.raises(RequestError, match="noise names 'roll', which is not a state"):
         model.live(noise={"roll": 1.0})

@@ -34,6 +34,7 @@ from seakeep.errors import RequestError, did_you_mean
 from seakeep.models import engine, store
 from seakeep.models.checks import typed
 from seakeep.models.engine import Dynamics, Windows
+from seakeep.models.executor import one_blas_thread
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import WINDOWS, LeadErrors
 from seakeep.models.inputs import Chain, FittedAlignment, Measured
@@ -235,6 +236,7 @@ class Live:
     def _x(self) -> FloatArray:
         return self._kept["x"]
 
+    @one_blas_thread()
     def step(
         self,
         u: npt.ArrayLike | Mapping[str, float] | None = None,
@@ -246,11 +248,11 @@ class Live:
         Parameters
         ----------
         u : array_like, shape (Q,), or mapping of names to numbers, optional
-            Measured inputs at this instant, physical units. None where the sample was lost: its
-            inputs are predicted from those before, and from the probe up-wave where positions are
-            known.
+            Measured inputs at this instant, physical units. What is missing (NaN, or left out of
+            a mapping) is predicted from the samples before, and from the probe up-wave where
+            positions are known.
         y : array_like, shape (N,), or mapping of names to numbers, optional
-            Measured states at this instant, NaN for what is missing; a mapping may leave them out.
+            Measured states at this instant, with what is missing as in `u`.
         time : float, optional
             Instant of the sample, s, to check that none was left out. By default one step after
             the last; the first is 0.
@@ -263,17 +265,12 @@ class Live:
         Raises
         ------
         RequestError
-            If a length, a name or the time does not fit, or an input is not finite. Nothing has
+            If a length, a name or the time does not fit, or a value is infinite. Nothing has
             changed then, and the same sample can be given again.
         """
         signature = self.signature
         instant = self._instant(time)
-        states = _sample("y", y, signature.states)
-        if np.any(np.isinf(states)):
-            raise RequestError(
-                "y holds an infinite value. Give NaN for a state that was not measured."
-            )
-        inputs = self._inputs(u)
+        states, inputs = _sample("y", y, signature.states), self._inputs(u)
         self._make_room()
         at = self._at["filled"]
         self._kept["u"][at], self._kept["y"][at] = inputs, states
@@ -307,23 +304,15 @@ class Live:
         )
 
     def _inputs(self, u: npt.ArrayLike | Mapping[str, float] | None) -> FloatArray:
-        names, filled = self.signature.inputs, self._at["filled"]
-        if not names:
-            return _sample("u", u, names)
-        if u is None:
-            if filled < 4:
+        inputs = _sample("u", u, self.signature.inputs)
+        lost = np.isnan(inputs)
+        if lost.any():
+            if (filled := self._at["filled"]) < 4:
                 raise RequestError(
-                    f"the inputs of a lost sample are predicted from those before, and there are "
-                    f"{filled}. Start with at least 4 samples of u."
+                    f"inputs that are missing are predicted from the samples before, and there are "
+                    f"{filled}. Start with at least 4 samples of all of u."
                 )
-            return self._foreseen()
-        inputs = _sample("u", u, names)
-        if not np.all(np.isfinite(inputs)):
-            bad = names[int(np.flatnonzero(~np.isfinite(inputs))[0])]
-            raise RequestError(
-                f"u holds a value of '{bad}' that is not finite. Fill it first, or give u = None: "
-                "all inputs of the sample are predicted then."
-            )
+            inputs[lost] = self._foreseen()[lost]
         return inputs
 
     def _foreseen(self) -> FloatArray:
@@ -496,6 +485,7 @@ class Live:
             run[name].attrs["x_position"] = position
         return run
 
+    @one_blas_thread()
     def forecast(
         self,
         steps: int,
@@ -879,7 +869,7 @@ def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArra
 
 
 def _sample(name: str, value: object, names: Sequence[str]) -> FloatArray:
-    """One sample in the order of the model; NaN for what a mapping leaves out."""
+    """One sample in the order of the model, NaN for what is missing."""
     if value is None:
         return np.full(len(names), np.nan)
     if isinstance(value, Mapping):
@@ -896,4 +886,6 @@ def _sample(name: str, value: object, names: Sequence[str]) -> FloatArray:
             f"{name} has shape {array.shape}; one number for each of {', '.join(names) or 'none'} "
             f"is needed: shape ({len(names)},)."
         )
-    return array
+    if np.any(np.isinf(array)):
+        raise RequestError(f"{name} holds an infinite value. Give NaN for what was not measured.")
+    return array.copy()
