@@ -15,7 +15,7 @@ from seakeep.core.readouts import LinearHinges
 from seakeep.files import MARK, check_output, make_folder, replacing
 from seakeep.hosts.program import Program, program_of
 from seakeep.models import Model
-from seakeep.models.engine import GROWTH
+from seakeep.models.engine import GROWTH, fading
 from seakeep.models.observables import Formula, Product, Term
 
 if TYPE_CHECKING:
@@ -105,6 +105,7 @@ def sources(program: Program, name: str) -> dict[str, str]:
         "direct": code[False],
         "kernels": kernels,
         "growth": GROWTH,
+        "fade": fading(signature),
         "readouts": [
             {"column": each.column, "code": _hinges(each.function)}
             for each in signature.readouts
@@ -148,9 +149,8 @@ def _numbers(values: FloatArray) -> str:
 
 def _text(value: str) -> str:
     """Literal of C for any text."""
-    plain = (chr(byte) if chr(byte).isalnum() or byte in b" _/^.-" else f"\\{byte:03o}"
-             for byte in value.encode())  # fmt: skip
-    return '"' + "".join(plain) + '"'
+    escaped = re.sub(rb"[^\w /^.-]", lambda found: b"\\%03o" % ord(found[0]), value.encode())
+    return f'"{escaped.decode()}"'
 
 
 def _term(term: Term, kernels: list[FloatArray]) -> str:
