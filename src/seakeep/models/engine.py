@@ -486,7 +486,7 @@ def _excess(scales: Dynamics | Signature, windows: Windows) -> FloatArray:
             (scales.direct_scale, windows.direct),
         )
     )
-    found = np.maximum(delayed[:, scales.input_delays :], direct)
+    found: FloatArray = np.maximum(delayed[:, scales.input_delays :], direct)
     last, fade = delayed[:, : scales.input_delays].max(axis=1, initial=1.0), fading(scales)
     for now in found.T:
         last = now[:] = np.maximum(now, 1.0 + fade * (last - 1.0))
