@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.errors import MissingFileError, RequestError
-from seakeep.files import MARK, check_output, existing_file, replacing, write_netcdf
+from seakeep.errors import RequestError
+from seakeep.files import MARK, check_output, replacing, write_netcdf
 
 
 def test_a_file_appears_when_it_is_whole(tmp_path):
@@ -89,16 +89,6 @@ def test_a_link_stays_one(tmp_path):
     assert (tmp_path / "a.txt").read_text() == "new"
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="Linux makes such files")
-def test_a_file_that_the_system_makes_is_not_read(tmp_path):
-    """Some of them, such as /proc/kmsg, never end."""
-    made = Path("/proc/self/status")
-    with pytest.raises(MissingFileError, match="is empty, or made by the system while it is read"):
-        existing_file(made)
-    (tmp_path / "empty").touch()
-    assert existing_file(tmp_path / "empty") == tmp_path / "empty"
-
-
 def test_a_folder_in_the_place_of_the_file_is_named(tmp_path):
     with (
         pytest.raises(RequestError, match=r"it is a folder\. Name a file in it"),
@@ -152,17 +142,15 @@ FULL = """
 import json, resource, signal, sys
 from pathlib import Path
 import numpy as np, xarray as xr
-from seakeep.campaign import store as campaign
 from seakeep.errors import SeakeepError
-from seakeep.models import store as models
+from seakeep.files import write_sealed
 from seakeep.report import comparison
 from seakeep.study import store as study
 from seakeep.tank import delivery, hydrodynamics
 
 folder, run = Path(sys.argv[1]), xr.Dataset({"heave": ("time", np.random.rand(50_000))})
 writers = {
-    "campaign": lambda path: campaign._write(run, path),
-    "model": lambda path: models.write(run, path, "hankel_dmdc"),
+    "model": lambda path: write_sealed(run, path, "model"),
     "forecast": lambda path: comparison.write_forecast(run, path),
     "raw file": lambda path: delivery.write_dataset(run, path),
     "hydrodynamics": lambda path: hydrodynamics.save_hydrodynamics(run, path),
@@ -197,7 +185,7 @@ def test_whatever_is_written_as_netcdf_survives_a_disk_that_is_full(tmp_path):
         assert kind == "StorageError"
         assert "File too large" in words
         assert "Free space on the disk; the same command then continues" in words
-    assert len(told) == 5
+    assert len(told) == 4
     for kind, words in told.values():
         assert kind == "RequestError"
         assert "file.nc: File too large" in words

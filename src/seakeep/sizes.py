@@ -7,15 +7,10 @@ everywhere.
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING
 
-from seakeep.errors import DataError, RequestError, warn
+from seakeep.errors import RequestError, warn
 
-if TYPE_CHECKING:
-    import h5py
-
-__all__ = ["check_declared", "check_numbers", "check_size", "most_bytes", "too_large"]
+__all__ = ["check_numbers", "check_size", "too_large"]
 
 MOST_NUMBERS = 250_000_000
 """Numbers that a run, or the redrawn series of a bootstrap, hold at once: 1907 MiB."""
@@ -55,11 +50,6 @@ MOST_PRODUCTS = 2e10
 """Samples times wave components of the tank: some minutes of work per wave probe."""
 MOST_LAGS = 20_000
 """Steps of the tank's radiation kernel."""
-
-FREE = 2**28
-"""Bytes that a file may unpack to, for any size of the file."""
-EXPANSION = 100
-"""Times its own size that a larger file may unpack to; tables of numbers reach 10, constants 50."""
 
 
 def too_large(asked: str, count: float, most: float, what: str, mend: str) -> str | None:
@@ -104,46 +94,3 @@ def check_numbers(asked: str, count: float, mend: str, long: float = math.inf) -
     mebibytes = 8 / 2**20
     check_size(asked, mebibytes * count, round(mebibytes * MOST_NUMBERS), "MiB", mend,
                mebibytes * long)  # fmt: skip
-
-
-def most_bytes(stored: int) -> int:
-    """Bytes that so many stored bytes may unpack to."""
-    return max(FREE, EXPANSION * stored)
-
-
-def check_declared(path: Path | str, file: h5py.File, mend: str) -> None:
-    """Refuse an HDF5 file whose sets declare far more values than they store.
-
-    A set that was never filled takes no disk, and all of its memory once it is read.
-
-    Parameters
-    ----------
-    path : Path or str
-        What the message calls the file.
-    file : h5py.File
-        The file, open.
-    mend : str
-        The remedy.
-
-    Raises
-    ------
-    DataError
-        Of the first set that does, or if all of them together do.
-    """
-    found: list[tuple[int, int]] = []
-
-    def judge(asked: str, declared: int, stored: int) -> None:
-        if declared > most_bytes(stored):
-            raise DataError(
-                f"{path}: {asked} ({declared / 2**20:.0f} MiB), and {stored / 2**20:.3g} MiB are "
-                f"stored: it was never filled, or is damaged. {mend}"
-            )
-
-    def look(name: str, item: h5py.Dataset | h5py.Group) -> None:
-        if getattr(item, "size", None) is not None:  # no group, and no set without values
-            found.append((item.size * item.dtype.itemsize, item.id.get_storage_size()))
-            judge(f"'{name}' declares {item.size} values", *found[-1])
-
-    file.visititems(look)
-    declared, stored = (sum(each) for each in zip(*found, strict=True)) if found else (0, 0)
-    judge(f"its {len(found)} sets declare too much together", declared, stored)

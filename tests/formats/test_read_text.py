@@ -469,13 +469,6 @@ def test_an_open_quotation_mark(tmp_path):
         read_table(path)
 
 
-def test_a_gzip_that_unpacks_without_end(tmp_path, monkeypatch):
-    monkeypatch.setattr("seakeep.sizes.FREE", 2**20)
-    path = write(tmp_path, gzip.compress(bytes(2**24), mtime=0), "run.csv.gz")
-    with pytest.raises(DataError, match=r"unpacks to more than 2 MiB, over 100 times its size"):
-        read_table(path)
-
-
 @pytest.mark.parametrize("encoding", ["utf-9", "hex", "a\0b"])
 def test_encodings_that_do_not_exist(tmp_path, encoding):
     with pytest.raises(DataError, match=r"the encoding .* is not known\. Write 'utf-8'"):

@@ -327,17 +327,6 @@ def test_numbers_of_numpy_are_kept_in_a_file(run, tmp_path, changes):
     assert back.alignment == ensemble.alignment
 
 
-def test_a_damaged_file_is_refused(run, tmp_path):
-    ensemble = fitted(run)
-    damaged = ensemble.to_dataset().drop_vars("delayed_0")
-    path = seakeep.models.store.write(damaged, tmp_path / "e.nc", "bayesian_hankel_dmdc")
-    with pytest.raises(
-        DataError,
-        match=r"e.nc does not hold what seakeep writes: .*delayed_0.* Fit the model again",
-    ):
-        seakeep.load_model(path)
-
-
 def test_diverged_members_are_counted_and_left_out(run):
     ensemble = fitted(run)
     forecast = ensemble.forecast(run, start=65.0, steps=30)

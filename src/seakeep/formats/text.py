@@ -23,7 +23,6 @@ from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, warn
 from seakeep.formats.columns import Columns, is_unit, unique_names
 from seakeep.formats.reader import Options
-from seakeep.sizes import EXPANSION, most_bytes
 
 __all__ = ["read_text"]
 
@@ -108,20 +107,12 @@ def _unpacked(path: Path) -> bytes:
     raw = path.read_bytes()
     if not raw.startswith(b"\x1f\x8b"):
         return raw
-    limit = most_bytes(len(raw))
     try:
-        with gzip.open(io.BytesIO(raw)) as file:
-            unpacked = file.read(limit + 1)
+        return gzip.decompress(raw)
     except (EOFError, OSError, zlib.error) as error:
         raise DataError(
             f"{path} is cut off or damaged (gzip: {error}). Copy or download it again."
         ) from None
-    if len(unpacked) > limit:
-        raise DataError(
-            f"{path} unpacks to more than {limit / 2**20:.0f} MiB, over {EXPANSION} times its "
-            "size: no measured table does. Unpack it yourself if it is one."
-        )
-    return unpacked
 
 
 def _utf8(path: Path, raw: bytes, encoding: str | None) -> bytes:

@@ -15,7 +15,15 @@ from pydantic import TypeAdapter, ValidationError
 from seakeep.arrays import GREATEST
 from seakeep.errors import SHOWN, RequestError, did_you_mean, wanted
 
-__all__ = ["check_choice", "check_integer", "check_keys", "parsed", "settings_of", "typed"]
+__all__ = [
+    "check_choice",
+    "check_integer",
+    "check_keys",
+    "of_json",
+    "parsed",
+    "settings_of",
+    "typed",
+]
 
 Settings = TypeVar("Settings")
 Made = TypeVar("Made")
@@ -120,6 +128,12 @@ def check_keys(kind: type, table: Mapping[str, object], what: str = "") -> None:
             raise RequestError(f"{what}unknown key '{key}'.{near} {listed}")
     if missing := [key for key in needed if key not in table]:
         raise RequestError(f"{what}the key '{missing[0]}' is missing. {listed}")
+
+
+def of_json(kind: type[Made], content: Mapping[str, Any]) -> Made:
+    """Rebuild a dataclass from its fields as JSON values, those of dataclasses in it included."""
+    made: Made = _adapter(kind).validate_python(content)  # type: ignore[arg-type]
+    return made
 
 
 def parsed(text: str, name: str, greatest: float = GREATEST) -> Any:

@@ -25,8 +25,7 @@ from seakeep.models.calibration import (
     warn_of_horizon,
     widened,
 )
-from seakeep.models.checks import typed
-from seakeep.models.draws import MOST_REDRAWS, Draw
+from seakeep.models.draws import Draw
 from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
 from seakeep.models.executor import Progress, in_order, one_blas_thread
 from seakeep.models.forecasts import (
@@ -50,7 +49,6 @@ from seakeep.models.linear import HankelDMDcModel, Kept
 from seakeep.models.live import Live
 from seakeep.models.members import (
     TrainingArrays,
-    check_draw,
     identify_member,
     spectral_radius,
     window_ends,
@@ -743,67 +741,36 @@ class HankelEnsemble(_Forecasts, store.Saved):
         cls, dataset: xr.Dataset, signature: Signature, settings: HankelSettings, origin: Json
     ) -> HankelEnsemble:
         """Rebuild an ensemble from :meth:`to_dataset`; its members are equal to the last bit."""
-        place = typed(_Place, store.content(dataset, "runs"), "runs")
+        place = store.content(dataset, "runs")
         delayed, direct = signature.input_map.regressors(signature.input_labels)
         names = (
             tuple(signature.states),
             tuple(label.name for label in delayed),
             tuple(label.name for label in direct),
         )
-        series = [
-            tuple(
-                store.numbers(dataset, f"{group}_{number}", (None, len(channels)))
-                for number in range(len(place.names))
-            )
-            for group, channels in zip(("states", "delayed", "direct"), names, strict=True)
-        ]
+        states, delayed_series, direct_series = (
+            tuple(store.numbers(dataset, f"{group}_{run}") for run in range(len(place["names"])))
+            for group in ("states", "delayed", "direct")
+        )
         arrays = TrainingArrays(
-            names=place.names,
-            states=series[0],
-            delayed=series[1],
-            direct=series[2],
-            offsets=place.offsets,
-            begins=place.begins,
+            names=tuple(place["names"]),
+            states=states,
+            delayed=delayed_series,
+            direct=direct_series,
+            offsets=tuple(place["offsets"]),
+            begins=tuple(place["begins"]),
             channels=names,
         )
-        if len({len(arrays.names), len(arrays.offsets), len(arrays.begins)}) != 1:
-            raise ValueError("runs, offsets and instants are of unequal number")
-        if min(arrays.offsets, default=0) < 0 or not np.all(np.isfinite(arrays.begins)):
-            raise ValueError("offsets or instants of the runs are none")
-        draws = _draws(dataset)
-        if origin.get("n_members", len(draws)) != len(draws):
-            raise ValueError(f"n_members is {origin['n_members']}, and {len(draws)} members follow")
-        store.check_settings(settings, signature, delays=False)
-        for number, draw in enumerate(draws):
-            try:
-                check_draw(arrays, settings, signature.input_map, draw)
-            except ValueError as error:
-                raise ValueError(f"member {number}: {error}") from None
-        for key in ("state_delays", "input_delays"):
-            longest = max(getattr(draw, key) for draw in draws)
-            if longest != getattr(signature, key):
-                raise ValueError(f"{key} of the members reach {longest}, not those stated")
         return cls(
             settings=settings,
             origin=origin,
-            members=draws,
+            members=_draws(dataset),
             arrays=arrays,
             signature=signature,
             coverage=Coverage.from_dataset(dataset, signature),
-            calibration=Calibration.from_json(
-                store.document(dataset, "calibration"), len(signature.state_labels)
-            ),
+            calibration=Calibration.from_json(store.content(dataset, "calibration")),
             selection=str(dataset.attrs["selection"]),
         )
-
-
-@dataclass(frozen=True)
-class _Place:
-    """What a file holds of the runs that train."""
-
-    names: tuple[str, ...]
-    offsets: tuple[int, ...]
-    begins: tuple[float, ...]
 
 
 def _radius(ensemble: HankelEnsemble, number: int) -> float:
@@ -987,21 +954,12 @@ def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Data
 
 
 def _draws(dataset: xr.Dataset) -> tuple[Draw, ...]:
-    columns: dict[str, list[Any]] = {}
-    for name in (*DRAWN, *ROUNDED):
-        found = dataset[name]
-        if found.dims != ("member",) or found.dtype.kind not in ("i" if name in ROUNDED else "f"):
-            raise ValueError(f"{name} is {found.dtype} over {found.dims}, not a number per member")
-        columns[name] = found.values.tolist()
+    columns = {name: dataset[name].values.tolist() for name in DRAWN}
     for name, (attribute, _) in ROUNDED.items():
-        values = columns.pop(name)
-        most = MOST_REDRAWS - 1 if name == "redrawn" else np.inf
-        for number, value in enumerate(values):
-            if value > most or (value < 0 and attribute not in OPTIONAL):
-                raise ValueError(f"{name} of member {number} is {value}")
-        columns[attribute] = [
-            None if each < 0 and attribute in OPTIONAL else each for each in values
-        ]
+        values = dataset[name].values.tolist()
+        if attribute in OPTIONAL:
+            values = [None if each < 0 else each for each in values]
+        columns[attribute] = values
     return tuple(
         Draw(**dict(zip(columns, each, strict=True)))
         for each in zip(*columns.values(), strict=True)

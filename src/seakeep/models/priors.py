@@ -14,7 +14,6 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from seakeep.errors import SHOWN, DataError, RequestError
-from seakeep.models.checks import typed
 
 __all__ = ["Fixed", "LogUniform", "Prior", "Uniform", "check_prior", "describe", "from_description"]
 
@@ -176,14 +175,6 @@ def describe(prior: Prior | None) -> dict[str, Any] | None:
     return {"prior": f"scipy.stats.{distribution}", "args": args, "kwds": kwds}
 
 
-@dataclass(frozen=True)
-class _Frozen:
-    """What a file holds of a distribution of SciPy."""
-
-    args: list[float]
-    kwds: dict[str, float]
-
-
 def from_description(setting: str, content: object) -> Prior | None:
     """Rebuild the prior of a setting from :func:`describe`; DataError for what is not known."""
     if content is None:
@@ -196,7 +187,8 @@ def from_description(setting: str, content: object) -> Prior | None:
     name = str(content["prior"])
     own: dict[str, Any] = {each.__name__: each for each in (Uniform, LogUniform, Fixed)}
     if name in own:
-        made: Prior = typed(own[name], content, setting)
+        bounds = {key: value for key, value in content.items() if key != "prior"}
+        made: Prior = own[name](**bounds)
         return made
     from scipy import stats
 
@@ -205,9 +197,5 @@ def from_description(setting: str, content: object) -> Prior | None:
         raise DataError(
             f"{setting}: the prior '{name:.{SHOWN}}' is not known here. Update seakeep or SciPy."
         )
-    kept = typed(_Frozen, content, setting)
-    try:
-        frozen: Prior = distribution(*kept.args, **kept.kwds)
-    except TypeError:
-        raise ValueError(f"{setting}: '{name}' takes other parameters than the file has") from None
+    frozen: Prior = distribution(*content["args"], **content["kwds"])
     return frozen

@@ -12,7 +12,7 @@ import xarray as xr
 
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled, store
-from seakeep.models.checks import check_choice, check_keys, typed
+from seakeep.models.checks import check_choice, check_keys
 from seakeep.models.draws import Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.executor import Progress
@@ -365,8 +365,6 @@ def _around_any(
 
 
 PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
-LONGEST_SEED = 100
-"""Digits of a seed; the entropy of NumPy has 39."""
 WINDOW = Uniform(60, 120)
 """Encounter periods that a member learns from where runs are long.
 
@@ -562,14 +560,9 @@ class BayesianHankelDMDc:
     def from_json(cls, content: Json) -> Self:
         """Settings from :meth:`to_json`; an unknown key or a value out of range raises an error."""
         stated = dict(content)
-        spawn_key = typed(list[int], stated.pop("spawn_key", None), "spawn_key")
+        spawn_key = stated.pop("spawn_key")
         check_keys(cls, stated)
-        entropy = str(stated.pop("seed", None))
-        if not (entropy.isdecimal() and len(entropy) <= LONGEST_SEED):
-            raise RequestError(
-                f"seed: received {entropy!r:.{SHOWN}}, which should be a whole number"
-            )
-        seed = np.random.SeedSequence(int(entropy), spawn_key=spawn_key)
+        seed = np.random.SeedSequence(int(stated.pop("seed")), spawn_key=spawn_key)
         stated |= {
             name: from_description(name, stated[name])
             for name in PRIORS
