@@ -1,5 +1,7 @@
 """A model in service: estimates, forecasts and states to go on from, sample by sample."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from drifting import INPUTS, STATES, drifting_run
@@ -10,6 +12,7 @@ import seakeep
 from seakeep import HankelDMDc, ProbeAlignment, RequestError, load_live
 from seakeep.models import growth
 from seakeep.models.growth import LeadErrors
+from seakeep.models.live import LEAST_RECORD
 from seakeep.signals import predict_waves
 from seakeep.waves import group_speed
 
@@ -194,6 +197,38 @@ def test_consistency_is_one_as_in_training_and_rises_with_another_vessel(models,
     assert live.consistency > 3
 
 
+def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(make_dataset):
+    """Of two states that each follow x' = .98 x + b u + w, one is pushed by .7 SD of w for good."""
+
+    def sea(seed, push, samples=3000):
+        rng = np.random.default_rng(seed)
+        wave, noise = rng.standard_normal(samples), rng.standard_normal((samples, 2))
+        forced = 0.5 * wave[:, None] + noise + [push, 0.0]
+        x = signal.lfilter([0.0, 1.0], [1.0, -0.98], forced, axis=0)
+        time = 0.1 * np.arange(samples)
+        return make_dataset(time, surge=x[:, 0], heave=x[:, 1], eta_fwd=wave)
+
+    model = HankelDMDc(0, 0, 1e-6, delay_rows="exact").fit(
+        sea(1, 0.0, 20_000), ["surge", "heave"], ["eta_fwd"]
+    )
+    found = {}
+    for push in (0.0, 0.7):
+        live, run = model.live(), sea(2, push)
+        for u, y in zip(run["eta_fwd"].values, matrix(run, ["surge", "heave"]), strict=True):
+            live.step([u], y)
+        found[push] = live.consistency, live.consistency_by_state
+    # 256 squares of a normal number have a mean of 1 ± 0.09 (SD); those of free runs, which are
+    # alike within some dozens of samples, of 1 ± 0.4.
+    assert found[0.0][0] == pytest.approx(1.0, abs=0.3)
+    np.testing.assert_allclose(found[0.0][1][0], 1.0, atol=0.3)
+    assert np.all((found[0.0][1][1] > 0.2) & (found[0.0][1][1] < 2.2))
+    np.testing.assert_allclose(found[0.7][1][0], [1.49, 1.0], atol=0.4)
+    # At a lead of 64: 0.49 (1 − .98⁶⁴)² / .02² of the push over (1 − .98¹²⁸) / .0396 of w.
+    surge, heave = found[0.7][1][1]
+    assert surge > 5 > 2.2 > heave > 0.2
+    assert found[0.7][0] == pytest.approx((1.49 + 1.0) / 2, abs=0.4)
+
+
 @pytest.mark.parametrize("value", [9.97e36, 1e200])
 def test_a_spike_is_forgotten_by_the_consistency(models, run, value):
     live = started(models["plain"], run)
@@ -372,7 +407,9 @@ def test_a_restarted_process_goes_on_bit_for_bit(models, run, tmp_path, key):
     np.testing.assert_array_equal(again.state, live.state)
     np.testing.assert_array_equal(again.covariance, live.covariance)
     np.testing.assert_array_equal(again.innovation, live.innovation)
-    assert (again.time, again.consistency) == (live.time, live.consistency)
+    assert again.time == live.time
+    np.testing.assert_array_equal(again.consistency_by_state, live.consistency_by_state)
+    assert again.consistency == live.consistency
     np.testing.assert_array_equal(mean(again.forecast(20)), mean(live.forecast(20)))
 
 
@@ -386,9 +423,17 @@ def test_what_is_kept_does_not_grow_and_does_not_count(models, run, tmp_path):
     model = models["plain"]
     live = started(model, run)
     size = live.save(tmp_path / "a.nc").stat().st_size
+    tracemalloc.start()
     for _ in range(3):
         play(live, run, 0, START)
-    assert live.save(tmp_path / "b.nc").stat().st_size < 1.2 * size
+        assert live.save(tmp_path / "b.nc").stat().st_size < 1.1 * size  # the head's numbers grow
+    before = tracemalloc.get_traced_memory()[0]
+    play(live, run, 0, START)
+    # Python's own caches; arrays of what came since would hold 500 rows of 4 numbers.
+    assert tracemalloc.get_traced_memory()[0] - before < 8 * 4 * 500
+    tracemalloc.stop()
+    kept = LEAST_RECORD * 8 * len(INPUTS)  # waves to come are predicted from; the rest is short
+    assert kept < size < kept + 12_000
     found = live.forecast(STEPS, matrix(run, INPUTS)[START:])
     expected = started(model, run).forecast(STEPS, matrix(run, INPUTS)[START:])
     np.testing.assert_array_equal(mean(found), mean(expected))

@@ -70,8 +70,9 @@ class DelayFilter:
         factor = np.sqrt(variances / np.maximum(found, np.finfo(float).tiny))
         if not exactly:
             factor = np.minimum(factor, 1.0)
-        self.covariance[newest] *= factor[:, None]
-        self.covariance[:, newest] *= factor
+        rows = self.covariance[newest] * factor[:, None]
+        rows[:, newest] = self.covariance[newest, newest] * np.outer(factor, factor)
+        self.covariance[newest], self.covariance[:, newest] = rows, rows.T  # exactly symmetric
 
     def measure(self, seen: BoolArray) -> tuple[FloatArray, FloatArray]:
         """Update by the rows that were measured.
