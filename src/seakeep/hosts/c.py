@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -21,7 +22,7 @@ from seakeep.models.observables import Formula, Product, Term
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-__all__ = ["identifier", "rendered", "sources", "write_c"]
+__all__ = ["content_of", "identifier", "rendered", "sources", "write_c", "write_sources"]
 
 KIND = "C source"
 OPERATORS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
@@ -56,8 +57,12 @@ def write_c(model: Model, folder: str | Path, name: str = "rom") -> list[Path]:
     Numbers are written in hexadecimal, so that none is rounded. ``cc -std=c99 -Wall -Werror``
     compiles the code without a warning.
     """
-    made = sources(program_of(model), identifier(name))
-    targets = {make_folder(Path(folder)) / file: text for file, text in made.items()}
+    return write_sources(sources(program_of(model), identifier(name)), folder)
+
+
+def write_sources(texts: Mapping[str, str], folder: str | Path) -> list[Path]:
+    """Write C files; raises as :func:`write_c`."""
+    targets = {make_folder(Path(folder)) / file: text for file, text in texts.items()}
     for target in targets:
         check_output(target, KIND)
     for target, text in targets.items():
@@ -74,12 +79,18 @@ def identifier(name: str) -> str:
 
 def sources(program: Program, name: str) -> dict[str, str]:
     """Text of the C files by their names."""
+    content = content_of(program, name)
+    return {f"{name}.{end}": rendered(f"model.{end}", **content) for end in ("h", "c")}
+
+
+def content_of(program: Program, name: str) -> dict[str, Any]:
+    """What the templates of C show of a model."""
     signature = program.model.signature
     n, m = program.sizes
     kernels: list[FloatArray] = []
     terms = {delayed: program.terms(delayed) for delayed in (True, False)}
     code = {key: [_term(each, kernels) for each in found] for key, found in terms.items()}
-    content: dict[str, Any] = {
+    return {
         "name": name,
         "upper": name.upper(),
         "mark": f"{MARK}: {KIND}, written by seakeep {metadata.version('seakeep')}:",
@@ -112,7 +123,6 @@ def sources(program: Program, name: str) -> dict[str, str]:
             if each.function is not None
         ],
     }
-    return {f"{name}.{end}": rendered(f"model.{end}", **content) for end in ("h", "c")}
 
 
 def rendered(template: str, **content: Any) -> str:

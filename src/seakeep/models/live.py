@@ -257,6 +257,18 @@ class Live:
         return found
 
     @property
+    def equations(self) -> dict[str, Any]:
+        """What the filter computes with, for hosts: x' = offset + a x̂ + b û, blocks oldest first.
+
+        Variances of process and measurement noise, mean and spread of the states, errors of free
+        runs by lead, and the samples of input that waves to come are predicted from.
+        """
+        scale, noises = self.signature.state_scale, {"process": self._filter.process}
+        noises |= {"noise": self._filter.noise, "errors": self.errors.rms}
+        moments = {"centre": scale.centre, "spread": scale.spread, "record": self._record}
+        return {"a": self._a, "b": self._b, "offset": self._offset} | noises | moments
+
+    @property
     def _last(self) -> int:
         return self._at["filled"] - 1
 
