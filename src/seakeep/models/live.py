@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
@@ -62,8 +62,6 @@ SPIKE = 100.0
 """What a single sample adds to the consistency at most: a spike tells of a sensor, for a while."""
 RIG = ("water_depth", "celerity", "probe_offset")
 """Attributes of a run that an alignment reads."""
-Judge = Callable[[int, int, FloatArray], None]
-"""Takes the place of a sample in the record, its slot, and its innovation."""
 
 
 class Servable(Protocol):
@@ -251,9 +249,8 @@ class Live:
         return self._mean_squares()[1:].reshape(2, -1)
 
     def _mean_squares(self) -> FloatArray:
-        total, weight = self._squares
-        found = np.full(total.size, np.nan)
-        np.divide(total, weight, out=found, where=weight > 0)
+        with np.errstate(invalid="ignore"):  # 0/0 before the first
+            found: FloatArray = self._squares[0] / self._squares[1]
         return found
 
     @property
@@ -414,14 +411,14 @@ class Live:
         """Bring estimates up to the sample `at`: final ones, then those that waves to come move."""
         place = self._at
         if at < place["begins"]:
-            self._advance(self._history, at, at, None)
+            self._advance(self._history, at, at)
             place["final"] = at
             return
         final = at - max(self._ahead - 1, 0)
         if final - place["final"] >= self._block:
             self._find_rows(final, self._known_inputs())
             place["rows"] = final
-            self._advance(self._history, place["final"] + 1, final, self._judge)
+            self._advance(self._history, place["final"] + 1, final, is_final=True)
             place["final"] = final
         if place["final"] == at:
             return
@@ -433,9 +430,11 @@ class Live:
         if self._ahead and self.signature.inputs:
             known = np.concatenate([known, predict_waves(known, self._ahead)])
         self._find_rows(at, known)
-        self._advance(self._history.copy(), place["final"] + 1, at, None)
+        self._advance(self._history.copy(), place["final"] + 1, at)
 
-    def _advance(self, history: FloatArray, first: int, last: int, judge: Judge | None) -> None:
+    def _advance(
+        self, history: FloatArray, first: int, last: int, *, is_final: bool = False
+    ) -> None:
         """Run the mean through samples, with the gains that were found for them."""
         place, s = self._at, self.signature.state_delays
         for at in range(first, last + 1):
@@ -456,8 +455,8 @@ class Live:
                 history[-1][exact] = measured[exact]
             first_kept = max(at - s, 0)
             self._x[first_kept : at + 1] = history[first_kept - at - 1 :]
-            if judge is not None:
-                judge(at, slot, innovation)
+            if is_final:
+                self._judge(at, slot, innovation)
 
     def _predicted(self, history: FloatArray, at: int) -> FloatArray:
         """One-step prediction from the sample `at`."""
