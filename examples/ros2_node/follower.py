@@ -55,7 +55,7 @@ class Follower:
         self._check_clock(now)
         if not isfinite(value):
             self.lost[channel, "not finite"] += 1
-        elif now - stamp > self.patience or (self.steps and stamp < self._next() - self.dt / 2):
+        elif now - stamp > self.patience:
             self.lost[channel, "late"] += 1
         elif stamp - now > self.patience:
             self.lost[channel, "early"] += 1

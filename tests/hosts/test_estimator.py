@@ -75,10 +75,12 @@ def samples(make_run, lost_inputs):
     """Inputs and states of a run, of which some are lost: at random, one, all, and for long."""
     run, rng = make_run(COUNT, 5), np.random.default_rng(3)
     u, y = (np.stack([run[name].values for name in of], axis=1) for of in (INPUTS, STATES))
-    y[rng.uniform(size=y.shape) < 0.1] = np.nan
+    lost = rng.uniform(size=y.shape) < 0.1
+    lost[280:300] = False  # what follows is blind
+    y[lost] = np.nan
     y[:8], y[200:260, 0], y[300:380] = np.nan, np.nan, np.nan
     if lost_inputs:
-        u[[400, 401, 402], 1], u[450] = np.nan, np.nan
+        u[[30, 400, 401, 402], 1], u[450] = np.nan, np.nan
     return u, y
 
 
@@ -109,6 +111,16 @@ def test_each_estimate_and_forecast_is_that_of_the_live_model(
     assert status == 0
     expected = np.stack([expected[each] for each in STATES], axis=1)
     np.testing.assert_allclose(forecast, expected, **close)
+
+
+def test_a_probe_that_stands_still_is_predicted_to(library, model):
+    live, found = model.live(), Estimator(library, "exact")
+    for at in range(12):
+        u = np.full(2, 0.25 if at < 8 else np.nan)  # no rounding hides 0/0
+        assert found.step(u, np.full(2, 0.1 * at)) == 0
+        live.step(u, np.full(2, 0.1 * at))
+    found.step(np.zeros(2), np.full(2, np.nan))  # reads the inputs that were predicted
+    np.testing.assert_allclose(found.state, live.step(np.zeros(2)), rtol=0, atol=1e-12)
 
 
 def test_a_bad_sample_leaves_the_estimator_as_it_was(library):
