@@ -114,28 +114,20 @@ def test_a_lack_of_permission_gets_its_own_mend(tmp_path):
         raise PermissionError(13, os.strerror(13))
 
 
-def test_a_netcdf_file_holds_root_and_groups_packed_as_asked(tmp_path):
+def test_a_netcdf_file_is_packed_as_asked(tmp_path):
     values = np.random.default_rng(0).standard_normal(5000)
     heave = xr.Dataset(
         {"heave": ("time", values, {"units": "m"}), "flag": ("time", values > 0)},
         coords={"time": 0.1 * np.arange(5000)},
         attrs={"name": "Mörkö", "span": (1.0, 2.0)},
     )
-    root, path = xr.Dataset(attrs={"format": 3}), tmp_path / "a.nc"
-    groups = {"prepared/one": heave, "prepared/two": heave.isel(time=slice(7))}
-    write_netcdf(path, root, groups, lambda each: {key: {"zlib": True} for key in each.data_vars})
-    assert xr.load_dataset(path, engine="h5netcdf").attrs == {"format": 3}
-    for name, group in groups.items():
-        found = xr.load_dataset(path, engine="h5netcdf", group=name)
-        xr.testing.assert_equal(found, group)
-        assert found["heave"].encoding["zlib"]
-        assert found["heave"].attrs == {"units": "m"}
-        assert found.attrs["name"] == "Mörkö"
-    write_netcdf(tmp_path / "b.nc", xr.Dataset(attrs={"format": 4}), onto=path)
-    assert xr.load_dataset(path, engine="h5netcdf").attrs == {"format": 3}
-    assert xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf").attrs == {"format": 4}
-    found = xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf", group="prepared/two")
-    xr.testing.assert_equal(found, groups["prepared/two"])
+    write_netcdf(tmp_path / "a.nc", heave, {"heave": {"zlib": True}})
+    found = xr.load_dataset(tmp_path / "a.nc", engine="h5netcdf")
+    xr.testing.assert_equal(found, heave)
+    assert found["heave"].encoding["zlib"]
+    assert not found["flag"].encoding["zlib"]
+    assert found["heave"].attrs == {"units": "m"}
+    assert found.attrs["name"] == "Mörkö"
 
 
 FULL = """

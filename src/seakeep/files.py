@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import difflib
 import errno
+import functools
 import hashlib
 import io
 import os
 import re
 import secrets
 import stat
-import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
@@ -54,15 +54,6 @@ SEAL = b"seakeep SHA-256 "
 
 SHOWN = 5
 """Names of a folder that a message lists at most."""
-
-SETTLED = 2.0
-"""Seconds for which a file must have been left alone before its checksum is remembered.
-
-Within the resolution of a file system's clock, 2 s at worst (FAT), a second change leaves the times
-of a file as they were.
-"""
-
-_SUMS: dict[Path, tuple[tuple[int, ...], str]] = {}
 
 
 def existing_file(path: Path | str) -> Path:
@@ -171,17 +162,16 @@ def sha256_of(path: Path) -> str:
     MissingFileError
         As :func:`reading`.
     """
-    with reading(path) as place, place.open("rb") as file:
-        found = os.fstat(file.fileno())
-        state = found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
-        known = _SUMS.get(path)
-        if known is not None and known[0] == state:
-            return known[1]
-        started = time.time_ns()
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    if max(found.st_mtime_ns, found.st_ctime_ns) < started - SETTLED * 1e9:
-        _SUMS[path] = state, digest
-    return digest
+    with reading(path) as place:
+        state = place.stat()
+        return _sum(place, state.st_ino, state.st_size, state.st_mtime_ns, state.st_ctime_ns)
+
+
+@functools.cache
+def _sum(path: Path, *state: int) -> str:
+    """Checksum of a file in a state."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def expanded(path: str | Path) -> Path:
@@ -285,9 +275,7 @@ def replacing(path: Path) -> Iterator[Path]:
 def write_netcdf(
     path: Path,
     dataset: xr.Dataset,
-    groups: Mapping[str, xr.Dataset] | None = None,
-    packing: Callable[[xr.Dataset], Mapping[Any, Mapping[str, Any]]] | None = None,
-    onto: Path | None = None,
+    encoding: Mapping[Any, Mapping[str, Any]] | None = None,
 ) -> None:
     """Write a NetCDF file with a checksum at its end, which :func:`read_sealed` compares.
 
@@ -299,29 +287,22 @@ def write_netcdf(
     path : Path
         The file, such as :func:`replacing` gives it; overwritten.
     dataset : Dataset
-        What goes into the root of the file.
-    groups : mapping of str to Dataset, optional
-        What goes into groups, by their names.
-    packing : callable, optional
-        Gives the encoding of the variables of a Dataset, such as their compression.
-    onto : Path, optional
-        A NetCDF file whose content is copied first.
+        What goes into it.
+    encoding : mapping, optional
+        Encoding of variables by their names, such as their compression.
 
     Raises
     ------
     OSError
-        If a file cannot be read or written; :func:`replacing` puts it into words.
+        If it cannot be written; :func:`replacing` puts it into words.
     """
     # Here, so that commands that write no such file start without HDF5.
     import h5netcdf
     from xarray.backends import H5NetCDFStore
 
-    made = io.BytesIO(b"" if onto is None else _content(onto.read_bytes())[0])
-    parts = [(None, dataset), *(groups or {}).items()]
-    with h5netcdf.File(made, "w" if onto is None else "r+") as file:
-        for name, each in parts:
-            encoding = {} if packing is None else packing(each)
-            each.dump_to_store(H5NetCDFStore(file, group=name, mode="a"), encoding=encoding)
+    made = io.BytesIO()
+    with h5netcdf.File(made, "w") as file:
+        dataset.dump_to_store(H5NetCDFStore(file, mode="a"), encoding=encoding or {})
     _seal(path, made)
 
 
@@ -391,21 +372,17 @@ def write_sealed(
     dataset: xr.Dataset,
     path: Path | str,
     kind: str,
-    groups: Mapping[str, xr.Dataset] | None = None,
-    packing: Callable[[xr.Dataset], Mapping[Any, Mapping[str, Any]]] | None = None,
 ) -> Path:
     """Write a file of ours: NetCDF with its kind, its format and a checksum.
 
     Parameters
     ----------
     dataset : Dataset
-        What goes into the root of the file.
+        What goes into it.
     path : Path or str
         The file; an earlier one of the same kind is replaced.
     kind : str
         What it is, such as ``"model"``.
-    groups, packing
-        As in :func:`write_netcdf`.
 
     Returns
     -------
@@ -420,7 +397,7 @@ def write_sealed(
     target = Path(path)
     check_output(target, kind)
     with replacing(target) as temporary:
-        write_netcdf(temporary, dataset.assign_attrs(_head(kind)), groups, packing)
+        write_netcdf(temporary, dataset.assign_attrs(_head(kind)))
     return target
 
 
@@ -461,7 +438,7 @@ def load_sealed(path: Path | str, kind: str) -> xr.Dataset:
     Returns
     -------
     Dataset
-        The root of the file, without kind and format.
+        What was written.
 
     Raises
     ------

@@ -20,18 +20,12 @@ LONG_MATRIX = 3000**2
 """Numbers of a model's matrix whose eigenvalues take a minute."""
 LEAST_PERIODS, MOST_PERIODS = 1e-6, 1e6
 """Encounter periods of a free run, and seconds of one: beyond them numbers of samples overflow."""
-MOST_CHANNELS = 1000
-"""Channels of a campaign: each is checked, drawn and written, some hundredths of a second long."""
-MOST_MEMBERS, LONG_MEMBERS = 1_000_000, 100_000
-"""Members of an ensemble: their list of draws alone fills the memory, or a fit takes an hour."""
 MOST_CELLS, LONG_CELLS = 100_000_000, 1_000_000
 """Forecasts of a study, each of some milliseconds: a week of work, or hours."""
 MOST_SERIES = 100_000
 """Redrawn series of a study: 400 MB of densities."""
 MOST_TAPS = 100_000
 """Forty times the paper's filter; a kernel of this length takes 0.2 GB when it is tabulated."""
-MOST_TRANSFORM = 2**24
-"""Points of a padded transform: 0.3 GB; the paper takes 2**16."""
 MOST_BINS = 2**21
 """Bins of a density, and points of a grid, that fit into 16 MB; finer ones are summed directly."""
 MOST_PLACES = 100_000
@@ -40,10 +34,6 @@ MOST_TERMS = 4000
 """Polynomials in the distance of a carried wave: each takes as much memory as the record."""
 MOST_PADDING = 10_000_000
 """Samples by which a record is continued at either end: 80 MB each."""
-MOST_AHEAD = 1_000_000
-"""Samples of waves that are predicted: the prediction fades within some periods."""
-MOST_UNROLLED = 100_000
-"""Steps of an ONNX graph, which holds each of them: 30 MB, and 0.1 GB while it is made."""
 MOST_STEPS = 10_000_000
 """Samples per column of a raw file of the tank, and steps of a simulated run: 80 MB per column."""
 MOST_PRODUCTS = 2e10

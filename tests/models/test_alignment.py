@@ -263,9 +263,9 @@ def test_a_gap_in_the_surge_is_named_in_a_forecast(models):
 def aligned_ensemble(runs, **alignment):
     return BayesianHankelDMDc(
         encounter_period=2.0,
-        train_length=Uniform(15, 25),
-        state_delay=Uniform(0.4, 0.8),
-        input_delay=Uniform(1, 3),
+        window=Uniform("15 T", "25 T"),
+        state_delays=Uniform("0.4 T", "0.8 T"),
+        input_delays=Uniform("1 T", "3 T"),
         ridge=Fixed(1e-3),
         n_members=3,
         delay_rows="exact",

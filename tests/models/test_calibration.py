@@ -40,9 +40,9 @@ def run():
 def ensemble(run):
     spec = seakeep.BayesianHankelDMDc(
         encounter_period=1.6,
-        train_length=seakeep.Uniform(10, 16),
-        state_delay=seakeep.Uniform(0.2, 0.6),
-        input_delay=seakeep.Uniform(0.5, 1.5),
+        window=seakeep.Uniform("10 T", "16 T"),
+        state_delays=seakeep.Uniform("0.2 T", "0.6 T"),
+        input_delays=seakeep.Uniform("0.5 T", "1.5 T"),
         ridge=seakeep.Uniform(200, 400),
         n_members=8,
         seed=1,
@@ -169,9 +169,9 @@ def test_another_run_is_used_whole(ensemble):
 def test_windows_leave_room_for_the_look_ahead():
     spec = seakeep.BayesianHankelDMDc(
         encounter_period=1.6,
-        train_length=seakeep.Fixed(15),
-        state_delay=seakeep.Fixed(0.4),
-        input_delay=seakeep.Fixed(1.0),
+        window=seakeep.Fixed("15 T"),
+        state_delays=seakeep.Fixed("0.4 T"),
+        input_delays=seakeep.Fixed("1.0 T"),
         ridge=seakeep.Uniform(200, 400),
         n_members=3,
         lead=10,
@@ -197,9 +197,9 @@ def unnamed(run):
 def test_runs_without_names_are_known_by_their_samples(run):
     spec = seakeep.BayesianHankelDMDc(
         encounter_period=1.6,
-        train_length=seakeep.Uniform(10, 16),
-        state_delay=seakeep.Fixed(0.5),
-        input_delay=seakeep.Fixed(1.0),
+        window=seakeep.Uniform("10 T", "16 T"),
+        state_delays=seakeep.Fixed("0.5 T"),
+        input_delays=seakeep.Fixed("1.0 T"),
         ridge=seakeep.Fixed(300.0),
         n_members=2,
     )
@@ -262,9 +262,9 @@ def test_a_file_keeps_the_calibration(calibrated, moved, learnt, ensemble, run, 
 def pooled(train_on, runs):
     spec = seakeep.BayesianHankelDMDc(
         encounter_period=1.6,
-        train_length=None,
-        state_delay=seakeep.Uniform(0.2, 0.6),
-        input_delay=seakeep.Uniform(0.5, 1.5),
+        window=None,
+        state_delays=seakeep.Uniform("0.2 T", "0.6 T"),
+        input_delays=seakeep.Uniform("0.5 T", "1.5 T"),
         ridge=seakeep.Uniform(200, 400),
         n_members=6,
         seed=1,

@@ -55,9 +55,9 @@ def models(runs):
 def ensemble(runs):
     return seakeep.BayesianHankelDMDc(
         encounter_period=1.6,
-        train_length=None,
-        state_delay=seakeep.Uniform(0.2, 0.6),
-        input_delay=seakeep.Uniform(0.5, 1.5),
+        window=None,
+        state_delays=seakeep.Uniform("0.2 T", "0.6 T"),
+        input_delays=seakeep.Uniform("0.5 T", "1.5 T"),
         ridge=seakeep.Uniform(1, 10),
         n_members=4,
         delay_rows="exact",

@@ -40,9 +40,9 @@ def ensemble(**more) -> BayesianHankelDMDc:
     """Members that are all as SPEC."""
     settings = {
         "encounter_period": PERIOD * DT,
-        "train_length": None,
-        "state_delay": Fixed(0.6),
-        "input_delay": Fixed(1.2),
+        "window": None,
+        "state_delays": Fixed("0.6 T"),
+        "input_delays": Fixed("1.2 T"),
         "ridge": Fixed(1e-3),
         "n_members": 1,
         "delay_rows": "exact",

@@ -95,8 +95,9 @@ class LinearSpec(HankelSettings):
     ) -> LinearModel:
         """Fit the model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
         named = as_runs(runs)
-        data = gather(named, states, inputs, stop, self)
-        return self.model.fitted(self, data, self.solve(data), named)
+        spec = self.resolved_in(named, inputs)
+        data = gather(named, states, inputs, stop, spec)
+        return self.model.fitted(spec, data, spec.solve(data), named)
 
     def solve(self, data: TrainingData) -> Solution:
         """Coefficients on standardised deviations, shape (N, N(s+1) + n(z+1) + m)."""

@@ -53,6 +53,7 @@ from seakeep.models.members import (
     spectral_radius,
     window_ends,
 )
+from seakeep.models.priors import unit_of
 from seakeep.models.settings import HankelSettings
 from seakeep.models.summaries import (
     reduce_members,
@@ -66,15 +67,14 @@ from seakeep.signals.time_axis import span_text
 __all__ = ["BandForecast", "HankelEnsemble", "HeldEnsemble"]
 
 DRAWN = {
-    "train_length": ("length of the training window", "encounter periods"),
-    "state_delay": ("longest delay of the states", "encounter periods"),
-    "input_delay": ("longest delay of the inputs", "encounter periods"),
-    "ridge": ("ridge λ", "1"),
+    "window": "length of the training window",
+    "state_delays": "longest delay of the states",
+    "input_delays": "longest delay of the inputs",
 }
 ROUNDED = {
-    "train_length_samples": ("window", "length of the training window; −1 for all of a run"),
-    "state_delay_samples": ("state_delays", "number of delayed copies of the states"),
-    "input_delay_samples": ("input_delays", "number of delayed copies of the inputs"),
+    "window_samples": ("window", "length of the training window; −1 for all of a run"),
+    "state_delays_samples": ("state_delays", "number of delayed copies of the states"),
+    "input_delays_samples": ("input_delays", "number of delayed copies of the inputs"),
     "training_run": ("run", "run that trains; −1 for all"),
     "last_sample": ("last", "last sample of the training window; −1 for that at stop"),
     "redrawn": ("redrawn", "infeasible draws before this one"),
@@ -383,10 +383,10 @@ class HankelEnsemble(_Forecasts, store.Saved):
     def draws(self) -> xr.Dataset:
         """Drawn settings, over ``member``.
 
-        ``train_length``, ``state_delay`` and ``input_delay`` in encounter periods (NaN where all
-        of a run trains), the integers ``…_samples`` they became (−1 for all of a run), ``ridge``,
-        the run that trains (−1 for all) and its last sample (−1 for ``stop``), and how many
-        infeasible draws came before.
+        ``window``, ``state_delays`` and ``input_delays`` as drawn, in the units of their priors
+        (NaN where all of a run trains), the integers ``…_samples`` they became (−1 for all of a
+        run), ``ridge``, the run that trains (−1 for all) and its last sample (−1 for ``stop``),
+        and how many infeasible draws came before.
         """
         return draws_dataset(self.members, self.origin)
 
@@ -546,11 +546,9 @@ class HankelEnsemble(_Forecasts, store.Saved):
             f"  inputs        {', '.join(with_units(self.input_labels)) or 'none (autonomous)'}",
             f"  draws         {SAMPLING[origin['sampling']]}, seed {origin['seed']}; "
             f"{refused or 'none'} infeasible and drawn again",
-            f"  window        {_window(self.members)}",
-            f"  state delay   {_periods([d.state_delay for d in draws])} "
-            f"({_samples([d.state_delays for d in draws])})",
-            f"  input delay   {_periods([d.input_delay for d in draws])} "
-            f"({_samples([d.input_delays for d in draws])})",
+            f"  window        {_drawn(self, 0, [d.window for d in draws if d.window])}",
+            f"  state delay   {_drawn(self, 1, [d.state_delays for d in draws])}",
+            f"  input delay   {_drawn(self, 2, [d.input_delays for d in draws])}",
             f"  ridge         {_range([d.ridge for d in draws], '.4g')}{scale}; delay rows "
             f"{'exact' if settings.delay_rows == 'exact' else 'regressed'}",
             f"  history       {self.history_samples} samples up to the start of a forecast",
@@ -934,14 +932,13 @@ class HeldEnsemble(_Forecasts):
 
 def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Dataset:
     """Draws over ``member``; see ``HankelEnsemble.draws``."""
-    variables = {
-        name: (
-            "member",
-            np.array([getattr(draw, name) for draw in members], dtype=float),
-            {"long_name": label, "units": units},
-        )
-        for name, (label, units) in DRAWN.items()
+    drawn = np.array([draw.drawn for draw in members], dtype=float).reshape(-1, len(DRAWN))
+    variables: dict[str, Any] = {
+        name: ("member", values, {"long_name": label, "units": unit_of(origin[name])})
+        for (name, label), values in zip(DRAWN.items(), drawn.T, strict=True)
     }
+    ridge = np.array([draw.ridge for draw in members], dtype=float)
+    variables["ridge"] = ("member", ridge, {"long_name": "ridge λ", "units": "1"})
     for name, (attribute, label) in ROUNDED.items():
         values = [getattr(draw, attribute) for draw in members]
         integers = np.array([-1 if value is None else value for value in values], dtype=np.int64)
@@ -954,15 +951,16 @@ def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Data
 
 
 def _draws(dataset: xr.Dataset) -> tuple[Draw, ...]:
-    columns = {name: dataset[name].values.tolist() for name in DRAWN}
+    columns: dict[str, list[Any]] = {"ridge": dataset["ridge"].values.tolist()}
     for name, (attribute, _) in ROUNDED.items():
         values = dataset[name].values.tolist()
-        if attribute in OPTIONAL:
-            values = [None if each < 0 else each for each in values]
-        columns[attribute] = values
+        columns[attribute] = [
+            None if each < 0 and attribute in OPTIONAL else each for each in values
+        ]
+    drawn = zip(*(dataset[name].values.tolist() for name in DRAWN), strict=True)
     return tuple(
-        Draw(**dict(zip(columns, each, strict=True)))
-        for each in zip(*columns.values(), strict=True)
+        Draw(drawn=lengths, **dict(zip(columns, each, strict=True)))
+        for lengths, each in zip(drawn, zip(*columns.values(), strict=True), strict=True)
     )
 
 
@@ -977,12 +975,14 @@ def _warn_of_unstable(radii: FloatArray) -> None:
         )
 
 
-def _window(draws: Sequence[Draw]) -> str:
-    windows = [draw.window for draw in draws if draw.window is not None]
-    if not windows:
+def _drawn(ensemble: HankelEnsemble, place: int, samples: Sequence[int]) -> str:
+    """A length as drawn, and in samples."""
+    if not samples:
         return "all of a run"
-    periods = _periods([draw.train_length for draw in draws])
-    return f"{periods} ({_samples(windows)})"
+    rounded = _of(_range(samples, "d"), "samples")
+    values = [draw.drawn[place] for draw in ensemble.members]
+    unit = unit_of(ensemble.origin[tuple(DRAWN)[place]])
+    return rounded if unit == "samples" else f"{_of(_range(values, '.4g'), unit)} ({rounded})"
 
 
 def _range(values: Sequence[float] | FloatArray, form: str) -> str:
@@ -990,13 +990,5 @@ def _range(values: Sequence[float] | FloatArray, form: str) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _periods(values: Sequence[float]) -> str:
-    return _of(_range(values, ".4g"), "encounter period")
-
-
-def _samples(values: Sequence[int]) -> str:
-    return _of(_range(values, "d"), "sample")
-
-
 def _of(count: str, unit: str) -> str:
-    return f"{count} {unit}" if count == "1" else f"{count} {unit}s"
+    return f"{count} {unit.removesuffix('s') if count == '1' else unit}"

@@ -21,7 +21,6 @@ import xarray as xr
 from scipy import special
 
 from seakeep.arrays import (
-    GREATEST,
     BoolArray,
     FloatArray,
     as_real,
@@ -882,11 +881,6 @@ def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArra
             )
         place = names.index(name)
         out[place] = positive(value, f"noise of {name}", units[place])
-        if out[place] > GREATEST:
-            raise RequestError(
-                f"noise of {name} is {out[place]:g} {units[place]}, which nothing measures. "
-                "Correct it."
-            )
     return out
 
 
@@ -902,7 +896,7 @@ def _sample(name: str, value: object, names: Sequence[str]) -> FloatArray:
                     f"{did_you_mean(str(key), names)} It takes: {', '.join(names) or 'none'}."
                 )
         value = [value.get(each, math.nan) for each in names]
-    array = as_real(value, name, greatest=np.inf)
+    array = as_real(value, name)
     if array.shape != (len(names),):
         raise RequestError(
             f"{name} has shape {array.shape}; one number for each of {', '.join(names) or 'none'} "

@@ -182,10 +182,12 @@ def read_out(readouts: Sequence[FittedReadOut], values: FloatArray) -> FloatArra
 
 
 def readouts_of(value: object) -> ReadOuts:
-    """Read-outs as they are, or made of tables of their keys, or the word."""
+    """Read-outs as they are, or made of tables (in a list, or by channel), or "auto"."""
     if isinstance(value, str) and value == "auto":
         return "auto"
-    if isinstance(value, str | Mapping) or not isinstance(value, Iterable):
+    if isinstance(value, Mapping):
+        value = [{"channel": name, **table} for name, table in value.items()]
+    if isinstance(value, str) or not isinstance(value, Iterable):
         raise RequestError(
             f"readouts must be a list or 'auto'; received {value!r:.{SHOWN}}. Write "
             "readouts=[seakeep.ReadOut('mooring_stern', of=('surge', 'heave', 'pitch'))]."

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.errors import DataError, MissingFileError, RequestError
+from seakeep.errors import MissingFileError, RequestError
 from seakeep.files import load_sealed, write_sealed
 from seakeep.models.inputs import Chain
 from seakeep.models.interface import Json, Scale, Signature
@@ -26,7 +25,6 @@ __all__ = [
     "numbers",
     "pack_signature",
     "read",
-    "rebuilt",
     "signature_json",
     "unpack_signature",
 ]
@@ -35,8 +33,6 @@ MODEL = "model"
 """Kind of these files."""
 SCALES = ("state", "input", "direct")
 MOMENTS = ("mean", "std", "spread", "centre", "reach")
-
-Value = TypeVar("Value")
 
 
 class Saved:
@@ -136,28 +132,6 @@ def _plain(value: object) -> object:
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(type(value).__name__)
-
-
-def rebuilt(
-    source: str | Path, build: Callable[[], Value], mend: str = "Fit the model again."
-) -> Value:
-    """What `build` makes of a file's content; anything that does not fit raises one DataError."""
-    try:
-        return build()
-    except DataError as error:
-        raise DataError(f"{source}: {error}") from error
-    except (
-        LookupError,
-        TypeError,
-        ValueError,
-        ArithmeticError,
-        AttributeError,
-        RecursionError,
-    ) as error:
-        missing = "a part is missing: " if isinstance(error, LookupError) else ""
-        raise DataError(
-            f"{source} does not hold what seakeep writes: {missing}{str(error).rstrip('.')}. {mend}"
-        ) from error
 
 
 def read(path: str | Path) -> xr.Dataset:

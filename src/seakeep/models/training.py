@@ -429,8 +429,8 @@ def _check_length(
     if window is not None and place.first < 0:
         raise DataError(
             f"{name} has {place.last + 1} samples up to the end of the training window, which asks "
-            f"for {window}: {-place.first} are missing. Shorten the window (window, or "
-            "train_length of an ensemble), or give a longer run (span or train in [runs.NAME])."
+            f"for {window}: {-place.first} are missing. Shorten window, or give a longer run (span "
+            "or train in [runs.NAME])."
         )
     if final - place.first_column < 1:
         needed = reach + 2 + place.last - final

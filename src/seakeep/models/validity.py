@@ -21,7 +21,6 @@ __all__ = ["Coverage", "Waves", "compare_waves", "outside_training"]
 TRAINED = 0.01
 """Part of the training energy from which a band, or a neighbour of it, counts as trained: the
 leakage of a taper stays below it, and the tail of a sea above twice its peak frequency too."""
-MOST_BANDS = 100 * PER_OCTAVE
 """Bands of a training record: a hundred octaves are more than any holds."""
 CYCLES = 5.0
 """Periods from which on a spectrum shows which waves it holds."""

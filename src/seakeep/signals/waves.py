@@ -13,7 +13,6 @@ import scipy
 from seakeep.arrays import FloatArray, IntArray, as_series, number, time_step, whole_number
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import parabola_peak
-from seakeep.sizes import MOST_TRANSFORM, check_size
 
 __all__ = [
     "WaveStatistics",
@@ -374,7 +373,6 @@ def wave_spectrum(
             f"the transform must be at least as long as a segment ({length} samples); received "
             f"{padded}. Lengthen it, or leave it out."
         )
-    check_size("padded =", padded or 0, MOST_TRANSFORM, "points", "Pad less.")
     try:
         taper = scipy.signal.get_window(window, length)
     except ValueError as error:

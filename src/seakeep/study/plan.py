@@ -188,7 +188,7 @@ def _check_span(name: str, samples: int, needs: Needs, run: xr.Dataset) -> None:
         f"training: no window is feasible in '{name}'. Its span holds {samples} samples "
         f"({samples * dt:g} s), and the largest draw of all models needs {needed} "
         f"({needs.snapshots} snapshots and {needs.history} of delay history, "
-        f"{needed * dt:g} s). Shorten train_length or the delays, or give longer runs."
+        f"{needed * dt:g} s). Shorten window or the delays, or give longer runs."
     )
 
 
