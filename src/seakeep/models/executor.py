@@ -137,10 +137,11 @@ def as_finished(
                 raise errors[0]
 
 
-def one_blas_thread() -> AbstractContextManager[object]:
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
     """Limit BLAS to one thread: small products side by side beat products spread over cores."""
-    limit: AbstractContextManager[object] = _blas().limit(limits=1, user_api="blas")
-    return limit
+    with _blas().limit(limits=1, user_api="blas"):
+        yield
 
 
 @functools.cache
