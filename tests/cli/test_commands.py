@@ -682,11 +682,6 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
         ("prepare ~seakeep-nobody/c.toml", 2, r"cannot be read: .*home directory"),
         ("study ~seakeep-nobody/s.toml", 2, r"cannot be read: .*home directory"),
         (
-            f"forecast model.nc {FROM_20.replace('50', '1' + 400 * '0')} -o f.nc",
-            2,
-            r"--steps is larger than 9223372036854775807\. Give a smaller number\.",
-        ),
-        (
             f"compare model.nc {CAMPAIGN} --steps {5000 * '1'}",
             2,
             r"steps: received '1{12}\.\.\.1{13}'\. Give a whole number",
