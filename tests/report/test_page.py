@@ -190,11 +190,11 @@ def test_a_history_shows_the_calibrated_band_around_that_of_the_members(result):
     cell = result.tests[test].isel(training=training, window=window)
     kept = result.groups["calibration/bayesian"].isel(training=training)
     for axes, name in zip(figure.axes, result.channels, strict=True):
-        one = cell.sel(channel=name)
+        one = cell.sel(channel=name, model="bayesian", ensemble="bayesian")
         (lower,) = (line for line in axes.lines if line.get_label() == "calibrated")
         margin, floor = (float(kept[key].sel(channel=name)) for key in ("margin", "floor"))
-        half = margin * np.hypot(one["bayesian_std"].values, floor)
-        wider = one["bayesian_mean"].values - half
+        half = margin * np.hypot(one["std"].values, floor)
+        wider = one["mean"].values - half
         mean, spread = float(one["training_mean"]), float(one["training_std"])
         np.testing.assert_allclose(lower.get_ydata(), (wider - mean) / spread, rtol=1e-10)
     (legend,) = figure.legends

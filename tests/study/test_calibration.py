@@ -55,13 +55,12 @@ def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder
         alone = ensemble.calibrate(parts, steps, scale=scale).calibration
         np.testing.assert_allclose(kept["margin"][k], alone.found.margin, rtol=1e-9)
         assert int(kept["windows"][k]) == sum(alone.windows.values()) > 0
-        cell = test.isel(training=k)
-        lower = cell["bayesian_lower"] - alone.found.margin
-        upper = cell["bayesian_upper"] + alone.found.margin
+        cell = test.isel(training=k).sel(model="bayesian", ensemble="bayesian")
+        lower, upper = cell["lower"] - alone.found.margin, cell["upper"] + alone.found.margin
         if scale == "spread":
             np.testing.assert_allclose(kept["floor"][k], alone.floor, rtol=1e-9)
-            half = alone.found.margin * np.sqrt(cell["bayesian_std"] ** 2 + alone.floor**2)
-            lower, upper = cell["bayesian_mean"] - half, cell["bayesian_mean"] + half
+            half = alone.found.margin * np.sqrt(cell["std"] ** 2 + alone.floor**2)
+            lower, upper = cell["mean"] - half, cell["mean"] + half
         if scale == "learnt":
             np.testing.assert_allclose(kept["law"][k], alone.law, rtol=1e-6, atol=1e-9)
             band = replace(ensemble, calibration=alone)

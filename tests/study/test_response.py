@@ -25,13 +25,16 @@ def groups(shift=0.9, offset=0.3, ratio=0.8, lead=40.0):
             "run": ("window", np.array(["wave"] * 3, dtype=object)),
             "training_mean": (("training", "channel"), np.zeros((2, 1))),
             "training_std": (("training", "channel"), np.full((2, 1), 0.25)),
-            "m_mean": (
-                ("training", "window", "time", "channel"),
-                np.broadcast_to(forecast[None, ..., None], shape).copy(),
+            "mean": (
+                ("model", "training", "window", "time", "channel"),
+                np.broadcast_to(forecast[None, ..., None], shape)[None].copy(),
             ),
-            "m_nrmse": (("training", "window", "channel"), np.ones((2, 3, 1))),
+            "error": (
+                ("model", "measure", "training", "window", "channel"),
+                np.ones((1, 1, 2, 3, 1)),
+            ),
         },
-        coords={"time": TIME, "channel": ["surge"]},
+        coords={"time": TIME, "channel": ["surge"], "model": ["m"], "measure": ["nrmse"]},
     )
     runs = xr.Dataset(
         {
@@ -58,7 +61,7 @@ def groups(shift=0.9, offset=0.3, ratio=0.8, lead=40.0):
 
 
 def test_the_parts_are_what_the_forecast_was_made_of():
-    found = regular_response(groups(), "t", ["m"]).sel(model="m", channel="surge")
+    found = regular_response(groups(), "t").sel(model="m", channel="surge")
     # The record is not a whole number of periods, so that its own SD differs from 0.1/√2.
     own = groups()["tests/t"]["measured"].std("time", ddof=1).values[:, 0]
     offset = np.sqrt(np.mean((0.3 / own) ** 2))
@@ -73,17 +76,17 @@ def test_the_parts_are_what_the_forecast_was_made_of():
 def test_the_squares_add_up_to_that_of_the_error():
     made = groups()
     rng = np.random.default_rng(0)
-    made["tests/t"]["m_mean"] += 0.05 * rng.standard_normal(made["tests/t"]["m_mean"].shape)
-    found = regular_response(made, "t", ["m"]).sel(model="m", channel="surge")
+    made["tests/t"]["mean"] += 0.05 * rng.standard_normal(made["tests/t"]["mean"].shape)
+    found = regular_response(made, "t").sel(model="m", channel="surge")
     test = made["tests/t"]
-    error = ((test["m_mean"] - test["measured"]) ** 2).mean("time")
+    error = ((test["mean"] - test["measured"]) ** 2).mean("time")
     expected = float((error / test["measured"].var("time", ddof=1)).mean())
     squares = sum(float(found[f"error_{key}"]) ** 2 for key in ("offset", "wave", "rest"))
     assert squares == pytest.approx(expected, rel=1e-12)
 
 
 def test_one_celerity_makes_the_phase_error_of_linear_theory():
-    found = regular_response(groups(), "t", ["m"])
+    found = regular_response(groups(), "t")
     speed = float(phase_speed(2 * np.pi * FREQUENCY, 3.6))
     shift = float(groups()["tests/t"]["measured"].mean("time").median())
     lead = 360 * FREQUENCY * shift * (1 / speed - 1 / CELERITY)
@@ -92,7 +95,7 @@ def test_one_celerity_makes_the_phase_error_of_linear_theory():
 
 
 def test_the_training_sea_is_weighed():
-    found = regular_response(groups(), "t", ["m"])
+    found = regular_response(groups(), "t")
     # A flat spectrum to 1.72 Hz: a band of 0.172 Hz holds a tenth, to one of its 172 bins.
     assert found.attrs["energy_share"] == pytest.approx(0.1, abs=0.01)
     assert found.attrs["height_ratio"] == pytest.approx(1.5)

@@ -151,7 +151,7 @@ def _conditions(results: Results) -> str:
 def _split(result: StudyResult, test: str, model: str) -> list[float]:
     """Median error of the wave-frequency and of the slow channels."""
     data = result.tests[test]
-    cells = data[f"{model}_nrmse"].values[data["judged"].values]
+    cells = data["error"].sel(model=model, measure="nrmse").values[data["judged"].values]
     slow = np.isin(data["channel"].values.astype(str), SLOW)
     return [float(np.nanmedian(average_of(cells[:, part]))) for part in (~slow, slow)]
 

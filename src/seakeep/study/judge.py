@@ -23,13 +23,12 @@ from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.coverage import CoverageTable
 from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
 from seakeep.models.executor import in_order
-from seakeep.models.summaries import STATISTICS
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
 from seakeep.waves import phase_speed
 
 __all__ = [
-    "BAND_ERRORS",
+    "BANDS",
     "MEASURES",
     "VARIANTS",
     "average_of",
@@ -49,8 +48,8 @@ __all__ = [
 ]
 
 
-BAND_ERRORS = {"all": "error_over_time", "low": "error_low", "wave": "error_wave"}
-"""Names of ε(t), as a whole and in its two bands."""
+BANDS = ("all", "low", "wave")
+"""ε(t) as a whole, and in its two bands."""
 MEASURES = ("nrmse", "nammae", "training_nrmse")
 """Errors of a cell: both of the paper, in SD of the window, and the first in SD of the training."""
 
@@ -76,33 +75,35 @@ def judge(
     executor: Executor | None = None,
 ) -> dict[str, xr.Dataset]:
     """All statistics of a study, as groups ``statistics/…``; the densities side by side."""
-    models = list(settings.models)
     kinds = {name: each.kind for name, each in settings.models.items()}
     out: dict[str, xr.Dataset] = {}
-    if (lost := lost_forecasts(groups, settings.tests, models)) is not None:
+    if (lost := lost_forecasts(groups, settings.tests)) is not None:
         out["statistics/lost"] = lost
     for name in settings.tests:
         test = groups[f"tests/{name}"]
-        out[f"statistics/boxes/{name}"] = boxes = box_table(test, models)
+        out[f"statistics/boxes/{name}"] = boxes = box_table(test)
         rng = random_stream(settings.study.seed, f"differences.{name}")
-        differences = difference_table(test, models, groups["training"], rng)
+        differences = difference_table(test, groups["training"], rng)
         out[f"statistics/differences/{name}"] = differences
         if (skill := skill_table(boxes, differences, kinds)) is not None:
             out[f"statistics/skill/{name}"] = skill
-        if ensembles := [model for model in models if f"{model}_lower" in test]:
+        if test.sizes["ensemble"]:
             calibrations = {
-                m: groups[f"calibration/{m}"] for m in ensembles if f"calibration/{m}" in groups
+                m: groups[f"calibration/{m}"]
+                for m in test["ensemble"].values
+                if f"calibration/{m}" in groups
             }
-            out[f"statistics/coverage/{name}"] = coverage_table(test, ensembles, calibrations)
+            out[f"statistics/coverage/{name}"] = coverage_table(test, calibrations)
             level = settings.statistics.level
-            if (parts := band_parts(test, ensembles, calibrations, level)) is not None:
+            if (parts := band_parts(test, calibrations, level)) is not None:
                 out[f"statistics/bands/{name}"] = parts
         rng = random_stream(settings.study.seed, f"trend.{name}")
-        out[f"statistics/trend/{name}"] = trend_table(test, models, rng)
+        out[f"statistics/trend/{name}"] = trend_table(test, rng)
         if is_regular(groups, name):
-            out[f"statistics/response/{name}"] = regular_response(groups, name, models)
+            out[f"statistics/response/{name}"] = regular_response(groups, name)
     name = settings.statistics.densities_of or next(iter(settings.tests))
     test = groups[f"tests/{name}"]
+    models = list(settings.models)
     found = [_divergences(test, model, channels, settings, name, executor) for model in models]
     divergence, densities = (
         xr.concat([pair[k] for pair in found], dim=xr.Variable("model", models)) for k in (0, 1)
@@ -112,19 +113,16 @@ def judge(
     return out
 
 
-def lost_forecasts(
-    groups: Mapping[str, xr.Dataset], tests: Iterable[str], models: Sequence[str]
-) -> xr.Dataset | None:
+def lost_forecasts(groups: Mapping[str, xr.Dataset], tests: Iterable[str]) -> xr.Dataset | None:
     """Cells without a whole forecast, which are left out; of ensembles, all members were lost."""
     rows = []
     for name in tests:
         test = groups[f"tests/{name}"]
         runs, starts = test["run"].values.astype(str), test["start"].values
-        for model in models:
-            gone = np.isnan(test[f"{model}_mean"].values).any(axis=(2, 3)) & test["judged"].values
-            for k, w in zip(*np.nonzero(gone), strict=True):
-                training = str(test["training"].values[k])
-                rows.append((model, name, training, int(w), runs[w], float(starts[w])))
+        gone = np.isnan(test["mean"].values).any(axis=(3, 4)) & test["judged"].values
+        for m, k, w in zip(*np.nonzero(gone), strict=True):
+            model, training = str(test["model"].values[m]), str(test["training"].values[k])
+            rows.append((model, name, training, int(w), runs[w], float(starts[w])))
     if not rows:
         return None
     keys = ("model", "test", "training", "window", "run", "start")
@@ -149,7 +147,7 @@ def words_of_lost(lost: xr.Dataset) -> str:
 
 
 def difference_table(
-    test: xr.Dataset, models: Sequence[str], training: xr.Dataset, rng: np.random.Generator
+    test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
 ) -> xr.Dataset:
     """Change of the median error from one model to another, with its interval.
 
@@ -162,13 +160,8 @@ def difference_table(
     order, _ = training_order(training)
     blocks = blocks_of([test], training)
     judged = test["judged"].values[order]
-    cells = np.stack(
-        [
-            np.stack([test[f"{m}_{measure}"].values[order] for measure in MEASURES], axis=-2)
-            for m in models
-        ],
-        axis=2,
-    )  # (training, window, model, measure, channel)
+    errors = test["error"].transpose("training", "window", "model", "measure", "channel")
+    cells: FloatArray = errors.values[order]
     cells = np.concatenate([average_of(cells)[..., None], cells], axis=-1)
     cells = np.where(judged[..., None, None, None], cells, np.nan)
 
@@ -189,9 +182,9 @@ def difference_table(
             for key, values in zip(("change", "lower", "upper"), (found, *bounds), strict=True)
         },
         coords={
-            "model": list(models),
-            "other": list(models),
-            "measure": list(MEASURES),
+            "model": test["model"].values,
+            "other": test["model"].values,
+            "measure": test["measure"].values,
             "channel": ["average", *map(str, test["channel"].values)],
         },
         attrs={"blocks": blocks},
@@ -267,7 +260,7 @@ def skill_table(
     return out.assign(reference_model=("reference", list(named.values())))
 
 
-def box_table(test: xr.Dataset, models: Sequence[str]) -> xr.Dataset:
+def box_table(test: xr.Dataset) -> xr.Dataset:
     """Quartiles of the errors over all cells of a test set, over (model, measure, channel).
 
     The channel ``average`` is the paper's ANRMSE and NAMMAE: the average of each cell over the
@@ -285,22 +278,20 @@ def box_table(test: xr.Dataset, models: Sequence[str]) -> xr.Dataset:
         "left_out",
     )
     names = ["average", *map(str, test["channel"].values)]
-    values = np.full((len(numbers), len(models), len(MEASURES), len(names)), np.nan)
-    judged = test["judged"].values
-    for m, model in enumerate(models):
-        for k, measure in enumerate(MEASURES):
-            cells = test[f"{model}_{measure}"].values[judged]
-            columns = [average_of(cells), *cells.T]
-            for c, column in enumerate(columns):
-                try:
-                    box = statistics.box_statistics(column)
-                except DataError:  # never judged: a line that is slack in all windows
-                    values[-2:, m, k, c] = 0, column.size
-                    continue
-                values[:, m, k, c] = [getattr(box, number) for number in numbers]
+    errors = test["error"].values[:, :, test["judged"].values]  # (model, measure, cell, channel)
+    values = np.full((len(numbers), *errors.shape[:2], len(names)), np.nan)
+    for m, k in np.ndindex(errors.shape[:2]):
+        columns = [average_of(errors[m, k]), *errors[m, k].T]
+        for c, column in enumerate(columns):
+            try:
+                box = statistics.box_statistics(column)
+            except DataError:  # never judged: a line that is slack in all windows
+                values[-2:, m, k, c] = 0, column.size
+                continue
+            values[:, m, k, c] = [getattr(box, number) for number in numbers]
     return xr.Dataset(
         {n: (("model", "measure", "channel"), values[i]) for i, n in enumerate(numbers)},
-        coords={"model": list(models), "measure": list(MEASURES), "channel": names},
+        coords={"model": test["model"], "measure": test["measure"], "channel": names},
     )
 
 
@@ -313,7 +304,7 @@ def average_of(cells: FloatArray) -> FloatArray:
 
 
 def coverage_table(
-    test: xr.Dataset, ensembles: Sequence[str], calibrations: Mapping[str, xr.Dataset] | None = None
+    test: xr.Dataset, calibrations: Mapping[str, xr.Dataset] | None = None
 ) -> xr.Dataset:
     """Fraction of the instants at which the band holds the measurement, and the truth where known.
 
@@ -323,7 +314,7 @@ def coverage_table(
     sides = ["measured", *(["truth"] if "truth" in test else [])]
     numbers = ("inside", "below", "above", "relative_width")
     names = ["average", *map(str, test["channel"].values)]
-    judged = test["judged"].values
+    judged, ensembles = test["judged"].values, test["ensemble"].values
     variables: dict[str, Any] = {}
     for prefix in ("", "calibrated_") if calibrations else ("",):
         values = np.full((len(numbers), len(ensembles), len(sides), len(names)), np.nan)
@@ -335,20 +326,18 @@ def coverage_table(
         variables |= {
             prefix + n: (("model", "against", "channel"), values[i]) for i, n in enumerate(numbers)
         }
-    return xr.Dataset(
-        variables, coords={"model": list(ensembles), "against": sides, "channel": names}
-    )
+    return xr.Dataset(variables, coords={"model": ensembles, "against": sides, "channel": names})
 
 
 def band_parts(
-    test: xr.Dataset, ensembles: Sequence[str], calibrations: Mapping[str, xr.Dataset], level: float
+    test: xr.Dataset, calibrations: Mapping[str, xr.Dataset], level: float
 ) -> xr.Dataset | None:
     """Coverage, width, Winkler score and CRPS of bands over (model, band, part, channel).
 
     Parts are all instants, thirds by wave height, and thirds of the horizon; None where no band
     can be judged.
     """
-    judged = test["judged"].values
+    judged, ensembles = test["judged"].values, test["ensemble"].values
     shape = (*judged.shape, *test["measured"].shape[1:])
     measured = np.broadcast_to(test["measured"].values, shape)[judged]
     waves = None
@@ -374,7 +363,7 @@ def band_parts(
     return xr.Dataset(
         {number: (dims, values[i]) for i, number in enumerate(numbers)},
         coords={
-            "model": list(ensembles),
+            "model": ensembles,
             "band": list(bands),
             "part": list(parts),
             "channel": names,
@@ -386,14 +375,16 @@ def band_of(
     test: xr.Dataset, model: str, calibration: xr.Dataset | None
 ) -> tuple[FloatArray, FloatArray]:
     """Bounds of a band in a test set, (training, window, time, channel): calibrated, or not."""
+    test = test.sel(ensemble=model)
+    lower, upper = test["lower"].values, test["upper"].values
     if calibration is None:
-        return test[f"{model}_lower"].values, test[f"{model}_upper"].values
-    mean, std, lower, upper = (test[f"{model}_{key}"].values for key in STATISTICS)
+        return lower, upper
+    mean, std = test["mean"].sel(model=model).values, test["std"].values
     margin = calibration["margin"].values[:, None, None, :]
     scale = None
     if "law" in calibration:
         laws = (calibration["floor"].values, calibration["law"].values)
-        each = zip(std, *laws, test[f"{model}_envelope"].values, strict=True)
+        each = zip(std, *laws, test["envelope"].values, strict=True)
         scale = np.stack([band_scale(*row) for row in each])
     elif "floor" in calibration:
         scale = band_scale(std, calibration["floor"].values[:, None, None, :])
@@ -418,33 +409,31 @@ def _coverage_row(
     return np.array(rows)
 
 
-def trend_table(test: xr.Dataset, models: Sequence[str], rng: np.random.Generator) -> xr.Dataset:
+def trend_table(test: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
     """Test whether ε(t), averaged over all cells, grows with the age of the forecast."""
     numbers = ("slope", "lower", "upper", "change", "kendall_tau", "p_value", "block_length")
     names = ("error_mean", "lower_quartile", "upper_quartile")
-    found = np.full((len(numbers), len(BAND_ERRORS), len(models)), np.nan)
-    time = test["time"].values
-    series = np.full((len(names), len(BAND_ERRORS), len(models), time.size), np.nan)
-    judged = test["judged"].values
-    for b, key in enumerate(BAND_ERRORS.values()):
-        for m, model in enumerate(models):
-            cells = test[f"{model}_{key}"].values[judged]
-            cells = cells[np.isfinite(cells).all(axis=1)]
-            if not len(cells):
-                continue
-            series[:, b, m] = cells.mean(axis=0), *np.quantile(cells, [0.25, 0.75], axis=0)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", SeakeepWarning)  # the block length is in the table
-                trend = statistics.trend_test(
-                    series[0, b, m], rng=rng, time=time, n_series=TREND_SERIES
-                )
-            found[:, b, m] = [getattr(trend, number) for number in numbers]
+    time, shape = test["time"].values, (test.sizes["band"], test.sizes["model"])
+    found = np.full((len(numbers), *shape), np.nan)
+    series = np.full((len(names), *shape, time.size), np.nan)
+    errors = test["error_over_time"].values[:, :, test["judged"].values]
+    for b, m in np.ndindex(shape):
+        cells = errors[m, b][np.isfinite(errors[m, b]).all(axis=1)]
+        if not len(cells):
+            continue
+        series[:, b, m] = cells.mean(axis=0), *np.quantile(cells, [0.25, 0.75], axis=0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SeakeepWarning)  # the block length is in the table
+            trend = statistics.trend_test(
+                series[0, b, m], rng=rng, time=time, n_series=TREND_SERIES
+            )
+        found[:, b, m] = [getattr(trend, number) for number in numbers]
     return xr.Dataset(
         {
             **{n: (("band", "model"), found[i]) for i, n in enumerate(numbers)},
             **{n: (("band", "model", "time"), series[i]) for i, n in enumerate(names)},
         },
-        coords={"band": list(BAND_ERRORS), "model": list(models), "time": time},
+        coords={"band": test["band"].values, "model": test["model"].values, "time": time},
     )
 
 
@@ -456,7 +445,7 @@ def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
     set. A series in which a forecast diverged is left out; their number comes last.
     """
     judged = test["judged"].values
-    mean = test[f"{model}_mean"].values
+    mean = test["mean"].sel(model=model).values
     count = int(judged.sum(axis=0).min())
     rows = np.argsort(~judged, axis=0, kind="stable")[:count]
     windows = np.arange(judged.shape[1])
@@ -581,9 +570,7 @@ def is_regular(groups: Mapping[str, xr.Dataset], test: str) -> bool:
     return bool(np.isfinite(groups["runs"]["wave_frequency"].sel(run=names)).all())
 
 
-def regular_response(
-    groups: Mapping[str, xr.Dataset], test: str, models: Sequence[str]
-) -> xr.Dataset:
+def regular_response(groups: Mapping[str, xr.Dataset], test: str) -> xr.Dataset:
     """Take the error of a test set in regular waves apart.
 
     ``error_offset``, ``error_wave`` and ``error_rest`` are root mean squares over cells in measured
@@ -594,6 +581,7 @@ def regular_response(
     """
     data, runs = groups[f"tests/{test}"], groups["runs"]
     judged, channels = data["judged"].values, list(data["channel"].values)
+    models = list(data["model"].values)
     frequencies = runs["wave_frequency"].sel(run=data["run"].values.astype(str)).values
     spread, level = data["training_std"].values, data["training_mean"].values
     measured = data["measured"].values
@@ -627,8 +615,8 @@ def _parts(
     time = data["time"].values
     squares, responses = [], []
     rows, columns = cells
-    forecasts = data[f"{model}_mean"].values
-    slack = np.isnan(data[f"{model}_nrmse"].values)
+    one = data.sel(model=model, measure="nrmse")
+    forecasts, slack = one["mean"].values, np.isnan(one["error"].values)
     for row, column in zip(rows, columns, strict=True):
         found, response = _in_waves(
             time, frequencies[column], forecasts[row, column], measured[column]
@@ -671,7 +659,8 @@ def phase_leads(groups: Mapping[str, xr.Dataset], test: str, model: str) -> Floa
     data = groups[f"tests/{test}"]
     frequencies = groups["runs"]["wave_frequency"].sel(run=data["run"].values.astype(str)).values
     time, measured = data["time"].values, data["measured"].values
-    forecasts, errors = data[f"{model}_mean"].values, data[f"{model}_nrmse"].values
+    one = data.sel(model=model, measure="nrmse")
+    forecasts, errors = one["mean"].values, one["error"].values
     out = np.full(errors.shape, np.nan)
     for row, column in zip(*np.nonzero(data["judged"].values), strict=True):
         place = frequencies[column], forecasts[row, column], measured[column]

@@ -77,7 +77,8 @@ def _draw_band(axes: Any, result: StudyResult, trend: Any) -> float:
 def member_errors(result: StudyResult, test: str, model: str) -> FloatArray:
     """Median ANRMSE of each member over all cells of a test set."""
     data = result.tests[test]
-    cells = data[f"{model}_member_nrmse"].values[data["judged"].values].astype(float)
+    errors = data["member_nrmse"].sel(ensemble=model).values[..., : result.members_of(model), :]
+    cells = errors[data["judged"].values].astype(float)
     averages = np.stack([average_of(each) for each in cells])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a member that is lost everywhere

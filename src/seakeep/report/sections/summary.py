@@ -208,8 +208,8 @@ def _coverage_findings(result: StudyResult, model: str) -> list[str]:
             f"{float(row['calibrated_relative_width']):.2g} measured SD wide instead of "
             f"{float(row['relative_width']):.2g}."
         )
-    lost = int(sum((test[f"{model}_lost"] >= 0).sum() for test in result.tests.values()))
-    total = int(sum((test[f"{model}_lost"] >= -1).sum() for test in result.tests.values()))
+    each = [test["lost"].sel(ensemble=model) for test in result.tests.values()]
+    lost, total = (int(sum((test >= least).sum() for test in each)) for least in (0, -1))
     return [
         f"The {100 * level:g} % band of the {model_words(model)} model holds "
         f"{100 * inside:.0f} % of the measured instants of {result.label_of(first)}, {words}: "
