@@ -18,7 +18,7 @@ from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.executor import Progress
 from seakeep.models.html import settings_html
 from seakeep.models.inputs import Chain, ProbeAlignment
-from seakeep.models.interface import Json, Needs, Signature, Span, Spec, plain
+from seakeep.models.interface import Json, Needs, Role, Signature, Span, Spec, plain
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.members import TrainingArrays, reach, spectral_radius
@@ -142,6 +142,7 @@ class HankelDMDc(HankelSettings):
     """
 
     kind: ClassVar[str] = "hankel_dmdc"
+    role: ClassVar[Role] = "model"
     is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
     may_choose: ClassVar[bool] = True
@@ -432,6 +433,7 @@ class BayesianHankelDMDc:
     """
 
     kind: ClassVar[str] = "bayesian_hankel_dmdc"
+    role: ClassVar[Role] = "model"
     is_ensemble: ClassVar[bool] = True
     encounter_period: float
     train_length: Prior | None

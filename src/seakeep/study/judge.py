@@ -22,10 +22,10 @@ from seakeep.arrays import FloatArray
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.coverage import CoverageTable
 from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
+from seakeep.models import KINDS
 from seakeep.models.executor import in_order
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
-from seakeep.waves import phase_speed
 
 __all__ = [
     "BANDS",
@@ -41,6 +41,7 @@ __all__ = [
     "joined",
     "judge",
     "median_of",
+    "references_of",
     "regular_response",
     "training_order",
     "verdict",
@@ -57,15 +58,13 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "paper": {"block_length": "carlstein", "bandwidth": "paper", "joins": True},
     "recommended": {"block_length": "politis_white", "bandwidth": "silverman", "joins": False},
 }
-LINEAR = ("fir", "arx", "subspace")
-"""Kinds of the linear baselines."""
+CONSTANT = ("hold_last", "mean")
+"""Kinds of references that read nothing after the start."""
 SHOWN = 5
 """Lost forecasts that a warning names."""
 TREND_SERIES = 500
 DIFFERENCES = 500
 """Redrawn tables of cells for the interval of a difference between models."""
-NEAR = 0.1
-"""Energy within this part of a frequency counts as energy at it."""
 
 
 def judge(
@@ -248,16 +247,25 @@ def skill_table(
     none.
     """
     median = boxes["median"].sel(channel="average", drop=True)
-    named = {kind: model for model, kind in kinds.items() if kind in ("hold_last", "mean")}
-    linear = [model for model, kind in kinds.items() if kind in LINEAR]
-    errors = {model: float(median.sel(model=model, measure="nrmse")) for model in linear}
-    if known := {model: error for model, error in errors.items() if np.isfinite(error)}:
-        named["best_linear"] = min(known, key=known.__getitem__)
+    named = {}
+    for name, among in references_of(kinds).items():
+        errors = {model: float(median.sel(model=model, measure="nrmse")) for model in among}
+        if known := {model: error for model, error in errors.items() if np.isfinite(error)}:
+            named[name] = min(known, key=known.__getitem__)
     if not named:
         return None
     out = differences.sel(channel="average", other=list(named.values()), drop=True)
     out = out.rename(other="reference").assign_coords(reference=list(named))
     return out.assign(reference_model=("reference", list(named.values())))
+
+
+def references_of(kinds: Mapping[str, str]) -> dict[str, list[str]]:
+    """Names of the references among models of some kinds, those of one sort together."""
+    out: dict[str, list[str]] = {}
+    for model, kind in sorted(kinds.items(), key=lambda each: each[1] not in CONSTANT):
+        if KINDS[kind].role == "reference":
+            out.setdefault(kind if kind in CONSTANT else "best_linear", []).append(model)
+    return out
 
 
 def box_table(test: xr.Dataset) -> xr.Dataset:
@@ -575,49 +583,25 @@ def regular_response(groups: Mapping[str, xr.Dataset], test: str) -> xr.Dataset:
 
     ``error_offset``, ``error_wave`` and ``error_rest`` are root mean squares over cells in measured
     SDs, whose squares add up to that of the NRMSE; ``phase_lead`` is that of the forecast before
-    the measurement, degrees; ``celerity_phase`` is the lead that one celerity makes for waves of
-    another speed. ``sd_ratio`` and ``mean_shift`` compare the measurement with training, in
-    training SDs.
+    the measurement, degrees.
     """
     data, runs = groups[f"tests/{test}"], groups["runs"]
-    judged, channels = data["judged"].values, list(data["channel"].values)
-    models = list(data["model"].values)
     frequencies = runs["wave_frequency"].sel(run=data["run"].values.astype(str)).values
-    spread, level = data["training_std"].values, data["training_mean"].values
-    measured = data["measured"].values
-    rows, columns = np.nonzero(judged)
-    shift = (measured.mean(axis=1)[columns] - level[rows]) / spread[rows]
-    ratio = measured.std(axis=1, ddof=1)[columns] / spread[rows]
-    parts = {model: _parts(data, model, frequencies, (rows, columns), measured) for model in models}
+    parts = np.array([_parts(data, model, frequencies) for model in data["model"].values])
     keys = ("error_offset", "error_wave", "error_rest", "amplitude_ratio", "phase_lead")
-    out = xr.Dataset(
-        {
-            "sd_ratio": ("channel", np.median(ratio, axis=0)),
-            "mean_shift": ("channel", np.median(shift, axis=0)),
-            **{
-                key: (("model", "channel"), np.stack([parts[model][k] for model in models]))
-                for k, key in enumerate(keys)
-            },
-        },
-        coords={"model": list(models), "channel": channels},
+    return xr.Dataset(
+        {key: (("model", "channel"), parts[:, k]) for k, key in enumerate(keys)},
+        coords={"model": data["model"], "channel": data["channel"]},
     )
-    return _with_waves(out, groups, test, models, float(np.median(frequencies)), (rows, columns))
 
 
-def _parts(
-    data: xr.Dataset,
-    model: str,
-    frequencies: FloatArray,
-    cells: tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]],
-    measured: FloatArray,
-) -> list[FloatArray]:
+def _parts(data: xr.Dataset, model: str, frequencies: FloatArray) -> list[FloatArray]:
     """Errors and responses of a model, each of shape (channel,)."""
-    time = data["time"].values
+    time, measured = data["time"].values, data["measured"].values
     squares, responses = [], []
-    rows, columns = cells
     one = data.sel(model=model, measure="nrmse")
     forecasts, slack = one["mean"].values, np.isnan(one["error"].values)
-    for row, column in zip(rows, columns, strict=True):
+    for row, column in zip(*np.nonzero(data["judged"].values), strict=True):
         found, response = _in_waves(
             time, frequencies[column], forecasts[row, column], measured[column]
         )
@@ -666,61 +650,3 @@ def phase_leads(groups: Mapping[str, xr.Dataset], test: str, model: str) -> Floa
         place = frequencies[column], forecasts[row, column], measured[column]
         out[row, column] = np.degrees(np.angle(_in_waves(time, *place)[1]))
     return np.where(np.isnan(errors), np.nan, out)
-
-
-def _with_waves(
-    out: xr.Dataset,
-    groups: Mapping[str, xr.Dataset],
-    test: str,
-    models: Sequence[str],
-    frequency: float,
-    cells: tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]],
-) -> xr.Dataset:
-    """Add what linear wave theory and the training sea say about the frequency."""
-    data, runs, training = groups[f"tests/{test}"], groups["runs"], groups["training"]
-    depth = float(runs["water_depth"].sel(run=str(data["run"].values[0])))
-    speed = float(phase_speed(2 * np.pi * frequency, depth)) if np.isfinite(depth) else np.nan
-    out.attrs = {"frequency": frequency, "phase_speed": speed, "surge_shift": np.nan}
-    out.attrs |= _training_sea(groups, frequency, [str(run) for run in data["run"].values])
-    celerity, lead = np.full((2, len(models)), np.nan)
-    if "surge" in out["channel"]:
-        surge = data.sel(channel="surge")
-        rows, columns = cells
-        shifts = (
-            surge["measured"].values.mean(axis=1)[columns] - surge["training_mean"].values[rows]
-        )
-        out.attrs["surge_shift"] = float(np.median(shifts))
-        for number, model in enumerate(models):
-            if f"{model}_celerity" not in training:
-                continue
-            carried = training[f"{model}_celerity"].sel(of_run=data["run"].values.astype(str))
-            each = carried.values[rows, columns]
-            celerity[number] = np.median(each)
-            turns = frequency * shifts * (1 / speed - 1 / each)
-            lead[number] = 360 * np.median(turns)
-    out["celerity"] = ("model", celerity)
-    out["celerity_phase"] = ("model", lead)
-    return out
-
-
-def _training_sea(
-    groups: Mapping[str, xr.Dataset], frequency: float, tested: Sequence[str]
-) -> dict[str, float]:
-    """Height of the waves, and the training sea's share of energy near a frequency."""
-    nothing = {"height_ratio": np.nan, "energy_share": np.nan}
-    if "spectra" not in groups:
-        return nothing
-    spectra, runs = groups["spectra"], groups["runs"]
-    learnt = [str(run) for run in runs["run"].values[runs["trains"].values]]
-    learnt = [run for run in learnt if f"{run}_recommended_density" in spectra]
-    if not learnt:
-        return nothing
-    heights = spectra["significant_height"]
-    shares = []
-    for run in learnt:
-        f = spectra[f"{run}_recommended_frequency"].values
-        density = spectra[f"{run}_recommended_density"].values
-        near = np.abs(f - frequency) <= NEAR * frequency
-        shares.append(density[near].sum() / density.sum())
-    ratio = float(heights.sel(run=list(tested)).mean() / heights.sel(run=learnt).mean())
-    return {"height_ratio": ratio, "energy_share": float(np.mean(shares))}

@@ -279,7 +279,7 @@ class StudyResult:
 
     @cached_property
     def model_settings(self) -> dict[str, Any]:
-        """Per model its ``kind``, ``preset``, ``ensemble``, ``n_members`` and ``settings``.
+        """Per model ``kind``, ``role``, ``preset``, ``ensemble``, ``n_members`` and ``settings``.
 
         ``settings`` gives for each key its ``value`` (a JSON value) and its ``source``: "stated",
         "preset", "study" (the study's seed) or "default".

@@ -66,9 +66,10 @@ def history_figure(
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper right", ncols=min(len(handles), 5))
         run, learnt = str(cell["run"].values), str(cell["training"].values)
+        left_out = str(result.groups["training"]["left_out"].values[training])
         axes[0].set_title(
             f"{run}, from {float(cell['start']):.1f} s; trained "
-            + (learnt if learnt.startswith("without ") else f"on {learnt}"),
+            + (learnt if left_out else f"on {learnt}"),
             loc="left",
             fontsize=8,
         )
