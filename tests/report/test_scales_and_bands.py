@@ -48,8 +48,8 @@ def result():
             coords={"name": ["heave", "load"], "channel": ["heave", "load"]},
         ),
         "tests/t": test,
-        "statistics/boxes/t": box_table(test),
-        "statistics/bands/t": band_parts(test, {}, 0.95),
+        "statistics/boxes": box_table(test).expand_dims(test=["t"]),
+        "statistics/bands": band_parts(test, {}, 0.95).expand_dims(test=["t"]),
     }
     models = {"m": {"ensemble": True}}
     attrs = {"settings": json.dumps(settings), "models": json.dumps(models)}

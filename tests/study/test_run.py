@@ -106,7 +106,7 @@ def test_cells_are_what_the_models_say(study_folder, finished):
 
 
 def test_the_error_over_time_is_kept_in_bands_and_each_is_tested_for_a_trend(finished):
-    test, trend = finished.tests["unseen"], finished.groups["statistics/trend/unseen"]
+    test, trend = finished.tests["unseen"], finished.groups["statistics/trend"].sel(test="unseen")
     split = 1 / (3.0 * finished.attrs["encounter_period"])  # the default: three periods
     cell = test.isel(training=1, window=2)
     found = band_error_over_time(

@@ -79,7 +79,7 @@ def test_the_truth_is_read_at_the_instants_of_the_windows(found):
     heave = test.sel(channel="heave")
     np.testing.assert_allclose(heave["truth"], heave["measured"] + 0.005, rtol=0, atol=1e-9)
     assert np.isnan(test["truth"].sel(channel="pitch")).all()
-    table = found.groups["statistics/coverage/unseen"].sel(model="bayesian")
+    table = found.groups["statistics/coverage"].sel(test="unseen", model="bayesian")
     assert list(table["against"].values) == ["measured", "truth"]
     assert np.isnan(table["inside"].sel(against="truth", channel="pitch"))
     for side in ("measured", "truth"):
@@ -206,7 +206,7 @@ def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study, monk
         found = run_study(read_study(path), tmp_path / "out")
     lost = found.groups["statistics/lost"]
     assert set(lost["model"].values) == {"wild"}
-    boxes = found.groups["statistics/boxes/unseen"].sel(channel="average", measure="nrmse")
+    boxes = found.groups["statistics/boxes"].sel(test="unseen", channel="average", measure="nrmse")
     assert boxes["count"].sel(model="wild") == 0
     assert boxes["count"].sel(model="deterministic") == 6
     assert np.isfinite(found.groups["statistics/divergence"]["mean"].sel(model="bayesian")).all()
@@ -319,7 +319,7 @@ def test_any_registered_kind_runs_in_a_study_and_is_a_reference(tmp_path, put_st
     assert (still == still.isel(time=0)).all()
     average = test["mean"].sel(model="average").isel(window=0, time=0)
     np.testing.assert_allclose(average, test["training_mean"], rtol=1e-9, atol=1e-12)
-    skill = found.groups["statistics/skill/unseen"]
+    skill = found.groups["statistics/skill"].sel(test="unseen")
     assert list(skill["reference_model"].values) == ["still", "average", "classic"]
     change = skill["change"].sel(model="deterministic", measure="nrmse")
     assert (change.sel(reference=["hold_last", "mean"]) < -0.5).all()

@@ -166,7 +166,7 @@ def _heat_table(results: Results, test: str) -> Table:
     for name in [*first.channels, "average"]:
         cells = []
         for _, result, model in places:
-            at = result.groups[f"statistics/boxes/{test}"]["median"]
+            at = result.groups["statistics/boxes"]["median"].sel(test=test)
             cells.append(number(float(at.sel(model=model, measure="nrmse", channel=name)), 2))
         rows.append((name.replace("_", " "), *cells))
     heads = [f"{act.title.partition(' ')[0]} {model_words(model)}" for act, _, model in places]

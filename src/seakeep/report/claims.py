@@ -205,9 +205,9 @@ def _robust(results: Results) -> Verdict:
 
 
 def _trend(results: Results) -> Verdict:
-    at = results["paper"].groups["statistics/trend/irregular"]["p_value"].sel(band="all")
+    at = results["paper"].groups["statistics/trend"]["p_value"].sel(test="irregular", band="all")
     values = [float(at.sel(model=model)) for model in (SINGLE, ENSEMBLE)]
-    raw = results["raw"].groups["statistics/trend/irregular"]["p_value"].sel(band="all")
+    raw = results["raw"].groups["statistics/trend"]["p_value"].sel(test="irregular", band="all")
     kept = [probability(float(raw.sel(model=model))) for model in (SINGLE, ENSEMBLE)]
     return Verdict(
         f"p = {' and '.join(map(probability, values))}; act (b): {' and '.join(kept)}",

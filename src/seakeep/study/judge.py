@@ -9,6 +9,7 @@ the block length of Politis and White.
 from __future__ import annotations
 
 import warnings
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from typing import Any, Literal
@@ -75,37 +76,35 @@ def judge(
 ) -> dict[str, xr.Dataset]:
     """All statistics of a study, as groups ``statistics/…``; the densities side by side."""
     kinds = {name: each.kind for name, each in settings.models.items()}
-    out: dict[str, xr.Dataset] = {}
-    if (lost := lost_forecasts(groups, settings.tests)) is not None:
-        out["statistics/lost"] = lost
+    seed, level = settings.study.seed, settings.statistics.level
+    found: dict[str, dict[str, xr.Dataset | None]] = defaultdict(dict)
     for name in settings.tests:
         test = groups[f"tests/{name}"]
-        out[f"statistics/boxes/{name}"] = boxes = box_table(test)
-        rng = random_stream(settings.study.seed, f"differences.{name}")
-        differences = difference_table(test, groups["training"], rng)
-        out[f"statistics/differences/{name}"] = differences
-        if (skill := skill_table(boxes, differences, kinds)) is not None:
-            out[f"statistics/skill/{name}"] = skill
+        found["boxes"][name] = boxes = box_table(test)
+        rng = random_stream(seed, f"differences.{name}")
+        found["differences"][name] = changes = difference_table(test, groups["training"], rng)
+        found["skill"][name] = skill_table(boxes, changes, kinds)
         if test.sizes["ensemble"]:
-            calibrations = {
-                m: groups[f"calibration/{m}"]
-                for m in test["ensemble"].values
-                if f"calibration/{m}" in groups
-            }
-            out[f"statistics/coverage/{name}"] = coverage_table(test, calibrations)
-            level = settings.statistics.level
-            if (parts := band_parts(test, calibrations, level)) is not None:
-                out[f"statistics/bands/{name}"] = parts
-        rng = random_stream(settings.study.seed, f"trend.{name}")
-        out[f"statistics/trend/{name}"] = trend_table(test, rng)
+            ensembles = test["ensemble"].values
+            known = [model for model in ensembles if f"calibration/{model}" in groups]
+            calibrations = {model: groups[f"calibration/{model}"] for model in known}
+            found["coverage"][name] = coverage_table(test, calibrations)
+            found["bands"][name] = band_parts(test, calibrations, level)
+        found["trend"][name] = trend_table(test, random_stream(seed, f"trend.{name}"))
         if is_regular(groups, name):
-            out[f"statistics/response/{name}"] = regular_response(groups, name)
+            found["response"][name] = regular_response(groups, name)
+    lost = lost_forecasts(groups, settings.tests)
+    out = {} if lost is None else {"statistics/lost": lost}
+    for key, tables in found.items():
+        if made := {name: each for name, each in tables.items() if each is not None}:
+            names = xr.Variable("test", list(made))
+            out[f"statistics/{key}"] = xr.concat(list(made.values()), names, join="outer")
     name = settings.statistics.densities_of or next(iter(settings.tests))
     test = groups[f"tests/{name}"]
     models = list(settings.models)
-    found = [_divergences(test, model, channels, settings, name, executor) for model in models]
+    pairs = [_divergences(test, model, channels, settings, name, executor) for model in models]
     divergence, densities = (
-        xr.concat([pair[k] for pair in found], dim=xr.Variable("model", models)) for k in (0, 1)
+        xr.concat([pair[k] for pair in pairs], dim=xr.Variable("model", models)) for k in (0, 1)
     )
     out["statistics/divergence"] = divergence.assign_attrs(test=name)
     out["statistics/densities"] = densities.assign_attrs(test=name)
@@ -186,7 +185,6 @@ def difference_table(
             "measure": test["measure"].values,
             "channel": ["average", *map(str, test["channel"].values)],
         },
-        attrs={"blocks": blocks},
     )
 
 

@@ -40,7 +40,7 @@ def error_over_time_figure(result: StudyResult) -> Figure:
         figure = new_figure(8.5, 0.7 + 2.1 * len(tests))
         grid = figure.subplots(len(tests), len(BAND_WORDS), squeeze=False, sharey="row")
         for row, test in zip(grid, tests, strict=True):
-            trend = result.groups[f"statistics/trend/{test}"]
+            trend = result.groups["statistics/trend"].sel(test=test)
             tallest = 0.0
             for each, (band, words) in zip(row, BAND_WORDS.items(), strict=True):
                 tallest = max(tallest, _draw_band(each, result, trend.sel(band=band)))
