@@ -30,7 +30,7 @@ n_members = 3
 ridge = { log_uniform = [0.05, 0.5] }
 observables = []
 readouts = {}
-train_length = { uniform = [10, 20] }
+window = { uniform = ["10 T", "20 T"] }
 [tests.unseen]
 runs = ["unseen"]
 windows = 2
@@ -88,9 +88,11 @@ def a_file(folder):
     ("spoil", "status", "words"),
     [
         (
-            lambda folder: change(folder / "study.toml", "[10, 20]", "[1000, 2000]"),
+            lambda folder: change(
+                folder / "study.toml", '["10 T", "20 T"]', '["1000 T", "2000 T"]'
+            ),
             2,
-            ["training: no window is feasible in", "Shorten train_length or the delays"],
+            ["training: no window is feasible in", "Shorten window or the delays"],
         ),
         (
             lambda folder: change(folder / "study.toml", "length = 6", "length = 600"),

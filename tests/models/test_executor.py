@@ -46,9 +46,9 @@ def ensemble_and_run():
     )
     spec = seakeep.BayesianHankelDMDc(
         encounter_period=1.6,
-        train_length=seakeep.Uniform(6, 12),
-        state_delay=seakeep.Uniform(0.2, 0.8),
-        input_delay=seakeep.Uniform(0.3, 1.2),
+        window=seakeep.Uniform("6 T", "12 T"),
+        state_delays=seakeep.Uniform("0.2 T", "0.8 T"),
+        input_delays=seakeep.Uniform("0.3 T", "1.2 T"),
         ridge=seakeep.LogUniform(0.1, 10),
         n_members=9,
         delay_rows="ridge",

@@ -319,8 +319,8 @@ def test_a_write_that_fails_names_the_mend_of_its_cause(number, kind, status, me
 
 
 def test_no_feasible_training_window(study_folder):
-    change(study_folder, "[10, 20]", "[1000, 2000]")
-    with pytest.raises(RequestError, match=r"no window is feasible.*Shorten train_length"):
+    change(study_folder, '["10 T", "20 T"]', '["1000 T", "2000 T"]')
+    with pytest.raises(RequestError, match=r"no window is feasible.*Shorten window"):
         run_study(read_study(study_folder / "study.toml"), study_folder / "out")
 
 

@@ -6,20 +6,20 @@ else the default of the kind.
 
 from __future__ import annotations
 
-import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, Literal, cast
 
-from seakeep.campaign import ModelSettings, PriorSettings
+from seakeep.campaign import ModelSettings
 from seakeep.campaign.settings import CampaignSettings
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import KINDS, ProbeAlignment, Select, Spec
+from seakeep.models.checks import check_keys
 from seakeep.models.observables import Observable, SlowSquares, observables_of
-from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform
-from seakeep.models.settings import periods_to_samples
+from seakeep.models.settings import Folds
 from seakeep.models.specs import left_open
-from seakeep.toml import Length, lengths, parse_length
+from seakeep.toml import Length, Mistake, lengths
 
 __all__ = [
     "ResolvedModel",
@@ -27,12 +27,12 @@ __all__ = [
     "build_spec",
     "can_align",
     "counts_in_periods",
+    "mistakes_of",
     "resolve_model",
 ]
 
 Source = Literal["stated", "preset", "study", "default"]
 
-PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
 TABLES = {"alignment": ProbeAlignment, "select": Select}
 """Arguments of a spec that are tables of their own."""
 OF_THE_DATA = ("dt", "encounter_period")
@@ -98,8 +98,6 @@ def _values(spec: Spec) -> dict[str, Any]:
     """Settings of a spec as JSON values; those of its tables one by one."""
     known = _defaults(type(spec))
     out = {key: value for key, value in spec.to_json().items() if key in known}
-    if "seed" in out:
-        out["seed"] = int(out["seed"])
     for name in TABLES:
         if (table := out.get(name)) is not None:
             del out[name]
@@ -110,8 +108,9 @@ def _values(spec: Spec) -> dict[str, Any]:
 def counts_in_periods(settings: ModelSettings) -> bool:
     """Whether a model is stated in encounter periods: by a preset, a key, or as an ensemble."""
     by_kind = _kind_of(settings).is_ensemble
-    squares = any(each.get("kind") == SlowSquares.kind for each in settings.observables or ())
-    named = preset_of(settings) is not None or settings.select is not None
+    stated = settings.arguments()
+    squares = any(each.get("kind") == SlowSquares.kind for each in stated.get("observables", ()))
+    named = preset_of(settings) is not None or "select" in stated
     return named or by_kind or squares or any(lengths(settings))
 
 
@@ -160,7 +159,7 @@ def resolve_model(
     preset: str | None = None,
     seed: int | None = None,
     aligned: bool = False,
-    folds: Literal["run", "sea_state"] = "run",
+    folds: Folds = "auto",
 ) -> ResolvedModel:
     """Fill in, key by key, what the table of a model does not state."""
     kind = _kind_of(settings)
@@ -176,7 +175,6 @@ def resolve_model(
     else:
         preset = preset_of(settings)
     stated = settings.arguments()
-    stated.pop("stop", None)
     known = list(_defaults(kind))
     if unknown := [key for key in stated if key not in known]:
         raise RequestError(
@@ -195,9 +193,6 @@ def resolve_model(
     if "observables" in stated:
         tables = stated["observables"]
         stated["observables"] = tuple(_observable(each, encounter_period) for each in tables)
-    stated = {
-        key: _converted(key, value, ensemble, encounter_period, dt) for key, value in stated.items()
-    }
     from_study: dict[str, Any] = (
         {"seed": seed} if ensemble and seed is not None and "seed" not in stated else {}
     )
@@ -205,12 +200,35 @@ def resolve_model(
     if preset is not None and encounter_period is not None:
         filled = _filled(kind, preset, encounter_period, dt, alignment)
     data = {"encounter_period": encounter_period, "dt": dt}
-    spec = _made(kind, filled, {**from_study, **stated}, data)
+    spec = _made(kind, filled, {**from_study, **stated}, data).resolved(dt, encounter_period)
     open_spec = left_open(spec)
-    if open_spec and folds != "run" and "folds" not in (stated.get("select") or {}):
+    if open_spec and folds != "auto" and "folds" not in (stated.get("select") or {}):
         spec = replace(open_spec, select=replace(open_spec.select or Select(), folds=folds))
         from_study["select.folds"] = folds
     return ResolvedModel(settings.kind, preset, spec, _sources(spec, filled, stated, from_study))
+
+
+def mistakes_of(
+    settings: ModelSettings, place: tuple[str, ...], preset: str | None = None
+) -> list[Mistake]:
+    """What is wrong with the table of a model, before its runs are prepared.
+
+    Parameters
+    ----------
+    settings : ModelSettings
+        The table.
+    place : tuple of str
+        Keys that lead to it in its file.
+    preset : str, optional
+        Preset of the study.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeakeepWarning)  # given when the model is fitted
+        try:
+            resolve_model(settings, 1.0, 1.0 / 32, preset=preset)  # any period and step
+        except RequestError as error:
+            return [Mistake(place, str(error))]
+    return []
 
 
 def _filled(
@@ -249,6 +267,7 @@ def _made(
 ) -> Spec:
     for name, table in TABLES.items():
         if isinstance(given.get(name), dict):
+            check_keys(table, given[name], f"{name}: ")
             before = getattr(filled, name, None) or table()
             given = {**given, name: replace(before, **given[name])}
     if given.get("observables") is not None and "select" in _defaults(kind):
@@ -260,10 +279,10 @@ def _made(
     if filled is not None:
         return cast("Spec", replace(cast("Any", filled), **given))
     needed = [key for key, default in _defaults(kind).items() if default is MISSING]
-    if "train_length" in needed:
-        given.setdefault("train_length", None)
     if missing := [key for key in needed if key not in given]:
-        as_priors = " as priors, such as { uniform = [0.5, 1.5] }" if kind.is_ensemble else ""
+        as_priors = (
+            " as priors, such as { uniform = ['0.5 T', '1.5 T'] }" if kind.is_ensemble else ""
+        )
         presets = [f"'{name}'" for name in ("recommended", "paper") if hasattr(kind, name)]
         raise RequestError(
             f"the [model] table states no {missing[0]}. Add {', '.join(missing)}{as_priors}"
@@ -300,9 +319,7 @@ def _select(table: dict[str, Any], encounter_period: float | None) -> dict[str, 
     if "horizon" in table:
         given = table["horizon"]
         every = given if isinstance(given, list | tuple) else (given,)
-        made["horizon"] = tuple(
-            parse_length(each).value if isinstance(each, str) else each for each in every
-        )
+        made["horizon"] = tuple(each.value if isinstance(each, Length) else each for each in every)
     return made
 
 
@@ -312,34 +329,10 @@ def _observable(table: Mapping[str, Any], encounter_period: float | None) -> Obs
     def counted(value: Any) -> Any:
         if isinstance(value, list | tuple):
             return [counted(each) for each in value]
-        return parse_length(value).value if isinstance(value, str) else value
+        return value.value if isinstance(value, Length) else value
 
     in_periods = {key: counted(table[key]) for key in ("cutoff", "lead", "lags") if key in table}
     (made,) = observables_of([{**table, **in_periods}])
     if isinstance(made, SlowSquares) and made.period is None:
         return replace(made, period=encounter_period)
     return made
-
-
-def _converted(key: str, value: Any, ensemble: bool, period: float | None, dt: float) -> Any:
-    """Value of a key as the constructor takes it: lengths in samples, priors of an ensemble."""
-    if isinstance(value, Length) and period is not None:
-        whole = math.isinf(value.value)  # "inf T": all samples of a run
-        return None if whole else periods_to_samples(value.value, period, dt)
-    return _prior(value) if ensemble and key in PRIORS and value != "rollout" else value
-
-
-def _prior(stated: PriorSettings | float) -> Prior:
-    if not isinstance(stated, PriorSettings):
-        return Fixed(float(stated))
-    if stated.uniform is not None:
-        return Uniform(*stated.uniform)
-    if stated.log_uniform is not None:
-        return LogUniform(*stated.log_uniform)
-    if stated.distribution is not None:
-        from scipy import stats
-
-        frozen: Prior = getattr(stats, stated.distribution)(**stated.parameters)
-        return frozen
-    assert stated.fixed is not None
-    return Fixed(stated.fixed)
