@@ -219,7 +219,7 @@ def result_of(folder: Path, name: str, text: str, progress: Progress) -> StudyRe
 
 def median(results: Results, test: str, model: str, channel: str, key: str = "nrmse") -> float:
     """Median over the cells; the channel "average" is the ANRMSE."""
-    boxes = results[test].groups[f"statistics/boxes/{test}"]["median"]
+    boxes = results[test].groups["statistics/boxes"]["median"].sel(test=test)
     return float(boxes.sel(measure=key, model=model, channel=channel))
 
 
@@ -269,7 +269,7 @@ def bands(
     results: Results, test: str, band: str = "calibrated", model: str = "ensemble"
 ) -> dict[str, float]:
     """Coverage averaged over the channels, of all instants and of the worst thirds; width in SD."""
-    at = results[test].groups[f"statistics/bands/{test}"].sel(model=model, band=band)
+    at = results[test].groups["statistics/bands"].sel(test=test, model=model, band=band)
     inside = {str(part): float(at["inside"].sel(part=part).mean()) for part in at["part"].values}
     waves = [inside[part] for part in inside if "waves" in part]
     horizon = [inside[part] for part in inside if "third" in part]

@@ -137,7 +137,9 @@ def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page, result)
     path = page.parent / "tables" / "coverage_calibrated_bayesian.csv"
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
-    table = result.groups["statistics/coverage/unseen"].sel(model="bayesian", against="measured")
+    table = result.groups["statistics/coverage"].sel(
+        test="unseen", model="bayesian", against="measured"
+    )
     average = table.sel(channel="average")
     expected = [average["calibrated_inside"], average["calibrated_relative_width"]]
     assert rows[-1] == ["average", *(f"{float(value):.2f}" for value in expected)]
@@ -190,11 +192,11 @@ def test_a_history_shows_the_calibrated_band_around_that_of_the_members(result):
     cell = result.tests[test].isel(training=training, window=window)
     kept = result.groups["calibration/bayesian"].isel(training=training)
     for axes, name in zip(figure.axes, result.channels, strict=True):
-        one = cell.sel(channel=name)
+        one = cell.sel(channel=name, model="bayesian", ensemble="bayesian")
         (lower,) = (line for line in axes.lines if line.get_label() == "calibrated")
         margin, floor = (float(kept[key].sel(channel=name)) for key in ("margin", "floor"))
-        half = margin * np.hypot(one["bayesian_std"].values, floor)
-        wider = one["bayesian_mean"].values - half
+        half = margin * np.hypot(one["std"].values, floor)
+        wider = one["mean"].values - half
         mean, spread = float(one["training_mean"]), float(one["training_std"])
         np.testing.assert_allclose(lower.get_ydata(), (wider - mean) / spread, rtol=1e-10)
     (legend,) = figure.legends
@@ -340,9 +342,10 @@ def test_a_margin_for_windows_of_another_length_is_named(result):
     assert "not made for" not in coverage_table(result, "bayesian", calibrated=True).note
     settings = result.settings
     settings["tests"]["long"] = {**settings["tests"]["unseen"], "length": 12.0, "label": ""}
-    groups = dict(result.groups)
-    for name in ("tests", "statistics/coverage"):
-        groups[f"{name}/long"] = groups[f"{name}/unseen"]
+    table = result.groups["statistics/coverage"]
+    table = xr.concat([table, table.assign_coords(test=["long"])], "test")
+    groups = {**result.groups, "statistics/coverage": table}
+    groups["tests/long"] = groups["tests/unseen"]
     both = replace(result, attrs={**result.attrs, "settings": json.dumps(settings)}, groups=groups)
     note = coverage_table(both, "bayesian", calibrated=True).note
     assert "Those are 6 T̂ long; the margin is not made for long (12 T̂)" in note
@@ -589,7 +592,11 @@ def test_models_stand_beside_the_baselines_and_lost_forecasts_are_named(result):
     skill = xr.Dataset({**changes, "reference_model": ("reference", ["bayesian"])})
     cell = {"model": "m", "test": "unseen", "training": "t0", "window": 1, "run": "r", "start": 2.0}
     lost = xr.Dataset({key: ("cell", [value]) for key, value in cell.items()})
-    groups = {**result.groups, "statistics/skill/unseen": skill, "statistics/lost": lost}
+    groups = {
+        **result.groups,
+        "statistics/skill": skill.expand_dims(test=["unseen"]),
+        "statistics/lost": lost,
+    }
     judged = replace(result, groups=groups)
     table = errors(judged).tables[1]
     found = ("-20 [-35, -5]", "+10 [-5, +25] cannot tell")

@@ -34,8 +34,8 @@ def result(offset, wave=0.3, rest=0.1, slack=0.0):
         ),
         "runs": runs,
     }
+    groups["statistics/response"] = response.expand_dims(test=[*settings["tests"]])
     for name in settings["tests"]:
-        groups[f"statistics/response/{name}"] = response
         groups[f"tests/{name}"] = xr.Dataset({"run": ("window", [name])}, coords={"channel": names})
     models = {"m": {"kind": "hankel_dmdc", "ensemble": False}}
     attrs = {"settings": json.dumps(settings), "models": json.dumps(models)}

@@ -10,7 +10,7 @@ from seakeep.report.sections.bands import bands
 from seakeep.report.sections.chosen import chosen
 from seakeep.report.sections.scales import scales
 from seakeep.study import StudyResult
-from seakeep.study.judge import band_parts, box_table
+from seakeep.study.judge import MEASURES, band_parts, box_table
 
 
 @pytest.fixture
@@ -22,19 +22,23 @@ def result():
     dims = ("training", "window", "time", "channel")
     lower, upper = np.full((1, 1, 12, 2), -10.0), np.full((1, 1, 12, 2), 10.0)
     upper[..., :4, 0] = -9.0  # the first third of the horizon misses the wave
-    cell = ("training", "window", "channel")
+    errors = [[[[0.3, np.nan]]], [[[0.3, np.nan]]], [[[0.075, 1.525]]]]
     test = xr.Dataset(
         {
             "measured": (dims[1:], measured),
             "judged": (("training", "window"), [[True]]),
             "training_std": (("training", "channel"), [[8.0, 0.5]]),
-            "m_lower": (dims, lower),
-            "m_upper": (dims, upper),
-            "m_nrmse": (cell, [[[0.3, np.nan]]]),
-            "m_nammae": (cell, [[[0.3, np.nan]]]),
-            "m_training_nrmse": (cell, [[[0.075, 1.525]]]),
+            "lower": (("ensemble", *dims), lower[None]),
+            "upper": (("ensemble", *dims), upper[None]),
+            "error": (("model", "measure", "training", "window", "channel"), [errors]),
         },
-        coords={"channel": ["heave", "load"], "time": time},
+        coords={
+            "channel": ["heave", "load"],
+            "time": time,
+            "model": ["m"],
+            "ensemble": ["m"],
+            "measure": list(MEASURES),
+        },
     )
     names = {"units": ["m", "N"], "long_name": ["heave", "load"]}
     settings = {"tests": {"t": {"label": "sea"}}, "statistics": {"level": 0.95}}
@@ -44,8 +48,8 @@ def result():
             coords={"name": ["heave", "load"], "channel": ["heave", "load"]},
         ),
         "tests/t": test,
-        "statistics/boxes/t": box_table(test, ["m"]),
-        "statistics/bands/t": band_parts(test, ["m"], {}, 0.95),
+        "statistics/boxes": box_table(test).expand_dims(test=["t"]),
+        "statistics/bands": band_parts(test, {}, 0.95).expand_dims(test=["t"]),
     }
     models = {"m": {"ensemble": True}}
     attrs = {"settings": json.dumps(settings), "models": json.dumps(models)}

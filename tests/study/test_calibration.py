@@ -46,7 +46,9 @@ def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder
     plan, runs = make_plan(study)
     kept = found.groups["calibration/bayesian"]
     test = found.tests["unseen"]
-    table = found.groups["statistics/coverage/unseen"].sel(model="bayesian", against="measured")
+    table = found.groups["statistics/coverage"].sel(
+        test="unseen", model="bayesian", against="measured"
+    )
     inside = []
     for k, training in enumerate(plan.training):
         ensemble = fit_training(plan, runs, "bayesian", training)
@@ -55,13 +57,12 @@ def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder
         alone = ensemble.calibrate(parts, steps, scale=scale).calibration
         np.testing.assert_allclose(kept["margin"][k], alone.found.margin, rtol=1e-9)
         assert int(kept["windows"][k]) == sum(alone.windows.values()) > 0
-        cell = test.isel(training=k)
-        lower = cell["bayesian_lower"] - alone.found.margin
-        upper = cell["bayesian_upper"] + alone.found.margin
+        cell = test.isel(training=k).sel(model="bayesian", ensemble="bayesian")
+        lower, upper = cell["lower"] - alone.found.margin, cell["upper"] + alone.found.margin
         if scale == "spread":
             np.testing.assert_allclose(kept["floor"][k], alone.floor, rtol=1e-9)
-            half = alone.found.margin * np.sqrt(cell["bayesian_std"] ** 2 + alone.floor**2)
-            lower, upper = cell["bayesian_mean"] - half, cell["bayesian_mean"] + half
+            half = alone.found.margin * np.sqrt(cell["std"] ** 2 + alone.floor**2)
+            lower, upper = cell["mean"] - half, cell["mean"] + half
         if scale == "learnt":
             np.testing.assert_allclose(kept["law"][k], alone.law, rtol=1e-6, atol=1e-9)
             band = replace(ensemble, calibration=alone)
@@ -78,7 +79,7 @@ def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder
     np.testing.assert_allclose(table["calibrated_inside"][1:], by_channel, rtol=1e-9)
     assert (table["calibrated_inside"] >= table["inside"]).all()
     assert (table["calibrated_relative_width"] > table["relative_width"]).all()
-    bands = found.groups["statistics/bands/unseen"].sel(model="bayesian", band="calibrated")
+    bands = found.groups["statistics/bands"].sel(test="unseen", model="bayesian", band="calibrated")
     np.testing.assert_allclose(bands["inside"].sel(part="all"), by_channel, rtol=1e-9)
     thirds = bands.sel(part=["lowest waves", "middle waves", "highest waves"])
     np.testing.assert_allclose(thirds["crps"].mean("part"), bands["crps"].sel(part="all"))
@@ -130,7 +131,7 @@ def test_training_data_without_a_window_that_is_not_read_give_no_margin(study_fo
     kept = found.groups["calibration/bayesian"]
     assert int(kept["windows"][0]) == 0
     assert np.isnan(kept["margin"]).all()
-    table = found.groups["statistics/coverage/unseen"]
+    table = found.groups["statistics/coverage"].sel(test="unseen")
     assert np.isnan(table["calibrated_inside"]).all()
     assert np.isfinite(table["inside"].sel(channel="average", against="measured")).all()
 
@@ -148,5 +149,7 @@ def test_runs_that_are_left_out_and_test_nowhere_have_no_margin(study_folder):
     folds = list(kept["training"].values)
     assert folds == ["without first", "without second", "without unseen"]
     assert np.isfinite(kept["margin"]).all("channel").values.tolist() == [False, False, True]
-    table = found.groups["statistics/coverage/unseen"].sel(channel="average", against="measured")
+    table = found.groups["statistics/coverage"].sel(
+        test="unseen", channel="average", against="measured"
+    )
     assert np.isfinite(table["calibrated_inside"]).all()

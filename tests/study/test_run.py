@@ -95,34 +95,34 @@ def test_cells_are_what_the_models_say(study_folder, finished):
                 column = cell.sel(channel=channel)
                 # Windows side by side are one product: sums in another order, about 1e-13.
                 kwargs = {"rtol": 1e-9, "atol": 1e-11}
-                np.testing.assert_allclose(column["deterministic_mean"], alone[channel], **kwargs)
+                ours = column["mean"].sel(model="deterministic")
+                np.testing.assert_allclose(ours, alone[channel], **kwargs)
+                ours = column.sel(model="bayesian", ensemble="bayesian")
                 for statistic in ("mean", "lower", "upper"):
-                    np.testing.assert_allclose(
-                        column[f"bayesian_{statistic}"],
-                        band[channel].sel(statistic=statistic),
-                        **kwargs,
-                    )
+                    expected = band[channel].sel(statistic=statistic)
+                    np.testing.assert_allclose(ours[statistic], expected, **kwargs)
                 measured = run[channel].values[at : at + window.steps]
                 np.testing.assert_array_equal(column["measured"], measured)
 
 
 def test_the_error_over_time_is_kept_in_bands_and_each_is_tested_for_a_trend(finished):
-    test, trend = finished.tests["unseen"], finished.groups["statistics/trend/unseen"]
+    test, trend = finished.tests["unseen"], finished.groups["statistics/trend"].sel(test="unseen")
     split = 1 / (3.0 * finished.attrs["encounter_period"])  # the default: three periods
     cell = test.isel(training=1, window=2)
     found = band_error_over_time(
-        predicted=cell["bayesian_mean"].values,
+        predicted=cell["mean"].sel(model="bayesian").values,
         measured=cell["measured"].values,
         dt=finished.attrs["dt"],
         frequency=split,
         training_std=cell["training_std"].values,
     )
-    np.testing.assert_array_equal(cell["bayesian_error_low"], found.low)
-    np.testing.assert_array_equal(cell["bayesian_error_wave"], found.wave)
+    bands = cell["error_over_time"].sel(model="bayesian", band=["low", "wave"])
+    np.testing.assert_array_equal(bands, found)
     assert list(trend["band"].values) == ["all", "low", "wave"]
-    for band, key in (("all", "error_over_time"), ("low", "error_low"), ("wave", "error_wave")):
+    for band in ("all", "low", "wave"):
         at = trend.sel(model="deterministic", band=band)
-        mean = test[f"deterministic_{key}"].mean(("training", "window"))
+        errors = test["error_over_time"].sel(model="deterministic", band=band)
+        mean = errors.mean(("training", "window"))
         np.testing.assert_allclose(at["error_mean"], mean, rtol=1e-12)
         slope = np.polyfit(test["time"], mean, 1)[0]
         assert float(at["slope"]) == pytest.approx(slope, rel=1e-9)
@@ -405,7 +405,7 @@ def test_joined_series_are_the_windows_end_to_end(finished):
     assert diverged == 0
     assert predicted.shape == (2, 3 * test.sizes["time"], test.sizes["channel"])
     np.testing.assert_array_equal(measured[: test.sizes["time"]], test["measured"][0])
-    np.testing.assert_array_equal(predicted[1, -1], test["bayesian_mean"][1, -1, -1])
+    np.testing.assert_array_equal(predicted[1, -1], test["mean"].sel(model="bayesian")[1, -1, -1])
 
 
 @pytest.mark.parametrize("name", ["report.html", "figures/photo.png", "tables/lines.csv"])

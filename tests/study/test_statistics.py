@@ -79,11 +79,12 @@ def test_the_truth_is_read_at_the_instants_of_the_windows(found):
     heave = test.sel(channel="heave")
     np.testing.assert_allclose(heave["truth"], heave["measured"] + 0.005, rtol=0, atol=1e-9)
     assert np.isnan(test["truth"].sel(channel="pitch")).all()
-    table = found.groups["statistics/coverage/unseen"].sel(model="bayesian")
+    table = found.groups["statistics/coverage"].sel(test="unseen", model="bayesian")
     assert list(table["against"].values) == ["measured", "truth"]
     assert np.isnan(table["inside"].sel(against="truth", channel="pitch"))
     for side in ("measured", "truth"):
-        inside = (heave["bayesian_lower"] <= heave[side]) & (heave[side] <= heave["bayesian_upper"])
+        band = heave.sel(ensemble="bayesian")
+        inside = (band["lower"] <= heave[side]) & (heave[side] <= band["upper"])
         row = table.sel(against=side, channel="heave")
         assert float(row["inside"]) == pytest.approx(float(inside.mean()), abs=1e-12)
     # Half a centimetre is a tenth of the wave height: the coverages differ.
@@ -133,18 +134,24 @@ def cells(inside=0.5):
         {
             "measured": (("window", "time", "channel"), measured),
             "judged": (("training", "window"), [[True, True], [True, False]]),
-            "m_lower": (("training", "window", "time", "channel"), lower),
-            "m_upper": (("training", "window", "time", "channel"), upper),
-            "m_nrmse": (("training", "window", "channel"), errors),
-            "m_nammae": (("training", "window", "channel"), 2 * errors),
-            "m_training_nrmse": (("training", "window", "channel"), 3 * errors),
+            "lower": (("ensemble", "training", "window", "time", "channel"), lower[None]),
+            "upper": (("ensemble", "training", "window", "time", "channel"), upper[None]),
+            "error": (
+                ("model", "measure", "training", "window", "channel"),
+                np.stack([errors, 2 * errors, 3 * errors])[None],
+            ),
         },
-        coords={"channel": ["heave", "pitch"]},
+        coords={
+            "channel": ["heave", "pitch"],
+            "model": ["m"],
+            "ensemble": ["m"],
+            "measure": list(MEASURES),
+        },
     )
 
 
 def test_coverage_by_hand():
-    row = coverage_table(cells(), ["m"]).sel(model="m", against="measured")
+    row = coverage_table(cells()).sel(model="m", against="measured")
     np.testing.assert_allclose(row["inside"], 0.5, rtol=1e-15)
     np.testing.assert_allclose(row["below"], 0.5, rtol=1e-15)
     # Widths of 60 and of 5 in turns, over SDs √(8/7) times amplitudes 1, 2, 1 (10, 20, 10).
@@ -156,7 +163,7 @@ def test_coverage_by_hand():
 
 def test_boxes_are_matplotlibs_of_the_judged_cells():
     cbook = pytest.importorskip("matplotlib.cbook", reason="needs matplotlib (extra 'figures')")
-    table = box_table(cells(), ["m"]).sel(model="m", measure="nrmse")
+    table = box_table(cells()).sel(model="m", measure="nrmse")
     expected = {
         "heave": [0.1, 0.2, 0.4],
         "pitch": [0.3, 0.8],  # one cell is slack, and left out
@@ -199,7 +206,7 @@ def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study, monk
         found = run_study(read_study(path), tmp_path / "out")
     lost = found.groups["statistics/lost"]
     assert set(lost["model"].values) == {"wild"}
-    boxes = found.groups["statistics/boxes/unseen"].sel(channel="average", measure="nrmse")
+    boxes = found.groups["statistics/boxes"].sel(test="unseen", channel="average", measure="nrmse")
     assert boxes["count"].sel(model="wild") == 0
     assert boxes["count"].sel(model="deterministic") == 6
     assert np.isfinite(found.groups["statistics/divergence"]["mean"].sel(model="bayesian")).all()
@@ -218,14 +225,16 @@ def crossed(rng, models, cells=10):
     """Errors of models in cells that share training sets and windows."""
     rows, columns = 0.1 * rng.standard_normal((cells, 1)), 0.1 * rng.standard_normal(cells)
     shared = 1.0 + rows + columns
-    dims = ("training", "window", "channel")
+    levels = np.array([*models.values()])[:, None, None, None, None]
+    errors = levels * shared[..., None] * [1.0, 2.0] * np.ones((len(MEASURES), 1, 1, 1))
     out = xr.Dataset(
-        {
-            f"{model}_{measure}": (dims, (level * shared)[..., None] * [1.0, 2.0])
-            for model, level in models.items()
-            for measure in MEASURES
+        {"error": (("model", "measure", "training", "window", "channel"), errors)},
+        coords={
+            "model": list(models),
+            "measure": list(MEASURES),
+            "channel": ["heave", "pitch"],
+            "time": [0.1, 10.0],
         },
-        coords={"channel": ["heave", "pitch"], "time": [0.1, 10.0]},
     )
     out["judged"] = (("training", "window"), np.ones((cells, cells), dtype=bool))
     out["run"] = ("window", np.array(["r"] * cells, dtype=object))
@@ -237,9 +246,9 @@ def test_differences_between_models_have_intervals_and_verdicts():
     rng = np.random.default_rng(0)
     test = crossed(rng, {"good": 0.8, "same": 1.0, "noisy": 1.0})
     noise = 1 + 0.3 * rng.standard_normal((10, 10, 1))
-    test["noisy_nrmse"] = test["noisy_nrmse"] * noise
+    test["error"].loc[{"model": "noisy", "measure": "nrmse"}] *= noise
     training = xr.Dataset({"begin": ("training", np.zeros(10))})
-    found = difference_table(test, ["good", "same", "noisy"], training, rng)
+    found = difference_table(test, training, rng)
     better = found.sel(model="good", other="same", measure="nrmse")
     # The same cells but for a factor: no draw can tell another change than the factor's.
     for key in ("change", "lower", "upper"):
@@ -306,11 +315,11 @@ def test_any_registered_kind_runs_in_a_study_and_is_a_reference(tmp_path, put_st
     path.write_text(text.replace(ensemble, "") + BASELINES, "utf-8")
     found = run_study(read_study(path), tmp_path / "out")
     test = found.tests["unseen"]
-    still = test["still_mean"]
+    still = test["mean"].sel(model="still")
     assert (still == still.isel(time=0)).all()
-    average = test["average_mean"].isel(window=0, time=0)
+    average = test["mean"].sel(model="average").isel(window=0, time=0)
     np.testing.assert_allclose(average, test["training_mean"], rtol=1e-9, atol=1e-12)
-    skill = found.groups["statistics/skill/unseen"]
+    skill = found.groups["statistics/skill"].sel(test="unseen")
     assert list(skill["reference_model"].values) == ["still", "average", "classic"]
     change = skill["change"].sel(model="deterministic", measure="nrmse")
     assert (change.sel(reference=["hold_last", "mean"]) < -0.5).all()

@@ -399,15 +399,10 @@ def _with_baselines(fitted: Mapping[str, Model], campaign: Campaign) -> dict[str
 
 def _print_comparison(tables: Mapping[str, xr.Dataset], kinds: Mapping[str, str]) -> None:
     from seakeep.report.comparison import band_findings, comparison_blocks, model_blocks
-    from seakeep.study.judge import LINEAR
+    from seakeep.study.judge import references_of
 
     several = len(tables) > 1
-    groups = {"hold last": ("hold_last",), "mean": ("mean",), "best linear": LINEAR}
-    references = {
-        heading: [name for name, kind in kinds.items() if kind in among]
-        for heading, among in groups.items()
-    }
-    known = {heading: names for heading, names in references.items() if names}
+    known = {name.replace("_", " "): names for name, names in references_of(kinds).items()}
     blocks = model_blocks(tables, known) if several else comparison_blocks(*tables.values())
     for block in blocks:
         print_table(block)

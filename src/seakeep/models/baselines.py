@@ -21,7 +21,7 @@ from seakeep.models import store
 from seakeep.models.engine import Windows, cut_lost
 from seakeep.models.forecasts import SingleModel, counted
 from seakeep.models.inputs import ProbeAlignment
-from seakeep.models.interface import Signature
+from seakeep.models.interface import Role, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.observables import Observable
@@ -82,6 +82,7 @@ class HoldLastModel(LinearModel):
 class LinearSpec(HankelSettings):
     """A baseline that is a linear model: it finds coefficients, the rest is common."""
 
+    role: ClassVar[Role] = "reference"
     is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
     model: ClassVar[type[LinearModel]]
@@ -277,6 +278,7 @@ class Subspace(HankelSettings):
     """
 
     kind: ClassVar[str] = "subspace"
+    role: ClassVar[Role] = "reference"
     is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
     ridge: float = 1e-3

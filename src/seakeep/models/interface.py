@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Protocol, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
 import xarray as xr
@@ -370,6 +370,9 @@ class Model(Protocol):
         ...
 
 
+Role = Literal["model", "reference"]
+
+
 class Spec(Protocol):
     """Settings that are fitted to runs; frozen, with JSON values.
 
@@ -377,11 +380,14 @@ class Spec(Protocol):
     ----------
     kind : str
         Its word in TOML files and in :data:`seakeep.models.registry.KINDS`.
+    role : {"model", "reference"}
+        Whether it is to be judged, or is what others are compared with.
     is_ensemble : bool
         Whether what it fits has several members.
     """
 
     kind: ClassVar[str]
+    role: ClassVar[Role]
     is_ensemble: ClassVar[bool]
 
     def resolved(self, dt: float, encounter_period: float | None) -> Self:

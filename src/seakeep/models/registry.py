@@ -15,7 +15,7 @@ from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
 __all__ = ["KINDS", "is_ensemble", "load_model"]
 
 KINDS: dict[str, type[Spec]] = {
-    each.kind: each for each in (HankelDMDc, BayesianHankelDMDc, Mean, HoldLast, FIR, ARX, Subspace)
+    each.kind: each for each in (HankelDMDc, BayesianHankelDMDc, HoldLast, Mean, FIR, ARX, Subspace)
 }
 """Specs by the word that TOML tables and files call their kind; one line adds a model."""
 

@@ -17,7 +17,7 @@ from seakeep.models.draws import PRIORS, Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.executor import Progress
 from seakeep.models.inputs import Chain, ProbeAlignment
-from seakeep.models.interface import Json, Needs, Signature, Span, Spec
+from seakeep.models.interface import Json, Needs, Role, Signature, Span, Spec
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.members import TrainingArrays, reach, spectral_radius
@@ -131,6 +131,7 @@ class HankelDMDc(HankelSettings):
     """
 
     kind: ClassVar[str] = "hankel_dmdc"
+    role: ClassVar[Role] = "model"
     is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
     may_choose: ClassVar[bool] = True
@@ -418,6 +419,7 @@ class BayesianHankelDMDc(HankelSettings):
     """
 
     kind: ClassVar[str] = "bayesian_hankel_dmdc"
+    role: ClassVar[Role] = "model"
     is_ensemble: ClassVar[bool] = True
     may_choose: ClassVar[bool] = True
     state_delays: Prior | int  # type: ignore[assignment]

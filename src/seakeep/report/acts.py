@@ -86,9 +86,7 @@ def _summary(results: Results) -> Section:
         "summary",
         "Results",
         words=(NOTE,),
-        points=tuple(
-            f"{act.title[:1].upper()}{act.title[1:]}. {act.sentence}" for act in _played(results)
-        ),
+        points=tuple(f"{act.title}. {act.sentence}" for act in _played(results)),
         figures=(
             Drawing(
                 "acts",
@@ -115,7 +113,7 @@ def acts_table(results: Results) -> Table:
     for act in _played(results):
         result = results[act.name]
         for model in result.models:
-            row = [act.title.partition(" ")[0], model_words(model)]
+            row = [act.letter, model_words(model)]
             for test in tests:
                 row += [number(value, 2) for value in _split(result, test, model)]
             rows.append(tuple(row))
@@ -142,7 +140,7 @@ def acts_table(results: Results) -> Table:
 def _conditions(results: Results) -> str:
     """Which acts read a measured output after the start."""
     reading = [act for act in _played(results) if results[act.name].attrs["conditional_on"]]
-    read = [act.title.partition(" ")[0] for act in reading]
+    read = [act.letter for act in reading]
     if not read:
         return ""
     return f"{' and '.join(read)}: conditional on measured surge, which the alignment reads."
@@ -151,7 +149,7 @@ def _conditions(results: Results) -> str:
 def _split(result: StudyResult, test: str, model: str) -> list[float]:
     """Median error of the wave-frequency and of the slow channels."""
     data = result.tests[test]
-    cells = data[f"{model}_nrmse"].values[data["judged"].values]
+    cells = data["error"].sel(model=model, measure="nrmse").values[data["judged"].values]
     slow = np.isin(data["channel"].values.astype(str), SLOW)
     return [float(np.nanmedian(average_of(cells[:, part]))) for part in (~slow, slow)]
 
@@ -168,7 +166,7 @@ def _heat_table(results: Results, test: str) -> Table:
     for name in [*first.channels, "average"]:
         cells = []
         for _, result, model in places:
-            at = result.groups[f"statistics/boxes/{test}"]["median"]
+            at = result.groups["statistics/boxes"]["median"].sel(test=test)
             cells.append(number(float(at.sel(model=model, measure="nrmse", channel=name)), 2))
         rows.append((name.replace("_", " "), *cells))
     heads = [f"{act.title.partition(' ')[0]} {model_words(model)}" for act, _, model in places]

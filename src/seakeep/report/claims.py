@@ -138,7 +138,7 @@ def _cells(result: StudyResult, tests: tuple[str, ...], model: str, measure: str
     """Errors over (training, window, channel), NaN where not judged; windows of all test sets."""
     order, _ = training_order(result.groups["training"])
     parts = [
-        np.where(data["judged"].values[..., None], data[f"{model}_{measure}"].values, np.nan)
+        data["error"].where(data["judged"]).sel(model=model, measure=measure).values
         for data in (result.tests[test] for test in tests)
     ]
     return np.concatenate(parts, axis=1)[order]
@@ -205,9 +205,9 @@ def _robust(results: Results) -> Verdict:
 
 
 def _trend(results: Results) -> Verdict:
-    at = results["paper"].groups["statistics/trend/irregular"]["p_value"].sel(band="all")
+    at = results["paper"].groups["statistics/trend"]["p_value"].sel(test="irregular", band="all")
     values = [float(at.sel(model=model)) for model in (SINGLE, ENSEMBLE)]
-    raw = results["raw"].groups["statistics/trend/irregular"]["p_value"].sel(band="all")
+    raw = results["raw"].groups["statistics/trend"]["p_value"].sel(test="irregular", band="all")
     kept = [probability(float(raw.sel(model=model))) for model in (SINGLE, ENSEMBLE)]
     return Verdict(
         f"p = {' and '.join(map(probability, values))}; act (b): {' and '.join(kept)}",
@@ -381,7 +381,7 @@ def _slow_loads(results: Results) -> Verdict:
     picked = _columns(result, LOADS)
     measured, forecast = (
         split_bands(values[..., picked], float(result.attrs["dt"]), frequency)[0]
-        for values in (test["measured"].values, test[f"{ENSEMBLE}_mean"].values[order])
+        for values in (test["measured"].values, test["mean"].sel(model=ENSEMBLE).values[order])
     )
     errors = np.sqrt(np.mean((forecast - measured) ** 2, axis=2)) / measured.std(axis=1)
     found = [

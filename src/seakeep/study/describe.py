@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
 
@@ -12,13 +13,11 @@ import xarray as xr
 from seakeep.campaign import Campaign
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
-from seakeep.models.inputs import FittedAlignment
 from seakeep.signals import significant_height, wave_spectrum
 from seakeep.signals.waves import paper_welch
 from seakeep.study.fit import find_repeat
 from seakeep.study.judge import wave_frequency
 from seakeep.study.plan import Plan, between, training_samples, whole_span
-from seakeep.study.resolve import Spec
 from seakeep.study.settings import Study
 
 __all__ = ["describe_study", "words_of_repeats"]
@@ -35,6 +34,7 @@ POSITIVE = {
 }
 SLACK = 1e-3
 """A load below this part of its largest value counts as slack."""
+WELCH = ("paper", "recommended")
 
 
 def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset]:
@@ -170,25 +170,6 @@ def _training(plan: Plan, runs: Runs) -> xr.Dataset:
         longest = training_samples(plan.needs) * plan.dt
         lengths = [min(longest, e.spans[0][2] - e.spans[0][1]) for e in plan.training]
         out["reads"] = ("training", np.array(lengths), {"units": "s"})
-    for model, spec in plan.specs.items():
-        if celerities := _celerities(spec, plan, runs):
-            dims = ("training", "of_run")
-            out[f"{model}_celerity"] = (dims, np.array(celerities), {"units": "m/s"})
-    return out
-
-
-def _celerities(spec: Spec, plan: Plan, runs: Runs) -> list[list[float]]:
-    """Celerity at which the waves of each run are carried to the measured surge, m/s."""
-    wanted = getattr(spec, "alignment", None)
-    if wanted is None or (wanted.mode, wanted.surge) != ("effective", "measured"):
-        return []
-    out = []
-    for each in plan.training:
-        parts = {name: between(runs[name], (begin, stop)) for name, begin, stop in each.spans}
-        fitted = wanted.fit(parts, plan.states, plan.inputs, None)
-        if not isinstance(fitted, FittedAlignment):  # an optional one that went without
-            return []
-        out.append([fitted.celerity_of(run) or np.nan for run in runs.values()])
     return out
 
 
@@ -253,20 +234,26 @@ def _spectra(plan: Plan, runs: Runs) -> xr.Dataset | None:
     waves = [name for name in plan.inputs if name.startswith("eta_")]
     if not waves:
         return None
-    variables: dict[str, Any] = {}
-    heights = []
-    for run_name, run in runs.items():
+    curves, heights = {}, []
+    for r, run in enumerate(runs.values()):
         spans = [run.attrs[k] for k in ("train_span", "test_span") if k in run.attrs]
         begin = min((float(s[0]) for s in spans), default=float(run["time"].values[0]))
         x = run[waves[0]].sel(time=slice(begin - 1e-6, None)).values
         heights.append(significant_height(x))
-        for kind in ("paper", "recommended"):
-            welch = paper_welch(plan.dt) if kind == "paper" else ()
-            try:
-                frequency, density = wave_spectrum(x, plan.dt, *welch)
-            except RequestError:  # a record shorter than one segment
-                continue
-            variables[f"{run_name}_{kind}_frequency"] = (f"{run_name}_{kind}", frequency)
-            variables[f"{run_name}_{kind}_density"] = (f"{run_name}_{kind}", density)
-    variables["significant_height"] = ("run", np.array(heights))
-    return xr.Dataset(variables, coords={"run": list(runs)}, attrs={"channel": waves[0]})
+        for k, kind in enumerate(WELCH):
+            with suppress(RequestError):  # a record shorter than one segment
+                welch = paper_welch(plan.dt) if kind == "paper" else ()
+                curves[r, k] = wave_spectrum(x, plan.dt, *welch)
+    bins = max((len(density) for _, density in curves.values()), default=0)
+    values = np.full((2, len(runs), len(WELCH), bins), np.nan)
+    for (r, k), curve in curves.items():
+        values[:, r, k, : len(curve[0])] = curve
+    return xr.Dataset(
+        {
+            "frequency": (("run", "kind", "bin"), values[0], {"units": "Hz"}),
+            "density": (("run", "kind", "bin"), values[1], {"units": "m^2/Hz"}),
+            "significant_height": ("run", np.array(heights), {"units": "m"}),
+        },
+        coords={"run": list(runs), "kind": list(WELCH)},
+        attrs={"channel": waves[0]},
+    )

@@ -32,7 +32,6 @@ __all__ = [
     "warn_of_waves",
 ]
 
-BASELINES = ("hold_last", "mean", "fir", "arx", "subspace")
 NOTHING_TRAINS = (
     "no run of the campaign trains a model. Give one role = 'train', or a span "
     "train = [start, end]."
@@ -220,7 +219,7 @@ def fit_baselines(
     runs = training_runs(prepared)
     period, dt = campaign.encounter_period(), float(next(iter(runs.values())).attrs["dt"])
     found: dict[str, Model] = {}
-    for kind in BASELINES:
+    for kind in (kind for kind, each in KINDS.items() if each.role == "reference"):
         recommended = getattr(KINDS[kind], "recommended", None)
         spec = KINDS[kind]() if recommended is None else recommended(period, dt)
         try:

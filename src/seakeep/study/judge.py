@@ -9,6 +9,7 @@ the block length of Politis and White.
 from __future__ import annotations
 
 import warnings
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from typing import Any, Literal
@@ -22,14 +23,13 @@ from seakeep.arrays import FloatArray
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.coverage import CoverageTable
 from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
+from seakeep.models import KINDS
 from seakeep.models.executor import in_order
-from seakeep.models.summaries import STATISTICS
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
-from seakeep.waves import phase_speed
 
 __all__ = [
-    "BAND_ERRORS",
+    "BANDS",
     "MEASURES",
     "VARIANTS",
     "average_of",
@@ -42,6 +42,7 @@ __all__ = [
     "joined",
     "judge",
     "median_of",
+    "references_of",
     "regular_response",
     "training_order",
     "verdict",
@@ -49,8 +50,8 @@ __all__ = [
 ]
 
 
-BAND_ERRORS = {"all": "error_over_time", "low": "error_low", "wave": "error_wave"}
-"""Names of ε(t), as a whole and in its two bands."""
+BANDS = ("all", "low", "wave")
+"""ε(t) as a whole, and in its two bands."""
 MEASURES = ("nrmse", "nammae", "training_nrmse")
 """Errors of a cell: both of the paper, in SD of the window, and the first in SD of the training."""
 
@@ -58,15 +59,13 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "paper": {"block_length": "carlstein", "bandwidth": "paper", "joins": True},
     "recommended": {"block_length": "politis_white", "bandwidth": "silverman", "joins": False},
 }
-LINEAR = ("fir", "arx", "subspace")
-"""Kinds of the linear baselines."""
+CONSTANT = ("hold_last", "mean")
+"""Kinds of references that read nothing after the start."""
 SHOWN = 5
 """Lost forecasts that a warning names."""
 TREND_SERIES = 500
 DIFFERENCES = 500
 """Redrawn tables of cells for the interval of a difference between models."""
-NEAR = 0.1
-"""Energy within this part of a frequency counts as energy at it."""
 
 
 def judge(
@@ -76,55 +75,52 @@ def judge(
     executor: Executor | None = None,
 ) -> dict[str, xr.Dataset]:
     """All statistics of a study, as groups ``statistics/…``; the densities side by side."""
-    models = list(settings.models)
     kinds = {name: each.kind for name, each in settings.models.items()}
-    out: dict[str, xr.Dataset] = {}
-    if (lost := lost_forecasts(groups, settings.tests, models)) is not None:
-        out["statistics/lost"] = lost
+    seed, level = settings.study.seed, settings.statistics.level
+    found: dict[str, dict[str, xr.Dataset | None]] = defaultdict(dict)
     for name in settings.tests:
         test = groups[f"tests/{name}"]
-        out[f"statistics/boxes/{name}"] = boxes = box_table(test, models)
-        rng = random_stream(settings.study.seed, f"differences.{name}")
-        differences = difference_table(test, models, groups["training"], rng)
-        out[f"statistics/differences/{name}"] = differences
-        if (skill := skill_table(boxes, differences, kinds)) is not None:
-            out[f"statistics/skill/{name}"] = skill
-        if ensembles := [model for model in models if f"{model}_lower" in test]:
-            calibrations = {
-                m: groups[f"calibration/{m}"] for m in ensembles if f"calibration/{m}" in groups
-            }
-            out[f"statistics/coverage/{name}"] = coverage_table(test, ensembles, calibrations)
-            level = settings.statistics.level
-            if (parts := band_parts(test, ensembles, calibrations, level)) is not None:
-                out[f"statistics/bands/{name}"] = parts
-        rng = random_stream(settings.study.seed, f"trend.{name}")
-        out[f"statistics/trend/{name}"] = trend_table(test, models, rng)
+        found["boxes"][name] = boxes = box_table(test)
+        rng = random_stream(seed, f"differences.{name}")
+        found["differences"][name] = changes = difference_table(test, groups["training"], rng)
+        found["skill"][name] = skill_table(boxes, changes, kinds)
+        if test.sizes["ensemble"]:
+            ensembles = test["ensemble"].values
+            known = [model for model in ensembles if f"calibration/{model}" in groups]
+            calibrations = {model: groups[f"calibration/{model}"] for model in known}
+            found["coverage"][name] = coverage_table(test, calibrations)
+            found["bands"][name] = band_parts(test, calibrations, level)
+        found["trend"][name] = trend_table(test, random_stream(seed, f"trend.{name}"))
         if is_regular(groups, name):
-            out[f"statistics/response/{name}"] = regular_response(groups, name, models)
+            found["response"][name] = regular_response(groups, name)
+    lost = lost_forecasts(groups, settings.tests)
+    out = {} if lost is None else {"statistics/lost": lost}
+    for key, tables in found.items():
+        if made := {name: each for name, each in tables.items() if each is not None}:
+            names = xr.Variable("test", list(made))
+            out[f"statistics/{key}"] = xr.concat(list(made.values()), names, join="outer")
     name = settings.statistics.densities_of or next(iter(settings.tests))
     test = groups[f"tests/{name}"]
-    found = [_divergences(test, model, channels, settings, name, executor) for model in models]
+    models = list(settings.models)
+    pairs = [_divergences(test, model, channels, settings, name, executor) for model in models]
     divergence, densities = (
-        xr.concat([pair[k] for pair in found], dim=xr.Variable("model", models)) for k in (0, 1)
+        xr.concat([pair[k] for pair in pairs], dim=xr.Variable("model", models)) for k in (0, 1)
     )
     out["statistics/divergence"] = divergence.assign_attrs(test=name)
     out["statistics/densities"] = densities.assign_attrs(test=name)
     return out
 
 
-def lost_forecasts(
-    groups: Mapping[str, xr.Dataset], tests: Iterable[str], models: Sequence[str]
-) -> xr.Dataset | None:
+def lost_forecasts(groups: Mapping[str, xr.Dataset], tests: Iterable[str]) -> xr.Dataset | None:
     """Cells without a whole forecast, which are left out; of ensembles, all members were lost."""
     rows = []
     for name in tests:
         test = groups[f"tests/{name}"]
         runs, starts = test["run"].values.astype(str), test["start"].values
-        for model in models:
-            gone = np.isnan(test[f"{model}_mean"].values).any(axis=(2, 3)) & test["judged"].values
-            for k, w in zip(*np.nonzero(gone), strict=True):
-                training = str(test["training"].values[k])
-                rows.append((model, name, training, int(w), runs[w], float(starts[w])))
+        gone = np.isnan(test["mean"].values).any(axis=(3, 4)) & test["judged"].values
+        for m, k, w in zip(*np.nonzero(gone), strict=True):
+            model, training = str(test["model"].values[m]), str(test["training"].values[k])
+            rows.append((model, name, training, int(w), runs[w], float(starts[w])))
     if not rows:
         return None
     keys = ("model", "test", "training", "window", "run", "start")
@@ -149,7 +145,7 @@ def words_of_lost(lost: xr.Dataset) -> str:
 
 
 def difference_table(
-    test: xr.Dataset, models: Sequence[str], training: xr.Dataset, rng: np.random.Generator
+    test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
 ) -> xr.Dataset:
     """Change of the median error from one model to another, with its interval.
 
@@ -162,13 +158,8 @@ def difference_table(
     order, _ = training_order(training)
     blocks = blocks_of([test], training)
     judged = test["judged"].values[order]
-    cells = np.stack(
-        [
-            np.stack([test[f"{m}_{measure}"].values[order] for measure in MEASURES], axis=-2)
-            for m in models
-        ],
-        axis=2,
-    )  # (training, window, model, measure, channel)
+    errors = test["error"].transpose("training", "window", "model", "measure", "channel")
+    cells: FloatArray = errors.values[order]
     cells = np.concatenate([average_of(cells)[..., None], cells], axis=-1)
     cells = np.where(judged[..., None, None, None], cells, np.nan)
 
@@ -189,12 +180,11 @@ def difference_table(
             for key, values in zip(("change", "lower", "upper"), (found, *bounds), strict=True)
         },
         coords={
-            "model": list(models),
-            "other": list(models),
-            "measure": list(MEASURES),
+            "model": test["model"].values,
+            "other": test["model"].values,
+            "measure": test["measure"].values,
             "channel": ["average", *map(str, test["channel"].values)],
         },
-        attrs={"blocks": blocks},
     )
 
 
@@ -255,11 +245,11 @@ def skill_table(
     none.
     """
     median = boxes["median"].sel(channel="average", drop=True)
-    named = {kind: model for model, kind in kinds.items() if kind in ("hold_last", "mean")}
-    linear = [model for model, kind in kinds.items() if kind in LINEAR]
-    errors = {model: float(median.sel(model=model, measure="nrmse")) for model in linear}
-    if known := {model: error for model, error in errors.items() if np.isfinite(error)}:
-        named["best_linear"] = min(known, key=known.__getitem__)
+    named = {}
+    for name, among in references_of(kinds).items():
+        errors = {model: float(median.sel(model=model, measure="nrmse")) for model in among}
+        if known := {model: error for model, error in errors.items() if np.isfinite(error)}:
+            named[name] = min(known, key=known.__getitem__)
     if not named:
         return None
     out = differences.sel(channel="average", other=list(named.values()), drop=True)
@@ -267,7 +257,16 @@ def skill_table(
     return out.assign(reference_model=("reference", list(named.values())))
 
 
-def box_table(test: xr.Dataset, models: Sequence[str]) -> xr.Dataset:
+def references_of(kinds: Mapping[str, str]) -> dict[str, list[str]]:
+    """Names of the references among models of some kinds, those of one sort together."""
+    out: dict[str, list[str]] = {}
+    for model, kind in sorted(kinds.items(), key=lambda each: each[1] not in CONSTANT):
+        if KINDS[kind].role == "reference":
+            out.setdefault(kind if kind in CONSTANT else "best_linear", []).append(model)
+    return out
+
+
+def box_table(test: xr.Dataset) -> xr.Dataset:
     """Quartiles of the errors over all cells of a test set, over (model, measure, channel).
 
     The channel ``average`` is the paper's ANRMSE and NAMMAE: the average of each cell over the
@@ -285,22 +284,20 @@ def box_table(test: xr.Dataset, models: Sequence[str]) -> xr.Dataset:
         "left_out",
     )
     names = ["average", *map(str, test["channel"].values)]
-    values = np.full((len(numbers), len(models), len(MEASURES), len(names)), np.nan)
-    judged = test["judged"].values
-    for m, model in enumerate(models):
-        for k, measure in enumerate(MEASURES):
-            cells = test[f"{model}_{measure}"].values[judged]
-            columns = [average_of(cells), *cells.T]
-            for c, column in enumerate(columns):
-                try:
-                    box = statistics.box_statistics(column)
-                except DataError:  # never judged: a line that is slack in all windows
-                    values[-2:, m, k, c] = 0, column.size
-                    continue
-                values[:, m, k, c] = [getattr(box, number) for number in numbers]
+    errors = test["error"].values[:, :, test["judged"].values]  # (model, measure, cell, channel)
+    values = np.full((len(numbers), *errors.shape[:2], len(names)), np.nan)
+    for m, k in np.ndindex(errors.shape[:2]):
+        columns = [average_of(errors[m, k]), *errors[m, k].T]
+        for c, column in enumerate(columns):
+            try:
+                box = statistics.box_statistics(column)
+            except DataError:  # never judged: a line that is slack in all windows
+                values[-2:, m, k, c] = 0, column.size
+                continue
+            values[:, m, k, c] = [getattr(box, number) for number in numbers]
     return xr.Dataset(
         {n: (("model", "measure", "channel"), values[i]) for i, n in enumerate(numbers)},
-        coords={"model": list(models), "measure": list(MEASURES), "channel": names},
+        coords={"model": test["model"], "measure": test["measure"], "channel": names},
     )
 
 
@@ -313,7 +310,7 @@ def average_of(cells: FloatArray) -> FloatArray:
 
 
 def coverage_table(
-    test: xr.Dataset, ensembles: Sequence[str], calibrations: Mapping[str, xr.Dataset] | None = None
+    test: xr.Dataset, calibrations: Mapping[str, xr.Dataset] | None = None
 ) -> xr.Dataset:
     """Fraction of the instants at which the band holds the measurement, and the truth where known.
 
@@ -323,7 +320,7 @@ def coverage_table(
     sides = ["measured", *(["truth"] if "truth" in test else [])]
     numbers = ("inside", "below", "above", "relative_width")
     names = ["average", *map(str, test["channel"].values)]
-    judged = test["judged"].values
+    judged, ensembles = test["judged"].values, test["ensemble"].values
     variables: dict[str, Any] = {}
     for prefix in ("", "calibrated_") if calibrations else ("",):
         values = np.full((len(numbers), len(ensembles), len(sides), len(names)), np.nan)
@@ -335,20 +332,18 @@ def coverage_table(
         variables |= {
             prefix + n: (("model", "against", "channel"), values[i]) for i, n in enumerate(numbers)
         }
-    return xr.Dataset(
-        variables, coords={"model": list(ensembles), "against": sides, "channel": names}
-    )
+    return xr.Dataset(variables, coords={"model": ensembles, "against": sides, "channel": names})
 
 
 def band_parts(
-    test: xr.Dataset, ensembles: Sequence[str], calibrations: Mapping[str, xr.Dataset], level: float
+    test: xr.Dataset, calibrations: Mapping[str, xr.Dataset], level: float
 ) -> xr.Dataset | None:
     """Coverage, width, Winkler score and CRPS of bands over (model, band, part, channel).
 
     Parts are all instants, thirds by wave height, and thirds of the horizon; None where no band
     can be judged.
     """
-    judged = test["judged"].values
+    judged, ensembles = test["judged"].values, test["ensemble"].values
     shape = (*judged.shape, *test["measured"].shape[1:])
     measured = np.broadcast_to(test["measured"].values, shape)[judged]
     waves = None
@@ -374,7 +369,7 @@ def band_parts(
     return xr.Dataset(
         {number: (dims, values[i]) for i, number in enumerate(numbers)},
         coords={
-            "model": list(ensembles),
+            "model": ensembles,
             "band": list(bands),
             "part": list(parts),
             "channel": names,
@@ -386,14 +381,16 @@ def band_of(
     test: xr.Dataset, model: str, calibration: xr.Dataset | None
 ) -> tuple[FloatArray, FloatArray]:
     """Bounds of a band in a test set, (training, window, time, channel): calibrated, or not."""
+    test = test.sel(ensemble=model)
+    lower, upper = test["lower"].values, test["upper"].values
     if calibration is None:
-        return test[f"{model}_lower"].values, test[f"{model}_upper"].values
-    mean, std, lower, upper = (test[f"{model}_{key}"].values for key in STATISTICS)
+        return lower, upper
+    mean, std = test["mean"].sel(model=model).values, test["std"].values
     margin = calibration["margin"].values[:, None, None, :]
     scale = None
     if "law" in calibration:
         laws = (calibration["floor"].values, calibration["law"].values)
-        each = zip(std, *laws, test[f"{model}_envelope"].values, strict=True)
+        each = zip(std, *laws, test["envelope"].values, strict=True)
         scale = np.stack([band_scale(*row) for row in each])
     elif "floor" in calibration:
         scale = band_scale(std, calibration["floor"].values[:, None, None, :])
@@ -418,33 +415,31 @@ def _coverage_row(
     return np.array(rows)
 
 
-def trend_table(test: xr.Dataset, models: Sequence[str], rng: np.random.Generator) -> xr.Dataset:
+def trend_table(test: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
     """Test whether ε(t), averaged over all cells, grows with the age of the forecast."""
     numbers = ("slope", "lower", "upper", "change", "kendall_tau", "p_value", "block_length")
     names = ("error_mean", "lower_quartile", "upper_quartile")
-    found = np.full((len(numbers), len(BAND_ERRORS), len(models)), np.nan)
-    time = test["time"].values
-    series = np.full((len(names), len(BAND_ERRORS), len(models), time.size), np.nan)
-    judged = test["judged"].values
-    for b, key in enumerate(BAND_ERRORS.values()):
-        for m, model in enumerate(models):
-            cells = test[f"{model}_{key}"].values[judged]
-            cells = cells[np.isfinite(cells).all(axis=1)]
-            if not len(cells):
-                continue
-            series[:, b, m] = cells.mean(axis=0), *np.quantile(cells, [0.25, 0.75], axis=0)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", SeakeepWarning)  # the block length is in the table
-                trend = statistics.trend_test(
-                    series[0, b, m], rng=rng, time=time, n_series=TREND_SERIES
-                )
-            found[:, b, m] = [getattr(trend, number) for number in numbers]
+    time, shape = test["time"].values, (test.sizes["band"], test.sizes["model"])
+    found = np.full((len(numbers), *shape), np.nan)
+    series = np.full((len(names), *shape, time.size), np.nan)
+    errors = test["error_over_time"].values[:, :, test["judged"].values]
+    for b, m in np.ndindex(shape):
+        cells = errors[m, b][np.isfinite(errors[m, b]).all(axis=1)]
+        if not len(cells):
+            continue
+        series[:, b, m] = cells.mean(axis=0), *np.quantile(cells, [0.25, 0.75], axis=0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SeakeepWarning)  # the block length is in the table
+            trend = statistics.trend_test(
+                series[0, b, m], rng=rng, time=time, n_series=TREND_SERIES
+            )
+        found[:, b, m] = [getattr(trend, number) for number in numbers]
     return xr.Dataset(
         {
             **{n: (("band", "model"), found[i]) for i, n in enumerate(numbers)},
             **{n: (("band", "model", "time"), series[i]) for i, n in enumerate(names)},
         },
-        coords={"band": list(BAND_ERRORS), "model": list(models), "time": time},
+        coords={"band": test["band"].values, "model": test["model"].values, "time": time},
     )
 
 
@@ -456,7 +451,7 @@ def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
     set. A series in which a forecast diverged is left out; their number comes last.
     """
     judged = test["judged"].values
-    mean = test[f"{model}_mean"].values
+    mean = test["mean"].sel(model=model).values
     count = int(judged.sum(axis=0).min())
     rows = np.argsort(~judged, axis=0, kind="stable")[:count]
     windows = np.arange(judged.shape[1])
@@ -581,55 +576,30 @@ def is_regular(groups: Mapping[str, xr.Dataset], test: str) -> bool:
     return bool(np.isfinite(groups["runs"]["wave_frequency"].sel(run=names)).all())
 
 
-def regular_response(
-    groups: Mapping[str, xr.Dataset], test: str, models: Sequence[str]
-) -> xr.Dataset:
+def regular_response(groups: Mapping[str, xr.Dataset], test: str) -> xr.Dataset:
     """Take the error of a test set in regular waves apart.
 
     ``error_offset``, ``error_wave`` and ``error_rest`` are root mean squares over cells in measured
     SDs, whose squares add up to that of the NRMSE; ``phase_lead`` is that of the forecast before
-    the measurement, degrees; ``celerity_phase`` is the lead that one celerity makes for waves of
-    another speed. ``sd_ratio`` and ``mean_shift`` compare the measurement with training, in
-    training SDs.
+    the measurement, degrees.
     """
     data, runs = groups[f"tests/{test}"], groups["runs"]
-    judged, channels = data["judged"].values, list(data["channel"].values)
     frequencies = runs["wave_frequency"].sel(run=data["run"].values.astype(str)).values
-    spread, level = data["training_std"].values, data["training_mean"].values
-    measured = data["measured"].values
-    rows, columns = np.nonzero(judged)
-    shift = (measured.mean(axis=1)[columns] - level[rows]) / spread[rows]
-    ratio = measured.std(axis=1, ddof=1)[columns] / spread[rows]
-    parts = {model: _parts(data, model, frequencies, (rows, columns), measured) for model in models}
+    parts = np.array([_parts(data, model, frequencies) for model in data["model"].values])
     keys = ("error_offset", "error_wave", "error_rest", "amplitude_ratio", "phase_lead")
-    out = xr.Dataset(
-        {
-            "sd_ratio": ("channel", np.median(ratio, axis=0)),
-            "mean_shift": ("channel", np.median(shift, axis=0)),
-            **{
-                key: (("model", "channel"), np.stack([parts[model][k] for model in models]))
-                for k, key in enumerate(keys)
-            },
-        },
-        coords={"model": list(models), "channel": channels},
+    return xr.Dataset(
+        {key: (("model", "channel"), parts[:, k]) for k, key in enumerate(keys)},
+        coords={"model": data["model"], "channel": data["channel"]},
     )
-    return _with_waves(out, groups, test, models, float(np.median(frequencies)), (rows, columns))
 
 
-def _parts(
-    data: xr.Dataset,
-    model: str,
-    frequencies: FloatArray,
-    cells: tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]],
-    measured: FloatArray,
-) -> list[FloatArray]:
+def _parts(data: xr.Dataset, model: str, frequencies: FloatArray) -> list[FloatArray]:
     """Errors and responses of a model, each of shape (channel,)."""
-    time = data["time"].values
+    time, measured = data["time"].values, data["measured"].values
     squares, responses = [], []
-    rows, columns = cells
-    forecasts = data[f"{model}_mean"].values
-    slack = np.isnan(data[f"{model}_nrmse"].values)
-    for row, column in zip(rows, columns, strict=True):
+    one = data.sel(model=model, measure="nrmse")
+    forecasts, slack = one["mean"].values, np.isnan(one["error"].values)
+    for row, column in zip(*np.nonzero(data["judged"].values), strict=True):
         found, response = _in_waves(
             time, frequencies[column], forecasts[row, column], measured[column]
         )
@@ -671,67 +641,10 @@ def phase_leads(groups: Mapping[str, xr.Dataset], test: str, model: str) -> Floa
     data = groups[f"tests/{test}"]
     frequencies = groups["runs"]["wave_frequency"].sel(run=data["run"].values.astype(str)).values
     time, measured = data["time"].values, data["measured"].values
-    forecasts, errors = data[f"{model}_mean"].values, data[f"{model}_nrmse"].values
+    one = data.sel(model=model, measure="nrmse")
+    forecasts, errors = one["mean"].values, one["error"].values
     out = np.full(errors.shape, np.nan)
     for row, column in zip(*np.nonzero(data["judged"].values), strict=True):
         place = frequencies[column], forecasts[row, column], measured[column]
         out[row, column] = np.degrees(np.angle(_in_waves(time, *place)[1]))
     return np.where(np.isnan(errors), np.nan, out)
-
-
-def _with_waves(
-    out: xr.Dataset,
-    groups: Mapping[str, xr.Dataset],
-    test: str,
-    models: Sequence[str],
-    frequency: float,
-    cells: tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]],
-) -> xr.Dataset:
-    """Add what linear wave theory and the training sea say about the frequency."""
-    data, runs, training = groups[f"tests/{test}"], groups["runs"], groups["training"]
-    depth = float(runs["water_depth"].sel(run=str(data["run"].values[0])))
-    speed = float(phase_speed(2 * np.pi * frequency, depth)) if np.isfinite(depth) else np.nan
-    out.attrs = {"frequency": frequency, "phase_speed": speed, "surge_shift": np.nan}
-    out.attrs |= _training_sea(groups, frequency, [str(run) for run in data["run"].values])
-    celerity, lead = np.full((2, len(models)), np.nan)
-    if "surge" in out["channel"]:
-        surge = data.sel(channel="surge")
-        rows, columns = cells
-        shifts = (
-            surge["measured"].values.mean(axis=1)[columns] - surge["training_mean"].values[rows]
-        )
-        out.attrs["surge_shift"] = float(np.median(shifts))
-        for number, model in enumerate(models):
-            if f"{model}_celerity" not in training:
-                continue
-            carried = training[f"{model}_celerity"].sel(of_run=data["run"].values.astype(str))
-            each = carried.values[rows, columns]
-            celerity[number] = np.median(each)
-            turns = frequency * shifts * (1 / speed - 1 / each)
-            lead[number] = 360 * np.median(turns)
-    out["celerity"] = ("model", celerity)
-    out["celerity_phase"] = ("model", lead)
-    return out
-
-
-def _training_sea(
-    groups: Mapping[str, xr.Dataset], frequency: float, tested: Sequence[str]
-) -> dict[str, float]:
-    """Height of the waves, and the training sea's share of energy near a frequency."""
-    nothing = {"height_ratio": np.nan, "energy_share": np.nan}
-    if "spectra" not in groups:
-        return nothing
-    spectra, runs = groups["spectra"], groups["runs"]
-    learnt = [str(run) for run in runs["run"].values[runs["trains"].values]]
-    learnt = [run for run in learnt if f"{run}_recommended_density" in spectra]
-    if not learnt:
-        return nothing
-    heights = spectra["significant_height"]
-    shares = []
-    for run in learnt:
-        f = spectra[f"{run}_recommended_frequency"].values
-        density = spectra[f"{run}_recommended_density"].values
-        near = np.abs(f - frequency) <= NEAR * frequency
-        shares.append(density[near].sum() / density.sum())
-    ratio = float(heights.sel(run=list(tested)).mean() / heights.sel(run=learnt).mean())
-    return {"height_ratio": ratio, "energy_share": float(np.mean(shares))}

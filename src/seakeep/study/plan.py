@@ -385,6 +385,11 @@ class Plan:
         """Specs of the models."""
         return {name: each.spec for name, each in self.models.items()}
 
+    @property
+    def ensembles(self) -> list[str]:
+        """Names of the models that have members."""
+        return [name for name, each in self.models.items() if each.is_ensemble]
+
     def is_shown(self, training: int, test: str, window: int) -> bool:
         """Whether the members of a cell are kept for figures."""
         first = next(iter(self.tests)) == test

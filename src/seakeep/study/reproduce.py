@@ -57,8 +57,8 @@ class Act:
     ----------
     name : str
         Folder of its study.
-    title : str
-        Words for headings.
+    letter, words : str
+        For headings.
     sentence : str
         What is done in it.
     preset : {"paper", "recommended"}
@@ -68,16 +68,23 @@ class Act:
     """
 
     name: str
-    title: str
+    letter: str
+    words: str
     sentence: str
     preset: Preset
     without_drift: bool = False
+
+    @property
+    def title(self) -> str:
+        """Letter and words."""
+        return f"{self.letter} {self.words}"
 
 
 ACTS = (
     Act(
         "paper",
-        "(a) the paper's procedure",
+        "(a)",
+        "the paper's procedure",
         f"Surge and both mooring loads have lost what is slower than {HIGH_PASS:g} Hz, their slow "
         "drift. That is inferred: behind the integration filter the paper's source has a comment, "
         "“along with detrending”.",
@@ -86,13 +93,15 @@ ACTS = (
     ),
     Act(
         "raw",
-        "(b) the same on raw channels",
+        "(b)",
+        "the same on raw channels",
         "The same models in the same windows forecast the channels as measured, drift included.",
         "paper",
     ),
     Act(
         "recommended",
-        "(c) the recommended model",
+        "(c)",
+        "the recommended model",
         "The recommended model learns from the two other irregular runs and forecasts the "
         "channels as measured, in the same windows; it reads no motion measured after the start.",
         "recommended",

@@ -79,6 +79,7 @@ class ResolvedModel:
         return {
             "kind": self.kind,
             "preset": self.preset,
+            "role": self.spec.role,
             "ensemble": self.is_ensemble,
             "n_members": self.n_members,
             "settings": {

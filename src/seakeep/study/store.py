@@ -279,7 +279,7 @@ class StudyResult:
 
     @cached_property
     def model_settings(self) -> dict[str, Any]:
-        """Per model its ``kind``, ``preset``, ``ensemble``, ``n_members`` and ``settings``.
+        """Per model ``kind``, ``role``, ``preset``, ``ensemble``, ``n_members`` and ``settings``.
 
         ``settings`` gives for each key its ``value`` (a JSON value) and its ``source``: "stated",
         "preset", "study" (the study's seed) or "default".
@@ -322,6 +322,10 @@ class StudyResult:
     def is_ensemble(self, model: str) -> bool:
         """Whether a model is an ensemble."""
         return bool(self.model_settings[model]["ensemble"])
+
+    def members_of(self, model: str) -> int:
+        """Number of members of a model, 1 of a single one."""
+        return int(self.model_settings[model]["n_members"])
 
     def label_of(self, test: str) -> str:
         """Words for a test set."""

@@ -30,7 +30,7 @@ from seakeep.models.selection import Selected
 from seakeep.models.specs import HankelDMDc, left_open
 from seakeep.models.summaries import STATISTICS, reduce_members
 from seakeep.signals import envelope_squared
-from seakeep.study.judge import BAND_ERRORS, MEASURES
+from seakeep.study.judge import BANDS, MEASURES
 from seakeep.study.nowcast import PERIODS, SHARE, labelled_skill, nowcast
 from seakeep.study.plan import Plan, TestWindow, TrainingSet, between
 from seakeep.study.settings import Study
@@ -43,16 +43,16 @@ Read = Callable[["Unit"], Arrays]
 
 
 DIMS = {
-    "mean": ("time", "channel"),
-    "std": ("time", "channel"),
-    "lower": ("time", "channel"),
-    "upper": ("time", "channel"),
-    "lost": ("member",),
-    "member_nrmse": ("member", "channel"),
-    "member_nammae": ("member", "channel"),
-    "envelope": ("time",),
+    "mean": ("model", "training", "window", "time", "channel"),
+    **dict.fromkeys(
+        ("std", "lower", "upper"), ("ensemble", "training", "window", "time", "channel")
+    ),
+    "lost": ("ensemble", "training", "window", "member"),
+    "member_nrmse": ("ensemble", "training", "window", "member", "channel"),
+    "envelope": ("ensemble", "training", "window", "time"),
+    "members": ("ensemble", "shown", "member", "time", "channel"),
 }
-"""Dimensions of the arrays of a window, after (training, window)."""
+"""Dimensions of what units find in the windows of a test set."""
 
 
 @dataclass(frozen=True)
@@ -245,12 +245,8 @@ def _judged(
     reduced = reduce_members(series, lost, level)
     out: Arrays = {key: reduced[:, row] for row, key in enumerate(STATISTICS)}
     out["lost"] = lost.T
-    for key, error in (
-        ("member_nrmse", metrics.nrmse),
-        ("member_nammae", metrics.normalised_extremes_error),
-    ):
-        each = [error(predicted=np.array(values), **pair) for values in series]
-        out[key] = np.stack(each, axis=1).astype(np.float32)
+    each = [metrics.nrmse(predicted=np.array(values), **pair) for values in series]
+    out["member_nrmse"] = np.stack(each, axis=1).astype(np.float32)
     if shown:
         out["members"] = np.stack([series[:, row] for row in shown]).astype(np.float32)
     return out
@@ -414,22 +410,24 @@ def _collect_test(
     truth = true_channels(study, plan, runs, test)
     if truth is not None:
         variables["truth"] = (dims, truth)
-    for model in plan.specs:
-        variables.update(_collect_model(plan, found, test, model))
+    arrays, shown = _forecasts(plan, found, test)
+    frequency = 1.0 / (study.settings.statistics.split_period * plan.encounter_period)
     steps = windows[0].steps
     out = xr.Dataset(
-        variables,
+        variables | {key: (DIMS[key], values) for key, values in arrays.items()},
         coords={
+            "model": list(plan.models),
+            "ensemble": plan.ensembles,
+            "measure": list(MEASURES),
+            "band": list(BANDS),
             "training": [each.name for each in training],
             "window": list(range(len(windows))),
             "time": ("time", plan.dt * np.arange(1, steps + 1), {"units": "s"}),
             "channel": list(plan.states),
+            "shown": shown,
         },
     )
-    frequency = 1.0 / (study.settings.statistics.split_period * plan.encounter_period)
-    for model in plan.specs:
-        _add_errors(out, model, plan.dt, frequency)
-    return out
+    return out.assign(_errors(out, plan.dt, frequency))
 
 
 def _noise(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray:
@@ -457,69 +455,64 @@ def wave_heights(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> Float
     return np.stack(out)
 
 
-def _collect_model(
-    plan: Plan, found: Mapping[Unit, Arrays], test: str, model: str
-) -> dict[str, Any]:
-    """Arrays of a model over (training, window, …); NaN, or −2 of losses, where none is tested."""
-    size = (len(plan.training), len(plan.tests[test]))
-    arrays: Arrays = {}
-    members: dict[int, FloatArray] = {}
+def _forecasts(plan: Plan, found: Mapping[Unit, Arrays], test: str) -> tuple[Arrays, list[int]]:
+    """Arrays of :data:`DIMS`, and the windows whose members are shown.
+
+    NaN, or −2 of losses, where none is tested and beyond the members of a smaller ensemble.
+    """
+    windows, sets = range(len(plan.tests[test])), range(len(plan.training))
+    owners = {"model": list(plan.models), "ensemble": plan.ensembles}
+    shown = [k for k in windows if any(plan.is_shown(t, test, k) for t in sets)]
+    sizes = {
+        **{dim: len(names) for dim, names in owners.items()},
+        "training": len(sets),
+        "window": len(windows),
+        "shown": len(shown),
+        "member": max(each.n_members for each in plan.models.values()),
+        "time": plan.tests[test][0].steps,
+        "channel": len(plan.states),
+    }
+    out: Arrays = {}
     for unit, cells in found.items():
         numbers = list(tested_windows(plan, unit.training, test))
-        if unit.model != model or not numbers:
-            continue
         part = {k.rpartition("/")[2]: v for k, v in cells.items() if k.startswith(f"tests/{test}/")}
-        shown = part.pop("shown", np.array([], dtype=int))
-        members |= dict(zip(shown.tolist(), part.pop("members", []), strict=True))
+        drawn = [shown.index(k) for k in part.pop("shown", np.array([])).tolist()]
         for key, values in part.items():
-            if key not in arrays:
+            if key not in out:
                 empty = np.nan if values.dtype.kind == "f" else -2
-                arrays[key] = np.full((*size, *values.shape[1:]), empty, dtype=values.dtype)
-            arrays[key][unit.training, numbers] = values
-    out: dict[str, Any] = {
-        f"{model}_{key}": (("training", "window", *DIMS[key]), values)
-        for key, values in arrays.items()
-    }
-    if members:
-        in_order = sorted(members)
-        out[f"{model}_members"] = (
-            ("shown", "member", "time", "channel"),
-            np.stack([members[number] for number in in_order]),
-        )
-        out["shown"] = ("shown", np.array(in_order))
-    return out
+                size = [sizes[dim] for dim in DIMS[key]]
+                out[key] = np.full(size, empty, dtype=values.dtype)
+            place = out[key][owners[DIMS[key][0]].index(unit.model)]
+            rows, place = (drawn, place) if key == "members" else (numbers, place[unit.training])
+            place[rows, : values.shape[1]] = values
+    return out, shown
 
 
-def _add_errors(out: xr.Dataset, model: str, dt: float, frequency: float) -> None:
-    """Error measures of a model's (mean) forecast in every cell; bands meet at `frequency`, Hz."""
-    predicted = out[f"{model}_mean"].values
-    measured = np.broadcast_to(out["measured"].values, predicted.shape)
-    shape = predicted.shape
-    results = {
-        "nrmse": np.full((*shape[:2], shape[3]), np.nan),
-        "nammae": np.full((*shape[:2], shape[3]), np.nan),
-        "training_nrmse": np.full((*shape[:2], shape[3]), np.nan),
-        **{BAND_ERRORS[band]: np.full(shape[:3], np.nan) for band in BAND_ERRORS},
-    }
-    for training in range(shape[0]):
+def _errors(test: xr.Dataset, dt: float, frequency: float) -> dict[str, Any]:
+    """Error measures of each (mean) forecast in every cell; bands meet at `frequency`, Hz."""
+    forecasts, measured = test["mean"].values, test["measured"].values
+    shape = forecasts.shape
+    errors = np.full((shape[0], len(MEASURES), *shape[1:3], shape[4]), np.nan)
+    over_time = np.full((shape[0], len(BANDS), *shape[1:4]), np.nan)
+    for model, training in np.ndindex(shape[:2]):
         pair = {
-            "predicted": predicted[training],
-            "measured": measured[training],
-            "training_std": out["training_std"].values[training],
-            "noise_std": out["noise_std"].values,
+            "predicted": forecasts[model, training],
+            "measured": measured,
+            "training_std": test["training_std"].values[training],
+            "noise_std": test["noise_std"].values,
         }
-        results["nrmse"][training] = metrics.nrmse(**pair)
-        results["nammae"][training] = metrics.normalised_extremes_error(**pair)
-        error = metrics.root_mean_square(predicted[training] - measured[training])
-        results["training_nrmse"][training] = error / pair["training_std"]
-        results["error_over_time"][training] = metrics.error_over_time(**pair)
+        rest = metrics.root_mean_square(pair["predicted"] - measured) / pair["training_std"]
+        errors[model, :, training] = (
+            metrics.nrmse(**pair),
+            metrics.normalised_extremes_error(**pair),
+            rest,
+        )
         bands = band_error_over_time(**pair, dt=dt, frequency=frequency)
-        results["error_low"][training], results["error_wave"][training] = bands
-    dims = ("training", "window")
-    for key in MEASURES:
-        out[f"{model}_{key}"] = ((*dims, "channel"), results[key])
-    for key in BAND_ERRORS.values():
-        out[f"{model}_{key}"] = ((*dims, "time"), results[key])
+        over_time[model, :, training] = metrics.error_over_time(**pair), *bands
+    return {
+        "error": (("model", "measure", "training", "window", "channel"), errors),
+        "error_over_time": (("model", "band", "training", "window", "time"), over_time),
+    }
 
 
 def true_channels(study: Study, plan: Plan, runs: Runs, test: str) -> FloatArray | None:
@@ -585,7 +578,7 @@ def _collect_calibration(plan: Plan, found: Mapping[int, Arrays]) -> xr.Dataset:
         rows = [found[k][name] if k in found else nothing for k in range(len(plan.training))]
         dims = (
             "training",
-            *(("law",) if first.ndim > 1 else ()),
+            *(("term",) if first.ndim > 1 else ()),
             *(("channel",) * (first.ndim > 0)),
         )
         variables[name.removeprefix("calibration/")] = (dims, np.stack(rows))

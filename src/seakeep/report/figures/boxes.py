@@ -99,7 +99,8 @@ def draw_box_violin(
 def _cells(result: StudyResult, test: str, model: str, measure: str) -> FloatArray:
     """Errors of all judged cells, shape (cell, channel)."""
     data = result.tests[test]
-    cells: FloatArray = data[f"{model}_{measure}"].values[data["judged"].values]
+    errors = data["error"].sel(model=model, measure=measure).values
+    cells: FloatArray = errors[data["judged"].values]
     return cells
 
 

@@ -25,13 +25,9 @@ HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
 """Names of the paper for the averages of the two measures over the channels."""
 
 
-BASELINES = ("mean", "hold_last", "fir", "arx", "subspace")
-"""Kinds of models that others are compared with."""
-
-
 def judged_models(result: StudyResult) -> list[str]:
-    """Models that are not baselines; all models if there is no other."""
-    own = [m for m in result.models if result.model_settings[m].get("kind") not in BASELINES]
+    """Models that are no references; all models if there is no other."""
+    own = [m for m in result.models if result.model_settings[m].get("role") != "reference"]
     return own or result.models
 
 

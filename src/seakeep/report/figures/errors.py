@@ -40,7 +40,7 @@ def error_over_time_figure(result: StudyResult) -> Figure:
         figure = new_figure(8.5, 0.7 + 2.1 * len(tests))
         grid = figure.subplots(len(tests), len(BAND_WORDS), squeeze=False, sharey="row")
         for row, test in zip(grid, tests, strict=True):
-            trend = result.groups[f"statistics/trend/{test}"]
+            trend = result.groups["statistics/trend"].sel(test=test)
             tallest = 0.0
             for each, (band, words) in zip(row, BAND_WORDS.items(), strict=True):
                 tallest = max(tallest, _draw_band(each, result, trend.sel(band=band)))
@@ -77,7 +77,8 @@ def _draw_band(axes: Any, result: StudyResult, trend: Any) -> float:
 def member_errors(result: StudyResult, test: str, model: str) -> FloatArray:
     """Median ANRMSE of each member over all cells of a test set."""
     data = result.tests[test]
-    cells = data[f"{model}_member_nrmse"].values[data["judged"].values].astype(float)
+    errors = data["member_nrmse"].sel(ensemble=model).values[..., : result.members_of(model), :]
+    cells = errors[data["judged"].values].astype(float)
     averages = np.stack([average_of(each) for each in cells])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a member that is lost everywhere

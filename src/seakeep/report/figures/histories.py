@@ -66,9 +66,10 @@ def history_figure(
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper right", ncols=min(len(handles), 5))
         run, learnt = str(cell["run"].values), str(cell["training"].values)
+        left_out = str(result.groups["training"]["left_out"].values[training])
         axes[0].set_title(
             f"{run}, from {float(cell['start']):.1f} s; trained "
-            + (learnt if learnt.startswith("without ") else f"on {learnt}"),
+            + (learnt if left_out else f"on {learnt}"),
             loc="left",
             fontsize=8,
         )
@@ -81,21 +82,21 @@ def draw_channel(
     """Draw what was measured and the forecasts of all models but baselines."""
     mean, spread = float(cell["training_mean"]), float(cell["training_std"])
 
-    def standard(key: str) -> Any:
-        return (cell[key].values - mean) / spread
+    def standard(values: Any) -> Any:
+        return (values.values - mean) / spread
 
     time = cell["time"].values / float(result.attrs["encounter_period"])
     level = 100 * float(result.settings["statistics"]["level"])
     banded = any(result.is_ensemble(model) for model in result.models)
     solid = THIN if banded else LINES["measured"]
-    axes.plot(time, standard("measured"), label="measured", **solid)
+    axes.plot(time, standard(cell["measured"]), label="measured", **solid)
     for model in judged_models(result):
         style = line_of(result, model)
         if result.is_ensemble(model):
             axes.fill_between(
                 time,
-                standard(f"{model}_lower"),
-                standard(f"{model}_upper"),
+                standard(cell["lower"].sel(ensemble=model)),
+                standard(cell["upper"].sel(ensemble=model)),
                 color=style["color"],
                 alpha=0.25,
                 linewidth=0,
@@ -106,6 +107,6 @@ def draw_channel(
                     label = "calibrated" if number == 0 else None
                     axes.plot(time, (bound - mean) / spread, label=label, **{**style, **EDGE})
         words = f"{model_words(model)} mean" if result.is_ensemble(model) else model_words(model)
-        axes.plot(time, standard(f"{model}_mean"), label=words, **style)
+        axes.plot(time, standard(cell["mean"].sel(model=model)), label=words, **style)
     axes.set_ylabel(short_label(name), rotation=0, ha="right", va="center")
     axes.margins(x=0.005)

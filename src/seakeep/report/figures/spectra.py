@@ -53,28 +53,24 @@ def spectrum_figure(result: StudyResult) -> Figure:
         return figure
 
 
+def _curve(spectra: Any, run: str, kind: str) -> Any:
+    """Frequency and density of a run, without the bins beyond its own."""
+    at = spectra.sel(run=run, kind=kind).dropna("bin", subset=["density"])
+    return at["frequency"].values, at["density"].values
+
+
 def _mean(spectra: Any, names: list[str], kind: str) -> Any:
-    known = [n for n in names if f"{n}_{kind}_density" in spectra]
+    curves = [_curve(spectra, name, kind) for name in names]
+    known = [each for each in curves if each[0].size]
     if not known:
         return None
-    frequency = spectra[f"{known[0]}_{kind}_frequency"].values
-    rows = [
-        np.interp(
-            frequency,
-            spectra[f"{n}_{kind}_frequency"].values,
-            spectra[f"{n}_{kind}_density"].values,
-        )
-        for n in known
-    ]
-    return frequency, np.mean(rows, axis=0)
+    frequency = known[0][0]
+    return frequency, np.mean([np.interp(frequency, *each) for each in known], axis=0)
 
 
 def _peak(spectra: Any, name: str) -> float:
-    key = f"{name}_recommended"
-    if f"{key}_density" not in spectra:
-        return 0.0
-    at = int(np.argmax(spectra[f"{key}_density"].values))
-    return float(spectra[f"{key}_frequency"].values[at])
+    frequency, density = _curve(spectra, name, "recommended")
+    return float(frequency[np.argmax(density)]) if density.size else 0.0
 
 
 def _mark_regular(axes: Any, frequencies: npt.NDArray[np.float64]) -> None:

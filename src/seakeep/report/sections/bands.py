@@ -17,10 +17,11 @@ __all__ = ["bands"]
 
 def bands(result: StudyResult) -> Section | None:
     """Return coverage and scores of bands by wave height, horizon and channel."""
+    if "statistics/bands" not in result.groups:
+        return None
+    found = result.groups["statistics/bands"]
     groups = {
-        test: result.groups[f"statistics/bands/{test}"]
-        for test in result.tests
-        if f"statistics/bands/{test}" in result.groups
+        str(test): found.sel(test=test).dropna("part", how="all") for test in found["test"].values
     }
     tables = [
         make(result, groups, model, band)

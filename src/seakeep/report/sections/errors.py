@@ -44,7 +44,7 @@ def errors(result: StudyResult) -> Section:
         for test in tests
     ]
     tables = [overview_table(result), *(error_table(result, test) for test in tests)]
-    if any(f"statistics/skill/{test}" in result.groups for test in tests):
+    if "statistics/skill" in result.groups:
         tables.insert(1, _skill_table(result))
     return Section("errors", "Errors", figures=(*averages, *channels), tables=tuple(tables))
 
@@ -52,10 +52,9 @@ def errors(result: StudyResult) -> Section:
 def _skill_table(result: StudyResult) -> Table:
     """By how much each model beats the baselines among the models, or does not."""
     rows = []
-    groups = {test: result.groups.get(f"statistics/skill/{test}") for test in result.tests}
-    for test, data in groups.items():
-        if data is None:
-            continue
+    skill = result.groups["statistics/skill"]
+    for test in map(str, skill["test"].values):
+        data = skill.sel(test=test).dropna("reference", how="all", subset=["change"])
         names = [str(each) for each in data["reference_model"].values]
         for reference, name in zip(data["reference"].values, names, strict=True):
             for model in result.models:
@@ -88,7 +87,7 @@ def _with_interval(at: xr.Dataset) -> str:
 
 def error_table(result: StudyResult, test: str) -> Table:
     """Medians and inter-quartile ranges of both measures, average and per channel."""
-    boxes = result.groups[f"statistics/boxes/{test}"]
+    boxes = result.groups["statistics/boxes"].sel(test=test)
     models = judged_models(result)
     columns = ["channel"]
     for measure in HEADING:

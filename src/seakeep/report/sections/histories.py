@@ -151,19 +151,22 @@ def _test(result: StudyResult, name: str) -> dict[str, Any]:
 def _cell(result: StudyResult, test: str, training: int, window: int) -> dict[str, Any]:
     """Waves, measurement, forecasts and errors of a cell, packed."""
     data, factors = result.tests[test], _factors(result)
-    shown = data["shown"].values.tolist() if "shown" in data else []
+    shown = data["shown"].values.tolist()
     first = int(np.argmax(data["judged"].values[:, window]))
     row = shown.index(window) if window in shown and training == first else None
     models = {}
     for model in judged_models(result):
-        keys = ("mean", "lower", "upper") if result.is_ensemble(model) else ("mean",)
+        one = data.sel(model=model, measure="nrmse")
+        keys = ["mean"]
+        if result.is_ensemble(model):
+            one, keys = one.sel(ensemble=model), ["mean", "lower", "upper"]
         entry: dict[str, Any] = {
-            key: _packed(factors, data[f"{model}_{key}"].values[training, window]) for key in keys
+            key: _packed(factors, one[key].values[training, window]) for key in keys
         }
-        if row is not None and f"{model}_members" in data:
-            members = data[f"{model}_members"].values[row, :MOST_MEMBERS]
+        if row is not None and result.is_ensemble(model):
+            members = one["members"].values[row, : min(MOST_MEMBERS, result.members_of(model))]
             entry["members"] = _packed(factors, members.astype(float))
-        errors = data[f"{model}_nrmse"].values[training, window]
+        errors = one["error"].values[training, window]
         models[model] = entry | {"nrmse": [round(float(e), 3) if e == e else None for e in errors]}
     return {
         "measured": _packed(factors, data["measured"].values[window]),

@@ -63,7 +63,7 @@ def age(result: StudyResult) -> Section:
 def _trend_table(result: StudyResult) -> Table:
     rows = []
     for test in result.tests:
-        data: xr.Dataset = result.groups[f"statistics/trend/{test}"]
+        data: xr.Dataset = result.groups["statistics/trend"].sel(test=test)
         for band, words in BAND_WORDS.items():
             for model in judged_models(result):
                 at = data.sel(model=model, band=band)
@@ -114,7 +114,8 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
     """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
     prefix, words = ("calibrated_", "calibrated ") if calibrated else ("", "")
     columns = ["channel"]
-    groups = {t: result.groups[f"statistics/coverage/{t}"].sel(model=model) for t in result.tests}
+    found = result.groups["statistics/coverage"].sel(model=model)
+    groups = {test: found.sel(test=test) for test in result.tests}
     true = any("truth" in data["against"].values for data in groups.values())
     for test in groups:
         columns.append(f"{result.label_of(test)}: inside" + (" [of the truth]" if true else ""))

@@ -24,7 +24,7 @@ def scales(result: StudyResult) -> Section:
 
 def _table(result: StudyResult, test: str) -> Table:
     data = result.tests[test]
-    median = result.groups[f"statistics/boxes/{test}"]["median"]
+    median = result.groups["statistics/boxes"]["median"].sel(test=test)
     spread = data["measured"].std("time", ddof=1) / data["training_std"]
     size = spread.where(data["judged"]).median(["training", "window"])
     rows = []
