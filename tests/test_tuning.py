@@ -122,9 +122,11 @@ def test_folds_that_are_no_number_of_parts_are_refused():
 
 
 def test_the_figure_has_a_line_per_candidate_and_units():
-    pytest.importorskip("matplotlib")
+    pyplot = pytest.importorskip("matplotlib.pyplot")
     result = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["lead"], horizon=(15,))
+    before = pyplot.get_fignums()
     figure = result.figure()
+    assert pyplot.get_fignums() == before  # pyplot keeps what it makes until it is closed
     (axes,) = figure.axes
     words = [text.get_text() for text in axes.get_legend().get_texts()]
     leads = np.unique(result.table["lead"].values)

@@ -596,7 +596,15 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
             r"--band must be members or calibrated; received 'wide'\.",
         ),
         (f"compare model.nc {CAMPAIGN} --band members", 2, r"--band is for ensembles, and"),
-        (f"compare model.nc {CAMPAIGN} --nowcast --start 20", 2, r"--start and --nowcast do not"),
+        *(
+            (f"compare model.nc {CAMPAIGN} --nowcast {given}", 2, rf"{option} and --nowcast do not")
+            for given, option in (
+                ("--start 20", "--start"),
+                ("--radians", "--radians"),
+                ("--workers 1", "--workers"),
+            )
+        ),
+        (f"compare ensemble.nc {CAMPAIGN} --nowcast --band members", 2, r"--band and --nowcast do"),
         (f"compare model.nc {CAMPAIGN} --nowcast --steps 9999", 2, r"a forecast of 9999 steps"),
         (
             f"calibrate model.nc {CAMPAIGN} --steps 100 -o c.nc",

@@ -8,7 +8,8 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import IO, TYPE_CHECKING
 
 from rich.console import Console
 
@@ -54,8 +55,16 @@ def print_table(table: Table, note: bool = True) -> None:
 
 
 def messages() -> Console:
-    """Console of messages, on standard error; long lines are left to the terminal."""
-    return Console(file=sys.stderr, highlight=False, soft_wrap=True, markup=False, emoji=False)
+    """Console of messages, on standard error; long lines are left to the terminal.
+
+    It is the same one while a bar is shown, which moves down for a message.
+    """
+    return _console(getattr(sys.stderr, "rich_proxied_file", sys.stderr))
+
+
+@lru_cache(maxsize=1)
+def _console(stream: IO[str]) -> Console:
+    return Console(file=stream, highlight=False, soft_wrap=True, markup=False, emoji=False)
 
 
 def worker_count(workers: int | None) -> int:
@@ -85,20 +94,23 @@ def progress_bar(what: str) -> Iterator[Report]:
         TextColumn,
         TimeRemainingColumn,
     )
+    from rich.table import Column
 
     bar = Progress(
         TextColumn("{task.description}"),
-        BarColumn(),
+        BarColumn(bar_width=20),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
+        TextColumn("{task.fields[name]}", table_column=Column(ratio=1, no_wrap=True)),
         console=console,
         transient=True,
+        expand=True,
     )
     with bar:
-        task = bar.add_task(what, total=None)
+        task = bar.add_task(what, total=None, name="")
 
         def advance(done: int, total: int, name: str) -> None:
-            bar.update(task, total=total, completed=done, description=f"{what}: {name}")
+            bar.update(task, total=total, completed=done, name=name)
 
         yield advance
 

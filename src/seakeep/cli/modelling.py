@@ -282,7 +282,16 @@ def compare(
     if baselines:
         fitted = _with_baselines(fitted, read)
     if nowcast:
-        _refuse_in_service({"--start": start is not None, "--full-scale": full_scale})
+        _refuse_in_service(
+            {
+                "--start": start is not None,
+                "--full-scale": full_scale,
+                "--band": band is not None,
+                "--radians": radians,
+                "--workers": workers is not None,
+                "--scheduler": scheduler is not None,
+            }
+        )
         serving = {n: each for n, each in fitted.items() if n in names or hasattr(each, "live")}
         _nowcast(serving, read, run or read.test_runs, steps, shown["level"], out, figures, used)
         return
@@ -333,7 +342,8 @@ def _refuse_in_service(given: Mapping[str, bool]) -> None:
         if stated:
             raise RequestError(
                 f"{option} and --nowcast do not go together: forecasts start all over the runs, "
-                "and their errors are in training SDs. Leave one of them out."
+                "one after the other, with the band of the filter, and their errors are in "
+                "training SDs. Leave one of them out."
             )
 
 
