@@ -37,8 +37,8 @@ def worth_section(checked: Checked) -> Section | None:
             if why
         ]
     words = (
-        "Free runs from one measured start to the end of each of the "
-        f"{found.sizes['run']} {found.attrs['of']}; errors in measured SDs of the run. A verdict "
+        f"Free runs from one measured start to the end of each {_one(found)} "
+        f"({found.sizes['run']}); errors in measured SDs of the run. A verdict "
         "reads the upper bound of the 95 % interval of the error: below 0.1 (99 % of the variance "
         "is forecast), 0.3 (91 %), 0.7 (51 %). Better than a baseline: the paired 95 % interval of "
         "the change of the error lies below zero. Intervals hold for these runs.",
@@ -50,6 +50,11 @@ def worth_section(checked: Checked) -> Section | None:
         points=tuple(points),
         tables=(_by_run(found), _by_state(found), _of_runs(found)),
     )
+
+
+def _one(found: xr.Dataset) -> str:
+    """What a run is: a test, or training."""
+    return str(found.attrs["of"]).removesuffix("s")
 
 
 def _verdicts(found: xr.Dataset, repeats: Mapping[str, str]) -> Iterator[str]:
@@ -135,7 +140,7 @@ def _by_run(found: xr.Dataset) -> Table:
     return Table(
         "worth",
         "ANRMSE of the model and of baselines",
-        (found.attrs["of"].removesuffix("s"), "model", "95 %", *map(str, models[1:])),
+        (_one(found), "model", "95 %", *map(str, models[1:])),
         tuple(rows),
         "Baselines are fitted to the training runs with their recommended settings, and read no "
         "wave after the instant that they forecast and no measured state after the start."
