@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import time
@@ -23,7 +24,6 @@ __all__ = [
     "messages",
     "print_table",
     "progress_bar",
-    "quietly",
     "results",
     "tell_warnings",
     "worker_count",
@@ -78,12 +78,22 @@ def worker_count(workers: int | None) -> int:
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Report]:
-    """Show progress: a bar on a terminal, one line per step elsewhere, on standard error."""
+    """Show progress: a bar on a terminal, else a line every few seconds, on standard error."""
     console = messages()
     if not console.is_terminal:
+        told, began = -math.inf, (time.monotonic(), 0)
 
         def line(done: int, total: int, name: str) -> None:
-            console.print(f"{what} {done}/{total}: {name}")
+            nonlocal told, began
+            now = time.monotonic()
+            if done < began[1]:  # a new count
+                began = (now, done)
+            if now - told < SECONDS_BETWEEN_LINES and done < total:
+                return
+            told = now
+            left = (now - began[0]) / max(done - began[1], 1) * (total - done)
+            words = f" (about {left:.0f} s left)" if done > began[1] and left >= 1 else ""
+            console.print(f"{what} {done}/{total}: {name}{words}")
 
         yield line
         return
@@ -140,18 +150,3 @@ def tell_warnings() -> Iterator[None]:
         warnings.simplefilter("always", SeakeepWarning)
         warnings.showwarning = show
         yield
-
-
-def quietly(progress: Report) -> Report:
-    """Print progress every few seconds instead of a line for every step."""
-    if sys.stderr.isatty():
-        return progress
-    told = time.monotonic()
-
-    def tell(done: int, total: int, what: str) -> None:
-        nonlocal told
-        if time.monotonic() - told > SECONDS_BETWEEN_LINES:
-            told = time.monotonic()
-            progress(done, total, what)
-
-    return tell

@@ -461,7 +461,7 @@ def _motions(
 ) -> tuple[dict[str, FloatArray], BoolArray]:
     """Surge, heave and pitch of the centre of gravity, filtered, and what was bridged."""
     side = 1.0 if how.downstream == "right" else -1.0
-    pitch = side * seen["angle"] - how.level
+    pitch = side * seen["angle"] - how.camera_pitch
     (along, up), scale = how.panel_place, usual["scale"]
     # Where the panel's centre would be if the vessel had turned about its centre of gravity alone.
     x = side * scale * seen["x"] - along * np.cos(pitch) - up * np.sin(pitch)
