@@ -7,7 +7,7 @@ of unequal length. The message says what was received and how to correct it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ __all__ = [
     "ComplexArray",
     "FloatArray",
     "IntArray",
+    "Progress",
     "as_bundle",
     "as_real",
     "as_series",
@@ -37,6 +38,9 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.intp]
 ComplexArray = npt.NDArray[np.complex128]
+
+Progress = Callable[[int, int, str], None]
+"""Takes how many steps are done, how many there are, and the name of one."""
 
 LARGEST = 10**300
 """Integers beyond this are taken for it: no float holds them."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, MutableMapping, Sequence
+from collections.abc import Iterator, MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.errors import RequestError
 from seakeep.files import read_bytes, replacing
 from seakeep.models import HankelDMDc
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
     from seakeep.report.figures.tuning import Figure
 
 __all__ = ["TuneResult", "tune"]
-
-Progress = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,20 +7,21 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import IO, TYPE_CHECKING
 
 from rich.console import Console
 
+from seakeep.arrays import Progress
 from seakeep.errors import SeakeepWarning
 
 if TYPE_CHECKING:
     from seakeep.report.tables import Table
 
 __all__ = [
-    "Report",
+    "Progress",
     "messages",
     "print_table",
     "progress_bar",
@@ -29,8 +30,6 @@ __all__ = [
     "worker_count",
 ]
 
-Report = Callable[[int, int, str], None]
-"""Takes how many steps are done, how many there are, and the name of the next one."""
 
 SECONDS_BETWEEN_LINES = 5.0
 PIPE_WIDTH = 140
@@ -77,7 +76,7 @@ def worker_count(workers: int | None) -> int:
 
 
 @contextmanager
-def progress_bar(what: str) -> Iterator[Report]:
+def progress_bar(what: str) -> Iterator[Progress]:
     """Show progress: a bar on a terminal, else a line every few seconds, on standard error."""
     console = messages()
     if not console.is_terminal:
@@ -97,16 +96,16 @@ def progress_bar(what: str) -> Iterator[Report]:
 
         yield line
         return
+    import rich.progress
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
-        Progress,
         TextColumn,
         TimeRemainingColumn,
     )
     from rich.table import Column
 
-    bar = Progress(
+    bar = rich.progress.Progress(
         TextColumn("{task.description}"),
         BarColumn(bar_width=20),
         MofNCompleteColumn(),

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 import typer
 
-from seakeep.cli.console import Report, print_table, progress_bar, results
+from seakeep.arrays import Progress
+from seakeep.cli.console import print_table, progress_bar, results
 from seakeep.cli.options import Scheduler, checked_count
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def reproduce(
     size = Size.quick() if quick else Size()
     pictured = _pictured([act.name for act in ACTS if preset in (None, act.preset)])
 
-    def play(executor: Executor | None, tell: Report) -> dict[str, StudyResult]:
+    def play(executor: Executor | None, tell: Progress) -> dict[str, StudyResult]:
         play_acts = partial(
             reproduce_study, out, preset, size=size, seed=seed, executor=executor, progress=tell
         )
@@ -180,7 +181,7 @@ def _run(
     folder: Path,
     workers: int,
     scheduler: str | None,
-    work: Callable[[Executor | None, Report], Found],
+    work: Callable[[Executor | None, Progress], Found],
     write: Callable[[Path, Found, Executor | None], Path],
 ) -> tuple[Found, Path]:
     """Do the work and write its report; interrupted work is kept."""

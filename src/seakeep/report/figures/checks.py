@@ -11,7 +11,7 @@ import xarray as xr
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError
 from seakeep.report.figures.common import grid_of_axes, short_label
-from seakeep.report.style import COLOURS, LINES, figure_style, new_figure, shown_unit
+from seakeep.report.style import COLOURS, LINES, PALETTE, figure_style, new_figure, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +31,7 @@ __all__ = [
 
 NARROWEST = 7.5
 """Inches: a page stretches figures to its width, and a legend needs room."""
-UNTRAINED: dict[str, Any] = {"color": "#DDDDDD", "alpha": 0.6, "linewidth": 0}
+UNTRAINED: dict[str, Any] = {"color": PALETTE["light"], "alpha": 0.6, "linewidth": 0}
 MARKS: dict[str, dict[str, Any]] = {
     "regular": {"color": COLOURS["measured"], "marker": "o", "markersize": 5, "zorder": 4},
     "irregular": {
@@ -224,7 +224,7 @@ def coherence(
             own = found.sel(state=name)
             power = own["spectrum"].values
             place.fill_between(
-                frequency, power / max(power.max(), 1e-300), color="#DDDDDD", linewidth=0,
+                frequency, power / max(power.max(), 1e-300), color=PALETTE["light"], linewidth=0,
                 label="spectrum of the state",
             )  # fmt: skip
             for each in own["input"].values:
@@ -344,7 +344,7 @@ def residuals(
     """
     check_result(found, "autocorrelation", "seakeep.check.residuals")
     chosen = _chosen(found, states)
-    grey = {"color": "#BBBBBB", "linewidth": 0.8}
+    grey = {"color": PALETTE["pale"], "linewidth": 0.8}
     with figure_style():
         figure, places = panels(axes, 4 * len(chosen), 4, (2.6, 1.75))
         for number, name in enumerate(chosen):
@@ -499,7 +499,7 @@ def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) ->
     outside = found["outside"].values != ""
     train, test = (found.sel(part=each) for each in ("train", "test"))
     kinds = (
-        (train, "trained", {"marker": "o", "markersize": 11, "color": "#BBBBBB"}),
+        (train, "trained", {"marker": "o", "markersize": 11, "color": PALETTE["pale"]}),
         (test.isel(run=~outside), "test, inside", {"marker": "s", "color": COLOURS["ensemble"]}),
         (test.isel(run=outside), "test, outside", {"marker": "X", "color": COLOURS["forecast"]}),
     )
