@@ -98,6 +98,11 @@ def test_a_search_that_was_interrupted_goes_on(tmp_path):
     assert again.table.identical(whole.table)
     with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
         seakeep.tune(SPEC, runs(2), STATES, INPUTS, **more)
+    shifted = {name: run.assign_coords(time=run["time"] + 1.0) for name, run in runs().items()}
+    longer = {name: run.assign_attrs(encounter_period=2.0) for name, run in runs().items()}
+    for others in (shifted, longer):  # the same values
+        with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
+            seakeep.tune(SPEC, others, STATES, INPUTS, **more)
     kept.write_text("[]")
     with pytest.raises(RequestError, match="keeps no scores of a search"):
         seakeep.tune(SPEC, runs(), STATES, INPUTS, **more)

@@ -58,26 +58,12 @@ def panels(
         return figure, grid_of_axes(figure, count, most)
     several = isinstance(axes, Sequence | np.ndarray)
     given: list[Any] = list(np.ravel(np.array(axes, dtype=object))) if several else [axes]
-    if strange := [each for each in given if not hasattr(each, "get_figure")]:
-        raise RequestError(
-            f"axes must be Axes of matplotlib, or a list of them; received a "
-            f"{type(strange[0]).__name__}. Make them with matplotlib.pyplot.subplots()."
-        )
     if len(given) != count:
         raise RequestError(
             f"axes holds {len(given)} Axes and the figure draws {count} panels. Give as many, or "
             "none."
         )
     return given[0].figure, given
-
-
-def check_result(found: xr.Dataset, variable: str, source: str) -> None:
-    """Refuse a Dataset that is none of the results that a figure draws."""
-    if variable not in found:
-        raise RequestError(
-            f"a result of {source} is drawn; received a Dataset of "
-            f"{', '.join(map(str, found.data_vars)) or 'nothing'}."
-        )
 
 
 def _chosen(found: xr.Dataset, states: Sequence[str] | None) -> list[str]:
@@ -112,9 +98,6 @@ def response(
     -------
     Figure
     """
-    check_result(found, "trained", "seakeep.check.response")
-    if measured is not None:
-        check_result(measured, "kind", "seakeep.check.measured_response")
     known = [
         str(s) for s in found["state"].values if found["amplitude"].sel(state=s).notnull().any()
     ]
@@ -213,7 +196,6 @@ def coherence(
     -------
     Figure
     """
-    check_result(found, "spectrum", "seakeep.check.coherence")
     chosen = _chosen(found, states)
     frequency = found["frequency"].values
     with figure_style():
@@ -261,7 +243,6 @@ def modes(
     -------
     Figure
     """
-    check_result(found, "participation", "seakeep.check.modes")
     at = found.isel(mode=slice(0, most))
     states = [str(name) for name in at["state"].values]
     with figure_style():
@@ -305,7 +286,6 @@ def decay(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Fi
     -------
     Figure
     """
-    check_result(found, "displacement", "seakeep.check.decay")
     motions = [str(name) for name in found["motion"].values]
     with figure_style():
         figure, places = panels(axes, len(motions), 3, (3.0, 1.8))
@@ -342,7 +322,6 @@ def residuals(
     -------
     Figure
     """
-    check_result(found, "autocorrelation", "seakeep.check.residuals")
     chosen = _chosen(found, states)
     grey = {"color": PALETTE["pale"], "linewidth": 0.8}
     with figure_style():
@@ -428,7 +407,6 @@ def exceedance(
     -------
     Figure
     """
-    check_result(found, "exceedance", "seakeep.check.statistics")
     return by_state(found, states, axes, 2.0, _exceedance)
 
 
@@ -465,7 +443,6 @@ def density(
     axes: Sequence[Axes] | Axes | None = None,
 ) -> Figure:
     """Draw the densities of states, measured and forecast; arguments as :func:`exceedance`."""
-    check_result(found, "density", "seakeep.check.statistics")
     return by_state(found, states, axes, 1.9, _density)
 
 
@@ -492,7 +469,6 @@ def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) ->
     -------
     Figure
     """
-    check_result(found, "steepness", "seakeep.check.validity")
     maps = [("period", "mean zero-crossing period [s]", "height", "wave height [m]")]
     if (found["drift"].notnull() & found["steepness"].notnull()).any():
         maps.append(("drift", "mean surge [m]", "steepness", "wave steepness [1]"))
@@ -543,7 +519,6 @@ def drift(
     -------
     Figure
     """
-    check_result(found, "slow_response", "seakeep.check.drift")
     known = found["state"].values[found["slow_response"].notnull().any(["difference", "frequency"])]
     chosen = _chosen(found, [str(name) for name in known] if states is None else states)
     with figure_style():
