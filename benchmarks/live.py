@@ -29,9 +29,9 @@ SPECS = {
     "recommended": seakeep.HankelDMDc.recommended,
     "ensemble": lambda period, dt: seakeep.BayesianHankelDMDc(
         encounter_period=period,
-        train_length=None,
-        state_delay=seakeep.Uniform(0.5, 1.5),
-        input_delay=seakeep.Uniform(2, 4),
+        window=None,
+        state_delays=seakeep.Uniform("0.5 T", "1.5 T"),
+        input_delays=seakeep.Uniform("2 T", "4 T"),
         ridge=seakeep.Uniform(10, 90),
         n_members=20,
         dt=dt,

@@ -44,8 +44,11 @@ def many_members(members: int, delay_rows: str, small: bool) -> dict:
     run = as_run(base)
     paper = seakeep.BayesianHankelDMDc.paper(encounter_period=32 * DT, dt=DT, n_members=members)
     if small:
-        delays = {"state_delay": seakeep.Uniform(0.1, 0.4), "input_delay": seakeep.Uniform(0.2, 1)}
-        paper = dataclasses.replace(paper, train_length=seakeep.Uniform(5, 10), **delays)
+        delays = {
+            "state_delays": seakeep.Uniform("0.1 T", "0.4 T"),
+            "input_delays": seakeep.Uniform("0.2 T", "1 T"),
+        }
+        paper = dataclasses.replace(paper, window=seakeep.Uniform("5 T", "10 T"), **delays)
     spec = dataclasses.replace(paper, delay_rows=delay_rows)
     channels = names(base.states.shape[1], base.inputs.shape[1])
     ensemble = spec.fit(run, *channels, stop=base.stop * DT)

@@ -84,7 +84,7 @@ def plain_cells(draws, deterministic: bool, problem, stops, starts):
     """Plain NumPy over all training windows, models and test windows."""
     chosen = [
         draws[f"{name}_samples"].values.tolist()
-        for name in ("train_length", "state_delay", "input_delay")
+        for name in ("window", "state_delays", "input_delays")
     ]
     settings = [*zip(*chosen, draws.ridge.values.tolist(), strict=True)]
     if deterministic:

@@ -3,6 +3,7 @@
 python docs/make_reference.py   # campaign_file.md, and the keys in study.md; a build makes the others
 """
 
+import dataclasses
 import importlib
 import inspect
 import re
@@ -13,8 +14,9 @@ from pathlib import Path
 import typer
 from pydantic_core import PydanticUndefined
 
-from seakeep.campaign.settings import CampaignSettings
+from seakeep.campaign.settings import CampaignSettings, ModelSettings
 from seakeep.cli import app
+from seakeep.models import BayesianHankelDMDc, HankelDMDc, ProbeAlignment, ReadOut, Select
 from seakeep.study.settings import StudySettings
 from seakeep.toml import Table
 
@@ -67,7 +69,19 @@ input_delays = "5 T"
 T̂ is `encounter_period` of `[campaign]`. If that is not stated, T̂ is measured: the mean zero-up-crossing period of the wave
 channel over the irregular runs, in the used part of each run. The keys on which this measurement depends (spans of those
 runs, windows of clocks) can be in periods only if `encounter_period` is stated; a message says so. Lengths of
-models are rounded to the nearest number of samples. Priors of ensembles are always in periods.
+models are rounded to the nearest number of samples; they may be in seconds too (`"0.5 s"`), and bare numbers count samples.
+
+## Priors
+
+In an ensemble (`kind = "bayesian_hankel_dmdc"`) `window`, `state_delays`, `input_delays` and `ridge` may be priors, from
+which the settings of each member are drawn:
+
+| prior | draws |
+|---|---|
+| `{ uniform = ["10 T", "30 T"] }` | uniform between two bounds |
+| `{ log_uniform = [0.1, 10] }` | uniform in the logarithm |
+| `{ fixed = 100 }` | one value, as the bare value does |
+| `{ distribution = "norm", parameters = { loc = 15, scale = 1 }, unit = "T" }` | a distribution of `scipy.stats`; `unit` is that of a length, `"T"` or `"s"`, and samples without it |
 
 ## Observables
 
@@ -121,8 +135,14 @@ This part is generated from the settings themselves.
 """
 
 
-CONSTRUCTOR = "as in [`HankelDMDc`](api/seakeep.HankelDMDc.md)"
-"""Of a key without a description."""
+PARAMETER = re.compile(r"^    (\w[\w, ]*)(?: : (.*))?$", re.MULTILINE)
+OF_MODELS = {
+    HankelDMDc: "`kind = 'hankel_dmdc'`",
+    BayesianHankelDMDc: "`kind = 'bayesian_hankel_dmdc'`",
+    ProbeAlignment: "`alignment`, a table",
+    Select: "`select`, a table",
+    ReadOut: "`[model.readouts.NAME]`, where NAME is the channel",
+}
 
 
 def tables_of(annotation):
@@ -147,8 +167,24 @@ def shown(field):
 def rows(table):
     """Rows of the keys of a table."""
     for name, field in table.model_fields.items():
-        words = (field.description or CONSTRUCTOR).replace("|", "\\|")
+        words = (field.description or "").replace("|", "\\|")
         yield f"| `{field.alias or name}` | {shown(field)} | {words} |"
+
+
+def documented(spec):
+    """Rows of the arguments of a model, from its docstring."""
+    section = spec.__doc__.split("----------\n", 1)[1].split("\n    Raises\n")[0]
+    parts = PARAMETER.split(section)[1:]
+    defaults = {each.name: each.default for each in dataclasses.fields(spec) if each.init}
+    for names, kind, text in zip(parts[::3], parts[1::3], parts[2::3], strict=True):
+        words = re.sub(r":\w+:`~?([^`]*)`", r"`\1`", " ".join(text.split())).replace("``", "`")
+        kinds = (kind or "").removesuffix(", optional")
+        for name in names.split(", "):
+            default = defaults[name]
+            value = "–" if default in (None, ()) else f"`{default}`"
+            value = "needed" if default is dataclasses.MISSING else value
+            meaning = f"{kinds}: {words}" if kinds else words
+            yield f"| `{name}` | {value} | {meaning} |".replace("||", "\\|\\|")
 
 
 def text_of(table):
@@ -170,6 +206,9 @@ def keys_of(settings):
         done.append(table)
         lines += [f"### {table.__name__.removesuffix('Settings')}", "", text_of(table), ""]
         lines += ["| key | default | meaning |", "|---|---|---|", *rows(table), ""]
+        for spec, words in OF_MODELS.items() if table is ModelSettings else ():
+            lines += [f"Keys of {words}:", ""]
+            lines += ["| key | default | meaning |", "|---|---|---|", *documented(spec), ""]
         if table.others is not None:
             queue.insert(0, table.others)
         for field in table.model_fields.values():

@@ -85,9 +85,7 @@ def test_what_is_no_array_of_real_numbers_is_refused(name, place, kind):
         call(*arguments)
 
 
-@pytest.mark.parametrize(
-    "kind", ["three axes", "one number", "two samples", "empty", "NaN", "huge"]
-)
+@pytest.mark.parametrize("kind", ["three axes", "one number", "two samples", "empty", "NaN"])
 @pytest.mark.parametrize(("name", "place"), CASES)
 def test_other_shapes_and_gaps_are_taken_or_refused_in_words(name, place, kind):
     """No error of NumPy's or SciPy's reaches the user, and no warning."""
@@ -99,7 +97,6 @@ def test_other_shapes_and_gaps_are_taken_or_refused_in_words(name, place, kind):
         "two samples": sound[:2],
         "empty": sound[:0],
         "NaN": np.full(sound.shape, np.nan),
-        "huge": 1e200 * sound,
     }[kind]
     with contextlib.suppress(SeakeepError):
         call(*arguments)
@@ -137,12 +134,6 @@ def test_what_is_taken_as_it_is():
         (lambda: as_series(TABLE), RequestError, r"shape \(1200, 2\); expected \(time,\)"),
         (lambda: as_series([1.0]), DataError, r"has 1 sample\(s\); at least 2 are needed"),
         (lambda: as_series([1.0, np.inf]), DataError, "1 value.*, of 2, the first at sample 1"),
-        (lambda: as_series([1.0, -1e160]), DataError, "values beyond 1e.150.* damaged row"),
-        (
-            lambda: metrics.nrmse(predicted=TABLE, measured=1e160 * TABLE),
-            DataError,
-            "measured holds values beyond 1e.150",
-        ),
         (lambda: as_bundle(TABLE[None]), RequestError, r"expected \(time,\) or \(series, time\)"),
         (lambda: number("3", "x"), RequestError, "x must be a number; received '3'"),
         (lambda: number(np.datetime64("2020"), "x"), RequestError, "x must be a number"),

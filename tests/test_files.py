@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.errors import MissingFileError, RequestError
-from seakeep.files import MARK, check_output, existing_file, replacing, write_netcdf
+from seakeep.errors import RequestError
+from seakeep.files import MARK, check_output, replacing, write_netcdf
 
 
 def test_a_file_appears_when_it_is_whole(tmp_path):
@@ -89,16 +89,6 @@ def test_a_link_stays_one(tmp_path):
     assert (tmp_path / "a.txt").read_text() == "new"
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="Linux makes such files")
-def test_a_file_that_the_system_makes_is_not_read(tmp_path):
-    """Some of them, such as /proc/kmsg, never end."""
-    made = Path("/proc/self/status")
-    with pytest.raises(MissingFileError, match="is empty, or made by the system while it is read"):
-        existing_file(made)
-    (tmp_path / "empty").touch()
-    assert existing_file(tmp_path / "empty") == tmp_path / "empty"
-
-
 def test_a_folder_in_the_place_of_the_file_is_named(tmp_path):
     with (
         pytest.raises(RequestError, match=r"it is a folder\. Name a file in it"),
@@ -124,45 +114,35 @@ def test_a_lack_of_permission_gets_its_own_mend(tmp_path):
         raise PermissionError(13, os.strerror(13))
 
 
-def test_a_netcdf_file_holds_root_and_groups_packed_as_asked(tmp_path):
+def test_a_netcdf_file_is_packed_as_asked(tmp_path):
     values = np.random.default_rng(0).standard_normal(5000)
     heave = xr.Dataset(
         {"heave": ("time", values, {"units": "m"}), "flag": ("time", values > 0)},
         coords={"time": 0.1 * np.arange(5000)},
         attrs={"name": "Mörkö", "span": (1.0, 2.0)},
     )
-    root, path = xr.Dataset(attrs={"format": 3}), tmp_path / "a.nc"
-    groups = {"prepared/one": heave, "prepared/two": heave.isel(time=slice(7))}
-    write_netcdf(path, root, groups, lambda each: {key: {"zlib": True} for key in each.data_vars})
-    assert xr.load_dataset(path, engine="h5netcdf").attrs == {"format": 3}
-    for name, group in groups.items():
-        found = xr.load_dataset(path, engine="h5netcdf", group=name)
-        xr.testing.assert_equal(found, group)
-        assert found["heave"].encoding["zlib"]
-        assert found["heave"].attrs == {"units": "m"}
-        assert found.attrs["name"] == "Mörkö"
-    write_netcdf(tmp_path / "b.nc", xr.Dataset(attrs={"format": 4}), onto=path)
-    assert xr.load_dataset(path, engine="h5netcdf").attrs == {"format": 3}
-    assert xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf").attrs == {"format": 4}
-    found = xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf", group="prepared/two")
-    xr.testing.assert_equal(found, groups["prepared/two"])
+    write_netcdf(tmp_path / "a.nc", heave, {"heave": {"zlib": True}})
+    found = xr.load_dataset(tmp_path / "a.nc", engine="h5netcdf")
+    xr.testing.assert_equal(found, heave)
+    assert found["heave"].encoding["zlib"]
+    assert not found["flag"].encoding["zlib"]
+    assert found["heave"].attrs == {"units": "m"}
+    assert found.attrs["name"] == "Mörkö"
 
 
 FULL = """
 import json, resource, signal, sys
 from pathlib import Path
 import numpy as np, xarray as xr
-from seakeep.campaign import store as campaign
 from seakeep.errors import SeakeepError
-from seakeep.models import store as models
+from seakeep.files import write_sealed
 from seakeep.report import comparison
 from seakeep.study import store as study
 from seakeep.tank import delivery, hydrodynamics
 
 folder, run = Path(sys.argv[1]), xr.Dataset({"heave": ("time", np.random.rand(50_000))})
 writers = {
-    "campaign": lambda path: campaign._write(run, path),
-    "model": lambda path: models.write(run, path, "hankel_dmdc"),
+    "model": lambda path: write_sealed(run, path, "model"),
     "forecast": lambda path: comparison.write_forecast(run, path),
     "raw file": lambda path: delivery.write_dataset(run, path),
     "hydrodynamics": lambda path: hydrodynamics.save_hydrodynamics(run, path),
@@ -197,7 +177,7 @@ def test_whatever_is_written_as_netcdf_survives_a_disk_that_is_full(tmp_path):
         assert kind == "StorageError"
         assert "File too large" in words
         assert "Free space on the disk; the same command then continues" in words
-    assert len(told) == 5
+    assert len(told) == 4
     for kind, words in told.values():
         assert kind == "RequestError"
         assert "file.nc: File too large" in words

@@ -25,9 +25,9 @@ def ensemble_run():
     run = xr.Dataset({"heave": ("time", heave), "eta": ("time", waves)}, coords={"time": time})
     spec = BayesianHankelDMDc(
         encounter_period=1.6,
-        train_length=Uniform(6, 8),
-        state_delay=Uniform(0.2, 0.4),
-        input_delay=Uniform(0.3, 0.6),
+        window=Uniform("6 T", "8 T"),
+        state_delays=Uniform("0.2 T", "0.4 T"),
+        input_delays=Uniform("0.3 T", "0.6 T"),
         ridge=Uniform(5, 10),
         n_members=3,
     )

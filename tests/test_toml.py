@@ -54,9 +54,6 @@ def test_a_value_without_end_is_cut(tmp_path):
     [
         (b"name = 'K\xf6ln'\n", "tank.toml, line 1: not UTF-8, which TOML asks for. Save the file"),
         (b"[a\n", "is not valid TOML: "),
-        (b"a = " + b"[" * 3000 + b"]" * 3000, "nested hundreds of levels deep. Remove the superfl"),
-        (b"a = " + b"9" * 5000, "holds a value that cannot be read: Exceeds the limit (4300"),
-        (b"depth = " + b"9" * 4000, "depth: received 9999"),
         (b"a = 1979-99-99\n", "is not valid TOML: "),
         (b"depth = 1979-01-01\n", "depth: received 1979-01-01, which should be a number"),
         (b"depth = " + b"[" * 200 + b"]" * 200, "depth: received [[["),

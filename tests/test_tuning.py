@@ -35,16 +35,26 @@ def test_the_choice_is_in_the_spec_the_table_and_the_text():
     assert model.settings.ridge == result.spec.ridge
 
 
-@pytest.mark.parametrize("folds", ["run", "sea_state"])
-def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds):
-    seas = ("calm", "rough", "calm")
-    named = zip(runs().items(), seas, strict=True)
-    given = {name: run.assign_attrs(sea_state=sea) for (name, run), sea in named}
+@pytest.mark.parametrize(
+    ("folds", "words"),
+    [
+        ("run", "mean NRMSE"),
+        ("sea_state", "the runs of its sea state, of which there are 2"),
+        ("auto", "the runs that repeat its waves; 2 waves differ"),
+    ],
+)
+def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words):
+    """The third run repeats the waves of the first, a little higher and shorter."""
+    first, second, _ = runs().values()
+    third = first.isel(time=slice(-40)).map(lambda x: 1.02 * x, keep_attrs=True)
+    seas = {"first": (first, "calm"), "second": (second, "rough"), "third": (third, "calm")}
+    given = {name: run.assign_attrs(sea_state=sea) for name, (run, sea) in seas.items()}
     powers = seakeep.Powers("eta", (2,))
     spec = replace(SPEC, lead=4, observables=(powers,))
     result = seakeep.tune(spec, given, STATES, INPUTS, horizon=(15,), folds=folds)
     table = result.table
-    assert ("sea state, of which there are 2" in result.describe()) == (folds == "sea_state")
+    assert words in result.describe()
+    assert ("held out with each" in result.describe()) == (folds != "run")
     assert set(table["observables"].values.tolist()) == {"none", "powers"}
     steps, first = 15 * PERIOD, spec.input_delays
     for trial in range(0, table.sizes["trial"], 4):
@@ -53,7 +63,7 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds):
         settings = {"ridge": float(row["ridge"]), "ridge_scale": "per_snapshot"}
         plain = replace(spec, observables=chosen, **settings)
         for run in given.values():
-            key = (lambda r: r.attrs["sea_state"]) if folds == "sea_state" else id
+            key = (lambda r: r.attrs["sea_state"]) if folds != "run" else id
             model = plain.fit([r for r in given.values() if key(r) != key(run)], STATES, INPUTS)
             scores = []
             for at in range(first, run.sizes["time"] - model.lead_samples - steps + 1, steps):
@@ -121,7 +131,7 @@ def test_sea_states_that_hold_nothing_together_are_named(sea, words):
 
 def test_folds_that_are_no_number_of_parts_are_refused():
     with pytest.raises(
-        RequestError, match=r"folds must be 'run', 'sea_state' or an integer of at least 2"
+        RequestError, match=r"folds must be 'auto', 'run', 'sea_state' or an integer of at least 2"
     ):
         seakeep.tune(SPEC, runs(), STATES, INPUTS, folds=1)
 
@@ -192,7 +202,7 @@ def test_the_command_takes_windows_and_folds_from_the_file(tmp_path, monkeypatch
     monkeypatch.setattr("seakeep.tuning.tune", spy)
     assert main(["tune", "campaign.toml"]) == 2
     assert "seen" in capsys.readouterr().err
-    assert (given["horizon"], given["folds"]) == ((5.0, 10.0), "run")
+    assert (given["horizon"], given["folds"]) == ((5.0, 10.0), "auto")
 
 
 def test_a_tuned_file_holds_the_read_outs_and_is_else_as_it_was():

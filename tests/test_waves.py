@@ -91,7 +91,7 @@ def test_what_is_no_wave(call, message):
     ("value", "depth"), [(1.0, 1e308), (1.0, 1e-308), (1e-300, 3.6), (1e100, 3.6), (np.inf, 3.6)]
 )
 def test_what_overflows_is_refused(function, value, depth):
-    with pytest.raises((RequestError, DataError), match=r"between 1e-09 and 1e.09|beyond 1e.150"):
+    with pytest.raises((RequestError, DataError), match=r"between 1e-09 and 1e.09"):
         function(value, depth)
 
 

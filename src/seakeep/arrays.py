@@ -16,7 +16,6 @@ import numpy.typing as npt
 from seakeep.errors import DataError, RequestError, SeakeepError
 
 __all__ = [
-    "GREATEST",
     "BoolArray",
     "ComplexArray",
     "FloatArray",
@@ -42,18 +41,6 @@ ComplexArray = npt.NDArray[np.complex128]
 Progress = Callable[[int, int, str], None]
 """Takes how many steps are done, how many there are, and the name of one."""
 
-LARGEST = 10**300
-"""Integers beyond this are taken for it: no float holds them."""
-
-MOST_INTEGER = 2**63 - 1
-"""Whole number that 64 bits hold; counts beyond it are mistakes, of any number of digits."""
-
-GREATEST = 1e150
-"""Samples beyond this overflow when squared; no sensor reads them."""
-
-SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e9
-"""Seconds between samples: a nanosecond, and thirty years."""
-
 _REMEDIES = {
     "c": "Give its real part or its modulus",
     "M": "Give seconds: (t - t[0]) / numpy.timedelta64(1, 's')",
@@ -67,7 +54,6 @@ def as_real(
     values: object,
     name: str,
     error: type[SeakeepError] = RequestError,
-    greatest: float = GREATEST,
 ) -> FloatArray:
     """Return real numbers as an array of floats.
 
@@ -79,8 +65,6 @@ def as_real(
         What messages call them.
     error : type, optional
         What is raised; a DataError where the values come from a file.
-    greatest : float, optional
-        Finite values beyond it are refused, since their squares overflow.
 
     Returns
     -------
@@ -91,8 +75,6 @@ def as_real(
     RequestError
         If they are not real numbers: masked values, complex, dates, text, a Dataset, or rows of
         unequal length.
-    DataError
-        If a finite value is so large that its square overflows.
 
     Examples
     --------
@@ -100,7 +82,7 @@ def as_real(
     array([1., 2.])
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
-        return _bounded(values, name, greatest)
+        return values
     if hasattr(values, "data_vars"):
         raise error(
             f"{name} must be an array; received a Dataset. Select one channel: data['heave']."
@@ -119,19 +101,7 @@ def as_real(
             f"{name} must be real numbers; received {type(values).__name__} of type "
             f"{array.dtype}. {remedy}."
         )
-    return _bounded(np.asarray(array, dtype=np.float64), name, greatest)
-
-
-def _bounded(array: FloatArray, name: str, greatest: float) -> FloatArray:
-    """Refuse finite values beyond a limit; NaN and infinite ones pass."""
-    if array.size and greatest < np.inf and not -greatest <= array.min() <= array.max() <= greatest:
-        finite = array[np.isfinite(array)]
-        if np.any(np.abs(finite) > greatest):
-            raise DataError(
-                f"{name} holds values beyond {greatest:g}, whose squares overflow. Look for a "
-                "damaged row or a wrong unit."
-            )
-    return array
+    return np.asarray(array, dtype=np.float64)
 
 
 def _check_mask(values: object, name: str, error: type[SeakeepError]) -> None:
@@ -252,7 +222,7 @@ def number(value: object, name: str) -> float:
     plain = plain_number(value)
     if isinstance(plain, bool) or not isinstance(plain, int | float) or plain != plain:
         raise RequestError(f"{name} must be a number; received {value!r}.")
-    return float(min(max(plain, -LARGEST), LARGEST)) if isinstance(plain, int) else float(plain)
+    return float(plain)
 
 
 def positive(value: object, name: str, unit: str) -> float:
@@ -264,14 +234,8 @@ def positive(value: object, name: str, unit: str) -> float:
 
 
 def time_step(value: object) -> float:
-    """Return a time step in seconds as a float; steps that no record has overflow elsewhere."""
-    found = positive(value, "the time step", "s")
-    if not SHORTEST_STEP <= found <= LONGEST_STEP:
-        raise RequestError(
-            f"the time step must lie between {SHORTEST_STEP:g} and {LONGEST_STEP:g} s; received "
-            f"{value!r}."
-        )
-    return found
+    """Return a time step in seconds as a float."""
+    return positive(value, "the time step", "s")
 
 
 def fraction(value: object, name: str) -> float:
@@ -283,9 +247,7 @@ def fraction(value: object, name: str) -> float:
 
 
 def whole_number(value: object, name: str, least: int = 1) -> int:
-    """Return a whole number of at least `least` that 64 bits hold."""
-    if isinstance(value, int) and value > MOST_INTEGER:
-        raise RequestError(f"{name} is larger than {MOST_INTEGER}. Give a smaller number.")
+    """Return a whole number of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise RequestError(
             f"{name} must be a whole number of at least {least}; received {value!r}."

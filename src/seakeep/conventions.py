@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -210,14 +211,12 @@ def _registry() -> pint.UnitRegistry[Any]:
     return registry
 
 
-_SPELLINGS = (
+_RAISED = str.maketrans("⁻¹²³⁴", "-1234")
+_SPELLINGS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...] = (
     (re.compile(r"[·⋅×]"), "*"),
     (re.compile(r"µ|μ"), "µ"),
     (re.compile(r"%"), "percent"),
-    (re.compile("⁻¹"), "^-1"),
-    (re.compile("⁻²"), "^-2"),
-    (re.compile("²"), "^2"),
-    (re.compile("³"), "^3"),
+    (re.compile("[⁻¹²³⁴]+"), lambda match: "^" + match[0].translate(_RAISED)),
     (re.compile(r"(?<=[A-Za-z°])(-?[1-9])"), r"^\1"),
     (re.compile(r"\^"), "**"),
     (re.compile(r"(?<=[A-Za-z°0-9])[ .](?=[A-Za-z°])"), "*"),

@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import difflib
 import errno
-import glob
+import functools
 import hashlib
 import io
 import os
 import re
 import secrets
-import shutil
 import stat
-import tempfile
-import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
-from seakeep.sizes import check_declared
 
 if TYPE_CHECKING:
+    import h5py
     import xarray as xr
 
 __all__ = [
@@ -33,16 +31,19 @@ __all__ = [
     "existing_file",
     "expanded",
     "is_there",
+    "load_sealed",
     "make_folder",
     "read_bytes",
     "read_sealed",
     "reading",
     "replacing",
     "sha256_of",
-    "working_folder",
     "write_netcdf",
+    "write_sealed",
 ]
 
+FORMAT = 4
+"""Format of sealed files; one of another format is refused, and made again."""
 MARK = "seakeep_file"
 """Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""
 SEAL = b"seakeep SHA-256 "
@@ -50,25 +51,6 @@ SEAL = b"seakeep SHA-256 "
 
 SHOWN = 5
 """Names of a folder that a message lists at most."""
-
-LONGEST = 300
-"""Characters of a path that a message shows at most."""
-
-SETTLED = 2.0
-"""Seconds for which a file must have been left alone before its checksum is remembered.
-
-Within the resolution of a file system's clock, 2 s at worst (FAT), a second change leaves the times
-of a file as they were.
-"""
-
-_KINDS = (
-    (stat.S_ISDIR, "a folder", "Give the file in it."),
-    (stat.S_ISFIFO, "a pipe", "Copy what comes out of it into a file first."),
-    (stat.S_ISSOCK, "a socket", "Give a file."),
-    (stat.S_ISCHR, "a device", "Give a file."),
-    (stat.S_ISBLK, "a device", "Give a file."),
-)
-_SUMS: dict[Path, tuple[tuple[int, ...], str]] = {}
 
 
 def existing_file(path: Path | str) -> Path:
@@ -92,20 +74,19 @@ def existing_file(path: Path | str) -> Path:
     """
     place = expanded(path)
     try:
-        state = place.stat()
-        is_made = state.st_size == 0 and hasattr(os, "statvfs") and not os.statvfs(place).f_blocks
+        mode = place.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
         raise _missing(place) from None
     except (OSError, ValueError) as error:  # names with NUL raise ValueError
         raise _unreadable(path, error) from None
-    if (found := _kind_of(state.st_mode)) is not None:
+    if stat.S_ISDIR(mode):
         raise MissingFileError(
-            f"{_shown(path)} is {found[0]}, and only regular files are read. {found[1]}"
+            f"{path} is a folder, and only regular files are read. Give the file in it."
         )
-    if is_made:  # as in /proc, where some call themselves regular and never end
+    if not stat.S_ISREG(mode):
         raise MissingFileError(
-            f"{_shown(path)} is empty, or made by the system while it is read, and only files on a "
-            "disk are read. Copy what it holds into a file first."
+            f"{path} is a pipe or a device, and only regular files are read. Copy what comes out "
+            "of it into a file first."
         )
     return place
 
@@ -122,11 +103,6 @@ def is_there(path: Path) -> bool:
         return path.exists()
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from None
-
-
-def _kind_of(mode: int) -> tuple[str, str] | None:
-    """What stands in the place of a regular file, and what to do about it."""
-    return next(((what, mend) for is_kind, what, mend in _KINDS if is_kind(mode)), None)
 
 
 def _reason(error: Exception) -> str:
@@ -183,22 +159,16 @@ def sha256_of(path: Path) -> str:
     MissingFileError
         As :func:`reading`.
     """
-    with reading(path) as place, place.open("rb") as file:
-        found = os.fstat(file.fileno())
-        state = found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
-        known = _SUMS.get(path)
-        if known is not None and known[0] == state:
-            return known[1]
-        started = time.time_ns()
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    if max(found.st_mtime_ns, found.st_ctime_ns) < started - SETTLED * 1e9:
-        _SUMS[path] = state, digest
-    return digest
+    with reading(path) as place:
+        state = place.stat()
+        return _sum(place, state.st_ino, state.st_size, state.st_mtime_ns, state.st_ctime_ns)
 
 
-def _shown(path: Path | str) -> str:
-    text = str(path).replace("\0", "\\0")
-    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]}…{text[-LONGEST // 2 :]}"
+@functools.cache
+def _sum(path: Path, *state: int) -> str:
+    """Checksum of a file in a state."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def expanded(path: str | Path) -> Path:
@@ -231,7 +201,7 @@ def _unreadable(path: Path | str, error: Exception) -> MissingFileError:
         mend = "Change its permissions, or copy it to a place that you may read."
     elif isinstance(error, OSError) and error.errno == errno.EIO:
         mend = "Copy the file again, or check the disk."
-    return MissingFileError(f"{_shown(path)} cannot be read: {reason}. {mend}")
+    return MissingFileError(f"{path} cannot be read: {reason}. {mend}")
 
 
 def _missing(path: Path) -> MissingFileError:
@@ -239,8 +209,7 @@ def _missing(path: Path) -> MissingFileError:
         beside = sorted(each.name for each in path.parent.iterdir())
     except OSError:
         return MissingFileError(
-            f"{_shown(path)} does not exist: there is no folder {_shown(path.parent)}. Correct "
-            "the path."
+            f"{path} does not exist: there is no folder {path.parent}. Correct the path."
         )
     near = did_you_mean(path.name, beside)
     likeness = {name: difflib.SequenceMatcher(None, path.name, name).ratio() for name in beside}
@@ -249,7 +218,7 @@ def _missing(path: Path) -> MissingFileError:
     if len(beside) > SHOWN:
         listed = f"{len(beside)} names, the nearest of them {listed}"
     return MissingFileError(
-        f"{_shown(path)} does not exist.{near} Its folder holds {listed}. Correct the name."
+        f"{path} does not exist.{near} Its folder holds {listed}. Correct the name."
     )
 
 
@@ -277,10 +246,9 @@ def replacing(path: Path) -> Iterator[Path]:
     check_place(path)
     try:
         target = path.resolve()  # a link stays one
-        _clear_dead(target.parent.glob(f".{glob.escape(target.name)}.*.tmp"))
         # Opened and not made by tempfile, so that the file gets the permissions the user's umask
         # gives to any other.
-        temporary = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
+        temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
         temporary.open("xb").close()
         try:
             if target.exists():
@@ -301,49 +269,10 @@ def replacing(path: Path) -> Iterator[Path]:
         ) from error
 
 
-@contextmanager
-def working_folder(parent: Path | None = None) -> Iterator[Path]:
-    """Yield a folder that is gone afterwards, and remove those of processes that were killed.
-
-    Parameters
-    ----------
-    parent : Path, optional
-        Where it is made; the default is the system's folder for temporary files.
-
-    Yields
-    ------
-    Path
-        An empty folder ``.seakeep.PID.….tmp``.
-    """
-    place = Path(tempfile.gettempdir() if parent is None else parent)
-    _clear_dead(place.glob(".seakeep.*.tmp"))
-    prefix = f".seakeep.{os.getpid()}."
-    with tempfile.TemporaryDirectory(prefix=prefix, suffix=".tmp", dir=place) as folder:
-        yield Path(folder)
-
-
-def _clear_dead(litter: Iterable[Path]) -> None:
-    """Remove temporary files and folders, whose names end in ``.PID.….tmp``, of dead processes."""
-    if os.name == "nt":  # has no way to ask for a process that does not end it
-        return
-    for each in litter:
-        try:
-            os.kill(int(each.name.split(".")[-3]), 0)
-        except ProcessLookupError:
-            if each.is_dir():
-                shutil.rmtree(each, ignore_errors=True)
-            else:
-                each.unlink(missing_ok=True)
-        except (OSError, ValueError, OverflowError, IndexError):
-            continue  # somebody else's
-
-
 def write_netcdf(
     path: Path,
     dataset: xr.Dataset,
-    groups: Mapping[str, xr.Dataset] | None = None,
-    packing: Callable[[xr.Dataset], Mapping[Any, Mapping[str, Any]]] | None = None,
-    onto: Path | None = None,
+    encoding: Mapping[Any, Mapping[str, Any]] | None = None,
 ) -> None:
     """Write a NetCDF file with a checksum at its end, which :func:`read_sealed` compares.
 
@@ -355,29 +284,22 @@ def write_netcdf(
     path : Path
         The file, such as :func:`replacing` gives it; overwritten.
     dataset : Dataset
-        What goes into the root of the file.
-    groups : mapping of str to Dataset, optional
-        What goes into groups, by their names.
-    packing : callable, optional
-        Gives the encoding of the variables of a Dataset, such as their compression.
-    onto : Path, optional
-        A NetCDF file whose content is copied first.
+        What goes into it.
+    encoding : mapping, optional
+        Encoding of variables by their names, such as their compression.
 
     Raises
     ------
     OSError
-        If a file cannot be read or written; :func:`replacing` puts it into words.
+        If it cannot be written; :func:`replacing` puts it into words.
     """
     # Here, so that commands that write no such file start without HDF5.
     import h5netcdf
     from xarray.backends import H5NetCDFStore
 
-    made = io.BytesIO(b"" if onto is None else _content(onto.read_bytes())[0])
-    parts = [(None, dataset), *(groups or {}).items()]
-    with h5netcdf.File(made, "w" if onto is None else "r+") as file:
-        for name, each in parts:
-            encoding = {} if packing is None else packing(each)
-            each.dump_to_store(H5NetCDFStore(file, group=name, mode="a"), encoding=encoding)
+    made = io.BytesIO()
+    with h5netcdf.File(made, "w") as file:
+        dataset.dump_to_store(H5NetCDFStore(file, mode="a"), encoding=encoding or {})
     with path.open("wb") as whole, made.getbuffer() as content:
         whole.write(content)
         whole.write(SEAL + hashlib.sha256(content).hexdigest().encode())
@@ -404,8 +326,7 @@ def read_sealed(path: Path | str) -> io.BytesIO:
     MissingFileError
         If there is no such file, or it cannot be read.
     DataError
-        If its checksum is missing or another one, or what it holds would take far more memory than
-        disk.
+        If its checksum is missing or another one, or values of it lie in other files.
     """
     # Here, so that commands that read no such file start without HDF5.
     import h5py
@@ -418,15 +339,101 @@ def read_sealed(path: Path | str) -> io.BytesIO:
             "again, or remove it and make it anew."
         )
     kept = io.BytesIO(content)
-    try:
-        with h5py.File(kept, "r") as file:
-            check_declared(path, file, "Remove it and make it anew.")
-    except OSError as error:
-        raise DataError(
-            f"{path} is no NetCDF file, although its checksum fits: {error}. Remove it and make it "
-            "anew."
-        ) from None
+    with h5py.File(kept, "r") as file:
+        if outside := next(_outside(file), None):
+            raise DataError(
+                f"{path}: the values of {outside} lie in another file, which seakeep does not "
+                "write. Remove it and make it anew."
+            )
     return kept
+
+
+def _outside(group: h5py.Group) -> Iterator[str]:
+    """Names of a group and those below it whose values HDF5 would take from other files."""
+    import h5py
+
+    for name in group:
+        if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
+            yield name
+        elif isinstance(item := group[name], h5py.Group):
+            yield from _outside(item)
+        elif isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
+            yield name
+
+
+def write_sealed(
+    dataset: xr.Dataset,
+    path: Path | str,
+    kind: str,
+) -> Path:
+    """Write a file of ours: NetCDF with its kind, its format and a checksum.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        What goes into it.
+    path : Path or str
+        The file; an earlier one of the same kind is replaced.
+    kind : str
+        What it is, such as ``"model"``.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    RequestError
+        If it cannot be written, or a file of another kind is there.
+    """
+    target = Path(path)
+    check_output(target, kind)
+    head = {MARK: kind, "seakeep_format": FORMAT, "seakeep_version": metadata.version("seakeep")}
+    with replacing(target) as temporary:
+        write_netcdf(temporary, dataset.assign_attrs(head))
+    return target
+
+
+def load_sealed(path: Path | str, kind: str) -> xr.Dataset:
+    """Read a file of :func:`write_sealed` into memory.
+
+    What it holds is trusted: its checksum fits, and this version knows its format.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file.
+    kind : str
+        What it must be.
+
+    Returns
+    -------
+    Dataset
+        What was written.
+
+    Raises
+    ------
+    MissingFileError
+        If there is no such file, or it cannot be read.
+    DataError
+        If it is damaged, of another kind, or of another format.
+    """
+    import xarray as xr
+
+    dataset = xr.load_dataset(read_sealed(path), engine="h5netcdf", decode_times=False)
+    mark, number = dataset.attrs.pop(MARK, None), dataset.attrs.pop("seakeep_format", None)
+    if mark != kind:
+        raise DataError(
+            f"{path} holds a {mark or 'table'}, and a {kind} is expected here. Name another file."
+        )
+    if number != FORMAT:
+        raise DataError(
+            f"{path} has format {number}, written by seakeep "
+            f"{dataset.attrs.get('seakeep_version', '?')}, and this seakeep reads format {FORMAT}. "
+            "Make the file again with this version, or update seakeep."
+        )
+    return dataset
 
 
 def _content(file: bytes) -> tuple[bytes, str]:
@@ -450,24 +457,22 @@ def check_place(path: Path, suffix: str | None = None) -> None:
     Raises
     ------
     RequestError
-        If it is a folder, its own folder does not exist, or its name says another kind.
+        If it is a folder or a device, its own folder does not exist, or its name says another kind.
     """
     try:
         mode = path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
         mode = stat.S_IFREG
     except (OSError, ValueError) as error:
-        raise RequestError(
-            f"cannot write {_shown(path)}: {_reason(error)}. Choose another name."
-        ) from None
+        raise RequestError(f"cannot write {path}: {_reason(error)}. Choose another name.") from None
     if stat.S_ISDIR(mode):
         raise RequestError(
             f"cannot write {path}: it is a folder. Name a file in it, such as {path / 'model.nc'}."
         )
-    if (what := _kind_of(mode)) is not None:
+    if not stat.S_ISREG(mode):
         raise RequestError(
-            f"cannot write {path}: it is {what[0]}, and only regular files are replaced. Choose "
-            "another name."
+            f"cannot write {path}: it is a pipe or a device, and only regular files are replaced. "
+            "Choose another name."
         )
     if path.parent.exists() and not path.parent.is_dir():
         raise RequestError(
@@ -594,6 +599,6 @@ def make_folder(path: Path) -> Path:
         path.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
         raise RequestError(
-            f"cannot make the folder {_shown(path)}: {_reason(error)}. Choose another place."
+            f"cannot make the folder {path}: {_reason(error)}. Choose another place."
         ) from error
     return path

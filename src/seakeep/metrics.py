@@ -12,7 +12,7 @@ runs that of the noise in ``noise_std``.
 With ``interval=0.95`` a measure gives the bounds of its interval instead of its value, along a
 first axis (lower, upper; of Datasets the dimension ``bound``). Predicted and measured samples are
 redrawn together in blocks as long as the errors depend on one another (Politis and White), with the
-same draws for the same call; quantiles are taken further out for few blocks. The interval states
+same draws for the same call; Student's distribution accounts for few blocks. The interval states
 the uncertainty of the value for a longer record of this run and this model. For the uncertainty
 over runs and training sets see :func:`seakeep.statistics.two_way_interval`. Extremes (NAMMAE) are
 redrawn from the measured ones, so that their bounds are rough.
@@ -31,7 +31,7 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray, fraction
 from seakeep.core import metrics as core
-from seakeep.core.bootstrap import block_length, bootstrap_indices, outer_tail
+from seakeep.core.bootstrap import block_length, bootstrap_indices, student_interval
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.pairing import pair
 
@@ -192,8 +192,8 @@ def _valued(
     tails = fraction(level, "interval")
     block = _block(p, m)
     axis = max(p.ndim, m.ndim) - 2  # of the draws, behind members and windows
-    found = _redrawn(measure, p, m, known, block)
-    return _bounds(found, m.shape[-2] / block, tails, axis)
+    redrawn, value = _redrawn(measure, p, m, known, block), measure(**arrays, **known)
+    return np.stack(student_interval(value, redrawn, m.shape[-2] / block, tails, axis))
 
 
 def _block(p: FloatArray, m: FloatArray) -> int:
@@ -222,15 +222,6 @@ def _redrawn(
         [measure(predicted=p[..., at, :], measured=m[..., at, :], **known) for at in pieces],
         max(p.ndim, m.ndim) - 2,
     )
-
-
-def _bounds(found: FloatArray, blocks: float, level: float, axis: int) -> FloatArray:
-    """Quantiles over an axis of draws, further out for few blocks."""
-    tail = outer_tail(blocks, level)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # a channel that is never judged
-        out: FloatArray = np.nanquantile(found, [tail, 1.0 - tail], axis=axis)
-    return out
 
 
 def anrmse_differences(
@@ -288,14 +279,14 @@ def anrmse_differences(
         values.append(own)
         draws.append(redrawn)
         blocks += held
-        bounds.append(_bounds(_change(redrawn), held, level, -1))
-        own_bounds.append(_bounds(redrawn, held, level, -1))
+        bounds.append(student_interval(_change(own), _change(redrawn), held, level, -1))
+        own_bounds.append(student_interval(own, redrawn, held, level, -1))
     anrmses, pooled = np.stack(values, axis=-1), np.mean(draws, axis=0)
     means = anrmses.mean(axis=-1)
     lower, upper = np.stack(bounds, axis=-1)
-    all_lower, all_upper = _bounds(_change(pooled), blocks, level, -1)
+    all_lower, all_upper = student_interval(_change(means), _change(pooled), blocks, level, -1)
     own_lower, own_upper = np.stack(own_bounds, axis=-1)
-    all_own = _bounds(pooled, blocks, level, -1)
+    all_own = student_interval(means, pooled, blocks, level, -1)
     grid, single = ("model", "run"), ("model",)
     return xr.Dataset(
         {

@@ -8,7 +8,7 @@ from collections.abc import MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -20,6 +20,7 @@ from seakeep.models import HankelDMDc
 from seakeep.models.labelled import Runs, Stop, as_runs, channel_matrix
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.selection import select
+from seakeep.models.settings import FOLDS, Folds
 from seakeep.models.training import check_names, until
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def tune(
     inputs: Sequence[str],
     vary: Sequence[str] = ("ridge", "observables"),
     horizon: Sequence[float] = (15.0, 45.0),
-    folds: Literal["run", "sea_state"] | int = "run",
+    folds: Folds | int = "auto",
     *,
     stop: Stop = None,
     executor: Executor | None = None,
@@ -108,9 +109,9 @@ def tune(
         stacked, for those of the spec or for every load).
     horizon : sequence of float, optional
         Lengths of the free runs, encounter periods.
-    folds : {"run", "sea_state"} or int, optional
-        What is held out in turn: a run, with all others of its sea state or without, or a part of
-        a run: their number. A single run is held out in three parts.
+    folds : {"auto", "run", "sea_state"} or int, optional
+        What is held out in turn: a run and the runs that repeat its waves, a run alone, all runs
+        of a sea state, or a part of a run: their number. A single run is held out in three parts.
     stop : float, sequence or mapping of float, optional
         Last instant of the training window of the runs, s.
     executor : concurrent.futures.Executor, optional
@@ -136,9 +137,10 @@ def tune(
         As :meth:`HankelDMDc.fit`.
     """
     number = isinstance(folds, int) and not isinstance(folds, bool) and folds >= 2
-    if not number and folds not in ("run", "sea_state"):
+    if not number and folds not in FOLDS:
         raise RequestError(
-            f"folds must be 'run', 'sea_state' or an integer of at least 2; received {folds!r}."
+            f"folds must be {', '.join(map(repr, FOLDS))} or an integer of at least 2; received "
+            f"{folds!r}."
         )
     check_names(states, inputs)
     if spec.select is not None and spec.select.observables:

@@ -3,7 +3,7 @@
 import pytest
 
 from seakeep.campaign import read_campaign
-from seakeep.campaign.settings import ModelSettings, PriorSettings
+from seakeep.campaign.settings import ModelSettings
 from seakeep.errors import RequestError
 from seakeep.study import read_study
 from seakeep.toml import Length
@@ -131,32 +131,6 @@ MISTAKES = [
         "model.states: missing. Add it: list of channels that the model forecasts.",
     ),
     (
-        'inputs = ["eta_fwd"]',
-        'inputs = ["heave"]',
-        "model: 'heave' is among the states and the inputs; choose one",
-    ),
-    (
-        "ridge = 1",
-        "ridge = { uniform = [1, 2] }",
-        "model: 'ridge' of kind = 'hankel_dmdc' is a number, not a prior",
-    ),
-    (
-        "ridge = 1",
-        "n_members = 100",
-        "model: 'n_members' belongs to kind = 'bayesian_hankel_dmdc', not to 'hankel_dmdc'",
-    ),
-    (
-        "ridge = 1",
-        "ridge = { unifrom = [1, 2] }",
-        "model.ridge.unifrom: unknown key, received [1, 2]. Did you mean 'uniform'?",
-    ),
-    ("ridge = 1", "ridge = -1", "model.ridge: received -1, which should be greater than or"),
-    (
-        "state_delays = 4",
-        "state_delays = 4.5",
-        "model.state_delays: received 4.5, which should be an integer. Give samples, or per",
-    ),
-    (
         "eta_fwd = -2.5",
         "eta_fdw = -2.5",
         "rig.positions.eta_fdw: no such channel. Did you mean 'eta_fwd'?",
@@ -259,11 +233,11 @@ def test_every_mistake_is_named_at_once(edited):
         edited(
             ('column = "Heave"', 'colum = "Heave"'),
             ('role = "test"', 'role = "tset"'),
-            ("ridge = 1", 'ridge = "much"'),
+            ("states = [", "stats = ["),
         )
     )
     assert "3 mistakes in the campaign file" in message
-    for key in ("channels.heave.colum: ", "runs.second.role: ", "model.ridge: "):
+    for key in ("channels.heave.colum: ", "runs.second.role: ", "model.states: missing"):
         assert key in message
 
 
@@ -360,34 +334,6 @@ class TestModels:
         assert model.kind == "fir"
         assert model.arguments() == {"state_delays": 4, "input_delays": 8, "ridge": 1.0,
                                      "lead": Length(0.75), "memory": Length(2.0)}  # fmt: skip
-        message = refusal(edited(("ridge = 1", "rigde = 1")))
-        assert "model.rigde: unknown key, received 1. Did you mean 'ridge'? Keys here" in message
-
-    def test_only_stated_keys_of_an_alignment_are_handed_on(self, edited):
-        path = edited(("ridge = 1", 'alignment = { mode = "dispersion" }'))
-        assert read_campaign(path).model().arguments()["alignment"] == {"mode": "dispersion"}
-
-    def test_read_outs_are_tables_or_a_word(self, edited):
-        stated = "ridge = 1\n[model.readouts.heave]\nof = ['pitch']"
-        model = read_campaign(edited(("ridge = 1", stated))).model()
-        assert model.arguments()["readouts"] == (
-            {"channel": "heave", "kind": "auto", "of": ("pitch",)},
-        )
-        model = read_campaign(edited(("ridge = 1", "readouts = 'auto'"))).model()
-        assert model.arguments()["readouts"] == "auto"
-
-    @pytest.mark.parametrize(
-        ("readouts", "message"),
-        [
-            ("[model.readouts.heavy]\nof = ['heave']", "readouts.heavy names 'heavy', which is"),
-            ("[model.readouts.heave]\nof = ['surge']", "'surge', which is not among the states"),
-            ("[model.readouts.heave]\nkind = 'hinge'", "model.readouts.heave.of: missing. Add it"),
-            ("[model.readouts.heave]\nof = ['x']\nkind = 1", "model.readouts.heave.kind: received"),
-            ("readouts = 'all'", "model.readouts: received 'all', which should be 'auto'. Give t"),
-        ],
-    )
-    def test_read_outs_that_do_not_fit_are_refused(self, edited, readouts, message):
-        assert message in refusal(edited(("ridge = 1", f"ridge = 1\n{readouts}")))
 
     def test_named_models(self, edited):
         path = edited(
@@ -403,7 +349,7 @@ class TestModels:
         band = campaign.model("band")
         assert band.inputs == ()
         assert band.arguments() == {
-            "ridge": PriorSettings(log_uniform=(0.1, 1.0)),
+            "ridge": {"log_uniform": (0.1, 1)},
             "n_members": 10,
         }
         with pytest.raises(
@@ -427,13 +373,3 @@ class TestModels:
         model = ModelSettings(states=("heave",))
         with pytest.raises(ValueError, match="frozen"):
             model.ridge = 3.0
-
-    def test_a_prior_is_one_thing(self, edited):
-        message = refusal(
-            edited(
-                ("[model]", '[model]\nkind = "bayesian_hankel_dmdc"'),
-                ("state_delays = 4\ninput_delays = 8\n", ""),
-                ("ridge = 1", "state_delay = { uniform = [1, 2], fixed = 3 }"),
-            )
-        )
-        assert "model.state_delay: a prior is one of { uniform = [a, b] }" in message

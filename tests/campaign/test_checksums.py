@@ -1,14 +1,12 @@
 """Files are hashed in pieces, and again only when they have changed."""
 
 import hashlib
-import os
 import tracemalloc
 from collections import Counter
 from pathlib import Path
 
 import pytest
 
-from seakeep import files
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
 from seakeep.files import sha256_of
 
@@ -26,12 +24,6 @@ def hashed(monkeypatch):
     return count
 
 
-@pytest.fixture
-def settled(monkeypatch):
-    """A file that was written just now passes for one that was left alone."""
-    monkeypatch.setattr(files, "SETTLED", -60.0)
-
-
 def test_a_file_is_read_in_pieces(tmp_path):
     path, size = tmp_path / "long.bin", 2**24
     path.write_bytes(bytes(size))
@@ -43,7 +35,7 @@ def test_a_file_is_read_in_pieces(tmp_path):
     assert peak < size / 16
 
 
-def test_a_file_that_stays_is_read_once(tmp_path, hashed, settled):
+def test_a_file_that_stays_is_read_once(tmp_path, hashed):
     path = tmp_path / "a.csv"
     path.write_text("one")
     assert sha256_of(path) == sha256_of(path) == hashlib.sha256(b"one").hexdigest()
@@ -53,17 +45,7 @@ def test_a_file_that_stays_is_read_once(tmp_path, hashed, settled):
     assert hashed == {"a.csv": 2}
 
 
-def test_a_change_that_keeps_size_and_time_is_seen(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text("one")
-    before = path.stat()
-    assert sha256_of(path) == hashlib.sha256(b"one").hexdigest()
-    path.write_text("two")
-    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
-    assert sha256_of(path) == hashlib.sha256(b"two").hexdigest()
-
-
-def test_a_campaign_reads_each_file_once_for_its_checksum(tank, edited, hashed, settled):
+def test_a_campaign_reads_each_file_once_for_its_checksum(tank, edited, hashed):
     # The period is measured on all runs, so that each run depends on the files of all.
     path = edited(("sampling_rate = 10", "steps_per_period = 16"))
     write_prepared(read_campaign(path))

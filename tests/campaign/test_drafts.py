@@ -500,6 +500,63 @@ def test_a_test_lies_within_what_trains(tmp_path):
     assert campaign.test_runs == ["i2"]
 
 
+def rigged(folder, name, period, height, seed, begin=12.0):
+    """A regular run as a tank records it: still water, waves at the probe, then at the vessel."""
+    t = np.arange(0, 60, 0.04)
+    rng = np.random.default_rng(seed)
+
+    def wave(start, phase):
+        ramp = np.clip((t - start) / (2 * period), 0, 1)
+        return ramp * np.sin(2 * np.pi * (t - start) / period + phase)
+
+    response = 1 / (1 + (1.2 / period) ** 4)
+    columns = {
+        "Time [s]": t + 5,
+        "WP fwd [mm]": height * wave(begin, 0.0),
+        "Heave [mm]": height * response * wave(begin + 4, -response),
+        "Pitch (deg)": 0.1 * height * response * wave(begin + 4, 1.5 - response),
+    }
+    noise = {n: x + 0.01 * height * rng.normal(size=t.size) for n, x in columns.items()}
+    return write_csv(folder / f"{name}.csv", noise | {"Time [s]": columns["Time [s]"]})
+
+
+def test_the_draft_of_regular_waves_holds_out_what_the_others_surround(tmp_path, capsys):
+    """Neither the shortest nor the longest, nor a repeated one; from when the waves have come."""
+    series = {"a": (1.0, 20), "b": (1.2, 24), "b_2": (1.2, 24), "c": (1.35, 22), "d": (1.5, 24),
+              "d_2": (1.5, 24), "d_high": (1.5, 36), "e": (1.9, 20)}  # fmt: skip
+    files = [
+        rigged(tmp_path, name, *of, seed, 12.0 + seed / 10)
+        for seed, (name, of) in enumerate(series.items())
+    ]
+    text, campaign = drafted(tmp_path, files)
+    runs = campaign.settings.runs
+    assert campaign.test_runs == ["c"]
+    # The waves reach the vessel at 5 + 12.3 + 4 s, to grow for two periods.
+    assert 21.3 < runs["c"].span[0] < 21.3 + 3 * 1.35
+    assert {name: run.sea_state for name, run in runs.items() if run.sea_state} == {
+        "b": "waves of b", "b_2": "waves of b", "d": "waves of d", "d_2": "waves of d"
+    }  # fmt: skip
+    assert text.count("# guessed: the same waves come again\n") == 4
+    model, out = str(tmp_path / "r.nc"), str(tmp_path / "comparison")
+    campaign = str(tmp_path / "campaign.toml")
+    assert cli.main(["fit", campaign, "-o", model]) == 0
+    assert "the runs that repeat its waves; 5 waves differ" in capsys.readouterr().out
+    assert cli.main(["compare", model, campaign, "-o", out]) == 0
+    (average,) = re.findall(r"average +([\d.]+)", capsys.readouterr().out)[:1]
+    assert float(average) < 0.5  # the mean has 1; forecasts from the still water before had 1.4
+
+
+def test_waves_that_all_repeat_are_held_out_together(tmp_path):
+    series = {"a": 1.0, "a_2": 1.0, "b": 1.3, "b_2": 1.3, "c": 1.7, "c_2": 1.7}
+    files = [
+        rigged(tmp_path, name, period, 20, seed)
+        for seed, (name, period) in enumerate(series.items())
+    ]
+    assert drafted(tmp_path, files)[1].test_runs == ["b", "b_2"]
+    # Of one wave alone, nothing else is left to hold out.
+    assert drafted(tmp_path, files[:2])[1].test_runs == ["a_2"]
+
+
 def test_noise_that_leads_the_count_of_waves(tmp_path):
     columns = tank_columns(seconds=60.0)
     sound = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])[1].encounter_period()

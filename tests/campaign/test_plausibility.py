@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -87,6 +88,34 @@ class TestClocksAndRates:
         assert [each[0] for each in found] == ([] if text is None else ["time"])
         assert text is None or found[0][1].startswith(text)
 
+    @pytest.mark.parametrize(
+        ("header", "files", "is_said"),
+        [("Time", "", True), ("Sample", 'time = "Sample"', True), ("Time [s]", "", False),
+         ("Time", 'time_unit = "s"', False)],
+    )  # fmt: skip
+    def test_times_that_may_count_samples(self, edited, tank, header, files, is_said):
+        for number, name in enumerate(("first", "second")):
+            columns = tank_columns(number)
+            del columns["Time [s]"]
+            write_csv(tank / f"{name}.csv", {header: np.arange(1001.0)} | columns)
+        path = edited(
+            ("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"),
+            ("sampling_rate = 10", ""),
+        )
+        warned = pytest.warns(SeakeepWarning, match=r"state sampling_rate \(Hz\) in \[files\]")
+        with warned if is_said else nullcontext():
+            assert ("counted" in kinds(read_campaign(path).prepare(["first"])["first"])) is is_said
+
+    def test_a_motion_from_a_column_of_waves(self, edited):
+        path = edited(('column = "Heave"', 'column = "WP fwd"'))
+        with pytest.warns(
+            SeakeepWarning,
+            match=r"heave is read from the column 'WP fwd', which is called as wave probes are\. "
+            r"Correct column in \[channels\.heave\]",
+        ):
+            assert "wave column" in kinds(read_campaign(path).prepare(["first"])["first"])
+        assert "wave column" not in kinds(read_campaign(edited()).prepare(["first"])["first"])
+
 
 class TestSteps:
     """A step that loses the waves, and one that is finer than what was recorded."""
@@ -104,6 +133,21 @@ class TestSteps:
         found = step_findings(read_campaign(path).prepare(["first"])["first"])
         assert set(found) == ({"eta_fwd", "heave", "pitch"} if fate else set())
         assert fate is None or re.search(fate, found["eta_fwd"])
+
+    @pytest.mark.parametrize("edges", ["[0.2, 0.3]", "[2.0, 3.0]"])
+    def test_a_low_pass_that_removes_the_waves_is_named(self, edited, edges):
+        """Waves of 0.5 to 0.9 Hz: the first filter leaves none of them, the second all."""
+        path = edited(("sampling_rate = 10", f"sampling_rate = 10\nlow_pass = {edges}"))
+        campaign = read_campaign(path)
+        if edges == "[2.0, 3.0]":
+            assert not kinds(campaign.prepare(["first"])["first"])
+            return
+        with pytest.warns(
+            SeakeepWarning,
+            match=r"loses (9\d.*|100) % of the energy of its waves .* to the filter low_pass, "
+            r"which halves what lies at 0\.25 Hz .*\. Raise low_pass in \[preparation\]",
+        ):
+            assert "low pass" in kinds(campaign.prepare(["first"])["first"])
 
     def test_noise_has_nothing_to_lose(self, edited, tank):
         noise = np.random.default_rng(0).normal(0.0, 1.0, 1001)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, read_campaign, signals, statistics
+from seakeep import HankelDMDc, read_campaign, signals, statistics
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models.training import gather
 from seakeep.study.settings import StudySettings
@@ -13,10 +13,6 @@ from seakeep.waves import wavenumber
 X = np.sin(np.arange(0, 60, 0.05))
 STUDY = {"study": {"campaign": "c.toml"}, "statistics": {"n_series": 10**8}}
 RNG = np.random.default_rng
-
-
-def ensemble(members):
-    return BayesianHankelDMDc(2.0, *[Fixed(2.0)] * 4, n_members=members)
 
 
 @pytest.mark.parametrize(
@@ -40,23 +36,10 @@ def ensemble(members):
         (lambda: signals.delay_by_celerity(X, 0.05, 1e6, 1e-3), "Correct the distance"),
         (lambda: signals.delay_by_dispersion(X, 0.05, 1e9, 3.6), "Correct the distance"),
         (
-            lambda: signals.wave_spectrum(X, 0.05, padded=10**12),
-            r"padded = 1e\+12 points; at",
-        ),
-        (
             lambda: statistics.moving_block_bootstrap(X, 10**8, 9, RNG(0)),
             r"n_series = 100000000 series of 1200 samples take 9.16e\+05 MiB; at most 1907",
         ),
-        (
-            lambda: statistics.density_grid(X, points=10**9),
-            r"points = 1e\+09 points of a",
-        ),
-        (
-            lambda: ensemble(10**8),
-            "n_members = 100000000 members; at most",
-        ),
         (lambda: validated(StudySettings, STUDY, "s", "study"), "n_series: received 100000000"),
-        (lambda: signals.predict_waves(X, 10**12), r"count = 1e\+12 samples; at most"),
         (lambda: wavenumber(2.0, 1e100), "depth must be .* between 1e-09 and 1e"),
         (lambda: wavenumber(2.0, 1e-308), "depth must be .* between 1e-09 and 1e"),
     ],
@@ -72,11 +55,6 @@ def test_a_rate_that_fills_the_memory_is_refused_by_its_key(edited, key):
     message = rf"preparation\.{key} = 1e\+07: .* samples of run 'first' .* MiB; at most 1907"
     with pytest.raises(RequestError, match=message):
         read_campaign(path).prepare(["first"])
-
-
-def test_what_takes_long_is_said_before():
-    with pytest.warns(SeakeepWarning, match=r"n_members = 2e\+05 members, which takes long"):
-        ensemble(200_000)
 
 
 def test_delays_that_fill_the_memory_are_refused_and_long_ones_told(make_dataset):

@@ -95,8 +95,8 @@ def test_what_cannot_be_judged_says_why(model):
     with pytest.raises(RequestError, match=words):
         check.measured_decay(by_device, {"run": named})
     spec = BayesianHankelDMDc(
-        encounter_period=3.0, train_length=Fixed(3), state_delay=Fixed(0.1),
-        input_delay=Fixed(0.1), ridge=Fixed(1.0), n_members=2, seed=0,
+        encounter_period=3.0, window=Fixed("3 T"), state_delays=Fixed("0.1 T"),
+        input_delays=Fixed("0.1 T"), ridge=Fixed(1.0), n_members=2, seed=0,
     )  # fmt: skip
     ensemble = spec.fit(run, ["heave"], ["eta"])
     with pytest.raises(RequestError, match=r"For an ensemble, check a member"):
@@ -106,8 +106,8 @@ def test_what_cannot_be_judged_says_why(model):
 def test_free_runs_of_an_ensemble_are_the_mean_of_its_members():
     run = oscillator_run(samples=600)
     spec = BayesianHankelDMDc(
-        encounter_period=3.0, train_length=Fixed(4), state_delay=Fixed(0.1),
-        input_delay=Fixed(0.1), ridge=LogUniform(0.1, 10.0), n_members=3, seed=0,
+        encounter_period=3.0, window=Fixed("4 T"), state_delays=Fixed("0.1 T"),
+        input_delays=Fixed("0.1 T"), ridge=LogUniform(0.1, 10.0), n_members=3, seed=0,
     )  # fmt: skip
     ensemble = spec.fit(run, ["heave"], ["eta"], stop=20.0)
     starts = np.array([21.0, 25.0])

@@ -838,8 +838,8 @@ def test_a_diverging_forecast_is_told_and_ends_with_1(run, place):
 def test_members_that_diverge_are_counted_and_left_out_of_file_and_table(run, place):
     text = (place / CAMPAIGN).read_text()
     for key, value in {
-        "state_delay": "{ uniform = [1.0, 5.0] }",
-        "input_delay": "0.5",
+        "state_delays": '{ uniform = ["1 T", "5 T"] }',
+        "input_delays": '"0.5 T"',
         "ridge": "{ log_uniform = [1e-13, 1e-2] }",
     }.items():
         text = re.sub(rf"^{key} = .*uniform.*$", f"{key} = {value}", text, flags=re.MULTILINE)

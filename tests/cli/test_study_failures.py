@@ -4,13 +4,12 @@ import errno
 import os
 from pathlib import Path
 
-import numpy as np
 import pytest
 import xarray as xr
 from tutorial_study import put_tutorial
 
 from seakeep import cli
-from seakeep.study import read_result, read_study, run_study, store
+from seakeep.study import read_result, read_study, run_study
 from seakeep.study.store import UnitFolder
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
@@ -31,7 +30,7 @@ n_members = 3
 ridge = { log_uniform = [0.05, 0.5] }
 observables = []
 readouts = {}
-train_length = { uniform = [10, 20] }
+window = { uniform = ["10 T", "20 T"] }
 [tests.unseen]
 runs = ["unseen"]
 windows = 2
@@ -89,9 +88,11 @@ def a_file(folder):
     ("spoil", "status", "words"),
     [
         (
-            lambda folder: change(folder / "study.toml", "[10, 20]", "[1000, 2000]"),
+            lambda folder: change(
+                folder / "study.toml", '["10 T", "20 T"]', '["1000 T", "2000 T"]'
+            ),
             2,
-            ["training: no window is feasible in", "Shorten train_length or the delays"],
+            ["training: no window is feasible in", "Shorten window or the delays"],
         ),
         (
             lambda folder: change(folder / "study.toml", "length = 6", "length = 600"),
@@ -149,7 +150,7 @@ def undisturbed(tmp_path_factory):
 @pytest.mark.parametrize("room", [0, 3])
 def test_a_disk_that_fills_up_loses_no_finished_unit(folder, room, undisturbed, monkeypatch, capfd):
     with monkeypatch.context() as patch:
-        patch.setattr(np, "savez", filling(room, np.savez))
+        patch.setattr(Path, "write_bytes", filling(room, Path.write_bytes))
         assert study(folder) == 1
     told = " ".join(capfd.readouterr().err.split())
     assert "No space left on device. What was finished is kept." in told
@@ -158,7 +159,7 @@ def test_a_disk_that_fills_up_loses_no_finished_unit(folder, room, undisturbed, 
     assert len(before) == room
     # Then there is room for the units, and none for the result.
     with monkeypatch.context() as patch:
-        patch.setattr(store, "write_netcdf", filling(0, store.write_netcdf))
+        patch.setattr(Path, "write_bytes", filling(4 - room, Path.write_bytes))
         assert study(folder) == 1
     assert "No space left on device. What was finished is kept" in capfd.readouterr().err
     assert not (folder / "out" / "study.nc").exists()

@@ -192,21 +192,6 @@ def test_hdf5_sets_of_several_columns_are_split(tmp_path):
         read_table(tmp_path / "run.h5", columns=["cube"])
 
 
-@pytest.mark.parametrize("suffix", ["h5", "mat"])
-def test_hdf5_that_declares_more_than_it_stores(tmp_path, suffix):
-    path = tmp_path / f"run.{suffix}"
-    with h5py.File(path, "w", userblock_size=512) as file:
-        file["time"] = T
-        file.create_dataset("heave", (10**9,), "f8", chunks=(1024,))
-    if suffix == "mat":
-        with path.open("r+b") as raw:
-            raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
-    with pytest.raises(
-        DataError, match=r"'heave' declares 1000000000 values \(7629 MiB\), and 0 Mi"
-    ):
-        read_table(path)
-
-
 def test_hdf5_integers_and_float32(tmp_path):
     with h5py.File(tmp_path / "run.h5", "w") as file:
         file["time"] = np.arange(5)

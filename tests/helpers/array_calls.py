@@ -80,6 +80,9 @@ CALLS = {
         lambda x, y: signals.probe_separation(x, y, 0.05, 3.6, 1.2), X, Y,
     ),
     "signals.remove_gravity": (signals.remove_gravity, VECTORS, VECTORS),
+    "signals.repeated_waves": (
+        lambda x, y: signals.repeated_waves({"one": x, "other": y}, 0.05), X, Y,
+    ),
     "signals.resample": (lambda x, t, u: signals.resample(x, t, u), X, T, T[10:-10] + 0.01),
     "signals.rotation_matrix": (signals.rotation_matrix, VECTORS),
     "signals.significant_height": (signals.significant_height, X),

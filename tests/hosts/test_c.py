@@ -154,9 +154,9 @@ def test_an_alignment_that_was_left_out_leaves_nothing_to_be_carried(tmp_path, m
 
 class TestWhatCannotBeExported:
     def test_an_ensemble(self, tmp_path, make_run, channels):
-        lengths = dict.fromkeys(("state_delay", "input_delay"), Fixed(1.0))
+        lengths = dict.fromkeys(("state_delays", "input_delays"), Fixed(1.0))
         spec = BayesianHankelDMDc(
-            encounter_period=0.2, train_length=None, ridge=Fixed(1.0), n_members=2, **lengths
+            encounter_period=0.2, window=None, ridge=Fixed(1.0), n_members=2, **lengths
         )
         ensemble = spec.fit(make_run(), **channels)
         with pytest.raises(RequestError, match="Export one of them: --member 0"):

@@ -121,9 +121,9 @@ def test_predicted_waves_are_better_than_none(runs, test_run):
 def test_ensembles_windows_and_arrays_predict_alike(runs, test_run):
     spec = seakeep.BayesianHankelDMDc(
         encounter_period=1.6,
-        train_length=None,
-        state_delay=seakeep.Uniform(0.2, 0.4),
-        input_delay=seakeep.Uniform(0.6, 1.0),
+        window=None,
+        state_delays=seakeep.Uniform("0.2 T", "0.4 T"),
+        input_delays=seakeep.Uniform("0.6 T", "1.0 T"),
         ridge=seakeep.Uniform(1, 2),
         n_members=3,
         delay_rows="exact",

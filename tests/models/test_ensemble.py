@@ -20,6 +20,7 @@ from seakeep import (
 )
 from seakeep.models import engine, summaries
 from seakeep.models.draws import child
+from seakeep.toml import Length
 
 PERIOD, DT = 1.6, 0.1  # 16 samples per period
 STATES, INPUTS = ["heave", "pitch"], ["eta"]
@@ -55,9 +56,9 @@ def run():
 def small(**changes):
     settings = {
         "encounter_period": PERIOD,
-        "train_length": Uniform(8, 14),
-        "state_delay": Uniform(0.2, 0.6),
-        "input_delay": Uniform(0.5, 1.5),
+        "window": Uniform("8 T", "14 T"),
+        "state_delays": Uniform("0.2 T", "0.6 T"),
+        "input_delays": Uniform("0.5 T", "1.5 T"),
         "ridge": Uniform(0.5, 5),
         "n_members": 6,
         "seed": 3,
@@ -87,10 +88,10 @@ def test_members_equal_the_deterministic_model(run, delay_rows, history, ridge_s
     for number in range(ensemble.n_members):
         draw = ensemble.draws.isel(member=number)
         model = HankelDMDc(
-            state_delays=int(draw.state_delay_samples),
-            input_delays=int(draw.input_delay_samples),
+            state_delays=int(draw.state_delays_samples),
+            input_delays=int(draw.input_delays_samples),
             ridge=float(draw.ridge),
-            window=int(draw.train_length_samples),
+            window=int(draw.window_samples),
             **shared,
         ).fit(run, STATES, INPUTS, stop=60.0)
         alone = model.forecast(run, start=65.0, steps=120)
@@ -109,10 +110,10 @@ def test_several_runs_are_pooled_as_in_the_deterministic_model(run):
     ensemble = small().fit(both, STATES, INPUTS, stop={"one": 60.0, "two": 70.0})
     draw = ensemble.draws.isel(member=2)
     model = HankelDMDc(
-        state_delays=int(draw.state_delay_samples),
-        input_delays=int(draw.input_delay_samples),
+        state_delays=int(draw.state_delays_samples),
+        input_delays=int(draw.input_delays_samples),
         ridge=float(draw.ridge),
-        window=int(draw.train_length_samples),
+        window=int(draw.window_samples),
     ).fit(both, STATES, INPUTS, stop={"one": 60.0, "two": 70.0})
     np.testing.assert_allclose(ensemble.member(2).A, model.A, atol=1e-10)
     assert ensemble.member(2).training.runs == ("one", "two")
@@ -120,11 +121,11 @@ def test_several_runs_are_pooled_as_in_the_deterministic_model(run):
 
 def test_draws_are_rounded_to_the_nearest_sample(run):
     draws = fitted(run).draws
-    for name in ("train_length", "state_delay", "input_delay"):
+    for name in ("window", "state_delays", "input_delays"):
         expected = np.floor(draws[name] * PERIOD / DT + 0.5)
         np.testing.assert_array_equal(draws[f"{name}_samples"], expected)
-    assert draws.train_length.min() >= 8
-    assert draws.train_length.max() <= 14
+    assert draws.window.min() >= 8
+    assert draws.window.max() <= 14
     assert draws.sizes == {"member": 6}
 
 
@@ -146,9 +147,9 @@ def test_sobol_points_fill_the_prior_evenly(run):
 
 def test_infeasible_draws_are_drawn_again_and_counted(run):
     # 60 s are 601 samples: windows of up to 40 periods ask for up to 640 and their history.
-    draws = fitted(run, train_length=Uniform(30, 40), n_members=20).draws
-    reach = np.maximum(draws.state_delay_samples, draws.input_delay_samples)
-    assert np.all(draws.train_length_samples + reach <= 601)
+    draws = fitted(run, window=Uniform("30 T", "40 T"), n_members=20).draws
+    reach = np.maximum(draws.state_delays_samples, draws.input_delays_samples)
+    assert np.all(draws.window_samples + reach <= 601)
     assert draws.attrs["redrawn"] == int(draws.redrawn.sum()) > 0
 
 
@@ -158,7 +159,7 @@ def test_priors_that_never_fit_are_refused(run):
         r"draw asked for \d+ \(window 800, .*\). Give longer runs or a later stop, or narrow"
     )
     with pytest.raises(DataError, match=text):
-        fitted(run, train_length=Fixed(50))
+        fitted(run, window=Fixed("50 T"))
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of scipy, about its parameters
@@ -166,12 +167,12 @@ def test_priors_that_never_fit_are_refused(run):
     ("changes", "text"),
     [
         ({"ridge": Uniform(-2, -1)}, r"gave ridge = -1\.\d+, which is negative\. Move the prior"),
-        ({"state_delay": Fixed(-1)}, r"gave state_delays = -16, which is negative"),
+        ({"state_delays": Fixed("-1 T")}, r"gave state_delays = -16, which is negative"),
         ({"ridge": stats.uniform(np.nan, 1)}, r"gave ridge = nan\. Check the parameters of that"),
-        ({"input_delay": stats.uniform(0, np.inf)}, r"gave input_delay = inf\. Check the"),
-        ({"train_length": Fixed(0.05)}, r"a window of 1 samples, and 2 are needed\. Raise train"),
+        ({"input_delays": stats.uniform(0, np.inf)}, r"gave input_delays = inf\. Check the"),
+        ({"window": Fixed("0.05 T")}, r"a window of 1 samples, and 2 are needed\. Raise window"),
         (
-            {"train_length": Fixed(1), "input_delay": Fixed(2), "history": "inside"},
+            {"window": Fixed("1 T"), "input_delays": Fixed("2 T"), "history": "inside"},
             r"window of 16 samples with delays of \d and 32 inside it, and 34 are needed",
         ),
     ],
@@ -188,9 +189,9 @@ def test_an_infinite_quantile_is_drawn_again(run):
 
         dist = stats.uniform  # the name that a file gives it
 
-    draws = fitted(run, state_delay=Rare(), n_members=20).draws
+    draws = fitted(run, state_delays=Rare(), n_members=20).draws
     assert draws.attrs["redrawn"] > 0
-    assert np.all(draws.state_delay <= 0.5)
+    assert np.all(draws.state_delays <= 0.5)
 
 
 def test_the_seed_may_be_a_sequence_or_a_generator(run):
@@ -267,9 +268,9 @@ def test_windows_side_by_side_equal_single_forecasts(run):
 
 def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):
     fixed = {
-        "train_length": Fixed(10),
-        "state_delay": Fixed(0.5),
-        "input_delay": Fixed(1),
+        "window": Fixed("10 T"),
+        "state_delays": Fixed("0.5 T"),
+        "input_delays": Fixed("1 T"),
         "ridge": Fixed(1),
     }
     ensemble = fitted(run, train_on="windows", **fixed)
@@ -292,10 +293,10 @@ def test_members_over_runs_learn_from_one_run_each(run):
         draw = ensemble.draws.isel(member=number)
         chosen = list(runs.values())[int(draw.training_run)]
         model = HankelDMDc(
-            state_delays=int(draw.state_delay_samples),
-            input_delays=int(draw.input_delay_samples),
+            state_delays=int(draw.state_delays_samples),
+            input_delays=int(draw.input_delays_samples),
             ridge=float(draw.ridge),
-            window=int(draw.train_length_samples),
+            window=int(draw.window_samples),
         ).fit(chosen, STATES, INPUTS)
         np.testing.assert_allclose(ensemble.member(number).A, model.A, atol=1e-10)
 
@@ -325,17 +326,6 @@ def test_numbers_of_numpy_are_kept_in_a_file(run, tmp_path, changes):
     back = seakeep.load_model(ensemble.save(tmp_path / "ensemble.nc"))
     assert back.settings == ensemble.settings
     assert back.alignment == ensemble.alignment
-
-
-def test_a_damaged_file_is_refused(run, tmp_path):
-    ensemble = fitted(run)
-    damaged = ensemble.to_dataset().drop_vars("delayed_0")
-    path = seakeep.models.store.write(damaged, tmp_path / "e.nc", "bayesian_hankel_dmdc")
-    with pytest.raises(
-        DataError,
-        match=r"e.nc does not hold what seakeep writes: .*delayed_0.* Fit the model again",
-    ):
-        seakeep.load_model(path)
 
 
 def test_diverged_members_are_counted_and_left_out(run):
@@ -373,7 +363,7 @@ def test_members_that_diverge_say_when():
         },
         coords={"time": time},
     )
-    spec = small(train_length=Fixed(10), ridge=Fixed(1e-3))
+    spec = small(window=Fixed("10 T"), ridge=Fixed(1e-3))
     ensemble = spec.fit(run, STATES, INPUTS, stop=20.0)
     forecast = ensemble.forecast(run, start=20.0, steps=99)
     summary = ensemble.forecast_summary(run, start=20.0, steps=99)
@@ -390,7 +380,7 @@ def test_members_that_diverge_say_when():
 
 
 def test_the_summary_says_what_the_members_are(run):
-    ensemble = fitted(run, train_length=Uniform(30, 40), n_members=20, ridge=STABLE)
+    ensemble = fitted(run, window=Uniform("30 T", "40 T"), n_members=20, ridge=STABLE)
     assert repr(ensemble) == (
         "HankelEnsemble(n_members=20, states=['heave', 'pitch'], inputs=['eta'], dt=0.1; "
         "print(ensemble.summary()) says more)"
@@ -401,9 +391,9 @@ def test_the_summary_says_what_the_members_are(run):
         "Ensemble of 20 Hankel DMD models with control: 2 states, 1 input, dt 0.1 s",
         "heave [m], pitch [m]",
         f"Monte Carlo, seed 3; {draws.attrs['redrawn']} infeasible and drawn again",
-        f"({int(draws.train_length_samples.min())} to {int(draws.train_length_samples.max())} sam",
-        f"state delay   {float(draws.state_delay.min()):.4g} to",
-        f"({int(draws.input_delay_samples.min())} to {int(draws.input_delay_samples.max())} sam",
+        f"({int(draws.window_samples.min())} to {int(draws.window_samples.max())} sam",
+        f"state delay   {float(draws.state_delays.min()):.4g} to",
+        f"({int(draws.input_delays_samples.min())} to {int(draws.input_delays_samples.max())} sam",
         f"ridge         {float(draws.ridge.min()):.4g} to {float(draws.ridge.max()):.4g}; delay",
         f"history       {ensemble.history_samples} samples up to",
         "to 60 s",
@@ -415,9 +405,9 @@ def test_the_summary_says_what_the_members_are(run):
     )
     assert "Sobol, seed 3" in windows.summary()
     assert "2 runs, a window of one of them per member, drawn" in windows.summary()
-    whole = small(train_length=None, ridge=STABLE).fit(run, STATES, INPUTS)
+    whole = small(window=None, ridge=STABLE).fit(run, STATES, INPUTS)
     assert "window        all of a run" in whole.summary()
-    single = small(state_delay=Fixed(1.0), ridge=STABLE).fit(run, STATES, INPUTS)
+    single = small(state_delays=Fixed("1.0 T"), ridge=STABLE).fit(run, STATES, INPUTS)
     assert "state delay   1 encounter period (" in single.summary()
 
 
@@ -481,36 +471,36 @@ def test_forecasts_carry_the_spread_that_tells_a_slack_channel(run):
 
 def test_draws_are_quantiles_of_any_distribution_of_scipy(run):
     prior = stats.truncnorm(-2, 2, loc=11, scale=1)
-    draws = fitted(run, train_length=prior, ridge=stats.gamma(2.0)).draws
+    draws = fitted(run, window=prior, ridge=stats.gamma(2.0)).draws
     for member in range(6):
         quantiles = child(np.random.SeedSequence(3), member).random(4)
-        assert float(draws.train_length[member]) == prior.ppf(quantiles[0])
+        assert float(draws.window[member]) == prior.ppf(quantiles[0])
         assert float(draws.ridge[member]) == stats.gamma(2.0).ppf(quantiles[3])
 
 
 def test_both_ensembles_at_once_differ_in_settings_and_windows(run):
     draws = fitted(run, train_on="windows").draws
-    for name in ("ridge", "last_sample", "train_length_samples"):
+    for name in ("ridge", "last_sample", "window_samples"):
         assert len(np.unique(draws[name])) > 1
 
 
 def test_the_presets():
     paper = BayesianHankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32)
-    assert (paper.train_length, paper.ridge) == (Uniform(10, 30), Uniform(50, 150))
+    assert (paper.window, paper.ridge) == (Uniform("10 T", "30 T"), Uniform(50, 150))
     assert (paper.delay_rows, paper.ridge_scale, paper.n_members) == ("ridge", "absolute", 100)
     ours = BayesianHankelDMDc.recommended(encounter_period=1.64, n_members=5)
-    assert (ours.train_length, ours.delay_rows) == (None, "exact")
-    assert (ours.ridge, ours.lead, ours.alignment.passes) == ("rollout", 0.75, 3)
-    assert [ours.input_delay.ppf(q) for q in (0, 0.5, 1)] == [2, 3, 4]
+    assert (ours.window, ours.delay_rows) == (None, "exact")
+    assert (ours.ridge, ours.lead, ours.alignment.passes) == ("rollout", Length(0.75), 3)
+    assert [ours.input_delays.ppf(q) for q in (0, 0.5, 1)] == [2, 3, 4]
 
 
 def test_all_of_the_runs_train_where_no_length_is_drawn(run):
-    ensemble = fitted(run, train_length=None)
-    assert set(ensemble.draws.train_length_samples.values) == {-1}
+    ensemble = fitted(run, window=None)
+    assert set(ensemble.draws.window_samples.values) == {-1}
     draw = ensemble.draws.isel(member=0)
     model = HankelDMDc(
-        state_delays=int(draw.state_delay_samples),
-        input_delays=int(draw.input_delay_samples),
+        state_delays=int(draw.state_delays_samples),
+        input_delays=int(draw.input_delays_samples),
         ridge=float(draw.ridge),
     ).fit(run, STATES, INPUTS, stop=60.0)
     np.testing.assert_allclose(ensemble.member(0).A, model.A, atol=1e-10)
@@ -526,7 +516,6 @@ def test_an_ensemble_without_inputs(run):
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"ridge": 100}, "ridge must be a prior; received 100"),
         ({"n_members": 0}, "n_members must be an integer of at least 1; received 0"),
         ({"sampling": "grid"}, "sampling must be 'monte_carlo' or 'sobol'; received 'grid'"),
         (

@@ -46,9 +46,9 @@ def ensemble_and_run():
     )
     spec = seakeep.BayesianHankelDMDc(
         encounter_period=1.6,
-        train_length=seakeep.Uniform(6, 12),
-        state_delay=seakeep.Uniform(0.2, 0.8),
-        input_delay=seakeep.Uniform(0.3, 1.2),
+        window=seakeep.Uniform("6 T", "12 T"),
+        state_delays=seakeep.Uniform("0.2 T", "0.8 T"),
+        input_delays=seakeep.Uniform("0.3 T", "1.2 T"),
         ridge=seakeep.LogUniform(0.1, 10),
         n_members=9,
         delay_rows="ridge",
@@ -141,6 +141,33 @@ def test_an_error_in_the_block_ends_its_processes():
     (pid,) = found
     assert time.monotonic() - begin < 40  # fifty seconds of work for each were left
     assert _ends(pid)
+
+
+@posix
+def test_an_interrupt_waits_for_no_result_that_was_on_its_way(tmp_path):
+    script = tmp_path / "interrupted.py"
+    script.write_text(  # workers are nearly always in the middle of a result of 64 MB
+        "from collections import deque\n"
+        "import side_work\n"
+        "from seakeep.models.executor import as_finished, processes\n"
+        "if __name__ == '__main__':\n"
+        "    for count in range(3):\n"
+        "        try:\n"
+        "            with processes(2) as pool:\n"
+        "                work = as_finished(side_work.zeros, 8_000_000, deque(range(99)), pool)\n"
+        "                for done, _ in enumerate(work):\n"
+        "                    if done == count:\n"
+        "                        raise KeyboardInterrupt\n"
+        "        except KeyboardInterrupt:\n"
+        "            print(count)\n"
+    )
+    places = [*sys.path, str(Path(side_work.__file__).parent)]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(places)}
+    command = [sys.executable, str(script)]
+    found = subprocess.run(
+        command, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert (found.stdout, found.stderr, found.returncode) == ("0\n1\n2\n", "", 0)
 
 
 @posix

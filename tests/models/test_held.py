@@ -33,9 +33,9 @@ def sea(seed=0, samples=900):
 def fitted(delay_rows="exact", ridge=(2, 20), **settings):
     spec = seakeep.BayesianHankelDMDc(
         encounter_period=1.6,
-        train_length=seakeep.Uniform(10, 16),
-        state_delay=seakeep.Uniform(0.2, 0.6),
-        input_delay=seakeep.Uniform(0.5, 1.5),
+        window=seakeep.Uniform("10 T", "16 T"),
+        state_delays=seakeep.Uniform("0.2 T", "0.6 T"),
+        input_delays=seakeep.Uniform("0.5 T", "1.5 T"),
         ridge=seakeep.Uniform(*ridge),
         n_members=7,
         delay_rows=delay_rows,

@@ -55,9 +55,9 @@ def test_a_summary_does_not_hold_its_members(run, monkeypatch):
     def summary(members):
         spec = seakeep.BayesianHankelDMDc(
             encounter_period=1.6,
-            train_length=seakeep.Uniform(8, 12),
-            state_delay=seakeep.Uniform(0.2, 0.4),
-            input_delay=seakeep.Uniform(0.2, 0.4),
+            window=seakeep.Uniform("8 T", "12 T"),
+            state_delays=seakeep.Uniform("0.2 T", "0.4 T"),
+            input_delays=seakeep.Uniform("0.2 T", "0.4 T"),
             ridge=seakeep.Uniform(1, 2),
             n_members=members,
         )

@@ -6,12 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-import seakeep
 from seakeep import Fixed, LogUniform, RequestError, Uniform
-from seakeep.models.priors import check_prior, describe
+from seakeep.models.priors import Distribution, prior_json, prior_of
 
 PRIORS = [
     Uniform(10, 30),
+    Uniform("10 T", "30 T"),
+    Distribution("truncnorm", {"a": -2, "b": 2, "loc": 1, "scale": 0.1}, "T"),
     LogUniform(0.1, 10),
     Fixed(2.5),
     stats.norm(20, 2),
@@ -28,19 +29,13 @@ def test_quantiles_are_those_of_scipy(q):
 
 
 @pytest.mark.parametrize("prior", PRIORS, ids=lambda prior: type(prior).__name__)
-def test_a_description_says_all_of_a_prior(prior):
-    told = json.loads(json.dumps(describe(prior)))
-    name = told.pop("prior")
-    if name.startswith("scipy.stats."):
-        back = getattr(stats, name.removeprefix("scipy.stats."))(*told["args"], **told["kwds"])
-    else:
-        back = getattr(seakeep, name)(**told)
+def test_a_table_states_all_of_a_prior(prior):
+    table = json.loads(json.dumps(prior_json(prior)))
+    back = prior_of("window", table)
+    assert prior_json(back) == table
+    assert getattr(back, "unit", "") == getattr(prior, "unit", "")
     for q in (0.025, 0.5, 0.9):
         assert back.ppf(q) == prior.ppf(q)
-
-
-def test_no_prior_is_no_prior():
-    assert describe(None) is None
 
 
 @pytest.mark.parametrize(
@@ -48,11 +43,10 @@ def test_no_prior_is_no_prior():
     [
         (lambda: Uniform(3, 1), "lower bound below the upper one; received 3 and 1. Swap them"),
         (lambda: Uniform(1, 1), "use seakeep.Fixed for a single value"),
-        (lambda: Uniform("a", 1), "Uniform needs two finite numbers; received 'a' and 1"),
+        (lambda: Uniform("10 T", 1), "Uniform needs one unit; received '10 T' and 1. Write 'T'"),
         (lambda: LogUniform(0, 1), "positive lower bound; received 0. Logarithms start above zero"),
-        (lambda: LogUniform(1, np.inf), "two finite numbers; received 1 and inf"),
-        (lambda: Fixed(np.nan), "Fixed needs a finite number; received nan"),
-        (lambda: check_prior("ridge", 100), "ridge must be a prior; received 100. Pass"),
+        (lambda: LogUniform(1, np.inf), "finite numbers; received 1 and inf"),
+        (lambda: Fixed(np.nan), "Fixed needs finite numbers; received nan"),
     ],
 )
 def test_messages(make, text):
@@ -66,4 +60,4 @@ def test_a_prior_of_another_kind_is_not_written():
             return q
 
     with pytest.raises(RequestError, match=r"cannot be written to a file. Use one of seakeep's"):
-        describe(Own())
+        prior_json(Own())

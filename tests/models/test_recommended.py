@@ -100,7 +100,7 @@ def test_members_learn_from_windows_of_long_runs_and_else_from_all_of_them():
         ensemble = spec.fit(given, STATES, INPUTS)
         assert ensemble.origin["train_on"] == "all"
         assert {(draw.run, draw.window) for draw in ensemble.members} == {(None, None)}
-    again = dataclasses.replace(spec, train_on="windows", train_length=Uniform(60, 120))
+    again = dataclasses.replace(spec, train_on="windows", window=Uniform("60 T", "120 T"))
     assert again.fit(long, STATES, INPUTS).origin == taught.origin
 
 

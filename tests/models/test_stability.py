@@ -205,9 +205,9 @@ class TestStable:
     def test_members_are_clipped_too(self, make_dataset):
         spec = BayesianHankelDMDc(
             encounter_period=1.0,
-            train_length=None,
-            state_delay=Fixed(0.1),
-            input_delay=Fixed(0.1),
+            window=None,
+            state_delays=Fixed("0.1 T"),
+            input_delays=Fixed("0.1 T"),
             ridge=Uniform(1, 2),
             n_members=2,
             stable=0.95,

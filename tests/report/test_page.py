@@ -58,7 +58,7 @@ n_members = 4
 ridge = { log_uniform = [0.05, 0.5] }
 observables = []
 readouts = {}
-train_length = { uniform = [10, 20] }
+window = { uniform = ["10 T", "20 T"] }
 [tests.unseen]
 runs = ["unseen"]
 windows = 3
@@ -165,7 +165,7 @@ def test_models_that_learn_from_unequal_lengths_are_told(result):
     assert shares
     assert "as deterministic reads them, they share" in words
     for window in (300, None):
-        alike = with_models(result, deterministic__window=window, bayesian__train_length=window)
+        alike = with_models(result, deterministic__window=window, bayesian__window=window)
         assert unequal_training(alike) == ""
 
 
@@ -275,7 +275,7 @@ def test_the_data_quality_of_every_run_and_channel_is_a_link_away(page, result):
 def test_each_setting_of_a_model_says_where_it_comes_from(page):
     with (page.parent / "tables" / "models.csv").open(encoding="utf-8", newline="") as file:
         rows = {(model, key): told for model, key, *told in csv.reader(file)}
-    assert rows["Bayesian", "train length"] == ["uniform, 10 to 20 T̂", "stated"]
+    assert rows["Bayesian", "window"] == ["uniform, 10 to 20 T̂", "stated"]
     assert rows["Bayesian", "n members"] == ["4", "stated"]
     assert rows["deterministic", "delay rows"] == ["exact", "preset"]
     assert rows["deterministic", "window"] == ["all samples", "default"]

@@ -78,14 +78,6 @@ def test_as_python_would_reckon(x, y, z):
         ("9**9**9 * a", 1, "an exponent is a number from -16 to 16"),
         ("a ** b", 1, "an exponent is a number from -16 to 16"),
         ("a ** -17", 1, "an exponent is a number from -16 to 16"),
-        ("a * 1e200", 5, "a number is larger than 1e+150"),
-        ("a * 1" + "0" * 400, 5, "a number is larger than 1e+150"),
-        ("-" * 998 + "a", 102, "more than 100 operations are nested or in a row"),
-        ("a" + "+a" * 450, 1, "more than 100 operations are nested or in a row"),
-        ("sin(" * 150 + "a" + ")" * 150, 405, "more than 100 operations are nested or in a row"),
-        ("a + `\x07`", 5, "a name has 1 to 200 printable characters"),
-        ("a + ` `", 5, "a name has 1 to 200 printable characters"),
-        ("a + `" + 201 * "b" + "`", 5, "a name has 1 to 200 printable characters"),
         ("sqrt(a, axis=0)", 1, "'sqrt(a, axis=0)' is none of the allowed forms"),
         ("`wave 1`.x + a", 1, "'`wave 1`.x' is none of the allowed forms"),
         ("a b", 3, "this is not an arithmetic expression"),
@@ -112,10 +104,6 @@ def test_nothing_to_reckon_with():
         parse("1 + 2")
     with pytest.raises(RequestError, match="the expression ' ' is empty"):
         parse(" ")
-    with pytest.raises(RequestError, match="between 1 and 1000 characters; received 2001"):
-        parse("a" + "+a" * 1000)
-    with pytest.raises(RequestError, match="is not allowed"):
-        parse("(" * 400 + "a" + ")" * 400)
 
 
 def test_unknown_channel():

@@ -26,7 +26,7 @@ n_members = 4
 ridge = { log_uniform = [0.05, 0.5] }
 observables = []
 readouts = {}
-train_length = { uniform = [10, 20] }
+window = { uniform = ["10 T", "20 T"] }
 
 [tests.unseen]
 runs = ["unseen"]

@@ -124,7 +124,7 @@ def test_training_data_without_a_window_that_is_not_read_give_no_margin(study_fo
     study = edited(
         study_folder,
         ("windows = 2\n\n[models", 'scheme = "pooled"\nruns = ["first"]\n\n[models'),
-        ("train_length = { uniform = [10, 20] }\n", ""),
+        ('window = { uniform = ["10 T", "20 T"] }\n', ""),
     )
     found = run_study(study, study_folder / "out")
     kept = found.groups["calibration/bayesian"]

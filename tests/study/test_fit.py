@@ -12,10 +12,10 @@ from scipy import stats
 import seakeep
 from seakeep import BayesianHankelDMDc, Fixed, LogUniform, ProbeAlignment, Uniform
 from seakeep.campaign import ModelSettings
-from seakeep.campaign.settings import AlignmentSettings, SelectSettings
 from seakeep.campaign.store import write_prepared
 from seakeep.cli import main
 from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.models import KINDS
 from seakeep.study import (
     build_spec,
     compare,
@@ -164,9 +164,9 @@ def table(**keys):
 
 def test_one_function_makes_the_spec_of_an_ensemble_too():
     stated = table(
-        train_length={"fixed": 12},
-        state_delay=0.5,
-        input_delay={"uniform": [1, 2]},
+        window={"fixed": "12 T"},
+        state_delays="0.5 T",
+        input_delays={"uniform": ["1 T", "2 T"]},
         ridge={"log_uniform": [0.1, 10]},
         n_members=9,
         seed=3,
@@ -178,9 +178,9 @@ def test_one_function_makes_the_spec_of_an_ensemble_too():
     assert build_spec(stated, encounter_period=2.0, dt=0.1) == BayesianHankelDMDc(
         encounter_period=2.0,
         dt=0.1,
-        train_length=Fixed(12),
-        state_delay=Fixed(0.5),
-        input_delay=Uniform(1, 2),
+        window=Fixed("12 T"),
+        state_delays=10,
+        input_delays=Uniform("1 T", "2 T"),
         ridge=LogUniform(0.1, 10),
         n_members=9,
         seed=3,
@@ -195,75 +195,86 @@ def test_a_preset_of_an_ensemble_is_overridden_key_by_key():
     stated = table(preset="paper", n_members=5, ridge=80.0, train_on="runs")
     expected = dataclasses.replace(
         BayesianHankelDMDc.paper(encounter_period=2.0, dt=0.1, n_members=5),
-        ridge=Fixed(80.0),
+        ridge=80.0,
         train_on="runs",
     )
     assert build_spec(stated, encounter_period=2.0, dt=0.1) == expected
 
 
 def test_distributions_of_scipy_are_named_in_the_table():
-    stated = {"distribution": "truncnorm", "parameters": {"a": -2, "b": 2, "loc": 1, "scale": 0.1}}
-    spec = build_spec(table(preset="paper", state_delay=stated), encounter_period=2.0, dt=0.1)
+    stated = {
+        "distribution": "truncnorm",
+        "parameters": {"a": -2, "b": 2, "loc": 1, "scale": 0.1},
+        "unit": "T",
+    }
+    spec = build_spec(table(preset="paper", state_delays=stated), encounter_period=2.0, dt=0.1)
     expected = stats.truncnorm(-2, 2, loc=1, scale=0.1).ppf([0.0, 0.3, 1.0])
-    np.testing.assert_array_equal(spec.state_delay.ppf(np.array([0.0, 0.3, 1.0])), expected)
+    np.testing.assert_array_equal([spec.state_delays.ppf(q) for q in (0.0, 0.3, 1.0)], expected)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (
-            "{ uniform = [30, 10] }",
-            r"state_delay.uniform: the bounds are \[low, high\], two",
-        ),
-        ("{ uniform = [1, inf] }", r"two finite numbers with low below high"),
-        ("{ log_uniform = [0, 1] }", r"'log_uniform' needs positive bounds"),
-        ("{ uniform = [1, 2], fixed = 1 }", r"state_delay: a prior is one of { uniform"),
-        ("{ fixed = 1, parameters = { loc = 1 } }", r"'parameters' go with 'distribution'; remove"),
-        (
-            '{ distribution = "nrom" }',
-            r"scipy.stats has no distribution 'nrom'. Did you mean 'norm'\?",
-        ),
+        ("{ uniform = [30, 10] }", "state_delays: Uniform needs its lower bound below the upper"),
+        ("{ uniform = [1, inf] }", "Uniform needs finite numbers; received 1 and inf"),
+        ('{ uniform = ["1 T", 3] }', "Uniform needs one unit"),
+        ("{ log_uniform = [0, 1] }", "LogUniform needs a positive lower bound"),
+        ("{ uniform = [1, 2], fixed = 1 }", "state_delays: a prior is one of { uniform"),
+        ('{ distribution = "nrom" }', "scipy.stats has no distribution 'nrom'.*mean 'norm'"),
         (
             '{ distribution = "gamma", parameters = { scale = 2.0 } }',
-            r"'parameters' of 'gamma' are a, loc, scale, of which loc and scale may be left out; ",
+            "'parameters' of 'gamma' are a, loc, scale, of which loc and scale may be left out; ",
         ),
         (
             '{ distribution = "norm", parameters = { scale = -1.0 } }',
-            r"'norm' with these 'parameters' has no median; correct them",
+            "'norm' with these 'parameters' has no median; correct them",
         ),
-        ("-1.0", r"state_delay: received -1.0, which should be greater than or equal to 0"),
+        ("-1", "state_delays must be an integer of at least 0; received -1"),
+        ('"1 Q"', "state_delays: a text in place of a number counts in encounter periods"),
+        ("1\nriddge = 2", "has no key 'riddge'. Did you mean 'ridge'"),
+        (
+            "1\nalignment = { mode = 'dispersive' }",
+            "alignment: mode must be 'effective'",
+        ),
+        ("1\nalignment = { mode = 'dispersion', celerity = 2.0 }", "celerity.*effective"),
+        ("1\nalignment = { sruge = 'none' }", "alignment: unknown key 'sruge'.*mean 'surge'"),
+        ("1\nselect = { fold = 'run' }", "select: unknown key 'fold'.*mean 'folds'"),
     ],
 )
-def test_wrong_priors_in_the_file_are_named(halves, text, message):
-    with pytest.raises(RequestError, match=message):
-        campaign(halves, f'{ENSEMBLE}\npreset = "paper"\nstate_delay = {text}')
+def test_wrong_keys_of_a_model_are_named_before_its_runs_are_prepared(halves, text, message):
+    wrong = campaign(halves, f'{ENSEMBLE}\npreset = "paper"\nstate_delays = {text}')
+    with pytest.raises(RequestError, match=rf"line \d+, model: .*{message}"):
+        fit_campaign(wrong)
 
 
 def test_keys_of_an_ensemble_in_a_single_model_are_named(halves):
-    with pytest.raises(RequestError, match="'train_on' belongs to kind = 'bayesian_hankel_dmdc'"):
-        campaign(halves, EXACT + '\ntrain_on = "runs"')
+    with pytest.raises(RequestError, match="kind = 'hankel_dmdc' has no key 'train_on'"):
+        fit_campaign(campaign(halves, EXACT + '\ntrain_on = "runs"'))
 
 
 def test_an_ensemble_without_period_or_priors_says_where_to_state_them():
     with pytest.raises(RequestError, match=r"an ensemble counts in .* State encounter_period"):
-        build_spec(table(state_delay=1, input_delay=1, ridge=1), encounter_period=None, dt=0.1)
+        build_spec(table(state_delays=1, input_delays=1, ridge=1), encounter_period=None, dt=0.1)
     with pytest.raises(
-        RequestError, match=r"no input_delay\. Add input_delay, ridge as priors, such as { uniform"
+        RequestError,
+        match=r"no input_delays\. Add input_delays, ridge as priors, such as { uniform",
     ):
-        build_spec(table(state_delay=1), encounter_period=2.0, dt=0.1)
+        build_spec(table(state_delays=1), encounter_period=2.0, dt=0.1)
 
 
-WINDOWED = ENSEMBLE + "state_delay = 0.2\ninput_delay = { uniform = [1, 3] }\nridge = 1e-9"
+WINDOWED = (
+    ENSEMBLE + "state_delays = '0.2 T'\ninput_delays = { uniform = ['1 T', '3 T'] }\nridge = 1e-9"
+)
 LATE = '[runs.all]\nfile = "run.csv"\ntrain = [100.0, 150.0]\ntest = [150.0, 200.0]\n'
 
 
 @pytest.mark.parametrize("train_on", ["all", "runs", "windows"])
 def test_an_ensemble_learns_inside_the_training_span(halves, train_on):
-    model = f'{WINDOWED}\ntrain_length = {{ uniform = [4, 8] }}\ntrain_on = "{train_on}"'
+    model = f"{WINDOWED}\nwindow = {{ uniform = ['4 T', '8 T'] }}\ntrain_on = '{train_on}'"
     ensemble = fit_campaign(campaign(halves, model, LATE))
     assert ensemble.n_members == 4
     first, stop = ensemble.training_spans["all"]
-    longest = 0.1 * (int(ensemble.draws.train_length_samples.max()) - 1)
+    longest = 0.1 * (int(ensemble.draws.window_samples.max()) - 1)
     assert first >= 100.0
     assert stop <= 150.0 + 1e-9
     if train_on == "windows":
@@ -274,26 +285,25 @@ def test_an_ensemble_learns_inside_the_training_span(halves, train_on):
 
 def test_the_history_of_an_ensemble_may_come_from_before_the_span(halves):
     # The span holds 501 samples: beside a window of 495 there is no room for the delays.
-    period = campaign(halves, EXACT, LATE).encounter_period()
     snapshots = 495
-    model = f"{WINDOWED}\ntrain_length = {snapshots * 0.1 / period}"
+    model = f"{WINDOWED}\nwindow = {snapshots}"
     ensemble = fit_campaign(campaign(halves, model, LATE))
-    assert set(ensemble.draws.train_length_samples.values) == {snapshots}
+    assert set(ensemble.draws.window_samples.values) == {snapshots}
     assert ensemble.draws.attrs["redrawn"] == 0
     for number in range(4):
         assert ensemble.member(number).training.columns == (snapshots - 1,)
 
 
 def test_the_same_table_gives_the_members_that_python_gives(halves):
-    model = f"{WINDOWED}\ntrain_length = {{ uniform = [10, 20] }}"
+    model = f"{WINDOWED}\nwindow = {{ uniform = ['10 T', '20 T'] }}"
     whole = campaign(halves, model)
     ensemble = fit_campaign(whole)
     spec = BayesianHankelDMDc(
         encounter_period=whole.encounter_period(),
-        train_length=Uniform(10, 20),
-        state_delay=Fixed(0.2),
-        input_delay=Uniform(1, 3),
-        ridge=Fixed(1e-9),
+        window=Uniform("10 T", "20 T"),
+        state_delays="0.2 T",
+        input_delays=Uniform("1 T", "3 T"),
+        ridge=1e-9,
         n_members=4,
         seed=7,
     )
@@ -304,7 +314,8 @@ def test_the_same_table_gives_the_members_that_python_gives(halves):
 
 
 def test_repeats_of_an_ensemble_are_warned_of(repeating):
-    whole = campaign(repeating, ENSEMBLE + "state_delay = 0.2\ninput_delay = 0.2\nridge = 1")
+    delays = "state_delays = '0.2 T'\ninput_delays = '0.2 T'\n"
+    whole = campaign(repeating, f"{ENSEMBLE}{delays}ridge = 1")
     with pytest.warns(seakeep.SeakeepWarning, match=REPEATS):
         fit_campaign(whole)
 
@@ -390,25 +401,6 @@ def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halve
     assert float(found["probe_offset"]) == 0.1
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            'alignment = { mode = "dispersive" }',
-            r"model.alignment.mode: received 'dispersive', .*'effective'",
-        ),
-        (
-            'alignment = { mode = "dispersion", celerity = 2.0 }',
-            "model.alignment: 'celerity' goes with mode = 'effective' alone; remove it",
-        ),
-        ("alignment = { sruge = 'none' }", "model.alignment.sruge: unknown key.*mean 'surge'"),
-    ],
-)
-def test_wrong_alignments_in_the_file_are_named(halves, text, message):
-    with pytest.raises(RequestError, match=message):
-        campaign(halves, EXACT + "\n" + text)
-
-
 def test_a_preset_fills_in_what_is_not_stated_key_by_key_and_says_so():
     stated = {"state_delays": 4, "input_delays": 20, "ridge": 0.15, "alignment": {"surge": "none"}}
     settings = ModelSettings(states=("heave",), inputs=("eta_fwd",), **stated)
@@ -443,7 +435,7 @@ def test_a_study_that_leaves_sea_states_out_chooses_so_too():
     found = resolve_model(settings, 2.0, 0.1, preset="recommended", folds="sea_state")
     assert (found.spec.select.folds, found.sources["select.folds"]) == ("sea_state", "study")
     assert found.spec.select.observables
-    stated = settings.model_copy(update={"select": SelectSettings(folds="run")})
+    stated = ModelSettings(states=("heave",), inputs=("eta_fwd",), select={"folds": "run"})
     found = resolve_model(stated, 2.0, 0.1, preset="recommended", folds="sea_state")
     assert (found.spec.select.folds, found.sources["select.folds"]) == ("run", "stated")
     numbers = ModelSettings(states=("heave",), inputs=("eta_fwd",), kind="mean")
@@ -456,7 +448,9 @@ def test_the_paper_s_alignment_is_taken_where_the_campaign_can_align():
     found = resolve_model(settings, 2.0, 0.1, aligned=True)
     assert found.spec.alignment == ProbeAlignment(mode="effective", surge="measured")
     assert found.sources["alignment.mode"] == "preset"
-    stated = settings.model_copy(update={"alignment": AlignmentSettings(surge="none")})
+    stated = ModelSettings(
+        states=("heave",), inputs=("eta_fwd",), preset="paper", alignment={"surge": "none"}
+    )
     assert resolve_model(stated, 2.0, 0.1, aligned=True).spec.alignment.surge == "none"
     baseline = ModelSettings(states=("heave",), inputs=("eta_fwd",), kind="fir")
     found = resolve_model(baseline, 2.0, 0.1, preset="paper", aligned=True)
@@ -472,11 +466,11 @@ def test_priors_and_seed_of_a_study_are_kept_as_json_values_with_their_source():
     assert found["n_members"] == 100
     settings = found["settings"]
     assert settings["ridge"] == {
-        "value": {"prior": "LogUniform", "low": 0.1, "high": 10.0},
+        "value": {"log_uniform": [0.1, 10.0]},
         "source": "stated",
     }
-    assert settings["train_length"] == {
-        "value": {"prior": "Uniform", "low": 10.0, "high": 30.0},
+    assert settings["window"] == {
+        "value": {"uniform": ["10 T", "30 T"]},
         "source": "preset",
     }
     assert settings["seed"] == {"value": 7, "source": "study"}
@@ -574,3 +568,19 @@ def test_a_lead_reads_waves_ahead_of_time(halves):
     # The step to instant k reads the waves of k + 7: seven instants before the end it is the last.
     run = asked.prepare()[whole.run]
     assert float(whole.forecast["time"][-1]) == pytest.approx(float(run["time"][-8]))
+
+
+def test_a_field_of_a_spec_is_a_key_of_files(monkeypatch, halves, tmp_path):
+    @dataclasses.dataclass(frozen=True)
+    class Damped(seakeep.HankelDMDc):
+        kind = "damped"
+        damping: float = 0.5
+
+    monkeypatch.setitem(KINDS, "damped", Damped)
+    text = f'kind = "damped"\ndamping = 0.7\n{EXACT}'
+    model = fit_campaign(campaign(halves, text))
+    assert model.settings.damping == 0.7
+    assert Damped.from_json(json.loads(json.dumps(model.settings.to_json()))) == model.settings
+    wrong = campaign(halves, text.replace("damping", "dampign"))
+    with pytest.raises(RequestError, match=r"no key 'dampign'.*mean 'damping'"):
+        fit_campaign(wrong)

@@ -105,7 +105,7 @@ def paper(found):
         and (ensemble.ridge_scale, ensemble.ridge) == ("absolute", Uniform(50, 150)),
         14: study is None or not study.calibrates,
         15: single.delay_rows == ensemble.delay_rows == "ridge",
-        23: single.window == 640 and ensemble.train_length == Uniform(10, 30),
+        23: single.window == 640 and ensemble.window == Uniform("10 T", "30 T"),
         24: (preparation.low_pass, preparation.anti_alias) == ((10.0, 10.75), False),
     }
     if study is not None:
@@ -146,7 +146,7 @@ def test_the_papers_column_is_taken_in_all_29_rows(tank, door):
     assert all(map(is_elevation, inputs))
     assert set(inputs) <= set(names)
     assert single.state_delays == 32  # rows 8 and 10: one period of 1.64 s, to the nearest
-    assert ensemble.state_delay == Uniform(0.5, 1.5)  # row 11
+    assert ensemble.state_delays == Uniform("0.5 T", "1.5 T")  # row 11
     assert found.campaign.settings.celerity_channels == ("eta_fwd", "eta_cog")  # row 4
     assert found.campaign.settings.rig.positions["eta_fwd"] == 48.42  # row 27
 
@@ -161,7 +161,7 @@ def test_the_recommended_column_is_another_wherever_it_says_so(tank, door):
     assert single.ridge_scale == ensemble.ridge_scale == "per_snapshot"  # row 12
     assert not isinstance(ensemble.ridge, Uniform)
     assert single.window is None  # row 23: all of the runs
-    assert ensemble.train_length is None
+    assert ensemble.window is None
     for each in found.specs:
         assert each.alignment is None or each.alignment.surge != "measured"  # row 6
     assert found.study is None or found.study.calibrates  # row 14

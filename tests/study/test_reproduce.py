@@ -1,17 +1,24 @@
 """The three acts of ``seakeep reproduce``: one tank, the same windows, and a page over them."""
 
+import os
+import signal
+import subprocess
+import sys
+import time
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from started import started
 from tutorial_study import put_tutorial
 
 from seakeep.errors import SeakeepWarning
-from seakeep.files import write_netcdf
 from seakeep.models.executor import make_executor
+from seakeep.report.acts import write_reproduction
 from seakeep.report.tables import MISSING
-from seakeep.study import read_result, read_study
+from seakeep.study import read_study
 from seakeep.study.plan import make_plan
 from seakeep.study.reproduce import (
     ACTS,
@@ -66,7 +73,7 @@ def record(name, seconds, rng):
 def play_small(settings, out, progress=None):
     """Stands in for the tank: six small runs, and the campaign file that the tank would write."""
     for each in ("raw", "truth"):
-        (out / each).mkdir(parents=True)
+        (out / each).mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(0)
     files = {}
     for name, run in settings.runs.items():
@@ -77,12 +84,6 @@ def play_small(settings, out, progress=None):
     (out / "campaign.toml").write_text(campaign_text(settings, files, "nc", True), "utf-8")
 
 
-def write_one(path, *parts):
-    """Writes the result of one act: each takes longer than its models."""
-    if path.parent.name == "paper":
-        write_netcdf(path, *parts)
-
-
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     """The acts of the paper with the smallest counts."""
@@ -90,8 +91,63 @@ def results(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
         warnings.simplefilter("ignore", SeakeepWarning)  # of windows that hold one drift cycle
         patch.setattr("seakeep.tank.play.play", play_small)
-        patch.setattr("seakeep.study.store.write_netcdf", write_one)
         return reproduce(folder, "paper", size=SMALL)
+
+
+STAGES = (
+    "campaign/played.txt",
+    "campaign/prepared/*.nc",
+    "paper/units/*.npz",
+    "paper/study.nc",
+    "raw/units/*.npz",
+    "paper/report.html",
+)
+"""What a killed run had written last."""
+GO = """
+import sys
+from unittest import mock
+
+import test_reproduce
+from seakeep.cli import main
+from seakeep.study.reproduce import Size
+
+if __name__ == "__main__":
+    with (
+        mock.patch("seakeep.tank.play.play", test_reproduce.play_small),
+        mock.patch.object(Size, "quick", lambda: test_reproduce.SMALL),
+    ):
+        sys.exit(main(["reproduce", "--quick", "--preset", "paper", *sys.argv[1:]]))
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system knows no SIGKILL")
+@pytest.mark.filterwarnings("ignore:.*unfinished file")
+def test_a_command_that_is_killed_at_any_stage_goes_on_and_ends_the_same(tmp_path, results):
+    pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+    (tmp_path / "go.py").write_text(GO, "utf-8")
+    places = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    out, environment = tmp_path / "out", os.environ | {"PYTHONPATH": places}
+
+    def started_with(workers):
+        command = [sys.executable, "go.py", "--out", str(out), "--workers", str(workers)]
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "env": environment}
+        return started(command, tmp_path, **quiet)
+
+    for count, stage in enumerate(STAGES):
+        with started_with(1 + count % 2) as process:
+            while not list(out.glob(stage)):
+                assert process.poll() is None, process.stderr.read()
+                time.sleep(0.002)
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+    (tmp_path / "alone").mkdir()
+    write_reproduction(tmp_path / "alone", results)
+    for workers in (2, 1):  # to the end, and again with all that it has written
+        with started_with(workers) as process:
+            told = process.communicate()[1]
+            assert process.returncode == 0, told
+        for path in (tmp_path / "alone" / "tables").glob("*"):
+            assert (out / "tables" / path.name).read_bytes() == path.read_bytes(), path.name
 
 
 @pytest.fixture(scope="module")
@@ -99,13 +155,13 @@ def played(results):
     return results["paper"].folder.parent
 
 
-def test_an_act_is_read_back_as_it_was_found(played, results, monkeypatch):
-    found = read_result(played / "paper")
-    assert found.groups.keys() == results["paper"].groups.keys()
-    for name, group in results["paper"].groups.items():
-        xr.testing.assert_identical(group, found.groups[name])
-    monkeypatch.setattr("seakeep.study.reproduce.read_result", lambda folder: folder)
-    assert read_reproduction(played) == {name: played / name for name in ("paper", "raw")}
+def test_the_acts_are_read_back_as_they_were_found(played, results):
+    found = read_reproduction(played)
+    assert list(found) == list(results)
+    for act, result in results.items():
+        assert found[act].groups.keys() == result.groups.keys()
+        for name, group in result.groups.items():
+            xr.testing.assert_identical(group, found[act].groups[name])
 
 
 def test_the_acts_of_the_paper_have_the_same_windows(results):
@@ -183,8 +239,6 @@ def test_an_interval_that_few_cells_do_not_give_is_not_printed(results):
 
 def test_the_page_over_the_acts_links_to_theirs(played, results):
     pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
-    from seakeep.report.acts import write_reproduction
-
     page = write_reproduction(played, results).read_text("utf-8")
     for act in ACTS[:2]:
         assert f'href="{act.name}/report.html"' in page

@@ -54,9 +54,9 @@ alignment = { mode = "dispersion", surge = "predicted" }
 [models.bayesian]
 kind = "bayesian_hankel_dmdc"
 n_members = 3
-train_length = { uniform = [15, 20] }
-state_delay = { uniform = [0.3, 0.6] }
-input_delay = { uniform = [1, 2] }
+window = { uniform = ["15 T", "20 T"] }
+state_delays = { uniform = ["0.3 T", "0.6 T"] }
+input_delays = { uniform = ["1 T", "2 T"] }
 ridge = 1e-2
 alignment = { mode = "dispersion", surge = "predicted" }
 [tests.later]

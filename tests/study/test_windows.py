@@ -38,8 +38,8 @@ RUNS = {
 NEEDS = Needs(snapshots=120, history=30)
 
 
-def training(needs=NEEDS, runs=RUNS, **table):
-    return choose_training(settings(training=table), runs, list(runs), needs)
+def training(needs=NEEDS, runs=RUNS, inputs=(), **table):
+    return choose_training(settings(training=table), runs, list(runs), needs, inputs)
 
 
 def windows_of(runs=RUNS, name="set", steps=50, needs=NEEDS, whole=False, **table):
@@ -139,6 +139,24 @@ def test_leaving_out_a_sea_state_leaves_out_all_of_its_runs():
     ]
     assert found[0].may_test("a2")
     assert not found[0].may_test("b1")
+
+
+def test_leaving_out_a_run_leaves_out_those_that_repeat_its_waves():
+    """By what the first elevation among the inputs measured, whatever sea states are stated."""
+    runs = {}
+    for name, (period, late) in {"a": (1.5, 0.0), "b": (2.0, 0.0), "a_2": (1.5, 0.4)}.items():
+        run = recorded(400, sea_state="same")
+        waves = np.sin(2 * np.pi * (run["time"].values - late) / period)
+        wind = ("time", np.ones(400), {"units": "m/s"})
+        runs[name] = run.assign(wind=wind, eta=("time", waves, {"units": "m"}))
+    inputs = ["wind", "eta"]
+    found = training(runs=runs, inputs=inputs, scheme="leave_out")
+    assert [each.left_out for each in found] == [("a", "a_2"), ("b",)]
+    found = training(runs=runs, inputs=inputs, scheme="leave_out", leave_out="run")
+    assert [each.left_out for each in found] == [("a",), ("b",), ("a_2",)]
+    del runs["b"]
+    with pytest.raises(RequestError, match="a run with its repetitions of a, a_2 leaves no run"):
+        training(runs=runs, inputs=inputs, scheme="leave_out")
 
 
 def test_nothing_is_left_to_learn_from_where_one_sea_state_is_all():

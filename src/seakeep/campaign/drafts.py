@@ -22,7 +22,7 @@ from seakeep.campaign.guesses import (
     guess_channels,
     is_trigger,
     rising_column,
-    sea_of,
+    seas_of,
     waves_of_name,
 )
 from seakeep.campaign.readers import time_column, time_step_of, time_unit_of
@@ -38,12 +38,6 @@ __all__ = ["draft_campaign"]
 
 STEPS = 32
 """Samples per period that the paper takes, and a draft proposes."""
-
-STILL = 0.05
-"""Part of the highest run's waves below which a run has none."""
-
-LIKE = 1.25
-"""Factor by which a test's waves may leave the range of the training's, in height and period."""
 
 _REMOVE = "prepare warns of it: remove it"
 
@@ -93,7 +87,7 @@ def draft_campaign(
     if not any(guess.channel for guess in guesses):
         _refuse(read)
     wave = next(iter(_inputs(guesses)), None)
-    seas = {} if wave is None else _seas(read, wave)
+    seas = {} if wave is None else seas_of(read, guesses, wave)
     lines = [
         f"# Draft of a campaign ({MARK}: draft). Read every line that says 'guessed', then",
         "# run: seakeep prepare THIS-FILE, and look at the sheet it makes",
@@ -143,14 +137,6 @@ def _refuse(files: Sequence[File]) -> None:
         f"{first.path}: no column has numbers that a channel could be made of (columns: "
         f"{', '.join(first.table.names)}). Check delimiter and decimal mark of the file."
     )
-
-
-def _seas(files: Sequence[File], wave: Guess) -> dict[str, Sea]:
-    """Waves of each run in which there are any; still water and decay tests have none."""
-    found = {f.run: sea_of(f, wave.column) for f in files if f.logger == wave.logger}
-    seas = {run: sea for run, sea in found.items() if sea is not None}
-    highest = max((sea.height for sea in seas.values()), default=0.0)
-    return {run: sea for run, sea in seas.items() if sea.height > STILL * highest}
 
 
 def _general(files: Sequence[File], seas: Mapping[str, Sea], wave: Guess | None) -> Iterator[str]:
@@ -270,11 +256,23 @@ def _runs(
         yield f"role = {_value(role)} # {why}"
         if len(names) == 1:
             yield "# train = [0.0, 60.0]  # s; in place of role, with test = [60.0, inf]"
-        yield "# span = [10.0, inf]  # s; cut the start-up of the waves off"
-        yield "# sea_state = 'A'  # one word for runs in the same sea, which studies judge together"
+        yield from _span_and_sea(name, role, seas, name == names[0])
         if set(own) != {""}:
             yield from ("", f"[runs.{_key(name)}.files]")
             yield from (f"{_key(logger)} = {_value(path)}" for logger, path in own.items())
+
+
+def _span_and_sea(run: str, role: str, seas: Mapping[str, Sea], is_first: bool) -> Iterator[str]:
+    """Where forecasts start; training keeps the onset, since steady waves hold one frequency."""
+    sea = seas.get(run)
+    if sea is not None and sea.start > 0 and role == "test":
+        yield f"span = [{sea.start:.2f}, inf] # s; guessed: the waves have come to the vessel"
+    elif is_first:
+        yield "# span = [10.0, inf]  # s; cut the start-up of the waves off"
+    if sea is not None and sum(sea.group == each.group for each in seas.values()) > 1:
+        yield f"sea_state = {_value(f'waves of {sea.group}')} # guessed: the same waves come again"
+    elif is_first:
+        yield "# sea_state = 'A'  # one word for runs in one sea, which studies judge together"
 
 
 def _kind(run: str, seas: Mapping[str, Sea]) -> str | None:
@@ -296,31 +294,39 @@ def _roles(names: Sequence[str], seas: Mapping[str, Sea]) -> dict[str, tuple[str
     irregular = [name for name in moved if _kind(name, seas) != "regular"]
     mixed = 0 < len(irregular) < len(moved)
     order = irregular if mixed else moved
-    test = _test_of(order, seas) if len(order) > 1 else None
+    tests = _tests_of(order, seas) if len(order) > 1 else set()
     why = "guessed: one run whose waves lie within those of the others tests, these train"
     if mixed:
-        why = "guessed: irregular runs train" + (" but one, the rest tests" if test else "")
-    roles = {n: ("test" if n == test or n not in order else "train", why) for n in moved}
+        why = "guessed: irregular runs train" + (" but one, the rest tests" if tests else "")
+    roles = {n: ("test" if n in tests or n not in order else "train", why) for n in moved}
     unused = ("unused", "guessed: no waves were found, as in still water or decay tests")
     return {name: roles.get(name, unused) for name in names}
 
 
-def _test_of(names: Sequence[str], seas: Mapping[str, Sea]) -> str:
-    """The last run whose waves are no higher, lower, longer or shorter than the others'."""
+def _tests_of(names: Sequence[str], seas: Mapping[str, Sea]) -> set[str]:
+    """A run whose waves lie within the range of the others', or nearest to it, and its repeats.
 
-    def inside(value: float, others: Sequence[float]) -> bool:
-        return min(others) / LIKE <= value <= max(others) * LIKE
+    Of several regular waves, that with the least distance to the next one in period.
+    """
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(seas[name].group if seas else name, []).append(name)
+    if len(groups) < 2 or not seas:
+        return {names[-1]}
 
-    for name in reversed(names):
-        others = [seas[n] for n in names if n != name and n in seas]
-        if name not in seas or not others:
-            continue
-        sea = seas[name]
-        if inside(sea.height, [each.height for each in others]) and inside(
-            sea.period, [each.period for each in others]
+    def reach(group: list[str]) -> tuple[float, int, float]:
+        own, outside = seas[group[0]], 0.0
+        others = [seas[name] for name in names if name not in group]
+        for value, rest in (
+            (own.height, [sea.height for sea in others]),
+            (own.period, [sea.period for sea in others]),
         ):
-            return name
-    return names[-1]
+            outside += math.log(max(min(rest) / value, value / max(rest), 1.0))
+        nearest = min(abs(math.log(sea.period / own.period)) for sea in others)
+        return outside, len(group), nearest if own.regular else -names.index(group[0])
+
+    nearest = min(groups.values(), key=reach)
+    return set(nearest)
 
 
 def _relative(path: Path, folder: Path | str | None) -> str:

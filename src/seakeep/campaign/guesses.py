@@ -12,13 +12,13 @@ from typing import Literal
 import numpy as np
 
 from seakeep.arrays import FloatArray
-from seakeep.campaign.readers import time_step_of
+from seakeep.campaign.readers import time_step_of, time_unit_of
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import DataError
 from seakeep.formats import Columns
 from seakeep.formats.columns import is_unit, named_unit
-from seakeep.signals import encounter_period, uniform_step, waves_part
-from seakeep.signals.waves import energy_period
+from seakeep.signals import encounter_period, repeated_waves, uniform_step, waves_part
+from seakeep.signals.waves import energy_period, tapered_power
 
 __all__ = [
     "MOTIONS",
@@ -28,8 +28,9 @@ __all__ = [
     "arranged",
     "guess_channels",
     "is_trigger",
+    "is_wave",
     "rising_column",
-    "sea_of",
+    "seas_of",
     "suggest_channel",
     "waves_of_name",
 ]
@@ -59,6 +60,9 @@ LONG = 64
 
 USABLE = 0.9
 """Part of a column that must be numbers for it to become a channel with gaps."""
+
+STILL = 0.05
+"""Part of the highest run's waves below which a run has none."""
 
 SHORT_GAP = 0.25
 """Seconds: what ``gaps = "bridge"`` fills unless ``longest_gap`` says otherwise."""
@@ -117,38 +121,95 @@ class Guess:
 class Sea:
     """Waves of a run: standard deviation in the file's unit, mean period in s, and their kind.
 
-    `noisy` says that noise of the probe leads the count of waves.
+    `noisy` says that noise of the probe leads the count of waves, `start` when the waves have come
+    to all probes and to the vessel (s, on the run's clock), `group` the first run of these waves.
     """
 
     height: float
     period: float
     regular: bool
     noisy: bool
+    start: float
+    group: str
 
 
-@np.errstate(over="ignore", invalid="ignore")
-def sea_of(file: File, column: str) -> Sea | None:
-    """Waves that a probe recorded in a run; None where it recorded none."""
+def _series(file: File, column: str) -> FloatArray | None:
+    """A column without its gaps; None where there is too little of it, or it is constant."""
     series = file.table.values.get(column, np.zeros(0))
     there = np.isfinite(series)
     if file.rate is None or there.sum() < LONG or not np.ptp(series[there]):
         return None
     at = np.arange(series.size)
-    series, step = np.interp(at, at[there], series[there]), 1.0 / file.rate
+    return np.interp(at, at[there], series[there])
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def seas_of(files: Sequence[File], guesses: Sequence[Guess], wave: Guess) -> dict[str, Sea]:
+    """Waves, as one probe recorded them, of each run that has some; decay tests have none."""
+    seas, waves, rates = {}, {}, {}
+    for file in files:
+        series = _series(file, wave.column) if file.logger == wave.logger else None
+        if series is not None and (sea := _sea(file, series)) is not None:
+            seas[file.run], waves[file.run], rates[file.run] = sea, series, float(file.rate or 1.0)
+    highest = max((sea.height for sea in seas.values()), default=0.0)
+    seas = {run: sea for run, sea in seas.items() if sea.height > STILL * highest}
+    rate = min((rates[run] for run in seas), default=1.0)
+    groups = repeated_waves(
+        {
+            run: np.interp(
+                np.arange(0, series.size, rates[run] / rate), np.arange(series.size), series
+            )
+            for run, series in waves.items()
+            if run in seas
+        },
+        1.0 / rate,
+    )
+    return {
+        run: replace(sea, group=groups[run], start=_start(run, files, guesses))
+        for run, sea in seas.items()
+    }
+
+
+def _sea(file: File, series: FloatArray) -> Sea | None:
+    step = 1.0 / float(file.rate or 1.0)
     try:
         series = series[waves_part(series, step)]
+        power = tapered_power(series)
+        frequency = np.fft.rfftfreq(series.size, step)
+        peak = frequency[1 + int(np.argmax(power[1:]))]
+        off = np.abs(frequency - peak * np.clip(np.round(frequency / peak), 1, 3))
+        near = off < max(0.1 * peak, 2.5 * frequency[1])
+        regular = bool(power[near].sum() > ONE_WAVE * power[1:].sum())
         period = encounter_period(series, step)
-        if noisy := period < energy_period(series, step) / 2:
+        if noisy := period < energy_period(series, step) * (0.8 if regular else 0.5):
             period = encounter_period(series, step, HYSTERESIS)
     except DataError:
         return None
-    power = np.abs(np.fft.rfft((series - series.mean()) * np.hanning(series.size))) ** 2
-    frequency = np.fft.rfftfreq(series.size, step)
-    peak = frequency[1 + int(np.argmax(power[1:]))]
-    off = np.abs(frequency - peak * np.clip(np.round(frequency / peak), 1, 3))
-    near = off < max(0.1 * peak, 2.5 * frequency[1])
-    regular = bool(power[near].sum() > ONE_WAVE * power[1:].sum())
-    return Sea(float(series.std()), period, regular, noisy)
+    return Sea(float(series.std()), period, regular, noisy, 0.0, file.run)
+
+
+def _start(run: str, files: Sequence[File], guesses: Sequence[Guess]) -> float:
+    """Latest instant at which the waves have come to a probe, or a motion has begun."""
+    starts = [0.0]
+    for file in (each for each in files if each.run == run):
+        for guess in (each for each in guesses if each.logger == file.logger):
+            name, series = str(guess.channel), _series(file, guess.column)
+            if series is None or not (name.startswith("eta_") or name in MOTIONS):
+                continue
+            if name in MOTIONS:  # slow drifts hide the start of the waves, and less so in rates
+                series = np.gradient(series)
+            if begin := waves_part(series, 1.0).start:
+                step = 1.0 / float(file.rate or 1.0)
+                starts.append(step * begin + _first(file))
+    return max(starts)
+
+
+def _first(file: File) -> float:
+    """First instant of a file, s; zero where it states none."""
+    times = file.table.values.get(file.time or "", np.zeros(1))
+    unit = time_unit_of(file.table, file.time or "")
+    factor = conversion(unit, "s") if is_unit(unit) else 1.0
+    return factor * float(times[0]) if np.isfinite(times[0]) else 0.0
 
 
 def waves_of_name(run: str) -> str | None:
@@ -160,6 +221,12 @@ def waves_of_name(run: str) -> str | None:
 def is_trigger(column: str) -> bool:
     """Whether a column may hold the pulses that all loggers recorded."""
     return bool(_TRIGGER & set(_words(column)))
+
+
+def is_wave(column: str) -> bool:
+    """Whether a column is called as those of wave probes are, and not as a motion."""
+    words = _words(column)
+    return bool(_WAVE & set(words)) and _motion(words, None) is None
 
 
 def _plain(text: str) -> str:

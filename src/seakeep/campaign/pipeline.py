@@ -28,7 +28,9 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray
 from seakeep.campaign.derivation import derive
+from seakeep.campaign.guesses import MOTIONS, is_wave
 from seakeep.campaign.readers import (
+    counts_samples,
     find_column,
     labelled_table,
     time_column,
@@ -49,7 +51,7 @@ from seakeep.campaign.validation import derivation_order, needed_channels, sourc
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
 from seakeep.formats import Columns, Options
-from seakeep.formats.columns import is_unit, meant_column
+from seakeep.formats.columns import is_unit, meant_column, same_unit
 from seakeep.quality import Finding, Rate, Record, Redundant, check
 from seakeep.signals import (
     Clock,
@@ -79,7 +81,7 @@ from seakeep.signals.quality import (
     reading_step,
 )
 from seakeep.signals.synchronisation import ASSUMED
-from seakeep.signals.time_axis import instant_text, span_text, stretches
+from seakeep.signals.time_axis import instant_text, stretches
 from seakeep.sizes import LONG_NUMBERS, check_numbers
 from seakeep.toml import Length, number
 
@@ -306,7 +308,9 @@ def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings])
     columns = [each.column or name for name, each in channels.items()]
     table = labelled_table(path, logger.columns, logger.options, columns)
     instants = run.clocks[logger.name].reference(table["time"].to_numpy())
-    table = _recorded(table.assign_coords(time=table["time"].copy(data=instants)), run)
+    is_reference = logger.name == next(iter(run.loggers))
+    table = table.assign_coords(time=table["time"].copy(data=instants))
+    table = _recorded(table, run, is_reference)
     changed = run.own.channels
     variables = {}
     for name, each in channels.items():
@@ -320,20 +324,18 @@ def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings])
     return out
 
 
-def _recorded(table: xr.Dataset, run: Run) -> xr.Dataset:
+def _recorded(table: xr.Dataset, run: Run, is_reference: bool) -> xr.Dataset:
     """Part of a file that `record` asks for."""
     if run.own.record is None:
         return table
     start, end = (number(edge) for edge in run.own.record)
     time = table["time"].to_numpy()
-    kept = (time >= start) & (time <= end)
-    if kept.sum() < 2:
-        step = float(np.median(np.diff(time)))
-        raise RequestError(
-            f"runs.{run.name}.record: received [{start:g}, {end:g}] s, and the file runs from "
-            f"{span_text(time[0], time[-1], step)}: nothing is left. Correct the two times."
-        )
-    return table.isel(time=kept)
+    step, key = float(np.median(np.diff(time))), f"runs.{run.name}.record"
+    whole = float(time[0]), float(time[-1])
+    if is_reference:
+        _refuse_outside(key, (start, end), whole, step, step * (1 + 1e-6))
+    _refuse_empty(key, (start, end), time, step, whole)
+    return table.isel(time=(time >= start) & (time <= end))
 
 
 def _column(table: xr.Dataset, name: str, settings: ChannelSettings) -> xr.DataArray:
@@ -351,10 +353,7 @@ def _refuse_other_unit(
     """Refuse a unit that is stated for all runs where this run's file says another one."""
     stated = settings.unit
     said = str(_column(table, name, settings).attrs.get("units", "")).strip()
-    if stated is None or said in ("", "-", "1") or not is_unit(said):
-        return
-    same = si_unit(said) == si_unit(stated)
-    if same and conversion(said, si_unit(said)) == conversion(stated, si_unit(stated)):
+    if stated is None or said in ("", "-", "1") or not is_unit(said) or same_unit(said, stated):
         return
     raise RequestError(
         f"channels.{name}: the unit '{stated}' is stated, and run '{run}' ({path}) says "
@@ -403,6 +402,8 @@ def cleaned(run: Run) -> Run:
             step = None if aside is None else time_step_of(logger.columns, aside)
             if step is not None:  # the step of the file's times, where a stated rate is used
                 data.attrs["time_column_step"] = step
+        elif counts_samples(logger.columns, logger.options):
+            data.attrs["time_counts"] = 1
         groups[key] = data
     return replace(run, groups=groups)
 
@@ -699,10 +700,12 @@ def checked(
         own = settings.instruments[name] if name else settings.files
         if own.sampling_rate is not None:
             rates[name] = Rate(own.sampling_rate, own.time is None, own.sampling_rate_assumed)
-    units = {
-        name: each.unit or "-"
-        for name, each in channels_of(settings, run.own).items()
-        if each.unit_assumed
+    channels = channels_of(settings, run.own)
+    units = {name: each.unit or "-" for name, each in channels.items() if each.unit_assumed}
+    waves = {
+        name: each.column
+        for name, each in channels.items()
+        if each.column and name.partition("_")[0] in MOTIONS and is_wave(each.column)
     }
     record = Record(
         run=run.name,
@@ -717,6 +720,7 @@ def checked(
         redundant=redundant_pairs(settings, None),
         rates=rates,
         assumed_units=units,
+        wave_columns=waves,
         bridged=preparation.longest_gap if preparation.gaps == "bridge" else None,
         anti_alias=preparation.anti_alias,
         left_out=left_out or {},
@@ -747,13 +751,7 @@ def cropped(run: Run) -> Run:
         if (span := getattr(run.own, key)) is not None
     }
     for key, span in spans.items():
-        finite = [edge for edge in span if np.isfinite(edge)]
-        if any(not record[0] - slack <= edge <= record[1] + slack for edge in finite):
-            begin, end = _texts(record, dt)
-            raise RequestError(
-                f"runs.{run.name}.{key}: received [{', '.join(_texts(span, dt))}] s, and the "
-                f"record runs from {begin} to {end} s. Correct the span; 'inf' stands for the end."
-            )
+        _refuse_outside(f"runs.{run.name}.{key}", span, record, dt, slack)
         _refuse_empty(f"runs.{run.name}.{key}", span, time, dt, record)
     if "span" not in spans:
         return run
@@ -768,6 +766,19 @@ def inside(time: FloatArray, span: tuple[float, float], dt: float) -> BoolArray:
     """Instants in a span, both ends included."""
     slack = 1e-6 * dt
     return (time >= span[0] - slack) & (time <= span[1] + slack)
+
+
+def _refuse_outside(
+    key: str, span: tuple[float, float], record: tuple[float, float], dt: float, slack: float
+) -> None:
+    """Refuse a span that reaches beyond a record by more than its last sample's own step."""
+    finite = [edge for edge in span if np.isfinite(edge)]
+    if any(not record[0] - slack <= edge <= record[1] + slack for edge in finite):
+        begin, end = _texts(record, dt)
+        raise RequestError(
+            f"{key}: received [{', '.join(_texts(span, dt))}] s, and the record runs from {begin} "
+            f"to {end} s. Correct the span; 'inf' stands for the end."
+        )
 
 
 def _refuse_empty(

@@ -51,7 +51,7 @@ KEPT = 2**30
 """Bytes of columns that are kept from the survey of all runs until each is prepared: campaigns of
 model tests fit; what is beyond is read again."""
 
-FORMAT = 9
+FORMAT = 10
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
 
 

@@ -17,13 +17,15 @@ from seakeep.conventions import conversion, si_unit
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.files import expanded, sha256_of
 from seakeep.formats import Columns, is_recording_folder, read_columns
-from seakeep.formats.columns import is_unit, meant_column, named_unit
+from seakeep.formats.columns import is_unit, meant_column, named_unit, same_unit
 from seakeep.signals.time_axis import check_order, instant_text
 
 __all__ = ["expand", "read_table"]
 
 _TIMES = {"time", "t", "times", "tid", "tempo", "zeit", "temps", "tiempo", "sec", "seconds",
           "elapsed", "elapsed time", "time elapsed", "timestamp"}  # fmt: skip
+COUNTED = 64
+"""Times from which a column that counts 1, 2, 3 may count samples."""
 _VARIABLE = re.compile(r"\$\{([^}]*)\}")
 
 
@@ -181,6 +183,15 @@ def time_step_of(table: Columns, name: str) -> float | None:
     return step if step > 0 else None
 
 
+def counts_samples(table: Columns, options: FileSettings) -> bool:
+    """Whether the times count 1, 2, 3 and nothing says that these are seconds."""
+    name = time_column(table, options.time)
+    if name is None or options.time_unit or _said_unit(table, name) or named_unit(name)[1]:
+        return False
+    times = table.values[name]
+    return times.size >= COUNTED and bool(times[0] in (0, 1) and np.all(np.diff(times) == 1))
+
+
 def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | None, FloatArray]:
     """Name of the time column, if there is one, and the instants, s, checked for their order."""
     name = time_column(table, options.time)
@@ -211,9 +222,7 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
 def _refuse_other_unit(path: Path, table: Columns, name: str, stated: str | None) -> None:
     """Refuse a unit of the times that is stated against the one in the file's header."""
     said = _said_unit(table, name)
-    if stated is None or not is_unit(said) or si_unit(said) != "s":
-        return
-    if conversion(said, "s") == conversion(stated, "s"):
+    if stated is None or not is_unit(said) or si_unit(said) != "s" or same_unit(said, stated):
         return
     raise RequestError(
         f"time_unit: '{stated}' is stated, and {path} says '{said}' for its time column '{name}'. "

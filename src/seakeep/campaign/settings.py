@@ -15,35 +15,25 @@ from pydantic import (
     AfterValidator,
     BeforeValidator,
     ConfigDict,
-    Discriminator,
     Field,
-    Tag,
     model_validator,
 )
 
 from seakeep.conventions import canonical_channel
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import RequestError
 from seakeep.formats import Options
-from seakeep.sizes import LEAST_PERIODS, MOST_MEMBERS, MOST_PERIODS
 from seakeep.toml import (
-    Count,
-    Delay,
     Duration,
     Finite,
     Instant,
-    Length,
     Names,
-    NotNegative,
     Positive,
     Span,
     Table,
-    Window,
     parse_length,
-    unknown_key,
 )
 
 __all__ = [
-    "AlignmentSettings",
     "CampaignSettings",
     "ChannelSettings",
     "DerivedSettings",
@@ -53,11 +43,9 @@ __all__ = [
     "InstrumentsSettings",
     "ModelSettings",
     "PreparationSettings",
-    "PriorSettings",
     "RedundantSettings",
     "RigSettings",
     "RunSettings",
-    "SelectSettings",
 ]
 
 
@@ -204,18 +192,11 @@ def _run_name(name: str) -> str:
     return name
 
 
-def _file_name(name: str) -> str:
-    if "\0" in name:
-        raise ValueError("no file has a name with a NUL character; correct it")
-    return name
-
-
 LONGEST_NAME = 100
 """Characters of a name: file systems allow 255 bytes, of which our own prefixes and suffixes take
 some."""
 ChannelName = Annotated[str, AfterValidator(_channel_name)]
 RunName = Annotated[str, AfterValidator(_run_name)]
-FileName = Annotated[str, AfterValidator(_file_name)]
 Band = Annotated[tuple[Positive, Positive], Field(strict=False), AfterValidator(_rising_band)]
 TwoColumns = Annotated[tuple[str, str], Field(strict=False)]
 Vector = Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]
@@ -492,83 +473,6 @@ class PreparationSettings(Table):
         return self.model_copy(update={**filters, "preset": preset})
 
 
-def _listed(value: object) -> object:
-    return tuple(value) if isinstance(value, list | tuple) else (value,)
-
-
-def _horizons(given: tuple[float | Length, ...]) -> tuple[float | Length, ...]:
-    values = [each.value if isinstance(each, Length) else each for each in given]
-    if not all(LEAST_PERIODS < value < MOST_PERIODS for value in values):
-        raise ValueError("free runs last 1e-6 to 1e6 encounter periods, such as '15 T'")
-    return given
-
-
-Horizons = Annotated[
-    tuple[Duration, ...],
-    BeforeValidator(_listed),
-    Field(min_length=1),
-    AfterValidator(_horizons),
-]
-
-
-class AlignmentSettings(Table):
-    """``alignment`` of a model: the keys of :class:`seakeep.ProbeAlignment`."""
-
-    mode: Literal["effective", "dispersion"] = Field(
-        default="effective", description="'effective' (one celerity) or 'dispersion'"
-    )
-    surge: Literal["measured", "predicted", "none"] = Field(
-        default="measured", description="'measured', 'predicted' or 'none'"
-    )
-    celerity: Positive | Literal["common"] | None = Field(
-        default=None,
-        description="m/s, of mode 'effective'; left out, each run's own by correlation; 'common': "
-        "the mean of the training runs for all",
-    )
-    offset: Finite = Field(
-        default=0.0, description="metres by which the elevation is carried, positive downstream"
-    )
-    surge_channel: str = Field(default="surge", description="the channel of the surge")
-    channels: Names | None = Field(
-        default=None, description="list of the inputs that are elevations"
-    )
-    highest_frequency: Positive | None = Field(
-        default=None, description="Hz, of mode 'dispersion'; left out, it is estimated"
-    )
-    passes: Count = Field(
-        default=2, description="how often a forecast runs, with surge = 'predicted'"
-    )
-    optional: bool = Field(
-        default=False,
-        description="true or false: whether a model goes without where surge, positions or depth "
-        "are missing",
-    )
-
-    @model_validator(mode="after")
-    def _keys_fit_mode(self) -> AlignmentSettings:
-        for key, mode in (("celerity", "effective"), ("highest_frequency", "dispersion")):
-            if getattr(self, key) is not None and self.mode != mode:
-                raise ValueError(f"'{key}' goes with mode = '{mode}' alone; remove it")
-        return self
-
-
-class SelectSettings(Table):
-    """``select`` of a model: the keys of :class:`seakeep.Select`."""
-
-    observables: bool = Field(
-        default=False, description="true or false: whether free runs choose among observables"
-    )
-    horizon: Horizons = Field(
-        default=(15.0, 45.0),
-        description="a length of free runs in encounter periods, such as '15 T', or a list of them",
-    )
-    folds: Literal["run", "sea_state"] = Field(
-        default="run",
-        description="'run', or 'sea_state': what is held out at a time, a run or all runs of its "
-        "sea state",
-    )
-
-
 class RunSettings(Table):
     """``[runs.NAME]``: one run, its file or files, and its role.
 
@@ -577,10 +481,8 @@ class RunSettings(Table):
     used for both. `record` cuts the files before anything else is done with them.
     """
 
-    file: FileName | None = Field(
-        default=None, description="the file, relative to the campaign file"
-    )
-    files: dict[str, FileName] = Field(
+    file: str | None = Field(default=None, description="the file, relative to the campaign file")
+    files: dict[str, str] = Field(
         default_factory=dict, description="instrument = its file, relative to the campaign file"
     )
     sea_state: str = Field(default="", description="a name for the sea state")
@@ -634,141 +536,27 @@ class RunSettings(Table):
         return self
 
 
-def _in_order(bounds: tuple[float, float]) -> tuple[float, float]:
-    if not (math.isfinite(bounds[0]) and math.isfinite(bounds[1]) and bounds[0] < bounds[1]):
-        raise ValueError("the bounds are [low, high], two finite numbers with low below high")
-    return bounds
-
-
-Bounds = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_in_order)]
-
-
-class PriorSettings(Table):
-    """A prior of the ensemble, such as ``{ uniform = [10, 30] }``."""
-
-    uniform: Bounds | None = Field(default=None, description="[low, high]")
-    log_uniform: Bounds | None = Field(default=None, description="[low, high], both positive")
-    fixed: Finite | None = Field(default=None, description="a number")
-    distribution: str | None = Field(
-        default=None, description="name of a distribution of scipy.stats, such as 'norm'"
-    )
-    parameters: dict[str, Finite] = Field(
-        default_factory=dict,
-        description="of that distribution, such as { loc = 1.0, scale = 0.1 }",
-    )
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> PriorSettings:
-        kinds = ("uniform", "log_uniform", "fixed", "distribution")
-        if sum(getattr(self, kind) is not None for kind in kinds) != 1:
-            raise ValueError(
-                "a prior is one of { uniform = [a, b] }, { log_uniform = [a, b] }, "
-                "{ fixed = value }, { distribution = 'name', parameters = { … } }"
-            )
-        if self.log_uniform is not None and self.log_uniform[0] <= 0:
-            raise ValueError("'log_uniform' needs positive bounds; logarithms start above zero")
-        if self.distribution is not None:
-            self._check_distribution()
-        elif self.parameters:
-            raise ValueError("'parameters' go with 'distribution'; remove them")
-        return self
-
-    def _check_distribution(self) -> None:
-        from scipy import stats
-
-        found = getattr(stats, str(self.distribution), None)
-        if not isinstance(found, stats.rv_continuous | stats.rv_discrete):
-            known = [
-                name
-                for name in dir(stats)
-                if isinstance(getattr(stats, name), stats.rv_continuous | stats.rv_discrete)
-            ]
-            raise ValueError(
-                f"scipy.stats has no distribution '{self.distribution}'."
-                f"{did_you_mean(str(self.distribution), known)} Name another one"
-            )
-        try:
-            median = float(found(**self.parameters).ppf(0.5))
-        except TypeError:
-            shapes = f"{found.shapes}, loc, scale" if found.shapes else "loc, scale"
-            stated = ", ".join(self.parameters) or "none"
-            raise ValueError(
-                f"'parameters' of '{found.name}' are {shapes}, of which loc and scale may be left "
-                f"out; stated: {stated}"
-            ) from None
-        if not math.isfinite(median):
-            raise ValueError(f"'{found.name}' with these 'parameters' has no median; correct them")
-
-
-def _branch(value: object) -> str:
-    return "<prior>" if isinstance(value, dict | PriorSettings) else "<number>"
-
-
-NumberOrPrior = Annotated[
-    Annotated[NotNegative, Tag("<number>")] | Annotated[PriorSettings, Tag("<prior>")],
-    Discriminator(_branch),
-]
-
-
-def _ridge_branch(value: object) -> str:
-    return "<word>" if isinstance(value, str) else _branch(value)
-
-
-Ridge = Annotated[
-    Annotated[NotNegative, Tag("<number>")]
-    | Annotated[PriorSettings, Tag("<prior>")]
-    | Annotated[Literal["rollout"], Tag("<word>")],
-    Discriminator(_ridge_branch),
-]
-_ONE_MODEL = ("state_delays", "input_delays", "window")
-_ENSEMBLE = (
-    *("train_length", "state_delay", "input_delay"),
-    *("n_members", "seed", "sampling", "train_on"),
-)
-_FOREIGN = {"hankel_dmdc": _ENSEMBLE, "bayesian_hankel_dmdc": _ONE_MODEL}
-"""By kind, the keys that belong to the other of the two."""
-
-
-def _maybe_length(value: object) -> object:
+def _read_lengths(value: object) -> object:
+    """Texts such as ``"1 T"``, wherever they stand in a table, as lengths."""
+    if isinstance(value, dict):
+        return {key: _read_lengths(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(_read_lengths(each) for each in value)
     try:
         return parse_length(value) if isinstance(value, str) else value
     except RequestError:
         return value
 
 
-class ReadOutSettings(Table):
-    """``[model.readouts.NAME]``: NAME is read off the forecast states."""
-
-    kind: Literal["auto", "hinge", "stacked"] = Field(
-        default="auto",
-        description="'hinge' (of measured states), 'stacked' (of forecast states) or 'auto': "
-        "whichever of them, or neither, is best on training runs that are held out",
-    )
-    of: Annotated[tuple[str, ...], Field(strict=False, min_length=1)] = Field(
-        description="list of states that bend it, such as ['surge', 'heave', 'pitch']"
-    )
-
-
-def _readout_branch(value: object) -> str:
-    return "<word>" if isinstance(value, str) else "<table>"
-
-
-ReadOuts = Annotated[
-    Annotated[Literal["auto"], Tag("<word>")]
-    | Annotated[dict[str, ReadOutSettings], Tag("<table>")],
-    Discriminator(_readout_branch),
-]
-
-
 class ModelSettings(Table):
-    """``[model]`` and ``[models.NAME]``: states, inputs, and the constructor's own keys.
+    """``[model]`` and ``[models.NAME]``: states, inputs, and the keys of the model's own kind.
 
-    Keys that are left out are None: the preset, or the constructor, decides about them. A `kind`
-    that is not in this table's lists takes the keys of its own constructor.
+    The kind reads its keys itself: they are the arguments of its constructor. What is left out,
+    the preset or the constructor decides.
     """
 
     model_config = ConfigDict(extra="allow", frozen=True, strict=True)
-    __pydantic_extra__: dict[str, Annotated[Any, BeforeValidator(_maybe_length)]] = Field(
+    __pydantic_extra__: dict[str, Annotated[Any, BeforeValidator(_read_lengths)]] = Field(
         init=False
     )
 
@@ -784,141 +572,19 @@ class ModelSettings(Table):
         description="list of channels that the model forecasts"
     )
     inputs: Names = Field(default=(), description="list of channels that drive the model")
-    state_delays: Delay | None = Field(
-        default=None, description="samples, or periods such as '1 T'"
-    )
-    input_delays: Delay | None = Field(
-        default=None, description="samples, or periods such as '5 T'"
-    )
-    lead: Delay | None = Field(
-        default=None, description="samples by which inputs are read ahead, or periods: '0.75 T'"
-    )
-    ridge: Ridge | None = Field(
-        default=None,
-        description="a number, 0 or more; 'rollout' chooses it by free runs on training runs that "
-        "are held out; a prior for an ensemble",
-    )
-    observables: Annotated[tuple[dict[str, Any], ...], Field(strict=False)] | None = Field(
-        default=None,
-        description="list of tables, such as { kind = 'slow_squares', of = 'eta_cog' }: further "
-        "inputs made of the measured ones; kinds 'slow_squares', 'powers' and 'expression'",
-    )
-    readouts: ReadOuts | None = Field(
-        default=None,
-        description="tables [model.readouts.NAME], or 'auto': every load among the states is read "
-        "off the motions among them where that helps",
-    )
-    window: Window | None = Field(
-        default=None,
-        description="training snapshots per run, or '20 T'; 'inf T' for all",
-    )
-    history: Literal["before", "inside"] | None = Field(default=None, description="")
-    delay_rows: Literal["ridge", "exact"] | None = Field(default=None, description="")
-    ridge_scale: Literal["absolute", "per_snapshot"] | None = Field(default=None, description="")
-    rank: Annotated[int, Field(ge=1)] | None = Field(default=None, description="a positive integer")
-    standardize: bool | None = Field(default=None, description="true or false")
-    stable: bool | Annotated[float, Field(gt=0, lt=1)] | None = Field(
-        default=None,
-        description="true, or the radius to which eigenvalues are clipped, such as 0.999",
-    )
     stop: Instant | None = Field(
         default=None, description="end of the training window, s or periods such as '60 T'"
     )
-    alignment: AlignmentSettings | None = Field(
-        default=None, description="a table, such as { mode = 'dispersion', surge = 'predicted' }"
-    )
-    select: SelectSettings | None = Field(
-        default=None,
-        description="a table, such as { observables = true, horizon = '15 T' }: what is chosen by "
-        "free runs on training runs that are held out",
-    )
-    train_length: NumberOrPrior | None = Field(
-        default=None, description="a prior or a number, in encounter periods; for an ensemble"
-    )
-    state_delay: NumberOrPrior | None = Field(
-        default=None, description="a prior or a number, in encounter periods; for an ensemble"
-    )
-    input_delay: NumberOrPrior | None = Field(
-        default=None, description="a prior or a number, in encounter periods; for an ensemble"
-    )
-    n_members: Annotated[int, Field(ge=1, le=MOST_MEMBERS)] | None = Field(
-        default=None, description=f"number of members of an ensemble, 1 to {MOST_MEMBERS}"
-    )
-    seed: Annotated[int, Field(ge=0)] | None = Field(
-        default=None, description="an integer, 0 or more; for an ensemble"
-    )
-    sampling: Literal["monte_carlo", "sobol"] | None = Field(
-        default=None, description="'monte_carlo' or 'sobol'; for an ensemble"
-    )
-    train_on: Literal["all", "runs", "windows", "auto"] | None = Field(
-        default=None,
-        description="what a member learns from: 'all' runs, one of the 'runs', one of their "
-        "'windows', or 'auto', windows of long runs; for an ensemble",
-    )
-
-    @model_validator(mode="after")
-    def _keys_fit_kind(self) -> ModelSettings:
-        foreign = _FOREIGN.get(self.kind, ())
-        if given := [key for key in foreign if getattr(self, key) is not None]:
-            meant = next(kind for kind in _FOREIGN if kind != self.kind)
-            raise ValueError(
-                f"'{given[0]}' belongs to kind = '{meant}', not to '{self.kind}'; remove it or "
-                "change the kind"
-            )
-        if self.kind == "hankel_dmdc" and isinstance(self.ridge, PriorSettings):
-            raise ValueError("'ridge' of kind = 'hankel_dmdc' is a number, not a prior")
-        for key in ("states", "inputs"):
-            names = getattr(self, key)
-            if len(set(names)) < len(names):
-                raise ValueError(f"'{key}' names a channel twice; remove the repetition")
-        if both := set(self.states) & set(self.inputs):
-            raise ValueError(f"{sorted(both)[0]!r} is among the states and the inputs; choose one")
-        if self.states and isinstance(self.readouts, dict):
-            for name, table in self.readouts.items():
-                if strange := [each for each in (name, *table.of) if each not in self.states]:
-                    raise ValueError(
-                        f"readouts.{name} names {strange[0]!r}, which is not among the states "
-                        f"({', '.join(self.states)});{did_you_mean(strange[0], self.states)} name "
-                        "states of the model"
-                    )
-        return self
 
     def arguments(self) -> dict[str, Any]:
-        """Keys of the constructor and of ``fit`` that the file states, without the channels.
-
-        Returns
-        -------
-        dict
-            Key → value; `kind`, `preset`, `states` and `inputs` are left out.
+        """Keys of the constructor that the file states.
 
         Examples
         --------
         >>> ModelSettings(states=("heave",), ridge=100.0).arguments()
         {'ridge': 100.0}
         """
-        apart = {"kind", "preset", "states", "inputs"}
-        stated = {
-            key: getattr(self, key)
-            for key in type(self).model_fields
-            if key not in apart and getattr(self, key) is not None
-        }
-        for key in ("alignment", "select"):
-            if key in stated:
-                stated[key] = stated[key].model_dump(exclude_unset=True)
-        if isinstance(self.readouts, dict):
-            stated["readouts"] = tuple(
-                {"channel": name, **each.model_dump()} for name, each in self.readouts.items()
-            )
-        return {**stated, **(self.model_extra or {})}
-
-    def unknown_keys(self) -> dict[str, str]:
-        """Keys that the two Hankel models do not know, and what to say; other kinds know theirs."""
-        if self.kind not in _FOREIGN:
-            return {}
-        known = list(type(self).model_fields)
-        return {
-            key: unknown_key(key, value, known) for key, value in self.__pydantic_extra__.items()
-        }
+        return dict(self.model_extra or {})
 
 
 class CampaignSettings(Table):

@@ -2,36 +2,23 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 import numpy as np
 import xarray as xr
-from pydantic import TypeAdapter, create_model
 
 from seakeep.campaign.pipeline import version
 from seakeep.campaign.prepare import Campaign, Progress
 from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepError, warn
-from seakeep.files import (
-    MARK,
-    check_output,
-    make_folder,
-    read_sealed,
-    replacing,
-    write_netcdf,
-)
-from seakeep.quality import Finding, findings_of
+from seakeep.files import check_output, load_sealed, make_folder, write_sealed
 
 __all__ = ["load_prepared", "prepared_folder", "write_prepared"]
 
 PREPARED = "prepared run"
 """Kind of these files, which sets them apart from measurements."""
-POSITIVE = ("dt", "scale_factor", "water_depth", "encounter_period")
-NUMBERS = (*POSITIVE, "celerity", "wave_direction", "probe_offset")
-"""Attributes that are numbers, those that are positive first."""
 
 
 def write_prepared(
@@ -89,19 +76,14 @@ def write_prepared(
             progress(done + count, len(wanted), name)
 
     for name, run in campaign.each_prepared(missing, told, failed):
-        _write(run, files[name])
+        write_sealed(run, files[name], PREPARED)
         steps.add(float(run.attrs["dt"]))
     if len(steps) > 1:  # fresh runs had another step, which only the whole campaign shows
         for name, run in campaign.each_prepared(wanted, progress, failed):
-            _write(run, files[name])
+            write_sealed(run, files[name], PREPARED)
     if failed and failures is None:
         raise as_one(failed)
     return {name: file for name, file in files.items() if name not in failed}
-
-
-def _write(run: xr.Dataset, path: Path) -> None:
-    with replacing(path) as temporary:
-        write_netcdf(temporary, run.assign_attrs({MARK: PREPARED}))
 
 
 def _fresh_step(campaign: Campaign, name: str, file: Path) -> float | None:
@@ -160,16 +142,9 @@ def _fresh(campaign: Campaign, name: str, file: Path) -> xr.Dataset | None:
     if not file.exists():
         return None
     try:
-        run = xr.load_dataset(read_sealed(file), engine="h5netcdf", decode_times=False)
-        if run.attrs.get(MARK) == PREPARED:
-            _check_contents(run)
-    except (SeakeepError, OSError, ValueError, LookupError, TypeError, RuntimeError):
-        warn(
-            f"{file} was altered since it was written, or cannot be read; the run is prepared "
-            "anew. Remove the file, and 'seakeep prepare' writes it again."
-        )
-        return None
-    if MARK not in run.attrs:
+        run = load_sealed(file, PREPARED)
+    except SeakeepError as error:
+        warn(f"{error} The run is prepared anew.")
         return None
     expected: Mapping[str, object] = {
         "campaign_digest": campaign.digest,
@@ -179,41 +154,12 @@ def _fresh(campaign: Campaign, name: str, file: Path) -> xr.Dataset | None:
     }
     if any(run.attrs.get(key) != value for key, value in expected.items()):
         return None
-    run.attrs = {key: _plain(value) for key, value in run.attrs.items() if key != MARK}
+    run.attrs = {key: _plain(value) for key, value in run.attrs.items()}
     for each in run.variables.values():
         each.attrs = {k: _plain(v) for k, v in each.attrs.items() if k != "_FillValue"}
         each.encoding = {}
     run.encoding = {}
     return run
-
-
-def _check_contents(run: xr.Dataset) -> None:
-    """Refuse what no preparation writes; a checksum does not say who wrote a file."""
-    numbers = {key: float(run.attrs[key]) for key in NUMBERS if key in ("dt", *run.attrs)}
-    spans = {f"{use}_span": use in run.attrs["role"] for use in ("train", "test")}
-    stated = [run.attrs[key] for key, needed in spans.items() if needed or key in run.attrs]
-    channels = run.variables.values()
-    sound = (
-        all(np.isfinite(each) for each in numbers.values())
-        and all(numbers[key] > 0 for key in POSITIVE if key in numbers)
-        and all(np.shape(span) == (2,) and span[0] <= span[1] for span in stated)
-        and all(each.dims == ("time",) and each.dtype.kind in "fiub" for each in channels)
-        and all(isinstance(each.attrs["units"], str) for each in run.data_vars.values())
-        and np.allclose(np.diff(run["time"].values), numbers["dt"], rtol=1e-3, atol=0)
-        and _stored().validate_json(run.attrs["quality"], strict=True) is not None
-        and all(each.text for each in findings_of(run))
-    )
-    if not sound:
-        raise ValueError(f"{run.encoding.get('source', 'the file')} is no prepared run")
-
-
-@functools.cache
-def _stored() -> TypeAdapter[Any]:
-    """Type of the list of findings, of the annotations of their class."""
-    types: Any = get_type_hints(Finding) | {"kind": str, "text": str}
-    made: Any = create_model  # its overloads know no keys of a mapping
-    stored: Any = made("Stored", **{name: (each, ...) for name, each in types.items()})
-    return TypeAdapter(list[stored])
 
 
 def _plain(value: Any) -> Any:

@@ -10,7 +10,6 @@ from seakeep.campaign.settings import CampaignSettings, ChannelSettings, Derived
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.signals.expressions import parse
-from seakeep.sizes import MOST_CHANNELS, too_large
 from seakeep.toml import Mistake, lengths, read_toml, validated
 
 __all__ = [
@@ -83,11 +82,6 @@ def needed_channels(settings: CampaignSettings, wanted: Collection[str]) -> set[
 
 
 def _cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
-    mend = "State those that are used."
-    if words := too_large("received", len(settings.channel_names), MOST_CHANNELS, "channels", mend):
-        largest = "derived" if len(settings.derived) > len(settings.channels) else "channels"
-        yield Mistake((largest,), words)
-        return
     yield from _channel_mistakes(settings)
     yield from _derived_mistakes(settings)
     yield from _name_mistakes(settings)
@@ -121,7 +115,6 @@ def _name_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
         wanted.append((("campaign", "period_channel"), settings.campaign.period_channel))
     for table, model in settings.all_models().items():
         place = tuple(table.split(".", 1))
-        yield from (Mistake((*place, k), words) for k, words in model.unknown_keys().items())
         wanted += [((*place, key), n) for key in ("states", "inputs") for n in getattr(model, key)]
     for key, pair in settings.redundant.items():
         wanted += [(("redundant", key, "channels"), name) for name in pair.channels]

@@ -116,7 +116,7 @@ def _densities(free: list[FreeRun], states: int) -> tuple[FloatArray, FloatArray
         reach = 1.1 * np.abs(both[:, :, state]).max(initial=0.0) or 1.0
         grids[state] = np.linspace(-reach, reach, PLACES)
         for side, values in enumerate(both[:, :, state]):
-            if np.ptp(values) > 0:
+            if values.size and np.ptp(values) > 0:
                 density = kernel_density(values, grids[state])
                 if density.sum() * 2 * reach / PLACES > 0.5:  # else the grid is too coarse for it
                     found[state, side] = density

@@ -7,6 +7,7 @@ samples, which keeps its dependence within a block (Künsch 1989).
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -32,8 +33,8 @@ __all__ = [
     "choose_block_length",
     "lag_one_correlation",
     "moving_block_bootstrap",
-    "outer_tail",
     "resolve_block_length",
+    "student_interval",
     "too_long",
 ]
 
@@ -333,15 +334,47 @@ def bootstrap_indices(
     return positions.reshape(n_series, -1)[:, :n_samples].astype(np.intp, copy=False)
 
 
-def outer_tail(blocks: float, level: float) -> float:
-    """Probability of the tail at which an interval from few blocks ends.
+def student_interval(
+    value: npt.ArrayLike, redrawn: FloatArray, blocks: float, level: float, axis: int = 0
+) -> tuple[FloatArray, FloatArray]:
+    r"""Interval of a statistic from its redrawn values, for few blocks.
 
-    Student's t in place of the normal quantile, and the bias of a variance from n values, take
-    quantiles further out than (1 − level)/2 (Hesterberg, The American Statistician 69, 2015: the
-    expanded percentile interval).
+    The bounds are :math:`v \pm t_{k-1} s \sqrt{k/(k-1)}` with s the standard deviation over the
+    draws, k the number of blocks, and t the quantile of Student's distribution (Hesterberg, The
+    American Statistician 69, 2015). Quantiles of the draws cover too little for ten blocks or
+    fewer. A statistic of which all values are positive is taken in the logarithm, so that its
+    bounds are positive too.
+
+    Parameters
+    ----------
+    value : array_like
+        The statistic.
+    redrawn : ndarray
+        The same over redrawn data, along `axis`; NaN is left out.
+    blocks : float
+        Blocks of the data that are independent of each other, more than one.
+    level : float
+        Probability between the bounds.
+    axis : int, optional
+        Axis of the draws.
+
+    Returns
+    -------
+    lower, upper : ndarray
     """
-    student = special.stdtrit(blocks - 1.0, 0.5 - level / 2)
-    return float(special.ndtr(np.sqrt(blocks / (blocks - 1.0)) * student))
+    middle = np.asarray(value, dtype=float)
+    positive = bool(
+        np.all((redrawn > 0) | np.isnan(redrawn)) and np.all((middle > 0) | np.isnan(middle))
+    )
+    if positive:
+        middle, redrawn = np.log(middle), np.log(redrawn)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a statistic that is NaN in all draws
+        spread = np.nanstd(redrawn, axis=axis, ddof=1)
+    student = special.stdtrit(blocks - 1.0, 0.5 + level / 2)
+    half = student * np.sqrt(blocks / (blocks - 1.0)) * spread
+    lower, upper = middle - half, middle + half
+    return (np.exp(lower), np.exp(upper)) if positive else (lower, upper)
 
 
 def moving_block_bootstrap(

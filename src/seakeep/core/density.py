@@ -18,7 +18,7 @@ from scipy import fft
 from seakeep.arrays import FloatArray, IntArray, as_bundle, as_real, fraction, whole_number
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
-from seakeep.sizes import MOST_BINS, check_numbers, check_size
+from seakeep.sizes import MOST_BINS, check_numbers
 
 __all__ = [
     "Bandwidth",
@@ -279,8 +279,7 @@ def density_grid(
     SeakeepWarning
         If its step is over 1.5 bandwidths of a series; a divergence on it is then coarse.
     """
-    count = whole_number(points, "points", 2)
-    check_size("points =", count, MOST_BINS, "points of a grid", "Ask for fewer.")
+    whole_number(points, "points", 2)
     if not series or not margin >= 0:
         raise RequestError(
             f"a grid needs at least one series and a margin of zero or more; received "

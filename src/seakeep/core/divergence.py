@@ -89,7 +89,7 @@ def jensen_shannon(p: npt.ArrayLike, q: npt.ArrayLike) -> FloatArray:
     >>> round(float(jensen_shannon([1.0, 0.0], [0.0, 1.0])), 4)
     0.6931
     """
-    first, second = (as_real(x, name, greatest=np.inf) for name, x in (("p", p), ("q", q)))
+    first, second = (as_real(x, name) for name, x in (("p", p), ("q", q)))
     if first.ndim < 1 or second.ndim < 1 or first.shape[-1] != second.shape[-1]:
         raise RequestError(
             f"p has shape {first.shape} and q {second.shape}; both must be given on one grid."

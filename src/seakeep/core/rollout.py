@@ -140,8 +140,8 @@ def rollouts(
         If shapes do not fit together.
     """
     # A free run may overflow: it is cut off where it does.
-    a = np.atleast_2d(as_real(A, "A", greatest=np.inf))
-    b = as_real(B, "B", greatest=np.inf)
+    a = np.atleast_2d(as_real(A, "A"))
+    b = as_real(B, "B")
     read = [_read(a, b, *batch, n_states) for batch in batches]
     matrices, count = read[0].matrices, read[0].count
     channels = tuple(values.shape[2] for values in read[0].series)
@@ -177,8 +177,8 @@ def _read(
     direct: npt.ArrayLike | None,
     n_states: int | None,
 ) -> _Read:
-    start = as_real(histories, "histories", greatest=np.inf)
-    driving = as_real(inputs, "inputs", greatest=np.inf)
+    start = as_real(histories, "histories")
+    driving = as_real(inputs, "inputs")
     if (
         a.ndim != 2
         or start.ndim not in (2, 3)
@@ -199,7 +199,7 @@ def _read(
             f"histories {np.shape(histories)} and inputs {driving.shape} do not fit A {a.shape}: "
             f"a history has {a.shape[1]} values, and both have one row per window."
         )
-    direct = None if direct is None else as_real(direct, "direct", greatest=np.inf)
+    direct = None if direct is None else as_real(direct, "direct")
     groups, further = [(b, driving)], () if direct is None else direct.shape
     if direct is not None:
         if len(further) != 3 or (len(further) and further[2] > b.shape[1]):

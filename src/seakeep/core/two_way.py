@@ -4,20 +4,19 @@ Cells of one row share a training set, those of one column a test window: none o
 independent of the others, and counting them as such makes intervals far too narrow. Rows and
 columns are redrawn apart from each other, and a cell is taken wherever a drawn row meets a drawn
 column (Owen, Annals of Applied Statistics 1, 2007: the pigeonhole bootstrap). Neighbours that
-overlap are drawn together, in circular blocks. Quantiles are taken further out for the few blocks
-there are (:func:`seakeep.core.bootstrap.outer_tail`).
+overlap are drawn together, in circular blocks. Student's distribution accounts for the few blocks
+there are (:func:`seakeep.core.bootstrap.student_interval`).
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import FloatArray, IntArray, as_real, fraction, whole_number
-from seakeep.core.bootstrap import outer_tail
+from seakeep.core.bootstrap import student_interval
 from seakeep.errors import RequestError
 
 __all__ = ["overlap_block", "two_way_interval"]
@@ -58,7 +57,7 @@ def two_way_interval(
     Returns
     -------
     lower, upper : ndarray, shape (…)
-        Quantiles over the series; NaN where an axis of several cells holds fewer than three
+        Bounds; NaN where an axis of several cells holds fewer than three
         blocks, which say nothing of their spread. An axis of one cell is not redrawn: the
         interval is then conditional on it.
 
@@ -98,11 +97,8 @@ def two_way_interval(
     held = min((n / block for n, block in zip(shape, blocks, strict=True) if n > 1), default=0.0)
     if held < FEWEST or np.isnan(values).all():
         return np.full(values.shape[1:], np.nan), np.full(values.shape[1:], np.nan)
-    tail = outer_tail(held, part)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # a statistic that is NaN in all series
-        lower, upper = np.nanquantile(values, [tail, 1.0 - tail], axis=0)
-    return lower, upper
+    value = np.asarray(statistic(*(each[None] for each in tables)), dtype=float)[0]
+    return student_interval(value, values, held, part)
 
 
 def _positions(size: int, block: int, count: int, rng: np.random.Generator) -> IntArray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from seakeep.arrays import FloatArray
-from seakeep.conventions import si_unit
+from seakeep.conventions import conversion, si_unit
 from seakeep.errors import DataError, RequestError, did_you_mean
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "is_unit",
     "meant_column",
     "named_unit",
+    "same_unit",
     "split_unit",
     "unique_names",
 ]
@@ -110,6 +111,14 @@ def is_unit(text: str) -> bool:
     except RequestError:
         return False
     return True
+
+
+def same_unit(one: str, other: str) -> bool:
+    """Whether two texts say the same unit, however it is spelled."""
+    if one == other or not (is_unit(one) and is_unit(other)):
+        return one == other
+    si = si_unit(one)
+    return si == si_unit(other) and conversion(one, si) == conversion(other, si)
 
 
 def split_unit(header: str) -> tuple[str, str | None]:

@@ -14,7 +14,6 @@ from pymatreader import read_mat
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError
 from seakeep.formats.columns import Columns, check_lengths, unique_names
-from seakeep.formats.limits import open_hdf5
 from seakeep.formats.reader import Options
 
 __all__ = ["read_matlab"]
@@ -106,7 +105,7 @@ def _opaque(path: Path) -> dict[str, str]:
                 "ascii", "replace"
             )
 
-    with open_hdf5(path) as file:
+    with h5py.File(path, "r") as file:
         file.visititems(look)
     return found
 

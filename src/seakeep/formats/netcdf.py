@@ -14,7 +14,6 @@ import xarray as xr
 
 from seakeep.errors import DataError, did_you_mean
 from seakeep.formats.columns import Columns
-from seakeep.formats.limits import open_hdf5
 from seakeep.formats.reader import Options
 
 __all__ = ["read_netcdf"]
@@ -103,7 +102,7 @@ def _group(path: Path, wanted: str | None) -> str | None:
             parent = name.rpartition("/")[0]
             holding[parent] = holding.get(parent, 0) + 1
 
-    with open_hdf5(path) as file:
+    with h5py.File(path, "r") as file:
         file.visititems(look)
         listed = ", ".join(f"'{name}' ({count} sets)" for name, count in holding.items() if name)
         if wanted is not None and not isinstance(file.get(wanted), h5py.Group):

@@ -21,23 +21,21 @@ import pandas as pd
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, warn
-from seakeep.formats.columns import Columns, is_unit, unique_names
+from seakeep.formats.columns import Columns, is_unit, same_unit, unique_names
 from seakeep.formats.reader import Options
-from seakeep.sizes import EXPANSION, most_bytes
 
 __all__ = ["read_text"]
 
 HEAD = 40
 """Lines that may stand above a header, and from which the layout is recognised."""
 
-PART = 2**18
-"""Bytes that are counted at a time: they stay in the processor's cache."""
-
 SHORT_END = 8192
 """Bytes at the end of a text that are searched for a last line that was cut off."""
 
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?\Z", re.ASCII)
 _MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf", "+inf"}
+_NO_THOUSANDS = re.compile(rb"(?<!\d)0\d*,|(?<!\d),|\d{4},|,(?!\d{3}(?!\d))")
+"""A comma that divides no thousands: behind a zero or four digits, or not before three digits."""
 _RULE = re.compile(
     r"(?=.*[-=_*~]{2})[-=_*~+.:|\s,;]+\Z|(\s*[+-]?[\d.]+\s+:\s+[+-]?[\d.]+\s*[,;]?)+\Z", re.ASCII
 )
@@ -74,6 +72,12 @@ def read_text(path: Path, options: Options) -> Columns:
         _warn_of_a_short_end(path, raw, layout)
     names, units = unique_names(layout.headers)
     if layout.units is not None:
+        for name, row, unit in zip(names, layout.units, units, strict=True):
+            if row and unit and is_unit(unit) and not same_unit(row, unit):
+                raise DataError(
+                    f"{path}: the header says '{unit}' for the column '{name}', and the row of "
+                    f"units below it '{row}'. Correct the wrong one of them in the file."
+                )
         units = [row or unit for row, unit in zip(layout.units, units, strict=True)]
     count = Counter(names)
     keep = [i for i, name in enumerate(names) if name and count[name] == 1]
@@ -108,20 +112,12 @@ def _unpacked(path: Path) -> bytes:
     raw = path.read_bytes()
     if not raw.startswith(b"\x1f\x8b"):
         return raw
-    limit = most_bytes(len(raw))
     try:
-        with gzip.open(io.BytesIO(raw)) as file:
-            unpacked = file.read(limit + 1)
+        return gzip.decompress(raw)
     except (EOFError, OSError, zlib.error) as error:
         raise DataError(
             f"{path} is cut off or damaged (gzip: {error}). Copy or download it again."
         ) from None
-    if len(unpacked) > limit:
-        raise DataError(
-            f"{path} unpacks to more than {limit / 2**20:.0f} MiB, over {EXPANSION} times its "
-            "size: no measured table does. Unpack it yourself if it is one."
-        )
-    return unpacked
 
 
 def _utf8(path: Path, raw: bytes, encoding: str | None) -> bytes:
@@ -238,7 +234,7 @@ def _layout(path: Path, raw: bytes, options: Options) -> _Layout:
     if at >= len(rows):
         raise DataError(f"{path} has a header and no rows of numbers. Export the run again.")
     start = rows[at][0]
-    decimal = options.decimal or _decimal(raw, start, marks, delimiter)
+    decimal = options.decimal or _decimal(path, raw, start, marks, delimiter)
     return _Layout(delimiter, decimal, headers, units, start, marks)
 
 
@@ -253,7 +249,7 @@ def _remarks(above: bytes, marks: tuple[str, ...], delimiter: str, width: int) -
     return []
 
 
-def _decimal(raw: bytes, start: int, marks: tuple[str, ...], delimiter: str) -> str:
+def _decimal(path: Path, raw: bytes, start: int, marks: tuple[str, ...], delimiter: str) -> str:
     """The mark of decimals: a comma if cells are numbers with a comma and none has a point."""
     if delimiter == "," or raw.find(b",", start) < 0:
         return "."
@@ -261,7 +257,14 @@ def _decimal(raw: bytes, start: int, marks: tuple[str, ...], delimiter: str) -> 
         cells = [cell for cell in _cells(line, delimiter) if _NUMBER.match(cell)]
         if any("." in cell for cell in cells):
             return "."
-        if any("," in cell for cell in cells):
+        if commas := [cell for cell in cells if "," in cell]:
+            if _NO_THOUSANDS.search(raw, start) is None:
+                raise DataError(
+                    f"{path}: the comma of {commas[0]!r} may divide thousands or decimals, and so "
+                    "may all others of the file. Export it without marks of thousands; or, if the "
+                    "comma is the decimal mark, state decimal = ',' in [files] (--decimal , of "
+                    "seakeep init)."
+                )
             return ","
     return "."
 
@@ -320,21 +323,30 @@ def _units(cells: list[str], headers: list[str]) -> list[str] | None:
 
 def _frame(path: Path, raw: bytes, layout: _Layout) -> pd.DataFrame:
     """Cells of the body, as pandas parses them, with as many in each row as the header has."""
-    text, start = raw, layout.start
-    if any(raw.find(mark.encode(), start) >= 0 for mark in layout.marks):
-        text, start = _plain(raw, layout), 0
-    frame, said = _parsed(text, start, layout)
-    if frame is None or not _is_whole(frame, text, start, layout):
-        text = _plain(raw, layout)
-        _check_widths(path, raw, text, layout)
-        lines = text.count(b"\n") + 1
-        if frame is not None and len(frame) != lines:  # lines of nothing but delimiters
-            frame, said = _parsed(text, 0, layout)
-        if frame is None or len(frame) != lines:
-            raise DataError(
-                f"{path} cannot be divided into cells ({said or 'fewer rows than lines'}). Look "
-                "for a quotation mark that is not closed."
+    body = _plain(raw, layout)
+    _check_widths(path, raw, body, layout)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # columns of several kinds: each cell is looked at here
+            frame: pd.DataFrame = pd.read_csv(  # type: ignore[call-overload]
+                io.BytesIO(body),
+                sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
+                decimal=layout.decimal,
+                header=None,
+                names=list(range(len(layout.headers))),
+                index_col=False,
+                skip_blank_lines=False,
+                skipinitialspace=b" " in body,
+                **_EXACT,
             )
+            said = "fewer rows than lines"
+    except ValueError as error:
+        frame, said = pd.DataFrame(), str(error).strip()
+    if len(frame) != body.count(b"\n") + 1:
+        raise DataError(
+            f"{path} cannot be divided into cells ({said}). Look for a quotation mark that is not "
+            "closed."
+        )
     return frame
 
 
@@ -347,55 +359,18 @@ def _plain(raw: bytes, layout: _Layout) -> bytes:
     return b"\n".join(line.encode() for _, line in _rows(raw, layout.start, layout.marks))
 
 
-def _parsed(text: bytes, start: int, layout: _Layout) -> tuple[pd.DataFrame | None, str]:
-    """Cells from an offset on, or why there are none."""
-    body = io.BytesIO(text)
-    body.seek(start)
-    try:
-        with warnings.catch_warnings():
-            # Of columns of several kinds and of cells without a header: both are looked at here.
-            warnings.simplefilter("ignore")
-            frame: pd.DataFrame = pd.read_csv(  # type: ignore[call-overload]
-                body,
-                sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
-                decimal=layout.decimal,
-                header=None,
-                names=list(range(len(layout.headers))),
-                index_col=False,
-                skipinitialspace=text.find(b" ", start) >= 0,
-                **_EXACT,
-            )
-    except ValueError as error:
-        return None, str(error).strip()
-    return frame, ""
-
-
-def _is_whole(frame: pd.DataFrame, text: bytes, start: int, layout: _Layout) -> bool:
-    """Whether no row can be too short or too long: else each is counted.
-
-    Too short a row ends with a missing value; too long a one leaves another too short where all
-    delimiters are as many as they must be.
-    """
-    mark, lines = layout.delimiter, text.count(b"\n", start) + (not text.endswith(b"\n"))
-    if mark == " " or text.find(b'"', start) >= 0 or frame.iloc[:, -1].isna().any():
-        return False
-    letters = np.frombuffer(text, np.uint8)[start:]
-    parts = (letters[i : i + PART] for i in range(0, letters.size, PART))
-    found = sum(np.count_nonzero(part == ord(mark)) for part in parts)
-    return len(frame) == lines and found == lines * (len(layout.headers) - 1)
-
-
 def _check_widths(path: Path, raw: bytes, body: bytes, layout: _Layout) -> None:
     """Refuse rows with more or fewer cells than the header, which pandas would fill or cut."""
     wanted, mark = len(layout.headers), layout.delimiter
     letters = np.frombuffer(body, np.uint8)
-    ends = np.append(np.flatnonzero(letters == ord("\n")), letters.size)
+    ends = letters == ord("\n")
     if mark == " ":
-        blank = (letters == ord(" ")) | (letters == ord("\t")) | (letters == ord("\n"))
-        words = np.flatnonzero(~blank & np.append(True, blank[:-1]))
-        counts = np.diff(np.searchsorted(words, ends), prepend=0)
+        blank = (letters == ord(" ")) | (letters == ord("\t")) | ends
+        firsts = ~blank & np.append(True, blank[:-1])
     else:
-        counts = np.diff(np.searchsorted(np.flatnonzero(letters == ord(mark)), ends), prepend=0) + 1
+        firsts = letters == ord(mark)
+    starts = np.append(0, np.flatnonzero(ends[:-1]) + 1)
+    counts = np.add.reduceat(firsts, starts, dtype=np.intp) + (mark != " ")
     if b'"' in body:
         for i, line in enumerate(body.decode().split("\n")):
             counts[i] = len(_cells(line, mark)) if '"' in line else counts[i]
@@ -474,7 +449,7 @@ def _numbers(
 def _number(cell: str, decimal: str) -> float | None:
     """Value of a cell; None if it is not a number."""
     if cell.lower() in _MISSING:
-        return float(cell)
+        return float(cell) if "inf" in cell.lower() else np.nan
     # The other mark would divide thousands, or the file mixes both: neither is guessed at.
     if (".,"[decimal == "."]) in cell or not _NUMBER.match(cell):
         return None
@@ -484,6 +459,8 @@ def _number(cell: str, decimal: str) -> float | None:
 def _mend(cell: str) -> str:
     if re.search(r"\d[-/:]\d", cell):
         return "Write dates and clock times as seconds from the start of the run."
+    if re.search(r"\d([.,' ])\d{3}(\1\d{3}|[.,]\d)*\b", cell):
+        return "If its mark divides thousands, export the file without such marks."
     return (
         "Correct the cell, leave it empty where the value is missing, or state decimal and "
         "delimiter in [files]."

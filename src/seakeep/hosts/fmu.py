@@ -8,6 +8,7 @@ import platform
 import shlex
 import shutil
 import subprocess
+import tempfile
 import uuid
 import zipfile
 from importlib import metadata
@@ -15,7 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from seakeep.errors import RequestError
-from seakeep.files import MARK, check_output, replacing, working_folder
+from seakeep.files import MARK, check_output, replacing
 from seakeep.hosts.c import identifier, rendered, sources
 from seakeep.hosts.program import Program, program_of
 from seakeep.models import Model
@@ -74,17 +75,17 @@ def write_fmu(model: Model, path: str | Path) -> Path:
     described = _description(program, content["start"])
     description = rendered("modelDescription.xml", **content, **described)
     with (
-        working_folder() as folder,
+        tempfile.TemporaryDirectory() as folder,
         replacing(target) as temporary,
         zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
     ):
         archive.writestr("modelDescription.xml", description, zipfile.ZIP_STORED)
         for file, text in files.items():
-            (folder / file).write_text(text, encoding="utf-8")
+            Path(folder, file).write_text(text, encoding="utf-8")
             archive.writestr(f"sources/{file}", text)
         if (found := compiler()) is not None:
             place, suffix = PLATFORMS[platform.system(), platform.machine()]
-            made = _compiled(found, folder, name, suffix)
+            made = _compiled(found, Path(folder), name, suffix)
             archive.write(made, f"binaries/{place}/{made.name}")
     return target
 

@@ -7,7 +7,7 @@ through studies and reports by their ``kind``. :mod:`seakeep.baselines` is the p
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -95,8 +95,9 @@ class LinearSpec(HankelSettings):
     ) -> LinearModel:
         """Fit the model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
         named = as_runs(runs)
-        data = gather(named, states, inputs, stop, self)
-        return self.model.fitted(self, data, self.solve(data), named)
+        spec = self.resolved_in(named, inputs)
+        data = gather(named, states, inputs, stop, spec)
+        return self.model.fitted(spec, data, spec.solve(data), named)
 
     def solve(self, data: TrainingData) -> Solution:
         """Coefficients on standardised deviations, shape (N, N(s+1) + n(z+1) + m)."""
@@ -432,21 +433,10 @@ class SubspaceModel(SingleModel, store.Saved):
     def from_dataset(cls, dataset: xr.Dataset, settings: Subspace) -> SubspaceModel:
         """Rebuild a model from what :meth:`save` wrote; it is equal to the last bit."""
         signature = store.unpack_signature(dataset)
-        store.check_settings(settings, signature)
-        n, N = settings.order, len(signature.states)
-        delayed, direct = signature.input_scale.mean.size, signature.direct_scale.mean.size
-        past = N * (settings.state_delays + 1) + delayed * settings.input_delays
-        shapes = {
-            "A": (n, n),
-            "B": (n, delayed + direct),
-            "C": (N, n),
-            "D": (N, delayed + direct),
-            "filter": (n, past),
-        }
         return cls(
             settings=settings,
-            space=StateSpace(*(store.numbers(dataset, key, at) for key, at in shapes.items())),
+            space=StateSpace(*(store.numbers(dataset, each.name) for each in fields(StateSpace))),
             signature=signature,
-            training=Training.from_json(store.content(dataset, "training"), signature.dt, n),
+            training=Training.from_json(store.content(dataset, "training")),
             coverage=Coverage.from_dataset(dataset, signature),
         )

@@ -23,9 +23,9 @@ from seakeep.core.calibration import (
     spread_floor,
     wave_envelope,
 )
-from seakeep.errors import DataError, RequestError, warn
+from seakeep.errors import RequestError, warn
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice, typed
+from seakeep.models.checks import check_choice
 from seakeep.models.engine import Runs as FreeRuns
 from seakeep.models.engine import Windows, member_series, read_windows
 from seakeep.models.executor import Progress
@@ -148,55 +148,18 @@ class Calibration:
         )
 
     @classmethod
-    def from_json(cls, content: object, channels: int) -> Calibration | None:
-        """Rebuild from the values of :meth:`to_json`, for so many states; None stays None."""
+    def from_json(cls, content: Json | None) -> Calibration | None:
+        """Rebuild from the values of :meth:`to_json`; None stays None."""
         if content is None:
             return None
-        if not isinstance(content, dict) or "floor" not in content:
-            raise DataError(
-                "the ensemble's band was calibrated by an older seakeep, in a form that is no "
-                "longer read. Calibrate the ensemble again, from its file without a calibration."
-            )
-        kept = typed(_Kept, content, "calibration")
-        arrays = {key: _positive(getattr(kept, key), key, channels) for key in NUMBERS}
-        floor = None if kept.floor is None else _positive(kept.floor, "floor", channels)
-        found = ConformalMargin(**arrays, level=fraction(kept.level, "level"))
-        law = None
-        if kept.law is not None:
-            sizes = [len(row) for row in kept.law]
-            if sizes != [channels] * 4 or not np.all(np.isfinite(kept.law)):
-                raise ValueError(
-                    f"law of the calibration is not a table of 4 rows of {channels} numbers"
-                )
-            law = np.array(kept.law)
-        return cls(found, floor, law, kept.windows, kept.steps, kept.spans, kept.folds)
-
-
-@dataclass(frozen=True)
-class _Kept:
-    """What a file holds of a calibration."""
-
-    margin: list[float]
-    block_length: list[float]
-    blocks: list[float]
-    warranted: list[float]
-    level: float
-    floor: list[float] | None
-    law: list[list[float]] | None
-    windows: dict[str, int]
-    steps: int
-    spans: dict[str, tuple[float, float]]
-    folds: str | None
-
-
-def _positive(stated: list[float], key: str, channels: int) -> FloatArray:
-    """Numbers of a calibration, one per state, none negative."""
-    values = np.array(stated)
-    if values.shape != (channels,) or not np.all(values >= 0):
-        raise ValueError(
-            f"{key} of the calibration is not a list of {channels} numbers from zero on"
+        found = ConformalMargin(
+            **{key: np.array(content[key]) for key in NUMBERS}, level=content["level"]
         )
-    return values
+        floor, law = (
+            None if content[key] is None else np.array(content[key]) for key in ("floor", "law")
+        )
+        spans = {run: (first, last) for run, (first, last) in content["spans"].items()}
+        return cls(found, floor, law, content["windows"], content["steps"], spans, content["folds"])
 
 
 def calibrate(

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import functools
-import json
 import numbers
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import MISSING, dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, fields
 from typing import Any, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
-from seakeep.arrays import GREATEST
-from seakeep.errors import SHOWN, RequestError, did_you_mean, wanted
+from seakeep.errors import SHOWN, RequestError, did_you_mean
 
-__all__ = ["check_choice", "check_integer", "check_keys", "parsed", "settings_of", "typed"]
+__all__ = ["check_choice", "check_integer", "check_keys", "of_json", "settings_of"]
 
 Settings = TypeVar("Settings")
 Made = TypeVar("Made")
@@ -122,104 +119,10 @@ def check_keys(kind: type, table: Mapping[str, object], what: str = "") -> None:
         raise RequestError(f"{what}the key '{missing[0]}' is missing. {listed}")
 
 
-def parsed(text: str, name: str, greatest: float = GREATEST) -> Any:
-    """JSON value of a text that a file keeps; numbers that nothing measures are refused.
-
-    Parameters
-    ----------
-    text : str
-        The text.
-    name : str
-        What a message calls it.
-    greatest : float, optional
-        Magnitude above which finite numbers are refused.
-
-    Raises
-    ------
-    ValueError
-        If it is no JSON, or holds such a number.
-    """
-
-    def bounded(kind: type[float]) -> Callable[[str], float | _Odd]:
-        return lambda each: kind(each) if abs(float(each)) <= greatest else _Odd(each)
-
-    try:
-        found = json.loads(
-            text, parse_constant=_constant, parse_float=bounded(float), parse_int=bounded(int)
-        )
-        _refuse_odd(found, name)
-    except json.JSONDecodeError:
-        raise ValueError(f"{name}: received {text!r:.{SHOWN}}, which is no JSON") from None
-    except RecursionError:
-        raise ValueError(f"{name} is nested hundreds of levels deep") from None
-    return found
-
-
-@dataclass(frozen=True)
-class _Odd:
-    """A number that nothing measures, until its key is known."""
-
-    text: str
-
-
-def _constant(text: str) -> float | _Odd:
-    return _Odd(text) if text == "NaN" else float(text)
-
-
-def _refuse_odd(value: object, place: str) -> None:
-    if isinstance(value, _Odd):
-        raise ValueError(f"{place}: received {value.text:.{SHOWN}}, which nothing measures")
-    if isinstance(value, dict | list):
-        for key, each in value.items() if isinstance(value, dict) else enumerate(value):
-            _refuse_odd(each, f"{place}.{key}")
-
-
-def typed(kind: type[Made], content: object, place: str = "") -> Made:
-    """Rebuild a dataclass from JSON values; its annotations say of which types they must be.
-
-    Parameters
-    ----------
-    kind : type
-        The dataclass.
-    content : object
-        JSON values.
-    place : str, optional
-        What a message calls them; by default the name of the class.
-
-    Raises
-    ------
-    ValueError
-        If a value is missing, or of another type.
-    """
-    anything: Any = kind  # mypy takes no type for hashable
-    whole = place or kind.__name__
-    try:
-        text = json.dumps(content)
-    except TypeError:
-        raise ValueError(f"{whole}: received {content!r:.{SHOWN}}, which is no JSON") from None
-    try:
-        made: Made = _adapter(anything).validate_json(text, strict=True)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join([whole, *_keys(first["loc"], content)])
-        if first["type"] == "missing":
-            raise ValueError(f"{key}.{first['loc'][-1]} is missing") from None
-        received = f"received {first['input']!r:.{SHOWN}}"
-        if first["type"] == "value_error":
-            said = str(first["ctx"]["error"])
-            known = "received" in said
-            raise ValueError(f"{key}: {said}" if known else f"{key}: {received}; {said}") from None
-        said = "is no JSON" if first["type"] == "json_invalid" else wanted(first["msg"])
-        raise ValueError(f"{key}: {received}, which {said}") from None
+def of_json(kind: type[Made], content: Mapping[str, Any]) -> Made:
+    """Rebuild a dataclass from its fields as JSON values, those of dataclasses in it included."""
+    made: Made = _adapter(kind).validate_python(content)  # type: ignore[arg-type]
     return made
-
-
-def _keys(place: Sequence[str | int], content: Any) -> Iterator[str]:
-    """Keys of a place without the names of types, which pydantic puts between them."""
-    for each in place:
-        with suppress(LookupError, TypeError):
-            content = content[each]
-            yield str(each)
 
 
 @functools.cache

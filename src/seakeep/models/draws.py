@@ -4,8 +4,8 @@ Every member has a generator of its own, the k-th child of the seed, and reads i
 alone, or from the k-th point of a Sobol net that the seed itself scrambles: a member is the same
 for any number of members or workers, in any order of work.
 
-Lengths are drawn in encounter periods and become samples by rounding to the nearest integer, halves
-upwards (:func:`~seakeep.models.settings.periods_to_samples`). A draw is infeasible where a run that
+Lengths are drawn in the unit of their prior and become samples by rounding to the nearest integer,
+halves upwards (:func:`~seakeep.models.settings.in_samples`). A draw is infeasible where a run that
 trains the member does not hold the window with its delay history before it (``history="before"``:
 m + max(s, z) samples; ``"inside"``: m samples, and max(s, z) + 2 of them), an integer is out of
 range, or a quantile is not finite. All of it is then drawn again from the member's own generator,
@@ -24,14 +24,14 @@ import scipy
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError
 from seakeep.models.interface import InputMap
-from seakeep.models.settings import History, periods_to_samples
+from seakeep.models.settings import History
 
 __all__ = ["Draw", "Sampling", "TrainOn", "draw_members"]
 
 Sampling = Literal["monte_carlo", "sobol"]
 TrainOn = Literal["all", "runs", "windows", "auto"]
 
-PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
+PRIORS = ("window", "state_delays", "input_delays", "ridge")
 """Settings that are drawn, in the order of a member's numbers."""
 MOST_REDRAWS = 1000
 """After so many infeasible draws of one member the priors are taken not to fit the data."""
@@ -43,8 +43,9 @@ class Draw:
 
     Parameters
     ----------
-    train_length, state_delay, input_delay : float
-        Lengths as drawn, encounter periods; the first is NaN where all of a run trains.
+    drawn : tuple of float
+        Window and delays of states and inputs as drawn, in the units of their priors; the first is
+        NaN where all of a run trains.
     ridge : float
         λ.
     window : int or None
@@ -59,9 +60,7 @@ class Draw:
         Infeasible draws before this one.
     """
 
-    train_length: float
-    state_delay: float
-    input_delay: float
+    drawn: tuple[float, float, float]
     ridge: float
     window: int | None
     state_delays: int
@@ -83,37 +82,20 @@ class Draw:
 
 
 class Drawn(Protocol):
-    """Priors, seed and rules that make the draws."""
+    """Priors, seed and rules that make the draws; see :class:`seakeep.BayesianHankelDMDc`."""
 
     @property
-    def encounter_period(self) -> float:
-        """As in :class:`seakeep.BayesianHankelDMDc`."""
-        ...
-
+    def n_members(self) -> int: ...
     @property
-    def n_members(self) -> int:
-        """As in :class:`seakeep.BayesianHankelDMDc`."""
-        ...
-
+    def sampling(self) -> Sampling: ...
     @property
-    def sampling(self) -> Sampling:
-        """As in :class:`seakeep.BayesianHankelDMDc`."""
-        ...
-
+    def train_on(self) -> TrainOn: ...
     @property
-    def train_on(self) -> TrainOn:
-        """As in :class:`seakeep.BayesianHankelDMDc`."""
-        ...
-
+    def history(self) -> History: ...
     @property
-    def history(self) -> History:
-        """As in :class:`seakeep.BayesianHankelDMDc`."""
-        ...
-
-    @property
-    def seed_sequence(self) -> np.random.SeedSequence:
-        """As in :class:`seakeep.BayesianHankelDMDc`."""
-        ...
+    def seed_sequence(self) -> np.random.SeedSequence: ...
+    def at(self, name: str, q: float) -> float | None: ...
+    def samples(self, name: str, value: float, dt: float) -> int: ...
 
 
 def child(seed: np.random.SeedSequence, member: int) -> np.random.Generator:
@@ -196,11 +178,8 @@ def _draw_member(
 
 
 def _quantiles_of(spec: Drawn, quantiles: FloatArray) -> dict[str, float]:
-    return {
-        name: float(prior.ppf(float(q)))
-        for name, q in zip(PRIORS, quantiles, strict=True)
-        if (prior := getattr(spec, name)) is not None
-    }
+    found = {name: spec.at(name, float(q)) for name, q in zip(PRIORS, quantiles, strict=True)}
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def _not_finite(drawn: dict[str, float]) -> str:
@@ -228,23 +207,19 @@ def _out_of_range(draw: Draw, inside: bool) -> str:
         )
         return (
             f"the last one gave a window of {draw.window} samples{within}, and {least} are "
-            "needed. Raise train_length, or lower the delays."
+            "needed. Raise window, or lower the delays."
         )
     return ""
 
 
 def _rounded(spec: Drawn, dt: float, drawn: dict[str, float], redrawn: int) -> Draw:
-    def to_samples(periods: float) -> int:
-        return periods_to_samples(periods, spec.encounter_period, dt)
-
+    lengths = {name: spec.samples(name, drawn[name], dt) for name in PRIORS[:3] if name in drawn}
     return Draw(
-        train_length=drawn.get("train_length", np.nan),
-        state_delay=drawn["state_delay"],
-        input_delay=drawn["input_delay"],
+        drawn=(drawn.get("window", np.nan), drawn["state_delays"], drawn["input_delays"]),
         ridge=drawn["ridge"],
-        window=to_samples(drawn["train_length"]) if "train_length" in drawn else None,
-        state_delays=to_samples(drawn["state_delay"]),
-        input_delays=to_samples(drawn["input_delay"]),
+        window=lengths.get("window"),
+        state_delays=lengths["state_delays"],
+        input_delays=lengths["input_delays"],
         run=None,
         last=None,
         redrawn=redrawn,

@@ -25,8 +25,7 @@ from seakeep.models.calibration import (
     warn_of_horizon,
     widened,
 )
-from seakeep.models.checks import typed
-from seakeep.models.draws import MOST_REDRAWS, Draw
+from seakeep.models.draws import Draw
 from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
 from seakeep.models.executor import Progress, in_order, one_blas_thread
 from seakeep.models.forecasts import (
@@ -50,11 +49,11 @@ from seakeep.models.linear import HankelDMDcModel, Kept
 from seakeep.models.live import Live
 from seakeep.models.members import (
     TrainingArrays,
-    check_draw,
     identify_member,
     spectral_radius,
     window_ends,
 )
+from seakeep.models.priors import unit_of
 from seakeep.models.settings import HankelSettings
 from seakeep.models.summaries import (
     reduce_members,
@@ -68,15 +67,14 @@ from seakeep.signals.time_axis import span_text
 __all__ = ["BandForecast", "HankelEnsemble", "HeldEnsemble"]
 
 DRAWN = {
-    "train_length": ("length of the training window", "encounter periods"),
-    "state_delay": ("longest delay of the states", "encounter periods"),
-    "input_delay": ("longest delay of the inputs", "encounter periods"),
-    "ridge": ("ridge λ", "1"),
+    "window": "length of the training window",
+    "state_delays": "longest delay of the states",
+    "input_delays": "longest delay of the inputs",
 }
 ROUNDED = {
-    "train_length_samples": ("window", "length of the training window; −1 for all of a run"),
-    "state_delay_samples": ("state_delays", "number of delayed copies of the states"),
-    "input_delay_samples": ("input_delays", "number of delayed copies of the inputs"),
+    "window_samples": ("window", "length of the training window; −1 for all of a run"),
+    "state_delays_samples": ("state_delays", "number of delayed copies of the states"),
+    "input_delays_samples": ("input_delays", "number of delayed copies of the inputs"),
     "training_run": ("run", "run that trains; −1 for all"),
     "last_sample": ("last", "last sample of the training window; −1 for that at stop"),
     "redrawn": ("redrawn", "infeasible draws before this one"),
@@ -385,10 +383,10 @@ class HankelEnsemble(_Forecasts, store.Saved):
     def draws(self) -> xr.Dataset:
         """Drawn settings, over ``member``.
 
-        ``train_length``, ``state_delay`` and ``input_delay`` in encounter periods (NaN where all
-        of a run trains), the integers ``…_samples`` they became (−1 for all of a run), ``ridge``,
-        the run that trains (−1 for all) and its last sample (−1 for ``stop``), and how many
-        infeasible draws came before.
+        ``window``, ``state_delays`` and ``input_delays`` as drawn, in the units of their priors
+        (NaN where all of a run trains), the integers ``…_samples`` they became (−1 for all of a
+        run), ``ridge``, the run that trains (−1 for all) and its last sample (−1 for ``stop``),
+        and how many infeasible draws came before.
         """
         return draws_dataset(self.members, self.origin)
 
@@ -548,11 +546,9 @@ class HankelEnsemble(_Forecasts, store.Saved):
             f"  inputs        {', '.join(with_units(self.input_labels)) or 'none (autonomous)'}",
             f"  draws         {SAMPLING[origin['sampling']]}, seed {origin['seed']}; "
             f"{refused or 'none'} infeasible and drawn again",
-            f"  window        {_window(self.members)}",
-            f"  state delay   {_periods([d.state_delay for d in draws])} "
-            f"({_samples([d.state_delays for d in draws])})",
-            f"  input delay   {_periods([d.input_delay for d in draws])} "
-            f"({_samples([d.input_delays for d in draws])})",
+            f"  window        {_drawn(self, 0, [d.window for d in draws if d.window])}",
+            f"  state delay   {_drawn(self, 1, [d.state_delays for d in draws])}",
+            f"  input delay   {_drawn(self, 2, [d.input_delays for d in draws])}",
             f"  ridge         {_range([d.ridge for d in draws], '.4g')}{scale}; delay rows "
             f"{'exact' if settings.delay_rows == 'exact' else 'regressed'}",
             f"  history       {self.history_samples} samples up to the start of a forecast",
@@ -743,67 +739,36 @@ class HankelEnsemble(_Forecasts, store.Saved):
         cls, dataset: xr.Dataset, signature: Signature, settings: HankelSettings, origin: Json
     ) -> HankelEnsemble:
         """Rebuild an ensemble from :meth:`to_dataset`; its members are equal to the last bit."""
-        place = typed(_Place, store.content(dataset, "runs"), "runs")
+        place = store.content(dataset, "runs")
         delayed, direct = signature.input_map.regressors(signature.input_labels)
         names = (
             tuple(signature.states),
             tuple(label.name for label in delayed),
             tuple(label.name for label in direct),
         )
-        series = [
-            tuple(
-                store.numbers(dataset, f"{group}_{number}", (None, len(channels)))
-                for number in range(len(place.names))
-            )
-            for group, channels in zip(("states", "delayed", "direct"), names, strict=True)
-        ]
+        states, delayed_series, direct_series = (
+            tuple(store.numbers(dataset, f"{group}_{run}") for run in range(len(place["names"])))
+            for group in ("states", "delayed", "direct")
+        )
         arrays = TrainingArrays(
-            names=place.names,
-            states=series[0],
-            delayed=series[1],
-            direct=series[2],
-            offsets=place.offsets,
-            begins=place.begins,
+            names=tuple(place["names"]),
+            states=states,
+            delayed=delayed_series,
+            direct=direct_series,
+            offsets=tuple(place["offsets"]),
+            begins=tuple(place["begins"]),
             channels=names,
         )
-        if len({len(arrays.names), len(arrays.offsets), len(arrays.begins)}) != 1:
-            raise ValueError("runs, offsets and instants are of unequal number")
-        if min(arrays.offsets, default=0) < 0 or not np.all(np.isfinite(arrays.begins)):
-            raise ValueError("offsets or instants of the runs are none")
-        draws = _draws(dataset)
-        if origin.get("n_members", len(draws)) != len(draws):
-            raise ValueError(f"n_members is {origin['n_members']}, and {len(draws)} members follow")
-        store.check_settings(settings, signature, delays=False)
-        for number, draw in enumerate(draws):
-            try:
-                check_draw(arrays, settings, signature.input_map, draw)
-            except ValueError as error:
-                raise ValueError(f"member {number}: {error}") from None
-        for key in ("state_delays", "input_delays"):
-            longest = max(getattr(draw, key) for draw in draws)
-            if longest != getattr(signature, key):
-                raise ValueError(f"{key} of the members reach {longest}, not those stated")
         return cls(
             settings=settings,
             origin=origin,
-            members=draws,
+            members=_draws(dataset),
             arrays=arrays,
             signature=signature,
             coverage=Coverage.from_dataset(dataset, signature),
-            calibration=Calibration.from_json(
-                store.document(dataset, "calibration"), len(signature.state_labels)
-            ),
+            calibration=Calibration.from_json(store.content(dataset, "calibration")),
             selection=str(dataset.attrs["selection"]),
         )
-
-
-@dataclass(frozen=True)
-class _Place:
-    """What a file holds of the runs that train."""
-
-    names: tuple[str, ...]
-    offsets: tuple[int, ...]
-    begins: tuple[float, ...]
 
 
 def _radius(ensemble: HankelEnsemble, number: int) -> float:
@@ -967,14 +932,13 @@ class HeldEnsemble(_Forecasts):
 
 def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Dataset:
     """Draws over ``member``; see ``HankelEnsemble.draws``."""
-    variables = {
-        name: (
-            "member",
-            np.array([getattr(draw, name) for draw in members], dtype=float),
-            {"long_name": label, "units": units},
-        )
-        for name, (label, units) in DRAWN.items()
+    drawn = np.array([draw.drawn for draw in members], dtype=float).reshape(-1, len(DRAWN))
+    variables: dict[str, Any] = {
+        name: ("member", values, {"long_name": label, "units": unit_of(origin[name])})
+        for (name, label), values in zip(DRAWN.items(), drawn.T, strict=True)
     }
+    ridge = np.array([draw.ridge for draw in members], dtype=float)
+    variables["ridge"] = ("member", ridge, {"long_name": "ridge λ", "units": "1"})
     for name, (attribute, label) in ROUNDED.items():
         values = [getattr(draw, attribute) for draw in members]
         integers = np.array([-1 if value is None else value for value in values], dtype=np.int64)
@@ -987,24 +951,16 @@ def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Data
 
 
 def _draws(dataset: xr.Dataset) -> tuple[Draw, ...]:
-    columns: dict[str, list[Any]] = {}
-    for name in (*DRAWN, *ROUNDED):
-        found = dataset[name]
-        if found.dims != ("member",) or found.dtype.kind not in ("i" if name in ROUNDED else "f"):
-            raise ValueError(f"{name} is {found.dtype} over {found.dims}, not a number per member")
-        columns[name] = found.values.tolist()
+    columns: dict[str, list[Any]] = {"ridge": dataset["ridge"].values.tolist()}
     for name, (attribute, _) in ROUNDED.items():
-        values = columns.pop(name)
-        most = MOST_REDRAWS - 1 if name == "redrawn" else np.inf
-        for number, value in enumerate(values):
-            if value > most or (value < 0 and attribute not in OPTIONAL):
-                raise ValueError(f"{name} of member {number} is {value}")
+        values = dataset[name].values.tolist()
         columns[attribute] = [
             None if each < 0 and attribute in OPTIONAL else each for each in values
         ]
+    drawn = zip(*(dataset[name].values.tolist() for name in DRAWN), strict=True)
     return tuple(
-        Draw(**dict(zip(columns, each, strict=True)))
-        for each in zip(*columns.values(), strict=True)
+        Draw(drawn=lengths, **dict(zip(columns, each, strict=True)))
+        for lengths, each in zip(drawn, zip(*columns.values(), strict=True), strict=True)
     )
 
 
@@ -1019,12 +975,14 @@ def _warn_of_unstable(radii: FloatArray) -> None:
         )
 
 
-def _window(draws: Sequence[Draw]) -> str:
-    windows = [draw.window for draw in draws if draw.window is not None]
-    if not windows:
+def _drawn(ensemble: HankelEnsemble, place: int, samples: Sequence[int]) -> str:
+    """A length as drawn, and in samples."""
+    if not samples:
         return "all of a run"
-    periods = _periods([draw.train_length for draw in draws])
-    return f"{periods} ({_samples(windows)})"
+    rounded = _of(_range(samples, "d"), "samples")
+    values = [draw.drawn[place] for draw in ensemble.members]
+    unit = unit_of(ensemble.origin[tuple(DRAWN)[place]])
+    return rounded if unit == "samples" else f"{_of(_range(values, '.4g'), unit)} ({rounded})"
 
 
 def _range(values: Sequence[float] | FloatArray, form: str) -> str:
@@ -1032,13 +990,5 @@ def _range(values: Sequence[float] | FloatArray, form: str) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _periods(values: Sequence[float]) -> str:
-    return _of(_range(values, ".4g"), "encounter period")
-
-
-def _samples(values: Sequence[int]) -> str:
-    return _of(_range(values, "d"), "sample")
-
-
 def _of(count: str, unit: str) -> str:
-    return f"{count} {unit}" if count == "1" else f"{count} {unit}s"
+    return f"{count} {unit.removesuffix('s') if count == '1' else unit}"

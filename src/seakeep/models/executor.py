@@ -182,11 +182,13 @@ def processes(workers: int) -> Iterator[Executor]:
     try:
         yield pool
     except BaseException:
-        for child in list((pool._processes or {}).values()):
-            child.terminate()
+        for worker in list((pool._processes or {}).values()):
+            worker.kill()
+        # The pool would wait for the rest of a result that a worker was sending while this end of
+        # the pipe is open.
+        pool._result_queue._writer.close()  # type: ignore[attr-defined]
         raise
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+    pool.shutdown(cancel_futures=True)
 
 
 def _start_worker() -> None:
@@ -280,7 +282,10 @@ def versions() -> dict[str, str]:
 def submitting(
     function: Function[Data, Item, Result], data: Data, executor: Executor
 ) -> Iterator[Callable[[Sequence[Item]], Future[list[Result]]]]:
-    """Hand out items; what is not done is cancelled when the block is left."""
+    """Hand out items; what is not done is cancelled when the block is left.
+
+    Except in a pool of processes: it fails over a cancelled future when its workers are killed.
+    """
     payload, token = pickle.dumps((data, versions()), protocol=5), uuid.uuid4().hex
     under_way: set[Future[list[Result]]] = set()  # not the finished: they hold their results
 
@@ -300,7 +305,7 @@ def submitting(
             "line: if __name__ == '__main__':"
         ) from None
     except BaseException as error:
-        for future in tuple(under_way):
+        for future in () if on_this_machine(executor) else tuple(under_way):
             future.cancel()
         if isinstance(error, CancelledError):
             raise WorkerLostError(

@@ -423,7 +423,7 @@ def rows_by_name(
     name: str, value: npt.ArrayLike, least: int, names: Sequence[str], meaning: str
 ) -> FloatArray:
     """Rows of numbers (time, channel); columns that have names are taken by name."""
-    array = as_real(_by_name(name, value, names), name, greatest=np.inf)
+    array = as_real(_by_name(name, value, names), name)
     channels = len(names)
     if array.ndim != 2 or array.shape[1] != channels or array.shape[0] < least:
         turned = array.ndim == 2 and array.shape[0] == channels and array.shape[1] >= least

@@ -87,26 +87,17 @@ class LeadErrors:
         }
 
     @classmethod
-    def from_dataset(cls, dataset: xr.Dataset, channels: int) -> Self | None:
-        """Read what a file keeps; None where it was written before these were kept."""
+    def from_dataset(cls, dataset: xr.Dataset) -> Self | None:
+        """Rebuild from :meth:`to_variables`; None where a file keeps none."""
         if "lead_errors" not in dataset:
             return None
-        made = cls(
-            store.numbers(dataset, "residual_covariance", (channels, channels)),
-            store.numbers(dataset, "lead_errors", (None, channels)),
-            store.numbers(dataset, "ending_errors", (None, channels))
-            if "ending_errors" in dataset
-            else np.zeros((0, channels)),
+        residual, rms = (
+            store.numbers(dataset, key) for key in ("residual_covariance", "lead_errors")
         )
-        # Of a covariance no correlation is beyond one; margins are of rounding.
-        bound = np.sqrt(np.maximum(np.diag(made.residual), 0.0))
-        if np.any(np.abs(made.residual) > 1.001 * np.outer(bound, bound)):
-            raise ValueError("residual_covariance is no covariance")
-        if not np.allclose(made.residual, made.residual.T, rtol=1e-6, atol=0.0):
-            raise ValueError("residual_covariance is not symmetric")
-        if np.any(made.rms < 0) or np.any(made.ending < 0):
-            raise ValueError("lead_errors or ending_errors are negative")
-        return made
+        ending = np.zeros((0, rms.shape[1]))
+        if "ending_errors" in dataset:
+            ending = store.numbers(dataset, "ending_errors")
+        return cls(residual, rms, ending)
 
 
 class Source(NamedTuple):

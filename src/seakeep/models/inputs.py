@@ -27,7 +27,7 @@ from scipy import signal
 from seakeep.arrays import FloatArray
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice, check_integer, settings_of, typed
+from seakeep.models.checks import check_choice, check_integer, of_json, settings_of
 from seakeep.models.interface import Drive, InputMap, Json, Regressors, Span, plain
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.observables import Observed
@@ -149,7 +149,7 @@ class Lead:
     @classmethod
     def from_json(cls, content: Json) -> Self:
         """Rebuild from :meth:`to_json`."""
-        return typed(cls, content)
+        return cls(**content)
 
 
 @dataclass(frozen=True, eq=False)
@@ -537,22 +537,7 @@ class FittedAlignment:
     @classmethod
     def from_json(cls, content: Json) -> Self:
         """Rebuild from :meth:`to_json`."""
-        made = typed(cls, content)
-        counts = {len(made.inputs), len(made.carried), len(made.positions)}
-        positive = (made.celerity, made.period, made.water_depth, made.highest_frequency)
-        needed = [made.celerity if made.settings.mode == "effective" else made.highest_frequency]
-        if made.settings.surge == "predicted":
-            needed.append(made.period)
-        if (
-            len(counts) > 1
-            or None in needed
-            or any(each is not None and each <= 0 for each in positive)
-            or (made.period is not None and made.period <= 2 * SURGE_CUTOFF)
-            or (made.celerity_spread is not None and made.celerity_spread < 0)
-            or made.surge_range[0] > made.surge_range[1]
-        ):
-            raise ValueError("the alignment of the inputs is not one of a vessel in waves")
-        return made
+        return of_json(cls, content)
 
     def offsets(self, run: xr.Dataset) -> FloatArray:
         """Constant distance by which each input of a run is carried, m."""
@@ -804,8 +789,8 @@ class Chain:
     def from_json(cls, content: Json) -> Self:
         """Rebuild from :meth:`to_json`; an unknown kind raises a DataError."""
         maps = []
-        for rest in typed(list[Json], content.get("maps"), "input_map.maps"):
-            kind = str(rest.pop("kind", ""))
+        for rest in content["maps"]:
+            kind = str(rest.pop("kind"))
             if kind not in MAPS:
                 raise DataError(
                     f"the input map '{kind}' is not known here. Update seakeep, or import the "

@@ -379,6 +379,10 @@ class Spec(Protocol):
     kind: ClassVar[str]
     is_ensemble: ClassVar[bool]
 
+    def resolved(self, dt: float, encounter_period: float | None) -> Self:
+        """Settings whose lengths are samples."""
+        ...
+
     def needs(self, dt: float) -> Needs:
         """Samples that it asks of its runs at a time step."""
         ...

@@ -115,7 +115,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
 
     @cached_property
     def errors(self) -> LeadErrors | None:
-        """Its errors in training, which :meth:`live` weighs; None where its file holds none."""
+        """Its errors in training, which :meth:`live` weighs; a member of an ensemble has none."""
         if isinstance(self.learnt, Kept):
             return self.learnt.errors
         return training_errors(self.dynamics, self.learnt.data, self.signature, self.learnt.runs)
@@ -506,23 +506,15 @@ class HankelDMDcModel(SingleModel, store.Saved):
     def from_dataset(cls, dataset: xr.Dataset, settings: HankelSettings) -> Self:
         """Rebuild a model from :meth:`to_dataset`; it is equal to the last bit."""
         signature = store.unpack_signature(dataset)
-        states = len(signature.states) * (signature.state_delays + 1)
-        rows = states if settings.delay_rows == "ridge" else len(signature.states)
-        width = states + signature.input_scale.mean.size * (signature.input_delays + 1)
-        shape = (rows, width + signature.direct_scale.mean.size)
-        store.check_settings(settings, signature)
-        training = Training.from_json(store.content(dataset, "training"), signature.dt, shape[1])
-        if training.clipped and settings.radius is None:
-            raise ValueError("training.clipped holds eigenvalues, and settings.stable is false")
         return cls(
             settings=settings,
-            coefficients=store.numbers(dataset, "coefficients", shape),
+            coefficients=store.numbers(dataset, "coefficients"),
             signature=signature,
-            training=Training.from_json(store.content(dataset, "training"), signature.dt, shape[1]),
+            training=Training.from_json(store.content(dataset, "training")),
             selection=str(dataset.attrs["selection"]),
             learnt=Kept(
                 Coverage.from_dataset(dataset, signature),
-                LeadErrors.from_dataset(dataset, len(signature.states)),
+                LeadErrors.from_dataset(dataset),
             ),
         )
 

@@ -20,7 +20,6 @@ import xarray as xr
 from scipy import special
 
 from seakeep.arrays import (
-    GREATEST,
     BoolArray,
     FloatArray,
     as_real,
@@ -31,8 +30,8 @@ from seakeep.arrays import (
 )
 from seakeep.core.kalman import DelayFilter, process_noise
 from seakeep.errors import RequestError, did_you_mean
+from seakeep.files import load_sealed, write_sealed
 from seakeep.models import engine, store
-from seakeep.models.checks import typed
 from seakeep.models.engine import Dynamics, Windows
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import WINDOWS, LeadErrors
@@ -43,6 +42,8 @@ from seakeep.signals.prediction import draw_sea, predict_waves, predictable_time
 
 __all__ = ["Live", "load_live"]
 
+STATE = "live state"
+"""Kind of the files of :meth:`Live.save`."""
 PAIRS = 8
 """Pairs of futures of the waves that are drawn where they are not known."""
 RECORD = 16
@@ -121,9 +122,8 @@ class Live:
         if errors is None:
             raise RequestError(
                 "the model holds no errors of its training, from which a live model takes its "
-                "noises: it is a member of an ensemble, which keeps them for all of its members, "
-                "or its file was written before they were kept. Use ensemble.hold().live(), or fit "
-                "the model again."
+                "noises: it is a member of an ensemble, which keeps them for all of its members. "
+                "Use ensemble.hold().live()."
             )
         self.model, self.signature, self.errors = model, model.signature, errors
         signature = self.signature
@@ -675,7 +675,7 @@ class Live:
         }
         words = {"places": json.dumps(self._at), "rig": json.dumps(self._rig)}
         dataset = xr.Dataset(arrays, attrs=words | {"model": self._fingerprint()})
-        return store.write(dataset, path, "live", "live state")
+        return write_sealed(dataset, path, STATE)
 
     def _fingerprint(self) -> str:
         """Identity of the model."""
@@ -696,30 +696,9 @@ class Live:
             "innovation": self._innovation,
         }
         for name, values in kept.items():
-            found = dataset[name].values
-            if found.shape != values.shape or found.dtype.kind != "f":
-                raise ValueError(f"{name} is {found.dtype} of shape {found.shape}")
-            values[:] = found
+            values[:] = dataset[name].values
         self._sum, self._weight, self._time = map(float, dataset["running"].values)
-        self._at = typed(dict[str, int], store.content(dataset, "places"), "places")
-        if not self._is_placed(**self._at):
-            raise ValueError("the places in its record do not fit together")
-
-    def _is_placed(
-        self, filled: int, final: int, rows: int, begins: int, taken: int, since: int, partly: int,
-        complete: int,
-    ) -> bool:  # fmt: skip
-        """Whether places could be those of a record, which moves on as samples are taken."""
-        first, delays = self.signature.history_samples, self.signature.input_delays
-        return (
-            0 <= filled <= min(2 * self._record, taken)
-            and begins == first - (taken - filled)
-            and filled - len(self._plain) <= final < filled
-            and begins - 1 - delays <= rows <= filled
-            and 0 <= since <= taken
-            and 0 <= complete <= taken
-            and partly in (0, 1)
-        )
+        self._at = store.content(dataset, "places")
 
 
 def load_live(model: Servable, path: str | Path) -> Live:
@@ -744,23 +723,8 @@ def load_live(model: Servable, path: str | Path) -> Live:
     DataError
         If it is damaged.
     """
-    dataset = store.read(path)
-    if dataset.attrs["seakeep_kind"] != "live":
-        raise RequestError(
-            f"{path} holds a model and no state of a live one. Load it with seakeep.load_model."
-        )
-    live = store.rebuilt(path, lambda: _restored(model, dataset), "Start anew with model.live().")
-    if live is None:
-        raise RequestError(
-            f"{path} is the state of another model. Load the model that was in service, or start "
-            "anew with model.live()."
-        )
-    return live
-
-
-def _restored(model: Servable, dataset: xr.Dataset) -> Live | None:
-    """The state that a file holds; None where it is another model's."""
-    rig = typed(dict[str, dict[str, float]], store.content(dataset, "rig"), "rig")
+    dataset = load_sealed(path, STATE)
+    rig = store.content(dataset, "rig")
     like = xr.Dataset(
         {name: ((), 0.0, {"x_position": each}) for name, each in rig["positions"].items()},
         attrs=rig["run"],
@@ -769,7 +733,10 @@ def _restored(model: Servable, dataset: xr.Dataset) -> Live | None:
     noise = dict(zip(states, dataset["noise"].values.tolist(), strict=False))
     live = model.live(like=like, noise={name: each for name, each in noise.items() if each})
     if dataset.attrs["model"] != live._fingerprint():
-        return None
+        raise RequestError(
+            f"{path} is the state of another model. Load the model that was in service, or start "
+            "anew with model.live()."
+        )
     live._restore(dataset)
     return live
 
@@ -870,11 +837,6 @@ def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArra
             )
         place = names.index(name)
         out[place] = positive(value, f"noise of {name}", units[place])
-        if out[place] > GREATEST:
-            raise RequestError(
-                f"noise of {name} is {out[place]:g} {units[place]}, which nothing measures. "
-                "Correct it."
-            )
     return out
 
 
@@ -890,7 +852,7 @@ def _sample(name: str, value: object, names: Sequence[str]) -> FloatArray:
                     f"{did_you_mean(str(key), names)} It takes: {', '.join(names) or 'none'}."
                 )
         value = [value.get(each, math.nan) for each in names]
-    array = as_real(value, name, greatest=np.inf)
+    array = as_real(value, name)
     if array.shape != (len(names),):
         raise RequestError(
             f"{name} has shape {array.shape}; one number for each of {', '.join(names) or 'none'} "

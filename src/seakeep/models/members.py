@@ -129,25 +129,6 @@ def _last_of(arrays: TrainingArrays, draw: Draw, run: int) -> int:
     return len(arrays.states[run]) - 1 if draw.last is None else draw.last - arrays.offsets[run]
 
 
-def check_draw(
-    arrays: TrainingArrays, settings: HankelSettings, input_map: InputMap, draw: Draw
-) -> None:
-    """Refuse a draw, as a file holds it, that these runs cannot teach: a ValueError says why."""
-    if not (np.isfinite(draw.ridge) and draw.ridge >= 0):
-        raise ValueError(f"its ridge is {draw.ridge}")
-    if draw.run is not None and draw.run >= len(arrays.names):
-        raise ValueError(f"it learns from run {draw.run}, and there are {len(arrays.names)}")
-    back = max(draw.state_delays, input_map.history(draw.input_delays))
-    for run in range(len(arrays.names)) if draw.run is None else (draw.run,):
-        count, end = len(arrays.states[run]), _last_of(arrays, draw, run)
-        fits = 0 <= end < count and (draw.window is None or 1 < draw.window <= end + 1)
-        if fits:
-            place = training_window(end, draw.window, draw.state_delays, back, settings.history)
-            fits = place.first_column < end - max(input_map.lead_samples - 1, 0)
-        if not fits:
-            raise ValueError(f"its window is not one of the {count} samples of {arrays.names[run]}")
-
-
 def spectral_radius(dynamics: Dynamics) -> float:
     """Largest modulus of an eigenvalue of Â."""
     top, _ = dynamics.matrices

@@ -20,7 +20,7 @@ from seakeep.arrays import FloatArray
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice, check_keys, typed
+from seakeep.models.checks import check_choice, check_keys
 from seakeep.models.interface import Drive, Regressors, Span
 from seakeep.models.labelled import ChannelLabel
 from seakeep.signals import expressions
@@ -594,20 +594,9 @@ class Observed:
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Self:
         """Rebuild from :meth:`to_json`."""
-        kept = typed(_Kept, content, "observed")
-        made = tuple(from_json(each) for each in kept.observables)
-        return cls(made, kept.lead, kept.inputs, kept.dt, kept.period)
-
-
-@dataclass(frozen=True)
-class _Kept:
-    """What a file holds of fitted observables."""
-
-    observables: list[dict[str, Any]]
-    lead: int
-    inputs: tuple[ChannelLabel, ...]
-    dt: float
-    period: float | None
+        inputs = tuple(ChannelLabel(**each) for each in content["inputs"])
+        made = tuple(from_json(each) for each in content["observables"])
+        return cls(made, content["lead"], inputs, content["dt"], content["period"])
 
 
 @dataclass(frozen=True, eq=False)

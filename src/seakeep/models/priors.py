@@ -2,21 +2,35 @@
 
 A prior is anything with a quantile function ``ppf``: one of the classes here, or a frozen
 distribution of :mod:`scipy.stats`. One uniform number between 0 and 1 makes one draw, so Monte
-Carlo and quasi-random points are used alike.
+Carlo and quasi-random points are used alike. A prior of a length states its unit, as in
+``Uniform("10 T", "30 T")``; bare numbers count samples.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
-from typing import Any, Protocol, runtime_checkable
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
-from seakeep.errors import SHOWN, DataError, RequestError
-from seakeep.models.checks import typed
+from seakeep.errors import SHOWN, RequestError, did_you_mean
+from seakeep.toml import Length, parse_length
 
-__all__ = ["Fixed", "LogUniform", "Prior", "Uniform", "check_prior", "describe", "from_description"]
+__all__ = [
+    "Distribution",
+    "Fixed",
+    "LogUniform",
+    "Prior",
+    "Uniform",
+    "prior_json",
+    "prior_of",
+    "unit_of",
+]
+
+Bound = float | str | Length
+"""Number, or a length such as ``"10 T"``."""
 
 
 @runtime_checkable
@@ -28,67 +42,95 @@ class Prior(Protocol):
         ...
 
 
-def _check_bounds(name: str, low: object, high: object, least: float) -> None:
-    numbers = [value for value in (low, high) if isinstance(value, int | float | np.number)]
-    if len(numbers) < 2 or not all(math.isfinite(value) for value in numbers):
+def _values(name: str, *given: object) -> tuple[list[float], str]:
+    """Finite numbers of the parameters of a prior, and the unit that they share."""
+    read = [parse_length(each) if isinstance(each, str) else each for each in given]
+    units = {each.unit if isinstance(each, Length) else "" for each in read}
+    values = [each.value if isinstance(each, Length) else each for each in read]
+    if len(units) > 1:
         raise RequestError(
-            f"{name} needs two finite numbers; received {low!r:.{SHOWN}} and {high!r:.{SHOWN}}."
+            f"{name} needs one unit; received {' and '.join(map(repr, given))}. Write 'T', for "
+            "encounter periods, or 's' behind each number, or behind none."
         )
-    if not numbers[0] < numbers[1]:
-        raise RequestError(
-            f"{name} needs its lower bound below the upper one; received {low!r} and {high!r}. "
-            "Swap them, or use seakeep.Fixed for a single value."
-        )
-    if numbers[0] < least:
-        raise RequestError(
-            f"{name} needs a positive lower bound; received {low!r}. Logarithms start above zero."
-        )
+    finite = [float(x) for x in values if isinstance(x, int | float | np.number)]
+    if len(finite) < len(values) or not all(map(math.isfinite, finite)):
+        received = " and ".join(f"{each!r:.{SHOWN}}" for each in given)
+        raise RequestError(f"{name} needs finite numbers; received {received}.")
+    return finite, units.pop()
+
+
+class _Bounded:
+    """Two parameters in order, and their unit."""
+
+    key: ClassVar[str]
+    low: Bound
+    high: Bound
+    bounds: tuple[float, float]
+    unit: str
+    least: ClassVar[float] = -math.inf
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        (low, high), unit = _values(name, self.low, self.high)
+        if not low < high:
+            raise RequestError(
+                f"{name} needs its lower bound below the upper one; received {self.low!r} and "
+                f"{self.high!r}. Swap them, or use seakeep.Fixed for a single value."
+            )
+        if low < self.least:
+            raise RequestError(
+                f"{name} needs a positive lower bound; received {self.low!r}. Logarithms start "
+                "above zero."
+            )
+        object.__setattr__(self, "low", _written(self.low))
+        object.__setattr__(self, "high", _written(self.high))
+        object.__setattr__(self, "bounds", (low, high))
+        object.__setattr__(self, "unit", unit)
 
 
 @dataclass(frozen=True)
-class Uniform:
+class Uniform(_Bounded):
     """Uniform between two bounds, as in the paper.
 
     Parameters
     ----------
-    low, high : float
-        Bounds.
+    low, high : float or str
+        Bounds; of a length ``"10 T"``, ``"0.5 s"``, or samples.
 
     Raises
     ------
     RequestError
-        If they are not finite, or not in order.
+        If they are not finite, not in order, or of two units.
 
     Examples
     --------
-    >>> Uniform(10, 30).ppf(0.25)
+    >>> Uniform("10 T", "30 T").ppf(0.25)
     15.0
     """
 
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        _check_bounds("Uniform", self.low, self.high, -math.inf)
+    key: ClassVar[str] = "uniform"
+    low: Bound
+    high: Bound
 
     def ppf(self, q: float) -> float:
         """Quantile function."""
-        return float(self.low + (self.high - self.low) * q)
+        low, high = self.bounds
+        return low + (high - low) * q
 
 
 @dataclass(frozen=True)
-class LogUniform:
+class LogUniform(_Bounded):
     """Uniform in the logarithm between two positive bounds.
 
     Parameters
     ----------
-    low, high : float
-        Bounds.
+    low, high : float or str
+        Bounds; of a length ``"10 T"``, ``"0.5 s"``, or samples.
 
     Raises
     ------
     RequestError
-        If they are not finite, not positive, or not in order.
+        If they are not finite, not positive, not in order, or of two units.
 
     Examples
     --------
@@ -96,15 +138,15 @@ class LogUniform:
     10.0
     """
 
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        _check_bounds("LogUniform", self.low, self.high, np.finfo(float).tiny)
+    key: ClassVar[str] = "log_uniform"
+    least: ClassVar[float] = float(np.finfo(float).tiny)
+    low: Bound
+    high: Bound
 
     def ppf(self, q: float) -> float:
         """Quantile function."""
-        return float(self.low * (self.high / self.low) ** q)
+        low, high = self.bounds
+        return float(low * (high / low) ** q)
 
 
 @dataclass(frozen=True)
@@ -113,8 +155,8 @@ class Fixed:
 
     Parameters
     ----------
-    value : float
-        The value.
+    value : float or str
+        The value; of a length ``"1 T"``, ``"0.5 s"``, or samples.
 
     Raises
     ------
@@ -122,92 +164,160 @@ class Fixed:
         If it is not a finite number.
     """
 
-    value: float
+    key: ClassVar[str] = "fixed"
+    value: Bound
+    unit: str = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.value, int | float | np.number) or not math.isfinite(self.value):
-            raise RequestError(f"Fixed needs a finite number; received {self.value!r:.{SHOWN}}.")
+        object.__setattr__(self, "unit", _values("Fixed", self.value)[1])
+        object.__setattr__(self, "value", _written(self.value))
 
     def ppf(self, q: float) -> float:
         """Quantile function: the value, for any probability."""
-        return float(self.value)
+        return _values("Fixed", self.value)[0][0]
 
 
-def check_prior(name: str, prior: object) -> None:
-    """Refuse what is not a prior; `name` is the setting it is for."""
-    if not isinstance(prior, Prior):
-        raise RequestError(
-            f"{name} must be a prior; received {prior!r:.{SHOWN}}. Pass "
-            "seakeep.Uniform(low, high), seakeep.LogUniform(low, high), seakeep.Fixed(value), or a "
-            "frozen distribution such as scipy.stats.norm(20, 2)."
-        )
-
-
-def describe(prior: Prior | None) -> dict[str, Any] | None:
-    """A prior as plain data, for a file.
+@dataclass(frozen=True)
+class Distribution:
+    """A distribution of :mod:`scipy.stats` by its name.
 
     Parameters
     ----------
-    prior : Prior or None
+    distribution : str
+        Name, such as ``"norm"``.
+    parameters : mapping of str to float, optional
+        Its parameters, such as ``{"loc": 1.0, "scale": 0.1}``.
+    unit : str, optional
+        Of a length: ``"T"``, encounter periods, or ``"s"``; samples by default.
+
+    Raises
+    ------
+    RequestError
+        If SciPy has no such distribution, or it takes other parameters.
+    """
+
+    distribution: str
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        from scipy import stats
+
+        kinds = stats.rv_continuous | stats.rv_discrete
+        found = getattr(stats, self.distribution, None)
+        if not isinstance(found, kinds):
+            known = [name for name in dir(stats) if isinstance(getattr(stats, name), kinds)]
+            raise RequestError(
+                f"scipy.stats has no distribution '{self.distribution}'."
+                f"{did_you_mean(self.distribution, known)} Name another one."
+            )
+        if self.unit not in ("", "s", "T"):
+            raise RequestError(f"the unit of a prior is 'T' or 's'; received {self.unit!r}.")
+        shapes = f"{found.shapes}, loc, scale" if found.shapes else "loc, scale"
+        try:
+            median = float(self.ppf(0.5))
+        except TypeError:
+            raise RequestError(
+                f"'parameters' of '{found.name}' are {shapes}, of which loc and scale may be left "
+                f"out; received {', '.join(self.parameters) or 'none'}."
+            ) from None
+        if not math.isfinite(median):
+            raise RequestError(
+                f"'{found.name}' with these 'parameters' has no median; correct them."
+            )
+
+    def ppf(self, q: float) -> float:
+        """Quantile function."""
+        from scipy import stats
+
+        return float(getattr(stats, self.distribution).ppf(q, **self.parameters))
+
+
+_OWN: dict[str, Any] = {each.key: each for each in (Uniform, LogUniform, Fixed)}
+
+
+def prior_of(name: str, value: object) -> Prior | None:
+    """Read the prior of a setting.
+
+    Parameters
+    ----------
+    name : str
+        The setting.
+    value : object
+        A prior, a table such as ``{"uniform": ["10 T", "30 T"]}``, or something else.
+
+    Returns
+    -------
+    Prior or None
+        None for what is neither.
+
+    Raises
+    ------
+    RequestError
+        If a table is not that of a prior.
+    """
+    if isinstance(value, Prior):
+        return value
+    if not isinstance(value, Mapping):
+        return None
+    try:
+        if "distribution" in value:
+            return Distribution(**value)
+        ((key, given),) = value.items()
+        made: Prior = _OWN[key](*(given if isinstance(given, list | tuple) else (given,)))
+        return made
+    except RequestError as error:
+        raise RequestError(f"{name}: {error}") from None
+    except (TypeError, ValueError, KeyError):
+        raise RequestError(
+            f"{name}: a prior is one of {{ uniform = [a, b] }}, {{ log_uniform = [a, b] }}, "
+            "{ fixed = value }, { distribution = 'name', parameters = { … } }; received "
+            f"{value!r:.{SHOWN}}."
+        ) from None
+
+
+def prior_json(prior: Prior) -> dict[str, Any]:
+    """A prior as its table, for a file.
+
+    Parameters
+    ----------
+    prior : Prior
         One of this module, or a frozen distribution of scipy.stats by its public name.
 
     Returns
     -------
-    dict or None
-        Name and parameters.
+    dict
+        The table; :func:`prior_of` reads it.
 
     Raises
     ------
     RequestError
         If the prior is of another kind.
     """
-    if prior is None:
-        return None
-    if isinstance(prior, Uniform | LogUniform | Fixed):
-        return {"prior": type(prior).__name__} | {k: float(v) for k, v in asdict(prior).items()}
-    distribution = getattr(getattr(prior, "dist", None), "name", None)
-    if distribution is None:
+    if isinstance(prior, _Bounded):
+        return {prior.key: [prior.low, prior.high]}
+    if isinstance(prior, Fixed):
+        return {prior.key: prior.value}
+    if isinstance(prior, Distribution):
+        return {**asdict(prior), "parameters": dict(prior.parameters)}
+    dist: Any = getattr(prior, "dist", None)
+    if dist is None:
         raise RequestError(
             f"the prior {prior!r} cannot be written to a file. Use one of seakeep's, or a frozen "
             "distribution of scipy.stats."
         )
-    args = [float(value) for value in getattr(prior, "args", ())]
-    kwds = {key: float(value) for key, value in getattr(prior, "kwds", {}).items()}
-    return {"prior": f"scipy.stats.{distribution}", "args": args, "kwds": kwds}
+    shapes = [each.strip() for each in (dist.shapes or "").split(",") if each]
+    given = zip([*shapes, "loc", "scale"], getattr(prior, "args", ()), strict=False)
+    stated = dict(given) | getattr(prior, "kwds", {})
+    parameters = {name: float(value) for name, value in stated.items()}
+    return prior_json(Distribution(dist.name, parameters))
 
 
-@dataclass(frozen=True)
-class _Frozen:
-    """What a file holds of a distribution of SciPy."""
-
-    args: list[float]
-    kwds: dict[str, float]
+def unit_of(written: object) -> str:
+    """Unit of a length as a file states it: a prior, a text, or a number of samples."""
+    length = parse_length(written) if isinstance(written, str) else prior_of("", written)
+    return {"T": "encounter periods", "s": "s"}.get(getattr(length, "unit", ""), "samples")
 
 
-def from_description(setting: str, content: object) -> Prior | None:
-    """Rebuild the prior of a setting from :func:`describe`; DataError for what is not known."""
-    if content is None:
-        return None
-    if not isinstance(content, dict) or "prior" not in content:
-        raise DataError(
-            f"{setting}: a prior is a table with the key 'prior'; received {content!r:.{SHOWN}}. "
-            "Fit the model again."
-        )
-    name = str(content["prior"])
-    own: dict[str, Any] = {each.__name__: each for each in (Uniform, LogUniform, Fixed)}
-    if name in own:
-        made: Prior = typed(own[name], content, setting)
-        return made
-    from scipy import stats
-
-    distribution = getattr(stats, name.removeprefix("scipy.stats."), None)
-    if not isinstance(distribution, stats.rv_continuous | stats.rv_discrete):
-        raise DataError(
-            f"{setting}: the prior '{name:.{SHOWN}}' is not known here. Update seakeep or SciPy."
-        )
-    kept = typed(_Frozen, content, setting)
-    try:
-        frozen: Prior = distribution(*kept.args, **kept.kwds)
-    except TypeError:
-        raise ValueError(f"{setting}: '{name}' takes other parameters than the file has") from None
-    return frozen
+def _written(value: Bound) -> float | str:
+    return str(value) if isinstance(value, Length | str) else value

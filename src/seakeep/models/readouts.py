@@ -11,7 +11,7 @@ import numpy as np
 from seakeep.arrays import FloatArray
 from seakeep.core.readouts import LinearHinges
 from seakeep.errors import SHOWN, RequestError, did_you_mean
-from seakeep.models.checks import check_choice, check_keys, typed
+from seakeep.models.checks import check_choice, check_keys
 from seakeep.models.labelled import ChannelLabel
 
 __all__ = [
@@ -163,61 +163,14 @@ class FittedReadOut:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any], states: Sequence[str]) -> Self:
-        """Rebuild from :meth:`to_json`; what does not fit the states raises a ValueError."""
-        kept = typed(_Kept, content, "readouts")
-        function = None if kept.function is None else kept.function.made(len(states))
-        if kept.channel not in states or (kept.function is not None and function is None):
-            raise ValueError(f"the read-out of {kept.channel} does not fit the states")
-        return cls(
-            channel=kept.channel,
-            of=kept.of,
-            kind=kept.kind,
-            column=list(states).index(kept.channel),
-            units=kept.units,
-            scores=kept.scores,
-            function=function,
-        )
-
-
-@dataclass(frozen=True)
-class _KeptHinges:
-    """What a file holds of a function."""
-
-    linear: list[int]
-    columns: list[int]
-    knots: list[list[float]]
-    weights: list[float]
-    floor: float | None
-
-    def made(self, states: int) -> LinearHinges | None:
-        """Rebuild the function of so many states; None where it is none of them."""
-        if (
-            len(self.weights) != 1 + len(self.linear) + sum(map(len, self.knots))
-            or len(self.knots) != len(self.columns)
-            or len(set(map(len, self.knots))) > 1
-            or not {*self.linear, *self.columns} <= set(range(states))
-            or not np.all(np.isfinite(self.weights))
-        ):
-            return None
-        return LinearHinges(
-            self.linear,
-            self.columns,
-            np.array(self.knots, dtype=float),
-            np.array(self.weights),
-            -np.inf if self.floor is None else self.floor,
-        )
-
-
-@dataclass(frozen=True)
-class _Kept:
-    """What a file holds of a fitted read-out."""
-
-    channel: str
-    of: tuple[str, ...]
-    kind: ReadOutKind
-    units: str
-    scores: dict[str, float]
-    function: _KeptHinges | None
+        """Rebuild from :meth:`to_json`, for a model of these states."""
+        function, column = content["function"], list(states).index(content["channel"])
+        if function is not None:
+            floor = -np.inf if function["floor"] is None else function["floor"]
+            arrays = {key: np.array(function[key], dtype=float) for key in ("knots", "weights")}
+            function = LinearHinges(**{**function, **arrays, "floor": floor})
+        of = tuple(content["of"])
+        return cls(**{**content, "of": of, "column": column, "function": function})
 
 
 def read_out(readouts: Sequence[FittedReadOut], values: FloatArray) -> FloatArray:
@@ -229,10 +182,12 @@ def read_out(readouts: Sequence[FittedReadOut], values: FloatArray) -> FloatArra
 
 
 def readouts_of(value: object) -> ReadOuts:
-    """Read-outs as they are, or made of tables of their keys, or the word."""
+    """Read-outs as they are, or made of tables (in a list, or by channel), or "auto"."""
     if isinstance(value, str) and value == "auto":
         return "auto"
-    if isinstance(value, str | Mapping) or not isinstance(value, Iterable):
+    if isinstance(value, Mapping):
+        value = [{"channel": name, **table} for name, table in value.items()]
+    if isinstance(value, str) or not isinstance(value, Iterable):
         raise RequestError(
             f"readouts must be a list or 'auto'; received {value!r:.{SHOWN}}. Write "
             "readouts=[seakeep.ReadOut('mooring_stern', of=('surge', 'heave', 'pitch'))]."

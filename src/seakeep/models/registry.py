@@ -57,12 +57,12 @@ def load_model(path: str | Path, kind: type[Kind] | None = None) -> Model | Kind
     """
     dataset = store.read(path)
     word = dataset.attrs["seakeep_kind"]
-    if not isinstance(word, str) or word not in KINDS:
+    if word not in KINDS:
         raise DataError(
             f"{path} holds a model of kind '{word}', which this version does not know. Update "
-            "seakeep."
+            "seakeep, or import the module that adds it."
         )
-    model = store.rebuilt(path, lambda: KINDS[word].restore(dataset))
+    model = KINDS[word].restore(dataset)
     if kind is None:
         return model
     if not isinstance(model, kind):

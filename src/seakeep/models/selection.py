@@ -13,7 +13,7 @@ import json
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import astuple, dataclass, field, replace
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -36,9 +36,10 @@ from seakeep.models.interface import Drive, Span
 from seakeep.models.labelled import mean_period
 from seakeep.models.observables import Observable, Observed, Powers, SlowSquares, named
 from seakeep.models.readouts import FittedReadOut, ReadOut, readouts_asked
-from seakeep.models.settings import HankelSettings, Select
+from seakeep.models.settings import Folds, HankelSettings, Select
 from seakeep.models.stacking import PERIODS, Held, fit_readouts
 from seakeep.models.training import TrainingData, gather
+from seakeep.signals import repeated_waves
 
 __all__ = [
     "RIDGES",
@@ -670,7 +671,7 @@ def select(
     vary: Sequence[str] = ("ridge",),
     ridges: Sequence[float] | None = None,
     horizon: Sequence[float] = (15.0, 45.0),
-    folds: Literal["run", "sea_state"] | int = "run",
+    folds: Folds | int = "auto",
     period: float | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
@@ -693,9 +694,9 @@ def select(
         λ to try, as the settings count it; by default ``RIDGES`` per snapshot pair.
     horizon : sequence of float
         Lengths of the windows that are judged, encounter periods.
-    folds : {"run", "sea_state"} or int, optional
-        What is held out in turn: a run, with all others of its sea state or without, or a part of
-        a run: their number. A single run is held out in three parts.
+    folds : {"auto", "run", "sea_state"} or int, optional
+        What is held out in turn: a run, with others as :func:`groups_of` says, or a part of a run:
+        their number. A single run is held out in three parts.
     period : float, optional
         Encounter period, s; by default that of the runs.
     executor, progress, known
@@ -718,6 +719,7 @@ def select(
     _check_asked(settings, vary, readouts)
     if isinstance(folds, str) and len(runs) == 1:
         folds = 3
+    apart = folds if isinstance(folds, int) else groups_of(runs, folds, inputs)
     step = labelled.common_step(runs)
     samples = mean_period(runs, list(inputs)) if period is None else period / step
     if "readouts" in vary:
@@ -756,7 +758,7 @@ def select(
                 base,
                 options,
                 tuple(max(round(each * samples), 1) for each in horizon),
-                folds,
+                apart,
             )
             for alignment in alignments
         ]
@@ -821,8 +823,9 @@ def select(
         for number, less in zip(taken.observables, without, strict=True)
     )
     note += "; over instants that all of these can forecast" * bool({*vary} - {"ridge", "readouts"})
-    if folds == "sea_state":
-        note += f"; {_words_of_groups(problems[0].groups)}"
+    groups = problems[0].groups
+    if folds == "sea_state" or len(set(groups)) < len(groups):
+        note += f"; {_words_of_groups(groups, folds == 'sea_state')}"
     rows = tuple(_rows_of(found, chosen, alignments, seed))
     fitted: tuple[FittedReadOut, ...] = ()
     if readouts:
@@ -917,9 +920,8 @@ def readouts_for(
     if len(runs) == 1 and settings.window is not None:  # whose parts are shorter
         runs = {name: run.isel(time=slice(-settings.window, None)) for name, run in runs.items()}
         settings = replace(settings, window=None)
-    problem = _problem(
-        settings, runs, states, inputs, base, {}, (steps,), 3 if len(runs) == 1 else "run"
-    )
+    apart = 3 if len(runs) == 1 else groups_of(runs, "auto", inputs)
+    problem = _problem(settings, runs, states, inputs, base, {}, (steps,), apart)
     if problem is None:
         return fit_readouts(readouts, _measured(settings, runs, states, inputs), ())
     return fit_readouts(readouts, problem.data, list(problem.held(base, ridge, steps)))
@@ -1017,7 +1019,7 @@ def _problem(
     base: Candidate,
     options: Mapping[str, Sequence[Any]],
     horizons: tuple[int, ...],
-    folds: Literal["run", "sea_state"] | int,
+    folds: Mapping[str, str] | int,
 ) -> Problem | None:
     """The columns of all candidates; None where the runs are too short for them."""
     leads = [base.lead, *options.get("lead", ())]
@@ -1041,7 +1043,7 @@ def _problem(
     chain = Chain(tuple(made))
     before = max(widest.state_delays, chain.history(delays))
     after = max(chain.lead_samples - 1, 0)
-    pieces = dict(runs) if isinstance(folds, str) else split(runs, folds, before, after)
+    pieces = split(runs, folds, before, after) if isinstance(folds, int) else dict(runs)
     if any(run.sizes["time"] < before + 2 + after for run in pieces.values()):
         return None
     data = gather(pieces, states, inputs, None, wide)
@@ -1067,18 +1069,35 @@ def _problem(
         horizons=horizons,
         passes=chain.passes if chain.reads_states == "predicted" else 0,
         is_per_snapshot=settings.ridge_scale == "per_snapshot",
-        groups=tuple(
-            str(run.attrs.get("sea_state") or name) if folds == "sea_state" else name
-            for name, run in pieces.items()
-        ),
+        groups=tuple(pieces if isinstance(folds, int) else folds.values()),
     )
 
 
-def _words_of_groups(groups: Sequence[str]) -> str:
+def groups_of(
+    runs: Mapping[str, xr.Dataset], folds: Folds, inputs: Sequence[str]
+) -> dict[str, str]:
+    """Name, by run, of the group of runs that are held out together.
+
+    With "sea_state", runs that state the same; with "auto", runs whose waves are the same, as the
+    first of `inputs` that is a length recorded them; with "run", each is alone.
+    """
+    if folds == "sea_state":
+        return {name: str(run.attrs.get("sea_state") or name) for name, run in runs.items()}
+    if folds == "run" or not inputs or len(runs) < 2:
+        return {name: name for name in runs}
+    lengths = (label.name for label in labelled.common_labels(runs, inputs) if label.units == "m")
+    wave = next(lengths, inputs[0])
+    records = {name: run[wave].to_numpy() for name, run in runs.items()}
+    return repeated_waves(records, labelled.common_step(runs))
+
+
+def _words_of_groups(groups: Sequence[str], by_sea: bool) -> str:
     """What was held out beside each run."""
     seas = len(set(groups))
     if 1 < seas < len(groups):
-        return f"held out with each: the runs of its sea state, of which there are {seas}"
+        if by_sea:
+            return f"held out with each: the runs of its sea state, of which there are {seas}"
+        return f"held out with each: the runs that repeat its waves; {seas} waves differ"
     shared = "no two runs share a sea state" if seas > 1 else "all runs have the same sea state"
     return f"{shared}, so each was held out alone"
 

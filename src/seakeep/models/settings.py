@@ -5,21 +5,26 @@ from __future__ import annotations
 import math
 import numbers
 import warnings
-from dataclasses import asdict, dataclass, fields
-from typing import ClassVar, Literal, Self
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, ClassVar, Literal, Self, get_args
 
 import numpy as np
+import xarray as xr
 
 from seakeep.core.embedding import History
 from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
+from seakeep.models import labelled
 from seakeep.models.checks import check_choice, check_integer, check_keys, settings_of
 from seakeep.models.html import settings_html
 from seakeep.models.inputs import Lead, ProbeAlignment
 from seakeep.models.interface import Fittable, Json, Needs, plain
 from seakeep.models.observables import Observable, Observing, observables_of
 from seakeep.models.observables import to_json as observable_json
+from seakeep.models.priors import Prior, prior_json
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
 from seakeep.sizes import LEAST_PERIODS, MOST_PERIODS
+from seakeep.toml import Length, parse_length
 
 __all__ = [
     "DelayRows",
@@ -27,9 +32,11 @@ __all__ = [
     "History",
     "RidgeScale",
     "Select",
+    "as_length",
     "check_integer",
     "check_ridge",
     "check_seconds",
+    "in_samples",
     "periods_to_samples",
 ]
 
@@ -66,13 +73,63 @@ def periods_to_samples(periods: float, encounter_period: float, dt: float) -> in
             f"the time step dt = {dt:g} s is no shorter than the encounter period of "
             f"{encounter_period:g} s. Are the two swapped?"
         )
-    samples = periods * encounter_period / dt
-    if not math.isfinite(samples):
+    return math.floor(periods * encounter_period / dt + 0.5)
+
+
+def in_samples(length: float | Length, dt: float, encounter_period: float | None) -> int:
+    """Number of samples of a length, to the nearest integer.
+
+    Parameters
+    ----------
+    length : int or Length
+        Samples, seconds or encounter periods.
+    dt : float
+        Time step, s.
+    encounter_period : float or None
+        Encounter period, s.
+
+    Returns
+    -------
+    int
+        Samples, halves rounded up.
+
+    Raises
+    ------
+    RequestError
+        If it counts in encounter periods and there is none.
+    """
+    if not isinstance(length, Length):
+        return math.floor(length + 0.5)
+    if length.unit == "s":
+        return math.floor(length.value / dt + 0.5)
+    if encounter_period is None:
         raise RequestError(
-            f"{periods:g} encounter periods of {encounter_period:g} s are countless steps of dt = "
-            f"{dt:g} s. Correct the step."
+            f"'{length}' counts in encounter periods, and there is none. State encounter_period "
+            "(s), in [campaign] or in run.attrs."
         )
-    return math.floor(samples + 0.5)
+    return periods_to_samples(length.value, encounter_period, dt)
+
+
+def as_length(name: str, value: Any, least: int = 0, optional: bool = False) -> int | Length | None:
+    """A setting that is a number of samples, or a length such as ``"1 T"`` or ``"0.5 s"``.
+
+    ``"inf T"`` of an optional one is None: all there is.
+    """
+    if isinstance(value, str):
+        try:
+            value = parse_length(value)
+        except RequestError as error:
+            raise RequestError(f"{name}: {error}; received {value!r:.{SHOWN}}.") from None
+    if isinstance(value, Length):
+        if optional and value.value == math.inf:
+            return None
+        if value.unit == "/T" or not 0 <= value.value < math.inf:
+            raise RequestError(
+                f"{name} must be a length that is not negative, such as '1 T'; received '{value}'."
+            )
+        return value
+    check_integer(name, value, least, optional)
+    return None if value is None else int(value)
 
 
 def check_seconds(name: str, value: object) -> None:
@@ -112,6 +169,11 @@ def check_stable(value: object) -> None:
         )
 
 
+Folds = Literal["auto", "run", "sea_state"]
+FOLDS: tuple[Folds, ...] = get_args(Folds)
+"""What may be held out at a time; :func:`seakeep.models.selection.groups_of` tells them apart."""
+
+
 @dataclass(frozen=True)
 class Select:
     """What free runs on held-out training runs choose, beside λ.
@@ -125,9 +187,9 @@ class Select:
         Lengths of the free runs, encounter periods.
     period : float, optional
         Encounter period, s; by default that of the training runs.
-    folds : {"run", "sea_state"}, optional
-        What is held out at a time: a run, or all runs of its sea state, for a model that must
-        forecast seas that no training run holds.
+    folds : {"auto", "run", "sea_state"}, optional
+        What is held out at a time: a run and the runs that repeat its waves, a run alone, or all
+        runs of its sea state, for a model that must forecast seas that no training run holds.
 
     Raises
     ------
@@ -138,10 +200,10 @@ class Select:
     observables: bool = False
     horizon: tuple[float, ...] = (15.0, 45.0)
     period: float | None = None
-    folds: Literal["run", "sea_state"] = "run"
+    folds: Folds = "auto"
 
     def __post_init__(self) -> None:
-        check_choice("select: folds", self.folds, ("run", "sea_state"))
+        check_choice("select: folds", self.folds, FOLDS)
         if not isinstance(self.observables, bool):
             raise RequestError(
                 "select: observables must be True or False; received "
@@ -176,6 +238,13 @@ class HankelSettings:
     """
 
     may_choose: ClassVar[bool] = False
+    lengths: ClassVar[Mapping[str, int]] = {
+        "window": 2,
+        "state_delays": 0,
+        "input_delays": 0,
+        "lead": 0,
+    }
+    """Settings that are lengths, and the least number of samples of each."""
     state_delays: int
     input_delays: int
     ridge: float | Literal["rollout"]
@@ -192,11 +261,9 @@ class HankelSettings:
     stable: bool | float = False
 
     def __post_init__(self) -> None:
-        check_integer("state_delays", self.state_delays, 0)
-        check_integer("input_delays", self.input_delays, 0)
-        check_integer("window", self.window, 2, optional=True)
+        for name in (*self.lengths, "ridge"):
+            object.__setattr__(self, name, self._read(name))
         check_integer("rank", self.rank, 1, optional=True)
-        check_ridge(self.ridge, self.may_choose)
         check_choice("history", self.history, ("before", "inside"))
         check_choice("delay_rows", self.delay_rows, ("ridge", "exact"))
         check_choice("ridge_scale", self.ridge_scale, ("absolute", "per_snapshot"))
@@ -204,18 +271,58 @@ class HankelSettings:
             raise RequestError(
                 f"standardize must be True or False; received {self.standardize!r:.{SHOWN}}."
             )
-        check_integer("lead", self.lead, 0)
         check_stable(self.stable)
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
         object.__setattr__(self, "observables", observables_of(self.observables))
         object.__setattr__(self, "readouts", readouts_of(self.readouts))
         self._check_readouts()
-        if self.rank is not None and self.ridge != 0:
+        if self.rank is not None and self.ridge != 0 and not isinstance(self.ridge, Prior):
             ridge = self.ridge if isinstance(self.ridge, str) else f"{self.ridge:g}"
             warn(
                 f"rank = {self.rank} truncates singular values instead of regularising, so "
                 f"ridge = {ridge} is not used. Set ridge=0 to say so."
             )
+
+    def _read(self, name: str) -> Any:
+        """A length or λ, checked; an ensemble takes priors too."""
+        value = getattr(self, name)
+        if name == "ridge":
+            check_ridge(value, self.may_choose)
+            return value
+        return as_length(name, value, self.lengths[name], name == "window")
+
+    def resolved(self, dt: float, encounter_period: float | None) -> Self:
+        """Settings whose lengths are samples.
+
+        Parameters
+        ----------
+        dt : float
+            Time step, s.
+        encounter_period : float or None
+            Encounter period, s.
+
+        Raises
+        ------
+        RequestError
+            If a length counts in encounter periods and there is none.
+        """
+        stated = {name: getattr(self, name) for name in self.lengths}
+        made: dict[str, Any] = {
+            name: in_samples(value, dt, encounter_period)
+            for name, value in stated.items()
+            if isinstance(value, Length)
+        }
+        return replace(self, **made) if made else self
+
+    def resolved_in(self, runs: dict[str, xr.Dataset], inputs: Sequence[str]) -> Self:
+        """Settings whose lengths are samples of some runs, with the period that these have."""
+        stated = [getattr(self, name) for name in self.lengths]
+        lengths = [each for each in stated if isinstance(each, Length)]
+        if not lengths:
+            return self
+        dt = labelled.common_step(runs)
+        in_periods = any(each.unit == "T" for each in lengths)
+        return self.resolved(dt, labelled.mean_period(runs, inputs) * dt if in_periods else None)
 
     def _check_readouts(self) -> None:
         """Refuse read-outs that these settings leave no room for."""
@@ -248,8 +355,8 @@ class HankelSettings:
     def maps(self) -> tuple[Fittable, ...]:
         """Input maps, not fitted yet: the alignment, the lead, and the observables on both."""
         alignment = () if self.alignment is None else (self.alignment,)
-        lead = (Lead(int(self.lead)),) if self.lead else ()
-        observed = (Observing(self.observables, int(self.lead)),) if self.observables else ()
+        lead = (Lead(self.lead),) if self.lead else ()
+        observed = (Observing(self.observables, self.lead),) if self.observables else ()
         return (*alignment, *lead, *observed)
 
     def around(self, dt: float, input_delays: int | None = None) -> tuple[int, int]:
@@ -263,7 +370,7 @@ class HankelSettings:
         delays = self.input_delays if input_delays is None else input_delays
         reach = [each.reach(dt) for each in self.observables]
         before = max([delays, *(before for before, _ in reach)])
-        return before, max([int(self.lead), *(ahead for _, ahead in reach)])
+        return before, max([self.lead, *(ahead for _, ahead in reach)])
 
     def needs(self, dt: float) -> Needs:
         """Samples that it asks of its runs."""
@@ -289,7 +396,7 @@ class HankelSettings:
             "readouts": readouts_json(self.readouts),
             "select": None if select is None else asdict(select),
         }
-        made: Json = plain({key: maps.get(key, value) for key, value in content.items()})
+        made: Json = plain({key: maps.get(key, _written(each)) for key, each in content.items()})
         return made
 
     @classmethod
@@ -299,3 +406,10 @@ class HankelSettings:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeakeepWarning)  # given when the settings were made
             return cls(**content)
+
+
+def _written(value: Any) -> Any:
+    """A setting as its file states it: a length or a prior as its text or table."""
+    if isinstance(value, Length):
+        return str(value)
+    return prior_json(value) if isinstance(value, Prior) else value

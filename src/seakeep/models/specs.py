@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, Literal, Self, get_args
 
 import numpy as np
@@ -12,36 +12,24 @@ import xarray as xr
 
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled, store
-from seakeep.models.checks import check_choice, check_keys, typed
-from seakeep.models.draws import Sampling, TrainOn, draw_members
+from seakeep.models.checks import check_choice
+from seakeep.models.draws import PRIORS, Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.executor import Progress
-from seakeep.models.html import settings_html
 from seakeep.models.inputs import Chain, ProbeAlignment
-from seakeep.models.interface import Json, Needs, Signature, Span, Spec, plain
+from seakeep.models.interface import Json, Needs, Signature, Span, Spec
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.members import TrainingArrays, reach, spectral_radius
-from seakeep.models.observables import Observable, observables_of
-from seakeep.models.observables import to_json as observable_json
-from seakeep.models.priors import (
-    LogUniform,
-    Prior,
-    Uniform,
-    check_prior,
-    describe,
-    from_description,
-)
-from seakeep.models.readouts import FittedReadOut, ReadOuts, readouts_json, readouts_of
+from seakeep.models.observables import Observable
+from seakeep.models.priors import LogUniform, Prior, Uniform, prior_of
+from seakeep.models.readouts import FittedReadOut
 from seakeep.models.selection import Selected, default_observables, readouts_for, settle
 from seakeep.models.settings import (
-    DelayRows,
     HankelSettings,
-    History,
-    RidgeScale,
     Select,
     check_integer,
-    check_seconds,
+    in_samples,
     periods_to_samples,
 )
 from seakeep.models.training import (
@@ -54,7 +42,7 @@ from seakeep.models.training import (
     until,
 )
 from seakeep.models.validity import Coverage
-from seakeep.sizes import LONG_MEMBERS, MOST_MEMBERS, check_size
+from seakeep.toml import Length
 
 __all__ = ["BayesianHankelDMDc", "HankelDMDc"]
 
@@ -79,14 +67,15 @@ class HankelDMDc(HankelSettings):
 
     Parameters
     ----------
-    state_delays : int
-        s, number of delayed copies of the states.
-    input_delays : int
+    state_delays : int or str
+        s, number of delayed copies of the states: samples, or a length such as ``"1 T"``
+        (encounter periods) or ``"0.5 s"``.
+    input_delays : int or str
         z, number of delayed copies of the inputs.
     ridge : float or "rollout"
         λ ≥ 0; zero takes the solution of least norm. "rollout" chooses λ per snapshot pair by the
         error of free runs on training runs that are held out in turn; it takes exact delay rows.
-    window : int, optional
+    window : int or str, optional
         m, snapshots per run; None takes all up to ``stop``.
     history : {"before", "inside"}, optional
         Whether the delay history of the first snapshot lies before the window or inside it.
@@ -103,8 +92,8 @@ class HankelDMDc(HankelSettings):
     alignment : ProbeAlignment, optional
         Alignment of the wave input to the moving vessel, the same in fit and forecast; a mapping
         of its keys is taken too.
-    lead : int, optional
-        Look-ahead in samples: the input up to j + lead drives the step from j to j + 1.
+    lead : int or str, optional
+        Look-ahead: the input up to j + lead drives the step from j to j + 1.
     observables : sequence of SlowSquares, Powers, Expression or tables, optional
         Further regressors, made of the aligned inputs.
     stable : bool or float, optional
@@ -265,7 +254,8 @@ class HankelDMDc(HankelSettings):
         check_names(states, inputs)
         named = until(as_runs(runs), stop)
         channels = list(states), list(inputs)
-        found = settle(self, self.select, named, *channels, executor=executor, progress=progress)
+        spec = self.resolved_in(named, inputs)
+        found = settle(spec, self.select, named, *channels, executor=executor, progress=progress)
         return replace(found, settings=replace(found.settings, select=None))
 
     def fit(
@@ -320,11 +310,12 @@ class HankelDMDc(HankelSettings):
             model = found.settings._fitted(named, states, inputs, stop, found.readouts)
             _check_growth(model)
             return replace(model, selection=found.describe())
+        spec = self.resolved_in(named, inputs)
         readouts: tuple[FittedReadOut, ...] = ()
         if self.readouts:
             check_names(states, inputs)
-            readouts = readouts_for(self, until(named, stop), list(states), list(inputs))
-        model = self._fitted(named, states, inputs, stop, readouts)
+            readouts = readouts_for(spec, until(named, stop), list(states), list(inputs))
+        model = spec._fitted(named, states, inputs, stop, readouts)
         return replace(model, selection=STATED if self.observables else "")
 
     def _fitted(
@@ -364,38 +355,35 @@ def _around_any(
     return max(before), max(after)
 
 
-PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
-LONGEST_SEED = 100
-"""Digits of a seed; the entropy of NumPy has 39."""
-WINDOW = Uniform(60, 120)
-"""Encounter periods that a member learns from where runs are long.
+WINDOW = Uniform("60 T", "120 T")
+"""What a member learns from where runs are long.
 
 Members that learn from windows of one run each differ most where the waves are unlike those of the
 training (docs/howto/bands.md)."""
 
 
 @dataclass(frozen=True)
-class BayesianHankelDMDc:
+class BayesianHankelDMDc(HankelSettings):
     r"""Settings of a Bayesian ensemble of Hankel models (paper, section UQ through ensembling).
 
-    Priors over training length, delays and ridge are pushed forward: each member is a
-    :class:`HankelDMDc` with settings drawn from them, and the spread of the members' forecasts is
-    the uncertainty (paper, equations of :math:`\mu[x(t)]` and :math:`\sigma[x(t)]`). There is no
-    likelihood: "Bayesian" is the paper's word, and a band holds what the members differ in, not
-    noise or model error: judge its coverage before you trust it. With ``train_on`` members also,
-    or only, differ in the data they saw: a frequentist ensemble.
+    The settings are those of :class:`HankelDMDc`; window, delays and ridge may be priors. These are
+    pushed forward: each member is a :class:`HankelDMDc` with settings drawn from them, and the
+    spread of the members' forecasts is the uncertainty (paper, equations of :math:`\mu[x(t)]` and
+    :math:`\sigma[x(t)]`). There is no likelihood: "Bayesian" is the paper's word, and a band holds
+    what the members differ in, not noise or model error: judge its coverage before you trust it.
+    With ``train_on`` members also, or only, differ in the data they saw: a frequentist ensemble.
 
     Parameters
     ----------
-    encounter_period : float
-        Mean encounter period, s.
-    train_length : prior or None
-        Length of the training window, encounter periods; None takes all of a run up to ``stop``.
-    state_delay, input_delay : prior
-        Longest delay of states and inputs, encounter periods.
-    ridge : prior or "rollout"
+    state_delays, input_delays : prior, int or str
+        As in :class:`HankelDMDc`, such as ``Uniform("0.5 T", "1.5 T")``.
+    ridge : prior, float or "rollout"
         λ. "rollout" chooses one by free runs, as :class:`HankelDMDc` does at the medians of the
         delays, and draws log-uniformly over 0.3 to 3 times that.
+    window : prior, int or str, optional
+        Length of the training window; None takes all of a run up to ``stop``.
+    encounter_period : float, optional
+        Mean encounter period, s; by default that of the training runs.
     n_members : int, optional
         Number of members.
     seed : int, SeedSequence or Generator, optional
@@ -409,9 +397,7 @@ class BayesianHankelDMDc:
         120, and none is of regular waves (``attrs["waves"]``), and all runs otherwise.
     dt : float, optional
         Time step the runs must have, s; None takes theirs.
-    lead : int or float, optional
-        Look-ahead of the waves: samples as an integer, encounter periods as a float.
-    history, delay_rows, ridge_scale, rank, standardize, observables, stable, select
+    lead, history, delay_rows, ridge_scale, rank, standardize, observables, stable, select
         As in :class:`HankelDMDc`.
     alignment
         As in :class:`HankelDMDc`. What an alignment estimates, it estimates once for all members,
@@ -422,162 +408,99 @@ class BayesianHankelDMDc:
     Raises
     ------
     RequestError
-        If a setting is out of range, or not a prior.
+        If a setting is out of range.
 
     Examples
     --------
     >>> spec = BayesianHankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32)
-    >>> spec.n_members, spec.train_length
-    (100, Uniform(low=10, high=30))
+    >>> spec.n_members, spec.window
+    (100, Uniform(low='10 T', high='30 T'))
     """
 
     kind: ClassVar[str] = "bayesian_hankel_dmdc"
     is_ensemble: ClassVar[bool] = True
-    encounter_period: float
-    train_length: Prior | None
-    state_delay: Prior
-    input_delay: Prior
-    ridge: Prior | Literal["rollout"]
+    may_choose: ClassVar[bool] = True
+    state_delays: Prior | int  # type: ignore[assignment]
+    input_delays: Prior | int  # type: ignore[assignment]
+    ridge: Prior | float | Literal["rollout"]  # type: ignore[assignment]
+    window: Prior | int | None = None  # type: ignore[assignment]
+    encounter_period: float | None = None
     n_members: int = 100
-    seed: int | np.random.SeedSequence | np.random.Generator = 0
+    seed: int | str | np.random.SeedSequence | np.random.Generator = 0
     sampling: Sampling = "monte_carlo"
     train_on: TrainOn = "all"
     dt: float | None = None
-    history: History = "before"
-    delay_rows: DelayRows = "ridge"
-    ridge_scale: RidgeScale = "absolute"
-    rank: int | None = None
-    standardize: bool = True
-    alignment: ProbeAlignment | None = None
-    lead: int | float = 0
-    observables: tuple[Observable, ...] = ()
-    readouts: ReadOuts = ()
-    stable: bool | float = False
     select: Select | None = None
     seed_sequence: np.random.SeedSequence = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for name in PRIORS:
-            value = getattr(self, name)
-            stated = value is not None and not isinstance(value, str)
-            if stated or (name, value) not in (("train_length", None), ("ridge", "rollout")):
-                check_prior(name, value)
+        super().__post_init__()
         check_integer("n_members", self.n_members, 1)
-        check_size("n_members =", self.n_members, MOST_MEMBERS, "members",
-                   "A hundred show a band, ten thousand its tails.", LONG_MEMBERS)  # fmt: skip
-        period = self.encounter_period
-        check_seconds("encounter_period", period)
-        # Without dt any step shorter than the period will do; the runs' own is checked at fit.
-        periods_to_samples(1, period, 0.5 * period if self.dt is None else self.dt)
-        _check_lead(self.lead)
+        if (period := self.encounter_period) is not None:
+            # Without dt any step shorter than the period will do; the runs' own is checked at fit.
+            periods_to_samples(1, period, self.dt or 0.5 * period)
         check_choice("sampling", self.sampling, ("monte_carlo", "sobol"))
         check_choice("train_on", self.train_on, get_args(TrainOn))
-        object.__setattr__(self, "observables", observables_of(self.observables))
-        object.__setattr__(self, "readouts", readouts_of(self.readouts))
         object.__setattr__(self, "select", Select.of(self.select))
-        object.__setattr__(self, "alignment", self.shared(0.5 * period).alignment)
         object.__setattr__(self, "seed_sequence", _seed_sequence(self.seed))
 
-    def _repr_html_(self) -> str:
-        """Settings as a table, for notebooks."""
-        return settings_html(type(self).__name__, self.to_json())
+    def _read(self, name: str) -> Any:
+        prior = prior_of(name, getattr(self, name)) if name in PRIORS else None
+        return super()._read(name) if prior is None else prior
+
+    def at(self, name: str, q: float) -> float | None:
+        """Quantile of a setting, in the unit of its prior; a value is its own."""
+        stated = getattr(self, name)
+        if isinstance(stated, Prior):
+            return float(stated.ppf(q))
+        return float(stated.value) if isinstance(stated, Length) else stated
+
+    def samples(self, name: str, value: float, dt: float) -> int:
+        """Samples of a length that :meth:`at` returns."""
+        unit: Any = getattr(getattr(self, name), "unit", "")
+        return in_samples(Length(value, unit) if unit else value, dt, self.encounter_period)
 
     def shared(self, dt: float) -> HankelSettings:
         """What all members share; its delays, window and λ are not used."""
-        lead = self.lead
-        if not isinstance(lead, int):
-            lead = periods_to_samples(lead, self.encounter_period, dt) if lead else 0
-        return HankelSettings(
-            state_delays=0,
-            input_delays=0,
-            ridge=0.0,
-            history=self.history,
-            delay_rows=self.delay_rows,
-            ridge_scale=self.ridge_scale,
-            rank=self.rank,
-            standardize=self.standardize,
-            alignment=self.alignment,
-            lead=lead,
-            observables=self.observables,
-            readouts=self.readouts,
-            stable=self.stable,
-        )
+        own = {each.name: getattr(self, each.name) for each in fields(HankelSettings)}
+        unused = {"state_delays": 0, "input_delays": 0, "ridge": 0.0, "window": None}
+        return HankelSettings(**own | unused).resolved(dt, self.encounter_period)
 
     def central(self, dt: float) -> HankelDMDc:
         """The single model at the medians of the priors."""
-
-        def samples(prior: Prior) -> int:
-            return periods_to_samples(float(prior.ppf(0.5)), self.encounter_period, dt)
-
         shared = self.shared(dt)
-        values = {each.name: getattr(shared, each.name) for each in fields(shared)} | {
-            "state_delays": samples(self.state_delay),
-            "input_delays": samples(self.input_delay),
-            "window": None if self.train_length is None else samples(self.train_length),
-            "ridge": self.ridge if isinstance(self.ridge, str) else float(self.ridge.ppf(0.5)),
-        }
-        return HankelDMDc(**values, select=self.select)
+        values = {each.name: getattr(shared, each.name) for each in fields(shared)}
+        ridge = self.ridge if isinstance(self.ridge, str) else self.at("ridge", 0.5)
+        return HankelDMDc(**values | self._lengths(0.5, dt) | {"ridge": ridge}, select=self.select)
+
+    def _lengths(self, q: float, dt: float) -> dict[str, int | None]:
+        """Window and delays at a quantile, samples."""
+        found: dict[str, int | None] = {}
+        for name in PRIORS[:3]:
+            value = self.at(name, q)
+            if value is not None and not np.isfinite(value):
+                value = self.at(name, 1.0 - 1e-6)  # of a prior without an upper end
+            found[name] = None if value is None else self.samples(name, value, dt)
+        return found
 
     def needs(self, dt: float) -> Needs:
         """Samples that its largest draw asks of its runs: the upper ends of the priors count."""
-        shared = self.shared(dt)
-
-        def samples(prior: Prior) -> int:
-            # The last quantile of a prior without an upper end is its 1 − 1e-6 quantile.
-            top = float(prior.ppf(1.0))
-            if not np.isfinite(top):
-                top = float(prior.ppf(1.0 - 1e-6))
-            return periods_to_samples(top, self.encounter_period, dt)
-
-        around = shared.around(dt, samples(self.input_delay))
+        most = self._lengths(1.0, dt)
+        around = self.shared(dt).around(dt, most["input_delays"])
         before, after = _around_any(around, self.select, self.observables, dt)
         return Needs(
-            1 if self.train_length is None else samples(self.train_length),
-            max(samples(self.state_delay), before),
+            most["window"] or 1,
+            max(most["state_delays"] or 0, before),
             self.history == "inside",
             after,
         )
 
     def to_json(self) -> Json:
-        """Settings as JSON values; the seed as entropy and spawn key."""
-        content = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
-        seed = self.seed_sequence
-        made: Json = plain(
-            content
-            | {
-                **{name: _described(getattr(self, name)) for name in PRIORS},
-                "encounter_period": float(self.encounter_period),
-                "n_members": int(self.n_members),
-                "seed": str(seed.entropy),
-                "spawn_key": [int(key) for key in seed.spawn_key],
-                "alignment": None if self.alignment is None else self.alignment.to_json(),
-                "observables": [observable_json(each) for each in self.observables],
-                "readouts": readouts_json(self.readouts),
-                "select": None if self.select is None else asdict(self.select),
-            }
-        )
-        return made
-
-    @classmethod
-    def from_json(cls, content: Json) -> Self:
-        """Settings from :meth:`to_json`; an unknown key or a value out of range raises an error."""
-        stated = dict(content)
-        spawn_key = typed(list[int], stated.pop("spawn_key", None), "spawn_key")
-        check_keys(cls, stated)
-        entropy = str(stated.pop("seed", None))
-        if not (entropy.isdecimal() and len(entropy) <= LONGEST_SEED):
-            raise RequestError(
-                f"seed: received {entropy!r:.{SHOWN}}, which should be a whole number"
-            )
-        seed = np.random.SeedSequence(int(entropy), spawn_key=spawn_key)
-        stated |= {
-            name: from_description(name, stated[name])
-            for name in PRIORS
-            if stated.get(name) != "rollout"
-        }
-        stated["observables"] = observables_of(stated.get("observables", []))
-        stated["readouts"] = readouts_of(stated.get("readouts", []))
-        return cls(**stated, seed=seed)
+        """Settings as JSON values; the seed as entropy, and the spawn key behind strokes."""
+        root = self.seed_sequence
+        numbers = (root.entropy, *root.spawn_key)
+        written: Any = "/".join(map(str, numbers)) if root.spawn_key else root.entropy
+        return HankelSettings.to_json(replace(self, seed=written))
 
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> HankelEnsemble:
@@ -615,9 +538,9 @@ class BayesianHankelDMDc:
         """
         return cls(
             encounter_period=encounter_period,
-            train_length=Uniform(10, 30),
-            state_delay=Uniform(0.5, 1.5),
-            input_delay=Uniform(2.5, 7.5),
+            window=Uniform("10 T", "30 T"),
+            state_delays=Uniform("0.5 T", "1.5 T"),
+            input_delays=Uniform("2.5 T", "7.5 T"),
             ridge=Uniform(50, 150),
             n_members=n_members,
             seed=seed,
@@ -651,9 +574,8 @@ class BayesianHankelDMDc:
         """
         return cls(
             encounter_period=encounter_period,
-            train_length=None,
-            state_delay=Uniform(0.5 * STATE_PERIODS, 1.5 * STATE_PERIODS),
-            input_delay=Uniform(INPUT_PERIODS - 1, INPUT_PERIODS + 1),
+            state_delays=Uniform("0.5 T", "1.5 T"),
+            input_delays=Uniform("2 T", "4 T"),
             ridge="rollout",
             n_members=n_members,
             seed=seed,
@@ -661,7 +583,7 @@ class BayesianHankelDMDc:
             delay_rows="exact",
             ridge_scale="per_snapshot",
             alignment=ALIGNMENT,
-            lead=LEAD_PERIODS,
+            lead=Length(LEAD_PERIODS),  # type: ignore[arg-type]
             readouts="auto",
             train_on="auto",
             select=Select(observables=True, period=encounter_period),
@@ -694,7 +616,8 @@ class BayesianHankelDMDc:
         RequestError, DataError
             As :meth:`HankelDMDc.fit`.
         """
-        central = self.central(labelled.common_step(as_runs(runs)))
+        named = as_runs(runs)
+        central = self._in(named, inputs).central(labelled.common_step(named))
         return self._adopt(
             central.settled(runs, states, inputs, stop, executor=executor, progress=progress)
         )
@@ -760,22 +683,28 @@ class BayesianHankelDMDc:
             return replace(ensemble, selection=found.describe())
         readouts: tuple[FittedReadOut, ...] = ()
         if self.readouts:
-            central = self.central(labelled.common_step(named))
+            central = self._in(named, inputs).central(labelled.common_step(named))
             readouts = readouts_for(central, until(named, stop), list(states), list(inputs))
         ensemble = self._drawn(named, states, inputs, stop, readouts)
         return replace(ensemble, selection=STATED if self.observables else "")
+
+    def _in(self, named: dict[str, xr.Dataset], inputs: Sequence[str]) -> BayesianHankelDMDc:
+        """Settings with the encounter period of the runs where none is stated."""
+        if self.encounter_period is not None:
+            return self
+        period = labelled.mean_period(named, inputs) * labelled.common_step(named)
+        return replace(self, encounter_period=period, seed=self.seed_sequence)
 
     def _taught_by(self, runs: Collection[xr.Dataset], shortest: float) -> BayesianHankelDMDc:
         """Settings that say what members learn from; `shortest` is the time of a run, s."""
         if self.train_on != "auto":
             return self
         seed = self.seed_sequence
-        long = len(runs) > 1 and shortest >= WINDOW.high * self.encounter_period
+        assert self.encounter_period is not None
+        long = len(runs) > 1 and shortest >= WINDOW.bounds[1] * self.encounter_period
         if not long or any(run.attrs.get("waves") == "regular" for run in runs):
             return replace(self, train_on="all", seed=seed)
-        return replace(
-            self, train_on="windows", train_length=self.train_length or WINDOW, seed=seed
-        )
+        return replace(self, train_on="windows", window=self.window or WINDOW, seed=seed)
 
     def _drawn(
         self,
@@ -788,7 +717,9 @@ class BayesianHankelDMDc:
         """The ensemble of settings that leave nothing to be chosen."""
         stops = stop_instants(stop, list(named))
         dt = _step_of(self.dt, named)
-        shared = self.shared(dt)
+        spec = self._in(named, inputs)
+        spec = spec.resolved(dt, spec.encounter_period)
+        shared = spec.shared(dt)
         labels = labelled.common_labels(named, states), labelled.common_labels(named, inputs)
         if shared.maps:
             named, stops = until(named, stops), dict.fromkeys(named)
@@ -798,7 +729,7 @@ class BayesianHankelDMDc:
             last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name) + 1
             for name, run in named.items()
         ]
-        spec = self._taught_by(named.values(), min(samples) * dt)
+        spec = spec._taught_by(named.values(), min(samples) * dt)
         members = draw_members(spec, dt, samples, input_map)
         earliest = reach(members, samples, self.history == "inside", input_map)
         arrays, trained = _training_arrays(named, states, inputs, samples, earliest, input_map)
@@ -840,15 +771,14 @@ def left_open(spec: Spec) -> HankelDMDc | BayesianHankelDMDc | None:
     return spec if isinstance(spec.ridge, str) or spec.select is not None else None
 
 
-def _described(prior: Prior | str | None) -> dict[str, Any] | str | None:
-    return prior if isinstance(prior, str) else describe(prior)
-
-
 def _seed_sequence(seed: object) -> np.random.SeedSequence:
     if isinstance(seed, np.random.SeedSequence):
         return seed
     if isinstance(seed, np.random.Generator):
         return np.random.SeedSequence(int(seed.integers(2**63)))
+    if isinstance(seed, str):  # of a file
+        entropy, *key = (int(each) for each in seed.split("/"))
+        return np.random.SeedSequence(entropy, spawn_key=key)
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise RequestError(
             f"seed must be an integer, zero or more, a SeedSequence or a Generator of numpy; "
@@ -868,14 +798,6 @@ def _step_of(dt: float | None, runs: Runs | None) -> float:
     if dt is not None:
         labelled.check_step(*next((run, name) for name, run in named.items()), dt)
     return step
-
-
-def _check_lead(lead: object) -> None:
-    if isinstance(lead, bool) or not isinstance(lead, int | float) or not 0 <= lead < np.inf:
-        raise RequestError(
-            f"lead must be zero or more, an integer of samples or a float of encounter periods; "
-            f"received {lead!r:.{SHOWN}}."
-        )
 
 
 def _training_arrays(

@@ -15,7 +15,7 @@ from seakeep.core.embedding import History, TrainingWindow, training_window
 from seakeep.core.solve import Method, Solution, identify
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.models import labelled
-from seakeep.models.checks import typed
+from seakeep.models.checks import of_json
 from seakeep.models.inputs import Chain, Measured
 from seakeep.models.interface import Json, Regressors, Scale, Signature, Span
 from seakeep.models.labelled import ChannelLabel, Stop
@@ -74,27 +74,9 @@ class Training:
         return asdict(self)
 
     @classmethod
-    def from_json(cls, content: Json, dt: float, regressors: int) -> Self:
-        """Rebuild from :meth:`to_json`, for a model of so many regressors; raises ValueErrors."""
-        made = typed(cls, content)
-        lengths = {len(made.runs), len(made.first), len(made.stop), len(made.columns)}
-        if len(lengths) != 1:
-            raise ValueError("training names runs, instants and columns of unequal number")
-        for run, first, stop, columns in zip(
-            made.runs, made.first, made.stop, made.columns, strict=True
-        ):
-            if not (abs(first) + abs(stop) < np.inf and 0 < columns <= (stop - first) / dt + 1.5):
-                raise ValueError(
-                    f"training takes {columns} snapshot pairs of {run}, from {first:g} to {stop:g} "
-                    f"s, in steps of {dt:g} s"
-                )
-        if not 0 <= made.ridge < np.inf:
-            raise ValueError(f"training.ridge is {made.ridge:g}")
-        if not 0 <= made.rank <= regressors:
-            raise ValueError(f"training.rank is {made.rank}, and there are {regressors} regressors")
-        if not all(0 < each < np.inf for each in made.clipped):
-            raise ValueError("training.clipped holds a modulus that is none")
-        return made
+    def from_json(cls, content: Json) -> Self:
+        """Rebuild from :meth:`to_json`."""
+        return of_json(cls, content)
 
 
 @dataclass(frozen=True, eq=False)
@@ -447,8 +429,8 @@ def _check_length(
     if window is not None and place.first < 0:
         raise DataError(
             f"{name} has {place.last + 1} samples up to the end of the training window, which asks "
-            f"for {window}: {-place.first} are missing. Shorten the window (window, or "
-            "train_length of an ensemble), or give a longer run (span or train in [runs.NAME])."
+            f"for {window}: {-place.first} are missing. Shorten window, or give a longer run (span "
+            "or train in [runs.NAME])."
         )
     if final - place.first_column < 1:
         needed = reach + 2 + place.last - final

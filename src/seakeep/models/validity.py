@@ -13,8 +13,7 @@ from scipy import fft
 from seakeep.arrays import BoolArray, FloatArray
 from seakeep.core.wave_bands import PER_OCTAVE, band_edges, band_energy
 from seakeep.models import labelled, store
-from seakeep.models.checks import typed
-from seakeep.models.interface import Model, Signature, plain
+from seakeep.models.interface import Model, Signature
 from seakeep.waves import GRAVITY
 
 __all__ = ["Coverage", "Waves", "compare_waves", "outside_training"]
@@ -22,7 +21,6 @@ __all__ = ["Coverage", "Waves", "compare_waves", "outside_training"]
 TRAINED = 0.01
 """Part of the training energy from which a band, or a neighbour of it, counts as trained: the
 leakage of a taper stays below it, and the tail of a sea above twice its peak frequency too."""
-MOST_BANDS = 100 * PER_OCTAVE
 """Bands of a training record: a hundred octaves are more than any holds."""
 CYCLES = 5.0
 """Periods from which on a spectrum shows which waves it holds."""
@@ -189,32 +187,20 @@ class Coverage:
     def to_variables(self) -> dict[str, Any]:
         """Variables of a file."""
         label = {"long_name": "part of the training energy", "units": "1", "first": self.first}
-        out: dict[str, Any] = {"wave_shares": (("channel", "band"), self.shares, label)}
-        if np.isfinite(self.heights).all():
-            label = {"long_name": "wave height, most of a training run"}
-            out["wave_heights"] = ("channel", self.heights, label)
-            label = {"long_name": "wave steepness, most of a training run", "units": "1"}
-            out["wave_steepnesses"] = ("channel", self.steepnesses, label)
-        return out
+        height = {"long_name": "wave height, most of a training run"}
+        steepness = {"long_name": "wave steepness, most of a training run", "units": "1"}
+        return {
+            "wave_shares": (("channel", "band"), self.shares, label),
+            "wave_heights": ("channel", self.heights, height),
+            "wave_steepnesses": ("channel", self.steepnesses, steepness),
+        }
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset, signature: Signature) -> Coverage:
-        """Rebuild from :meth:`to_variables`; what no training gives raises a ValueError."""
-        channels = tuple(signature.inputs)
-        first = typed(int, plain(dataset["wave_shares"].attrs["first"]), "wave_shares.first")
-        bands = _last_band(signature.dt) + 1 - first
-        if not 0 < bands <= MOST_BANDS:
-            raise ValueError(f"wave_shares.first is {first}, and the last band {first + bands - 1}")
-        shares = store.numbers(dataset, "wave_shares", (len(channels), bands))
-        if np.any(shares < 0) or np.any(shares.sum(axis=1) > 1 + 1e-9):  # rounding of a sum
-            raise ValueError("wave_shares are no parts of an energy")
-        most = [np.full(len(channels), np.nan)] * 2  # a file of an earlier version
-        if "wave_heights" in dataset:
-            keys = ("wave_heights", "wave_steepnesses")
-            most = [store.numbers(dataset, key, (len(channels),)) for key in keys]
-            if any(np.any(each < 0) for each in most):
-                raise ValueError("a wave height or steepness of the training is negative")
-        return cls(channels, first, shares, *most)
+        """Rebuild from :meth:`to_variables`."""
+        keys = ("wave_shares", "wave_heights", "wave_steepnesses")
+        first = int(dataset["wave_shares"].attrs["first"])
+        return cls(tuple(signature.inputs), first, *(store.numbers(dataset, key) for key in keys))
 
 
 def _last_band(dt: float) -> int:

@@ -53,6 +53,11 @@ class ClocksKind(Kind):
         "counted at the {limit:g} stated; the file's own times, which are left aside, give "
         "{value:.5g}. Leave sampling_rate out, or correct it"
     )
+    COUNTED = (
+        "counts 1, 2, 3 and states no unit: taken for seconds",
+        "If it counts samples, state sampling_rate (Hz) in [{table}] and leave time out there; if "
+        "these are seconds, state time_unit = 's' there.",
+    )
     OTHER_RATE = "samples at {value:.5g}, by its times; {limit:g} are stated"
     ASSUMED_CLOCK = (
         "clock assumed the same as the reference's: state trigger, shared, correlated or offset (0 "
@@ -82,6 +87,12 @@ class ClocksKind(Kind):
     COARSE_STEP = (
         "loses {share:.2g} % of the energy of its waves (peak at {period:.3g} s): it lies above "
         "{limit:.3g} and {fate} at {value:.4g}; take a finer step"
+    )
+    LOW_PASS = (
+        "loses {share:.3g} % of the energy of its waves (peak at {period:.3g} s) to the filter "
+        "low_pass, which halves what lies at {limit:.3g}",
+        "Raise low_pass in [preparation] above the waves, or leave it out.",
+        True,
     )
     PERIOD = (
         "counts waves of {value:.3g}, and the energy period of its spectrum is {limit:.3g}",
@@ -127,12 +138,13 @@ def clocks(record: Record) -> Iterator[Finding]:
 
 
 def rates(record: Record) -> Iterator[Finding]:
-    """Loggers whose rate is a guess."""
-    for name in record.groups:
-        rate = record.rates.get(name)
+    """Loggers whose rate is a guess, or whose times may count samples."""
+    for name, group in record.groups.items():
+        rate, label = record.rates.get(name), name or "time"
+        details = {"table": f"instruments.{name}" if name else "files"}
+        if group.attrs.get("time_counts"):
+            yield Finding(ClocksKind.COUNTED, record.run, label, details=details)
         if rate is not None and rate.counted and rate.assumed:
-            details = {"table": f"instruments.{name}" if name else "files"}
-            label = name or "time"
             yield Finding(
                 ClocksKind.RATE, record.run, label, rate.stated, unit="Hz", details=details
             )
@@ -172,14 +184,17 @@ def steps(record: Record) -> Iterator[Finding]:
     for logger, group in record.groups.items():
         for name, channel in channels_of(group).items():
             wanted = is_elevation(name, channel) or name in MOTIONS
-            if not wanted or "derived_from" in channel.attrs or own[logger] >= dt:
+            if not wanted or "derived_from" in channel.attrs:
                 continue
+            cuts = [(ClocksKind.COARSE_STEP, edge)] if own[logger] < dt else []
+            if (passed := record.whole[name].attrs.get("low_pass")) is not None:
+                cuts.append((ClocksKind.LOW_PASS, float(np.mean(passed))))
             x = channel.to_numpy()
-            share, period = energy_above(x, own[logger], edge)
-            if share > LOST_ENERGY and not is_noise(x):
-                details = {"share": 100 * share, "period": period, "fate": fate}
-                kind = ClocksKind.COARSE_STEP
-                yield Finding(kind, record.run, name, 1 / dt, edge, "Hz", details=details)
+            for kind, cut in cuts:
+                share, period = energy_above(x, own[logger], cut)
+                if share > LOST_ENERGY and not is_noise(x):
+                    details = {"share": 100 * share, "period": period, "fate": fate}
+                    yield Finding(kind, record.run, name, 1 / dt, cut, "Hz", details=details)
 
 
 def is_noise(series: FloatArray) -> bool:

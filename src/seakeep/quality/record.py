@@ -62,6 +62,8 @@ class Record:
         Stated rates by logger.
     assumed_units : mapping of str to str, optional
         Units that are guesses, by channel.
+    wave_columns : mapping of str to str, optional
+        Columns that are called as wave probes are, by the motion that is read from them.
     bridged : float, optional
         Longest gap that is bridged, s; None where gaps are masked.
     anti_alias : bool, optional
@@ -82,6 +84,7 @@ class Record:
     redundant: tuple[Redundant, ...] = ()
     rates: Mapping[str, Rate] = field(default_factory=dict)
     assumed_units: Mapping[str, str] = field(default_factory=dict)
+    wave_columns: Mapping[str, str] = field(default_factory=dict)
     bridged: float | None = None
     anti_alias: bool = True
     left_out: Mapping[str, str] = field(default_factory=dict)

@@ -46,6 +46,10 @@ class SamplesKind(Kind):
     DRIFT = "level drifts by {value:+.3g} over the record"
     IMPOSSIBLE = "reaches {value:.3g}, more than {limit:.3g}", _UNIT
     OUT_OF_WATER = "leaves its mean by {value:.3g} in water of {limit:g}", _UNIT
+    WAVE_COLUMN = (
+        "is read from the column '{column}', which is called as wave probes are",
+        "Correct column in [channels.{channel}], or rename it in the files.",
+    )
     UNIT = (
         "is taken as {stated}, which is assumed: no file states its unit",
         "Correct the unit in [channels.{channel}], and remove unit_assumed there.",
@@ -154,7 +158,9 @@ def _reached(x: FloatArray) -> float:
 
 
 def units(record: Record) -> Iterator[Finding]:
-    """Units that are guesses."""
+    """Units that are guesses, and motions that are read from columns of waves."""
+    for name, column in record.wave_columns.items():
+        yield Finding(SamplesKind.WAVE_COLUMN, record.run, name, details={"column": column})
     for name, unit in record.assumed_units.items():
         if name in record.whole:
             stated = "a number without a unit" if unit == "-" else unit

@@ -49,6 +49,7 @@ from seakeep.signals.tracking import Track, TrackingSettings, contact_sheet, tra
 from seakeep.signals.waves import (
     encounter_period,
     peak_period,
+    repeated_waves,
     significant_height,
     wave_heights,
     wave_spectrum,
@@ -93,6 +94,7 @@ __all__ = [
     "predict_waves",
     "probe_separation",
     "remove_gravity",
+    "repeated_waves",
     "resample",
     "rotation_matrix",
     "significant_height",

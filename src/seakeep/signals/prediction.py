@@ -12,7 +12,6 @@ import scipy
 from seakeep.arrays import FloatArray, as_series, whole_number
 from seakeep.signals.calculus import continued, predicted, reflections, whitening
 from seakeep.signals.propagation import LEAST_CORRELATION, band_limit, carry_by_dispersion
-from seakeep.sizes import MOST_AHEAD, check_size
 from seakeep.waves import group_speed
 
 __all__ = ["draw_sea", "draw_waves", "predict_waves", "predictable_time"]
@@ -66,7 +65,7 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     True
     """
     array = as_series(series, minimum=4, channels=True)
-    number_of = _checked(count)
+    number_of = whole_number(count, "count")
     flat = array.reshape(array.shape[0], -1)
     out = np.empty((number_of, flat.shape[1]))
     for column, values in enumerate(flat.T):
@@ -113,7 +112,7 @@ def draw_waves(
     ((6, 5), True)
     """
     array = as_series(series, minimum=4, channels=True)
-    number_of = _checked(count)
+    number_of = whole_number(count, "count")
     flat = array.reshape(array.shape[0], -1)
     expected = np.empty((number_of, flat.shape[1]))
     errors = np.empty((pairs, *expected.shape))
@@ -239,14 +238,6 @@ def predictable_time(series: npt.ArrayLike, dt: float, distance: float, depth: f
     """
     edge = band_limit(series, dt, QUICKLY)
     return float(distance / group_speed(2 * np.pi * edge, depth))
-
-
-def _checked(count: object) -> int:
-    """Number of samples to predict."""
-    number_of = whole_number(count, "count")
-    check_size("waves are predicted over some periods, and count =", number_of, MOST_AHEAD,
-               "samples", "Give fewer.")  # fmt: skip
-    return number_of
 
 
 def _memory(deviations: FloatArray) -> int:

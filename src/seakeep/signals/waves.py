@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -13,7 +14,6 @@ import scipy
 from seakeep.arrays import FloatArray, IntArray, as_series, number, time_step, whole_number
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import parabola_peak
-from seakeep.sizes import MOST_TRANSFORM, check_size
 
 __all__ = [
     "WaveStatistics",
@@ -21,6 +21,7 @@ __all__ = [
     "energy_period",
     "paper_welch",
     "peak_period",
+    "repeated_waves",
     "significant_height",
     "wave_heights",
     "wave_spectrum",
@@ -105,6 +106,77 @@ def waves_part(series: npt.ArrayLike, dt: float, still: float = STILL) -> slice:
             break
         begin, end = before, after
     return slice(begin, end)
+
+
+ALIKE = 0.9
+"""Correlation of two records from which their waves are the same, and part of the larger standard
+deviation that the smaller one must reach.
+
+Repetitions of one regular wave in a flume have 0.96 and 0.98 or more; waves of one period and two
+heights 0.92 and 0.5, and waves whose periods differ by 2 % 0.75.
+"""
+
+OVERLAP = 0.75
+"""Part of the shorter record over which two must agree: a few waves are alike in any two seas."""
+
+PER_WAVE = 8
+"""Samples of the shortest waves that are enough to compare records."""
+
+
+def repeated_waves(records: Mapping[str, npt.ArrayLike], dt: float) -> dict[str, str]:
+    """Group records in which the same waves come again, such as repetitions of one test.
+
+    Parameters
+    ----------
+    records : mapping of str to array_like, shape (time,)
+        Wave elevations of one probe by run, uniformly sampled, without gaps. Lengths may differ.
+    dt : float
+        Time step, s.
+
+    Returns
+    -------
+    dict of str to str
+        By run, the first run of its group. Two records repeat each other where they correlate to
+        0.9 or more at the lag of their best agreement, over three quarters of the shorter one or
+        more, and their standard deviations there differ by a tenth at most.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(0, 60, 0.05)
+    >>> runs = {"a": np.sin(5 * t), "b": np.sin(t), "again": np.sin(t + 2), "high": 2 * np.sin(t)}
+    >>> repeated_waves(runs, 0.05)
+    {'a': 'a', 'b': 'b', 'again': 'b', 'high': 'high'}
+    """
+    series = {name: as_series(each) for name, each in records.items()}
+    parts = {name: x[waves_part(x, dt)] for name, x in series.items()}
+    every = max(int(min(map(_dominant_period, parts.values()), default=1.0) / PER_WAVE), 1)
+    parts = {name: x[::every] - x.mean() for name, x in parts.items()}
+    size = scipy.fft.next_fast_len(2 * max(map(len, parts.values()), default=1), real=True)
+    spectra = {name: np.fft.rfft(x, size) for name, x in parts.items()}
+    groups: dict[str, str] = {}
+    for name, x in parts.items():
+        same = (
+            first
+            for first in dict.fromkeys(groups.values())
+            if _are_alike(x, parts[first], spectra[name] * spectra[first].conj(), size)
+        )
+        groups[name] = next(same, name)
+    return groups
+
+
+def _are_alike(
+    one: FloatArray, other: FloatArray, cross: npt.NDArray[np.complex128], size: int
+) -> bool:
+    """Whether two records hold the same waves, from their cross-spectrum of `size` samples."""
+    lag = int(np.argmax(np.fft.irfft(cross, size)))
+    lag -= size * (lag >= len(one))
+    begin, end = max(lag, 0), min(len(one), len(other) + lag)
+    if end - begin < OVERLAP * min(len(one), len(other)):
+        return False
+    one, other = one[begin:end], other[begin - lag : end - lag]
+    small, large = sorted((float(one.std()), float(other.std())))
+    return 0 < small >= ALIKE * large and bool(np.corrcoef(one, other)[0, 1] >= ALIKE)
 
 
 def tapered_power(x: FloatArray) -> FloatArray:
@@ -374,7 +446,6 @@ def wave_spectrum(
             f"the transform must be at least as long as a segment ({length} samples); received "
             f"{padded}. Lengthen it, or leave it out."
         )
-    check_size("padded =", padded or 0, MOST_TRANSFORM, "points", "Pad less.")
     try:
         taper = scipy.signal.get_window(window, length)
     except ValueError as error:

@@ -20,8 +20,8 @@ from seakeep.models.specs import left_open
 from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, find_leakage
 from seakeep.study.plan import between
-from seakeep.study.resolve import Spec, build_spec, can_align, counts_in_periods
-from seakeep.toml import Length
+from seakeep.study.resolve import Spec, build_spec, can_align, counts_in_periods, mistakes_of
+from seakeep.toml import Length, refusal
 
 __all__ = [
     "Repeat",
@@ -163,6 +163,9 @@ def read_training(
         Last instant of the training windows, s.
     """
     settings = campaign.model(model)
+    place = ("model",) if model is None else ("models", model)
+    if mistakes := mistakes_of(settings, place):
+        raise refusal(campaign.path, "campaign", mistakes)
     prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
     if not prepared:
         raise RequestError(NOTHING_TRAINS)

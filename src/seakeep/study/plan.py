@@ -18,6 +18,7 @@ from seakeep.campaign.prepare import Progress
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Needs
 from seakeep.models.calibration import BandScale
+from seakeep.models.selection import groups_of
 from seakeep.models.settings import periods_to_samples
 from seakeep.models.slow import warn_of_slow_motions
 from seakeep.study.resolve import ResolvedModel, Spec, can_align, resolve_model
@@ -118,12 +119,16 @@ def whole_span(run: xr.Dataset) -> tuple[float, float]:
 
 
 def choose_training(
-    settings: StudySettings, runs: Runs, names: Sequence[str], needs: Needs
+    settings: StudySettings,
+    runs: Runs,
+    names: Sequence[str],
+    needs: Needs,
+    inputs: Sequence[str],
 ) -> tuple[TrainingSet, ...]:
     """Choose what the models learn from."""
     training = settings.training
     if training.scheme == "leave_out":
-        return _folds(settings, runs, names, needs)
+        return _folds(settings, runs, names, needs, inputs)
     if missing := [name for name in names if "train_span" not in runs[name].attrs]:
         raise RequestError(
             f"training: the run '{missing[0]}' has no training span in the campaign. Give it "
@@ -188,7 +193,7 @@ def _check_span(name: str, samples: int, needs: Needs, run: xr.Dataset) -> None:
         f"training: no window is feasible in '{name}'. Its span holds {samples} samples "
         f"({samples * dt:g} s), and the largest draw of all models needs {needed} "
         f"({needs.snapshots} snapshots and {needs.history} of delay history, "
-        f"{needed * dt:g} s). Shorten train_length or the delays, or give longer runs."
+        f"{needed * dt:g} s). Shorten window or the delays, or give longer runs."
     )
 
 
@@ -198,18 +203,21 @@ def _refuse_training(spans: Mapping[str, tuple[int, int]], needs: Needs, runs: R
 
 
 def _folds(
-    settings: StudySettings, runs: Runs, names: Sequence[str], needs: Needs
+    settings: StudySettings,
+    runs: Runs,
+    names: Sequence[str],
+    needs: Needs,
+    inputs: Sequence[str],
 ) -> tuple[TrainingSet, ...]:
     groups: dict[str, list[str]] = {}
-    for name in names:
-        by_sea = settings.training.leave_out == "sea_state"
-        key = str(runs[name].attrs.get("sea_state") or name) if by_sea else name
-        groups.setdefault(key, []).append(name)
+    left_out = settings.training.leave_out
+    for name, group in groups_of({n: runs[n] for n in names}, left_out, inputs).items():
+        groups.setdefault(group, []).append(name)
     if len(groups) < 2:
+        what = "run with its repetitions" if left_out == "auto" else left_out.replace("_", " ")
         raise RequestError(
-            f"training: leaving out a {settings.training.leave_out.replace('_', ' ')} of "
-            f"{', '.join(names)} leaves no run to learn from. Give more runs, or use scheme = "
-            "'halves'."
+            f"training: leaving out a {what} of {', '.join(names)} leaves no run to learn "
+            "from. Give more runs, or use scheme = 'halves'."
         )
     spans = {name: whole_span(runs[name]) for name in names}
     for name in names:
@@ -419,13 +427,13 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
             preset=general.preset,
             seed=general.seed,
             aligned=aligned,
-            folds=settings.training.leave_out if left_out else "run",
+            folds=settings.training.leave_out if left_out else "auto",
         )
         for name, each in settings.models.items()
     }
     specs = [each.spec for each in models.values()]
     needs = needs_of(specs, dt)
-    training = choose_training(settings, runs, training_names, needs)
+    training = choose_training(settings, runs, training_names, needs, study.inputs)
     default = "whole" if left_out else "test"
     tests = {
         name: choose_tests(

@@ -6,37 +6,33 @@ else the default of the kind.
 
 from __future__ import annotations
 
-import json
-import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, Literal, cast
 
-from seakeep.campaign import ModelSettings, PriorSettings
+from seakeep.campaign import ModelSettings
 from seakeep.campaign.settings import CampaignSettings
-from seakeep.errors import SHOWN, RequestError, SeakeepWarning, did_you_mean
+from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import KINDS, ProbeAlignment, Select, Spec
-from seakeep.models.checks import typed
+from seakeep.models.checks import check_keys
 from seakeep.models.observables import Observable, SlowSquares, observables_of
-from seakeep.models.priors import Fixed, LogUniform, Prior, Uniform
-from seakeep.models.settings import periods_to_samples
+from seakeep.models.settings import Folds
 from seakeep.models.specs import left_open
-from seakeep.toml import Length, lengths, parse_length
+from seakeep.toml import Length, Mistake, lengths
 
 __all__ = [
     "ResolvedModel",
     "Spec",
     "build_spec",
     "can_align",
-    "check_settings",
     "counts_in_periods",
+    "mistakes_of",
     "resolve_model",
 ]
 
 Source = Literal["stated", "preset", "study", "default"]
 
-PRIORS = ("train_length", "state_delay", "input_delay", "ridge")
 TABLES = {"alignment": ProbeAlignment, "select": Select}
 """Arguments of a spec that are tables of their own."""
 OF_THE_DATA = ("dt", "encounter_period")
@@ -91,38 +87,6 @@ class ResolvedModel:
         }
 
 
-def check_settings(kind: str, values: Mapping[str, Any], period: float, dt: float) -> Spec:
-    """Make a spec of the values that :meth:`ResolvedModel.to_json` keeps.
-
-    Raises
-    ------
-    SeakeepError, ValueError, TypeError, LookupError
-        If the classes of the settings refuse them, or take them for others.
-    """
-    made = KINDS[kind]
-    table: dict[str, Any] = {key: each for key, each in values.items() if "." not in key}
-    for name, inner in TABLES.items():
-        keys = {key.partition(".")[2]: values[key] for key in values if key.startswith(f"{name}.")}
-        if keys:
-            typed(inner, keys, name)
-            table[name] = keys
-    data = {"encounter_period": period, "dt": dt}
-    table |= {each.name: data[each.name] for each in fields(cast("Any", made)) if each.name in data}
-    if made.is_ensemble:
-        table["spawn_key"] = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SeakeepWarning)  # given when the settings were made
-        spec = made.from_json(table)
-    taken = _values(spec)
-    for key, value in values.items():
-        if json.dumps(taken.get(key)) != json.dumps(value):
-            raise ValueError(
-                f"{key}: received {value!r:.{SHOWN}}, which would be taken for "
-                f"{taken.get(key)!r:.{SHOWN}}"
-            )
-    return spec
-
-
 def _defaults(kind: type[Spec]) -> dict[str, Any]:
     """Keys that a kind of model has, and their defaults."""
     settable = [each for each in fields(cast("Any", kind)) if each.init]
@@ -133,8 +97,6 @@ def _values(spec: Spec) -> dict[str, Any]:
     """Settings of a spec as JSON values; those of its tables one by one."""
     known = _defaults(type(spec))
     out = {key: value for key, value in spec.to_json().items() if key in known}
-    if "seed" in out:
-        out["seed"] = int(out["seed"])
     for name in TABLES:
         if (table := out.get(name)) is not None:
             del out[name]
@@ -145,8 +107,9 @@ def _values(spec: Spec) -> dict[str, Any]:
 def counts_in_periods(settings: ModelSettings) -> bool:
     """Whether a model is stated in encounter periods: by a preset, a key, or as an ensemble."""
     by_kind = _kind_of(settings).is_ensemble
-    squares = any(each.get("kind") == SlowSquares.kind for each in settings.observables or ())
-    named = preset_of(settings) is not None or settings.select is not None
+    stated = settings.arguments()
+    squares = any(each.get("kind") == SlowSquares.kind for each in stated.get("observables", ()))
+    named = preset_of(settings) is not None or "select" in stated
     return named or by_kind or squares or any(lengths(settings))
 
 
@@ -195,7 +158,7 @@ def resolve_model(
     preset: str | None = None,
     seed: int | None = None,
     aligned: bool = False,
-    folds: Literal["run", "sea_state"] = "run",
+    folds: Folds = "auto",
 ) -> ResolvedModel:
     """Fill in, key by key, what the table of a model does not state."""
     kind = _kind_of(settings)
@@ -211,7 +174,6 @@ def resolve_model(
     else:
         preset = preset_of(settings)
     stated = settings.arguments()
-    stated.pop("stop", None)
     known = list(_defaults(kind))
     if unknown := [key for key in stated if key not in known]:
         raise RequestError(
@@ -230,9 +192,6 @@ def resolve_model(
     if "observables" in stated:
         tables = stated["observables"]
         stated["observables"] = tuple(_observable(each, encounter_period) for each in tables)
-    stated = {
-        key: _converted(key, value, ensemble, encounter_period, dt) for key, value in stated.items()
-    }
     from_study: dict[str, Any] = (
         {"seed": seed} if ensemble and seed is not None and "seed" not in stated else {}
     )
@@ -240,12 +199,35 @@ def resolve_model(
     if preset is not None and encounter_period is not None:
         filled = _filled(kind, preset, encounter_period, dt, alignment)
     data = {"encounter_period": encounter_period, "dt": dt}
-    spec = _made(kind, filled, {**from_study, **stated}, data)
+    spec = _made(kind, filled, {**from_study, **stated}, data).resolved(dt, encounter_period)
     open_spec = left_open(spec)
-    if open_spec and folds != "run" and "folds" not in (stated.get("select") or {}):
+    if open_spec and folds != "auto" and "folds" not in (stated.get("select") or {}):
         spec = replace(open_spec, select=replace(open_spec.select or Select(), folds=folds))
         from_study["select.folds"] = folds
     return ResolvedModel(settings.kind, preset, spec, _sources(spec, filled, stated, from_study))
+
+
+def mistakes_of(
+    settings: ModelSettings, place: tuple[str, ...], preset: str | None = None
+) -> list[Mistake]:
+    """What is wrong with the table of a model, before its runs are prepared.
+
+    Parameters
+    ----------
+    settings : ModelSettings
+        The table.
+    place : tuple of str
+        Keys that lead to it in its file.
+    preset : str, optional
+        Preset of the study.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeakeepWarning)  # given when the model is fitted
+        try:
+            resolve_model(settings, 1.0, 1.0 / 32, preset=preset)  # any period and step
+        except RequestError as error:
+            return [Mistake(place, str(error))]
+    return []
 
 
 def _filled(
@@ -284,6 +266,7 @@ def _made(
 ) -> Spec:
     for name, table in TABLES.items():
         if isinstance(given.get(name), dict):
+            check_keys(table, given[name], f"{name}: ")
             before = getattr(filled, name, None) or table()
             given = {**given, name: replace(before, **given[name])}
     if given.get("observables") is not None and "select" in _defaults(kind):
@@ -295,10 +278,10 @@ def _made(
     if filled is not None:
         return cast("Spec", replace(cast("Any", filled), **given))
     needed = [key for key, default in _defaults(kind).items() if default is MISSING]
-    if "train_length" in needed:
-        given.setdefault("train_length", None)
     if missing := [key for key in needed if key not in given]:
-        as_priors = " as priors, such as { uniform = [0.5, 1.5] }" if kind.is_ensemble else ""
+        as_priors = (
+            " as priors, such as { uniform = ['0.5 T', '1.5 T'] }" if kind.is_ensemble else ""
+        )
         presets = [f"'{name}'" for name in ("recommended", "paper") if hasattr(kind, name)]
         raise RequestError(
             f"the [model] table states no {missing[0]}. Add {', '.join(missing)}{as_priors}"
@@ -335,9 +318,7 @@ def _select(table: dict[str, Any], encounter_period: float | None) -> dict[str, 
     if "horizon" in table:
         given = table["horizon"]
         every = given if isinstance(given, list | tuple) else (given,)
-        made["horizon"] = tuple(
-            parse_length(each).value if isinstance(each, str) else each for each in every
-        )
+        made["horizon"] = tuple(each.value if isinstance(each, Length) else each for each in every)
     return made
 
 
@@ -347,34 +328,10 @@ def _observable(table: Mapping[str, Any], encounter_period: float | None) -> Obs
     def counted(value: Any) -> Any:
         if isinstance(value, list | tuple):
             return [counted(each) for each in value]
-        return parse_length(value).value if isinstance(value, str) else value
+        return value.value if isinstance(value, Length) else value
 
     in_periods = {key: counted(table[key]) for key in ("cutoff", "lead", "lags") if key in table}
     (made,) = observables_of([{**table, **in_periods}])
     if isinstance(made, SlowSquares) and made.period is None:
         return replace(made, period=encounter_period)
     return made
-
-
-def _converted(key: str, value: Any, ensemble: bool, period: float | None, dt: float) -> Any:
-    """Value of a key as the constructor takes it: lengths in samples, priors of an ensemble."""
-    if isinstance(value, Length) and period is not None:
-        whole = math.isinf(value.value)  # "inf T": all samples of a run
-        return None if whole else periods_to_samples(value.value, period, dt)
-    return _prior(value) if ensemble and key in PRIORS and value != "rollout" else value
-
-
-def _prior(stated: PriorSettings | float) -> Prior:
-    if not isinstance(stated, PriorSettings):
-        return Fixed(float(stated))
-    if stated.uniform is not None:
-        return Uniform(*stated.uniform)
-    if stated.log_uniform is not None:
-        return LogUniform(*stated.log_uniform)
-    if stated.distribution is not None:
-        from scipy import stats
-
-        frozen: Prior = getattr(stats, stated.distribution)(**stated.parameters)
-        return frozen
-    assert stated.fixed is not None
-    return Fixed(stated.fixed)

@@ -174,7 +174,6 @@ def _attributes(
         "models": json.dumps({name: each.to_json() for name, each in plan.models.items()}),
         "conditional_on": _conditional(plan),
         "versions": json.dumps(versions()),
-        "groups": json.dumps(list(groups)),
     }
 
 

@@ -21,6 +21,7 @@ from seakeep.campaign.settings import ModelSettings
 from seakeep.errors import did_you_mean
 from seakeep.files import expanded, is_there, sha256_of
 from seakeep.sizes import MOST_SERIES
+from seakeep.study.resolve import mistakes_of
 from seakeep.toml import Count, Mistake, Names, Positive, Table, read_toml, refusal, validated
 
 __all__ = [
@@ -32,7 +33,7 @@ __all__ = [
     "read_study",
 ]
 
-FORMAT = 6
+FORMAT = 7
 """Goes into digest and result: raise it when the same settings give other arrays than before."""
 
 Preset = Literal["paper", "recommended"]
@@ -80,8 +81,10 @@ class TrainingSettings(Table):
         "once) or 'leave_out' (all runs but those that test)",
     )
     runs: Names = Field(default=(), description="list of runs; left out, the training runs")
-    leave_out: Literal["run", "sea_state"] = Field(
-        default="run", description="'run', or 'sea_state': all runs of one sea state at once"
+    leave_out: Literal["auto", "run", "sea_state"] = Field(
+        default="auto",
+        description="'auto', a run and those that repeat its waves; 'run', a run alone; "
+        "'sea_state', all runs of one sea state at once",
     )
     windows: Count | None = Field(
         default=10,
@@ -356,8 +359,7 @@ def _cross_checks(study: Study) -> list[Mistake]:
                 )
                 mistakes.append(Mistake((*table, "runs"), words))
     for name, model in settings.models.items():
-        unknown = model.unknown_keys().items()
-        mistakes += [Mistake(("models", name, key), words) for key, words in unknown]
+        mistakes += mistakes_of(model, ("models", name), settings.study.preset)
         for key in ("states", "inputs"):
             if getattr(model, key):
                 words = (

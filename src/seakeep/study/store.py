@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import errno
+import hashlib
+import io
 import json
 import tempfile
-import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 from filelock import FileLock, Timeout
 
-from seakeep.errors import SHOWN, DataError, RequestError, SeakeepError, warn
-from seakeep.files import check_report, is_there, read_bytes, read_sealed, replacing, write_netcdf
-from seakeep.models.checks import parsed, typed
-from seakeep.models.store import rebuilt
-from seakeep.study.schema import check_contents
+from seakeep.errors import SHOWN, RequestError, SeakeepError, warn
+from seakeep.files import SEAL, check_report, is_there, read_bytes, read_sealed, replacing
 from seakeep.study.settings import FORMAT
 
 __all__ = [
@@ -40,10 +38,10 @@ __all__ = [
 ]
 
 RESULT = "study.nc"
+NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 HEADER = "study.json"
 LOCK = "study.lock"
 UNITS = "units"
-MEND = "Remove it and run the study again."
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 FORBIDDEN = (errno.EACCES, errno.EPERM, errno.EROFS)
@@ -191,30 +189,25 @@ class UnitFolder:
         StorageError
             If the disk is full or cannot be written.
         """
-        kept: dict[str, Any] = {key: np.asarray(value) for key, value in arrays.items()}
-        with (
-            storing(self.folder),
-            replacing(self._path(name)) as temporary,
-            temporary.open("wb") as file,
-        ):
-            np.savez(file, digest=np.array(self.digest), **kept)
+        content = io.BytesIO()
+        np.savez(content, digest=np.array(self.digest), **cast("dict[str, Any]", arrays))
+        _write_sealed(self._path(name), content.getvalue())
 
     def read(self, name: str) -> Arrays | None:
         """Arrays of a finished unit; None where it is not finished, or damaged."""
         try:
-            # numpy leaves a damaged file open that it opened itself
-            with (
-                self._path(name).open("rb") as opened,
-                np.load(opened, allow_pickle=False) as file,
-            ):
-                arrays = {key: file[key] for key in file.files}
-        except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile):
+            content, _, seal = self._path(name).read_bytes().rpartition(SEAL)
+        except OSError:
             return None
-        return arrays if str(arrays.pop("digest", "")) == self.digest else None
+        if hashlib.sha256(content).hexdigest().encode() != seal:
+            return None
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
+            arrays = {key: file[key] for key in file.files}
+        return arrays if str(arrays.pop("digest")) == self.digest else None
 
     def has(self, name: str) -> bool:
         """Whether a unit is finished."""
-        return self._path(name).exists() and self.read(name) is not None
+        return self.read(name) is not None
 
     def clear(self) -> None:
         """Remove the units; for when all of them are in the result."""
@@ -222,6 +215,11 @@ class UnitFolder:
             path.unlink(missing_ok=True)
         with suppress(OSError):  # files of others stay
             (self.folder / UNITS).rmdir()
+
+
+def _write_sealed(path: Path, content: bytes) -> None:
+    with storing(path.parent), replacing(path) as temporary:
+        temporary.write_bytes(content + SEAL + hashlib.sha256(content).hexdigest().encode())
 
 
 def _read_header(path: Path) -> dict[str, Any]:
@@ -341,32 +339,53 @@ def write_result(
     finished: Callable[[StudyResult], None] | None = None,
 ) -> StudyResult:
     """Write everything into one sealed NetCDF file, renamed into place."""
-    kept = {**attrs, "format": FORMAT, "created": datetime.now(UTC).isoformat(timespec="seconds")}
-    found = StudyResult(folder, kept, dict(groups))
+    created = datetime.now(UTC).isoformat(timespec="seconds")
+    found = StudyResult(folder, {"format": FORMAT, "created": created, **attrs}, dict(groups))
     if finished is not None:
         finished(found)
-    with storing(folder), replacing(folder / RESULT) as temporary:
-        write_netcdf(temporary, xr.Dataset(attrs=kept), groups, _packing)
+    _write_sealed(folder / RESULT, _content(found))
     return found
 
 
-def _packing(group: xr.Dataset) -> dict[str, dict[str, object]]:
-    return {
-        str(key): {"zlib": True, "complevel": 1, "shuffle": True}
-        for key, variable in group.data_vars.items()
-        if variable.size > 4096 and variable.dtype.kind == "f"
+def _content(result: StudyResult) -> bytes:
+    """NetCDF-4 file of a result; h5netcdf would take a hundred times as long for it."""
+    # Here, so that commands that write no result start without HDF5.
+    import h5py
+
+    layout = {
+        name: [{str(k): each.dims for k, each in part.items()} for part in (group, group.coords)]
+        for name, group in result.groups.items()
     }
+    made = io.BytesIO()
+    with h5py.File(made, "w", libver="latest", track_order=True) as file:
+        file.attrs.update(result.attrs | {"layout": json.dumps(layout)})
+        for name, group in result.groups.items():
+            place = file.create_group(name, track_order=True)
+            place.attrs.update(group.attrs)
+            for dim in group.sizes:
+                if dim not in group.variables:
+                    place.create_dataset(dim, (group.sizes[dim],), ">f4").make_scale(NO_VARIABLE)
+            for key, each in group.variables.items():
+                x, text = each.values, each.dtype.kind in "OU"
+                packing: dict[str, Any] = {"dtype": h5py.string_dtype()} if text else {}
+                if each.size > 4096 and each.dtype.kind == "f":
+                    packing = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+                made_of = {"b": "i1", "U": "O"}.get(each.dtype.kind, each.dtype)
+                kept = place.create_dataset(key, data=x.astype(made_of), **packing)
+                kept.attrs.update(each.attrs | ({"dtype": "bool"} if x.dtype.kind == "b" else {}))
+                if each.dims == (key,):
+                    kept.make_scale(key)
+            for key, each in group.variables.items():
+                for number, dim in enumerate(each.dims if each.dims != (key,) else ()):
+                    place[key].dims[number].attach_scale(place[dim])
+    return made.getvalue()
 
 
 def relabel(result: StudyResult, words: Mapping[str, str]) -> StudyResult:
     """Write other names and labels into a finished result: attributes on which no array depends."""
-    changed = {key: value for key, value in words.items() if result.attrs.get(key) != value}
-    if not changed:
+    if all(result.attrs[key] == value for key, value in words.items()):
         return result
-    path = result.folder / RESULT
-    with storing(result.folder), replacing(path) as temporary:
-        write_netcdf(temporary, xr.Dataset(attrs=changed), onto=path)
-    return replace(result, attrs={**result.attrs, **changed})
+    return write_result(result.folder, {**result.attrs, **words}, result.groups)
 
 
 def read_result(folder: Path | str) -> StudyResult:
@@ -402,34 +421,33 @@ def read_result(folder: Path | str) -> StudyResult:
             )
         )
     # Here, so that commands that read no result start without HDF5.
-    import h5netcdf
-    from xarray.backends import H5NetCDFStore
+    import h5py
 
-    part, groups = "the attributes", {}
-    try:
-        with h5netcdf.File(read_sealed(path), "r", decode_vlen_strings=True) as file:
-            attrs = {key: _plain(value) for key, value in file.attrs.items()}
-            if attrs.get("format", FORMAT) != FORMAT:
-                raise RequestError(
-                    f"{path} was written in format {attrs['format']!s:.{SHOWN}}, and this version "
-                    f"of seakeep reads format {FORMAT}. Run the study again in another folder."
-                )
-            for name in rebuilt(path, lambda: _names(attrs), MEND):
-                part = f"the group {name!r:.{SHOWN}}"
-                opened = xr.open_dataset(H5NetCDFStore(file, group=name), decode_times=False)
-                groups[name] = opened.load()
-    except SeakeepError:
-        raise
-    except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError) as error:
-        raise DataError(
-            f"{path} does not hold what seakeep writes: {part} cannot be read. {MEND}"
-        ) from error
-    attrs = rebuilt(path, lambda: check_contents(attrs, groups), MEND)
+    with h5py.File(read_sealed(path), "r") as file:
+        attrs = {key: _plain(value) for key, value in file.attrs.items()}
+        if attrs.get("format") != FORMAT:
+            raise RequestError(
+                f"{path} was written in format {attrs.get('format')!s:.{SHOWN}}, and this version "
+                f"of seakeep reads format {FORMAT}. Run the study again in another folder."
+            )
+        layout = json.loads(attrs.pop("layout"))
+        groups = {name: _read_group(file[name], *parts) for name, parts in layout.items()}
     return StudyResult(folder, attrs, groups)
 
 
-def _names(attrs: Mapping[str, Any]) -> list[str]:
-    return typed(list[str], parsed(str(attrs["groups"]), "groups"), "groups")
+OF_HDF5 = frozenset({"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST"})
+"""Attributes that tie variables to their dimensions."""
+
+
+def _read_group(place: Any, *parts: Mapping[str, Sequence[str]]) -> xr.Dataset:
+    read: list[dict[str, xr.Variable]] = [{}, {}]
+    for into, part in zip(read, parts, strict=True):
+        for key, dims in part.items():
+            attrs = {k: _plain(v) for k, v in place[key].attrs.items() if k not in OF_HDF5}
+            values = (place[key].asstr() if place[key].dtype.kind == "O" else place[key])[()]
+            into[key] = xr.Variable(dims, np.asarray(values, attrs.pop("dtype", None)), attrs)
+    variables, coords = read
+    return xr.Dataset(variables, coords, {k: _plain(v) for k, v in place.attrs.items()})
 
 
 def _plain(value: Any) -> Any:

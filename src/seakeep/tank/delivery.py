@@ -115,7 +115,7 @@ def write_record(record: Record, folder: Path, kind: str) -> Path:
 def write_dataset(data: xr.Dataset, path: Path) -> None:
     """Write a Dataset to NetCDF, compressed, under a temporary name, then rename it."""
     with replacing(path) as temporary:
-        write_netcdf(temporary, data, packing=_packing)
+        write_netcdf(temporary, data, _packing(data))
 
 
 def _packing(data: xr.Dataset) -> dict[str, dict[str, object]]:

@@ -20,7 +20,6 @@ import xarray as xr
 from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import reading, replacing, write_netcdf
-from seakeep.formats.limits import open_hdf5
 
 __all__ = [
     "CONVENTIONS",
@@ -134,7 +133,7 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
     """
     source = Path(path) if path else shipped_hydrodynamics()
     try:
-        with reading(source) as place, open_hdf5(place):
+        with reading(source) as place:
             data = xr.load_dataset(place, engine="h5netcdf")
     except (SeakeepError, OSError, ValueError) as error:
         raise RequestError(

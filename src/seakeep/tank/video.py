@@ -6,6 +6,7 @@ moves in a plane of 2.5 mm per pixel. A lamp in the upper left corner shows the 
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,6 @@ import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError, SeakeepError
-from seakeep.files import working_folder
 from seakeep.tank.instruments import Played, clock_instants, trigger
 
 __all__ = [
@@ -210,8 +210,8 @@ def render_side_view(
     cv2 = check_video()
     clock = played.settings.instruments.clocks["video"]
     _, instants = clock_instants(clock, played.length if length is None else length)
-    with working_folder(path.parent) as folder:
-        part = folder / "side_view.mp4"
+    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+        part = Path(folder) / "side_view.mp4"
         code = cv2.VideoWriter_fourcc(*"mp4v")
         writer = cv2.VideoWriter(str(part), code, clock.rate, (WIDTH, HEIGHT))
         if not writer.isOpened():

@@ -24,9 +24,9 @@ BAND_WORDS = {"all": "all frequencies", "low": "low frequencies", "wave": "wave 
 """Bands of ε(t)."""
 
 HYPERPARAMETERS = {
-    "train_length": "training length [periods]",
-    "state_delay": "state delay [periods]",
-    "input_delay": "input delay [periods]",
+    "window": "training length",
+    "state_delays": "state delay",
+    "input_delays": "input delay",
     "ridge": "ridge λ",
 }
 
@@ -99,7 +99,8 @@ def hyperparameter_figure(result: StudyResult, model: str) -> Figure:
                 _scatter(each, draws[name].values, errors, model_colour(result, model))
             row[0].set_ylabel(f"{result.label_of(test)}\nANRMSE")
         for each, name in zip(axes[-1], drawn, strict=False):
-            each.set_xlabel(HYPERPARAMETERS[name])
+            unit = "" if name == "ridge" else f" [{draws[name].attrs['units']}]"
+            each.set_xlabel(HYPERPARAMETERS[name] + unit)
         return figure
 
 

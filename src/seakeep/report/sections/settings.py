@@ -110,7 +110,6 @@ def _leaves(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 UNITS = {
     **dict.fromkeys(("length", "split_period"), "T̂"),
-    **dict.fromkeys(("train_length", "state_delay", "input_delay"), "T̂"),
     **dict.fromkeys(("state_delays", "input_delays", "window", "lead"), "samples"),
     **dict.fromkeys(("startup", "encounter_period"), "s"),
 }
@@ -122,34 +121,37 @@ def setting_text(key: str, value: Any) -> str:
 
     Examples
     --------
-    >>> setting_text("state_delay", {"prior": "LogUniform", "low": 0.5, "high": 1.5})
+    >>> setting_text("state_delays", {"log_uniform": ["0.5 T", "1.5 T"]})
     'log-uniform, 0.5 to 1.5 T̂'
     >>> setting_text("tests.irregular.length", 15.0), setting_text("window", None)
     ('15 T̂', 'all samples')
     """
     name = key.rpartition(".")[2]
     if value is None:
-        return "all samples" if name in ("window", "train_length") else "none"
+        return "all samples" if name == "window" else "none"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list):
         return ", ".join(setting_text("", each) for each in value)
     unit = f" {UNITS[name]}" if name in UNITS else ""
     if isinstance(value, dict):
-        return f"{_prior_text(value)}{unit}" if "prior" in value else json.dumps(value)
+        return _prior_text(value, unit)
     return f"{value:.6g}{unit}" if isinstance(value, float) else f"{value}{unit}"
 
 
-def _prior_text(prior: dict[str, Any]) -> str:
-    kind = prior["prior"]
-    if kind == "Fixed":
-        return f"{prior['value']:.6g}"
-    if kind in ("Uniform", "LogUniform"):
-        words = "uniform" if kind == "Uniform" else "log-uniform"
-        return f"{words}, {prior['low']:.6g} to {prior['high']:.6g}"
-    given = [f"{each:.6g}" for each in prior.get("args", [])]
-    given += [f"{key}={each:.6g}" for key, each in prior.get("kwds", {}).items()]
-    return f"{kind}({', '.join(given)})"
+def _prior_text(prior: dict[str, Any], unit: str) -> str:
+    """A prior, or another table, in words; `unit` is that of bare numbers."""
+    for kind, words in (("uniform", "uniform, "), ("log_uniform", "log-uniform, "), ("fixed", "")):
+        if kind in prior:
+            bounds = prior[kind] if isinstance(prior[kind], list) else [prior[kind]]
+            numbers = [str(each).partition(" ") for each in bounds]
+            shared = {"T": " T̂", "s": " s"}.get(numbers[0][2], unit)
+            return words + " to ".join(f"{float(each[0]):.6g}" for each in numbers) + shared
+    if "distribution" in prior:
+        given = ", ".join(f"{key}={each:.6g}" for key, each in prior["parameters"].items())
+        shared = {"T": " T̂", "s": " s"}.get(prior.get("unit", ""), unit)
+        return f"scipy.stats.{prior['distribution']}({given}){shared}"
+    return json.dumps(prior)
 
 
 def _windows_table(result: StudyResult) -> Table:
@@ -200,10 +202,8 @@ def _trained_on(result: StudyResult) -> dict[str, Any]:
     lengths = {}
     for model, told in result.model_settings.items():
         known = told["settings"]
-        for key in ("train_length", "window"):
-            if key in known:
-                lengths[model] = known[key]["value"]
-                break
+        if "window" in known:
+            lengths[model] = known["window"]["value"]
     return lengths
 
 
@@ -224,10 +224,10 @@ def unequal_training(result: StudyResult) -> str:
     told = []
     for model, length in parts.items():
         if isinstance(length, dict):
-            words = _prior_text(length)
+            words = _prior_text(length, " samples")
         else:
-            words = f"{length * float(result.attrs['dt']) / period:.3g}"
-        told.append(f"{model_words(model)} from a part ({words} T̂)")
+            words = f"{length * float(result.attrs['dt']) / period:.3g} T̂"
+        told.append(f"{model_words(model)} from a part ({words})")
     return (
         f"Models learn from different amounts of data: {', '.join(map(model_words, whole))} from "
         f"all of a training set ({low if low == high else f'{low} to {high}'} T̂), "

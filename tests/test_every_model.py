@@ -1,0 +1,145 @@
+"""Every kind of model, by every preset, on every set of data, is the same after its file."""
+
+import os
+import shutil
+import tomllib
+from functools import cache
+from pathlib import Path
+
+import ground
+import numpy as np
+import pytest
+import small_tank
+import tomlkit
+import xarray as xr
+
+from seakeep import SeakeepError, load_model, read_campaign
+from seakeep.campaign import load_prepared, write_prepared
+from seakeep.check import check_model
+from seakeep.hosts import write_c
+from seakeep.models import KINDS, load_live
+from seakeep.study import compare, comparison_table, fit_campaign
+
+ROOT = Path(__file__).parents[1]
+STEPS = 12
+MADE = [("own", ""), *((kind, each) for kind, spec in KINDS.items()
+        for each in ("paper", "recommended", "") if not each or hasattr(spec, each)
+        if each or not hasattr(spec, "recommended"))]  # fmt: skip
+"""Kinds by their presets, or without one where there is none; and the campaign's own table."""
+FEWER = {"bayesian_hankel_dmdc": {"n_members": 3}, "subspace": {"order": 8}}
+"""What two states and a short run allow."""
+MEASURED = pytest.mark.skipif(
+    not os.environ.get("SEAKEEP_DATA_DIR"), reason="SEAKEEP_DATA_DIR is not set"
+)
+SETS = [
+    "tutorial",
+    "small tank",
+    "two loggers",
+    *(
+        pytest.param(name, marks=[pytest.mark.data, MEASURED])
+        for name in ("ntnu_ship_section", "sjtu_semisub")
+    ),
+]
+
+
+def written(name: str, folder: Path) -> str:
+    """Text of the campaign of a set of data, whose files lie in `folder` or are found anyhow."""
+    if name == "tutorial":
+        shutil.copytree(ROOT / "docs/tutorial", folder, dirs_exist_ok=True)
+        return (folder / "campaign.toml").read_text(encoding="utf-8")
+    if name == "small tank":
+        for seed, run in enumerate(("first", "second")):
+            columns = small_tank.tank_columns(seed, seconds=60.0)
+            small_tank.write_csv(folder / f"{run}.csv", columns)
+        return small_tank.CAMPAIGN.replace("[0, 10]", "[0, 40]").replace("[10, inf]", "[40, inf]")
+    if name == "two loggers":
+        shutil.copytree(ground.write(folder), folder, dirs_exist_ok=True)
+        return ground.CAMPAIGN
+    return (ROOT / "examples" / name / "campaign.toml").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def campaign_of(tmp_path_factory):
+    """Campaign of a set of data, prepared, with a table of each kind and preset."""
+
+    @cache
+    def made(name):
+        folder = tmp_path_factory.mktemp("data")
+        table = tomllib.loads(written(name, folder))
+        channels = {key: table["model"][key] for key in ("states", "inputs")}
+        models = table["models"] = {"own": table["model"]}
+        for kind, preset in MADE[1:]:
+            models[f"{kind}{preset}"] = {"kind": kind} | channels
+            if preset:
+                models[f"{kind}{preset}"]["preset"] = preset
+            models[f"{kind}{preset}"] |= FEWER.get(kind, {})
+        (folder / "campaign.toml").write_text(tomlkit.dumps(table), encoding="utf-8")
+        campaign = read_campaign(folder / "campaign.toml")
+        write_prepared(campaign)
+        return campaign
+
+    return made
+
+
+def answer(call):
+    """What a call gives, or the words of its refusal."""
+    try:
+        return call()
+    except SeakeepError as error:
+        return str(error)
+
+
+def answers(model, campaign, runs, folder):
+    """All that a model says and does, by a word for each."""
+    test = campaign.test_runs[0]
+    checked = check_model(model, {test: runs[test]})
+    compared = compare(model, campaign, [test], steps=STEPS)
+    folder.mkdir()
+    out = {
+        "file": model.save(folder / "model.nc").read_bytes(),
+        "summary": model.summary(),
+        "forecast": compared[0].forecast,
+        "compared": comparison_table(compared),
+        "refused": checked.refused,
+        **checked.found,
+        "C": answer(lambda: [each.read_text() for each in write_c(model, folder / "c")]),
+    }
+    served = model.hold() if hasattr(model, "hold") else model
+    if hasattr(served, "live"):
+        out["live"] = answer(lambda: follow(served, runs[test], folder / "live.nc"))
+    return out
+
+
+def follow(model, run, path):
+    """Estimates of a model in service, one half before and one after a restart from its file."""
+    live, found = model.live(like=run), []
+    for k in range(40):
+        if k == 20:
+            live = load_live(model, live.save(path))
+        inputs, states = (
+            {name: run[name].values[k] for name in names} for names in (model.inputs, model.states)
+        )
+        found.append(live.step(inputs, states))
+    return np.array(found)
+
+
+@pytest.mark.filterwarnings("ignore::seakeep.errors.SeakeepWarning")
+@pytest.mark.parametrize(("kind", "preset"), MADE)
+@pytest.mark.parametrize("name", SETS)
+def test_a_model_is_the_same_after_its_file(campaign_of, tmp_path, name, kind, preset):
+    campaign = campaign_of(name)
+    runs = load_prepared(campaign)
+    model = fit_campaign(campaign, f"{kind}{preset}")
+    if KINDS[model.kind].is_ensemble:
+        model = model.calibrate([runs[each] for each in campaign.test_runs], STEPS, level=0.5)
+    loaded = load_model(model.save(tmp_path / "model.nc"))
+    before = answers(model, campaign, runs, tmp_path / "before")
+    after = answers(loaded, campaign, runs, tmp_path / "after")
+    assert list(after) == list(before)
+    for word, found in after.items():
+        if isinstance(found, xr.Dataset):
+            xr.testing.assert_identical(found, before[word])
+        elif isinstance(found, np.ndarray):
+            np.testing.assert_array_equal(found, before[word])
+        else:
+            assert found == before[word]
