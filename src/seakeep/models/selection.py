@@ -822,7 +822,8 @@ def select(
         f"; without {named(chosen[number])} {trials[less].means.min():.3f}"
         for number, less in zip(taken.observables, without, strict=True)
     )
-    note += "; over instants that all of these can forecast" * bool({*vary} - {"ridge", "readouts"})
+    lengths = {"lead", "input_delays", "state_delays", "alignment"} & {*vary}
+    note += "; over instants that all of these can forecast" * bool(lengths)
     groups = problems[0].groups
     if folds == "sea_state" or len(set(groups)) < len(groups):
         note += f"; {_words_of_groups(groups, folds == 'sea_state')}"
