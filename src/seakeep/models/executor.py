@@ -28,6 +28,7 @@ from typing import Any, TypeVar
 
 import threadpoolctl
 
+from seakeep.arrays import Progress
 from seakeep.errors import RequestError, SeakeepError
 
 __all__ = [
@@ -46,7 +47,6 @@ Data = TypeVar("Data")
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 Function = Callable[[Data, Item], Result]
-Progress = Callable[[int, int, str], None]
 """Called as ``progress(done, total, what)``."""
 
 BATCHES = 32
