@@ -26,7 +26,6 @@ from seakeep.errors import RequestError, did_you_mean
 from seakeep.formats import Options
 from seakeep.sizes import LEAST_PERIODS, MOST_MEMBERS, MOST_PERIODS
 from seakeep.toml import (
-    Count,
     Delay,
     Duration,
     Finite,
@@ -534,9 +533,6 @@ class AlignmentSettings(Table):
     )
     highest_frequency: Positive | None = Field(
         default=None, description="Hz, of mode 'dispersion'; left out, it is estimated"
-    )
-    passes: Count = Field(
-        default=2, description="how often a forecast runs, with surge = 'predicted'"
     )
     optional: bool = Field(
         default=False,

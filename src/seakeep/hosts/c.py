@@ -16,7 +16,7 @@ from seakeep.files import MARK, check_output, make_folder, replacing
 from seakeep.hosts.program import Program, program_of
 from seakeep.models import Model
 from seakeep.models.engine import GROWTH
-from seakeep.models.observables import Formula, Product, Term
+from seakeep.models.observables import SLOPE, Formula, Power, Product, Term
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -105,6 +105,7 @@ def sources(program: Program, name: str) -> dict[str, str]:
         "direct": code[False],
         "kernels": kernels,
         "growth": GROWTH,
+        "slope": SLOPE,
         "readouts": [
             {"column": each.column, "code": _hinges(each.function)}
             for each in signature.readouts
@@ -157,13 +158,15 @@ def _term(term: Term, kernels: list[FloatArray]) -> str:
     """Expression of C in u, the inputs of the row; a filter is put beside the other ones."""
     if isinstance(term, Product):
         return " * ".join(f"u[{place}]" for place in term.places)
+    if isinstance(term, Power):
+        return f"bounded_power(u[{term.place}], {term.power}, {_number(term.limit)})"
     if isinstance(term, Formula):
         return term.expression.fold(_number, lambda name: f"u[{term.places[name]}]", _operation)
     number = next((k for k, each in enumerate(kernels) if each is term.kernel), len(kernels))
     if number == len(kernels):
         kernels.append(term.kernel)
     middle, half = f"u + ({term.shift}) * Q + {term.place}", len(term.kernel) // 2
-    return f"slow_square({middle}, {term.order}, kernel_{number}, {half})"
+    return f"slow_square({middle}, {term.order}, kernel_{number}, {half}, {_number(term.top)})"
 
 
 def _operation(name: str, values: list[str]) -> str:

@@ -14,7 +14,7 @@ from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing
 from seakeep.hosts.program import Program, program_of
 from seakeep.models import Model
-from seakeep.models.observables import Formula, Product, SlowSquare, Term
+from seakeep.models.observables import SLOPE, Formula, Power, Product, SlowSquare, Term
 from seakeep.sizes import MOST_UNROLLED, check_size
 
 if TYPE_CHECKING:
@@ -228,6 +228,13 @@ def _term(graph: _Nodes, term: Term, first: int, count: int) -> str:
             lambda name: _column(graph, rows, term.places[name]),
             lambda name, values: _operation(graph, name, values),
         )
+    if isinstance(term, Power):
+        u = value = _column(graph, rows, term.place)
+        grown = graph("Add", graph("Div", graph("Mul", u, u), np.array(term.limit)), np.array(1.0))
+        calm = graph("Div", u, graph("Sqrt", grown))
+        for _ in range(term.power - 1):
+            value = graph("Mul", value, calm)
+        return value
     value = _column(graph, rows, term.places[0])
     for place in term.places[1:]:
         value = graph("Mul", value, _column(graph, rows, place))
@@ -254,7 +261,11 @@ def _slow_square(graph: _Nodes, term: SlowSquare, first: int, count: int) -> str
     around += first + term.shift - (term.order > 0)
     square = graph("Squeeze", graph("Mul", value, value), [1])
     # A convolution runs backwards.
-    return graph("MatMul", graph("Gather", square, around, axis=0), term.kernel[::-1, None])
+    slow = graph("MatMul", graph("Gather", square, around, axis=0), term.kernel[::-1, None])
+    if not np.isfinite(term.top):
+        return slow
+    over = graph("Max", graph("Sub", slow, np.array(term.top)), np.array(0.0))
+    return graph("Sub", slow, graph("Mul", over, np.array(1.0 - SLOPE)))
 
 
 def _operation(graph: _Nodes, name: str, values: list[str]) -> str:

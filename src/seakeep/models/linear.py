@@ -236,13 +236,14 @@ class HankelDMDcModel(SingleModel, store.Saved):
             signature.state_scale,
             signature.input_scale,
             signature.direct_scale,
+            signature.input_map.follows,
         )
 
     def aligned_inputs(self, run: xr.Dataset) -> xr.Dataset:
         """Inputs of a run as the model wants them: carried to the measured position.
 
-        What :meth:`forecast_arrays` and the exported systems take. Without an alignment, the
-        inputs as they are.
+        What :meth:`forecast_arrays` and the exported systems take. Without an alignment, and for
+        a model that follows its own surge, the inputs as they are.
 
         Parameters
         ----------
@@ -262,7 +263,8 @@ class HankelDMDcModel(SingleModel, store.Saved):
         name = labelled.run_name(run, "the run")
         labelled.check_run(run, name)
         values = labelled.channel_matrix(run, self.inputs, name)
-        if (alignment := self.alignment) is not None:
+        alignment = self.alignment
+        if alignment is not None and self.signature.input_map.follows is None:
             time = np.asarray(run["time"].values, dtype=float)
             labelled.check_finite(values, self.inputs, name, 0, time)
             span = Span(0, len(values) - 1, len(values))

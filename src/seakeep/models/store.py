@@ -40,7 +40,7 @@ __all__ = [
     "write",
 ]
 
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 """Version of the layout. Files of another one are refused: models are quickly fitted again."""
 SCALES = ("state", "input", "direct")
 MOMENTS = ("mean", "std", "spread", "centre", "reach")
@@ -147,15 +147,16 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
 
 def check_settings(settings: HankelSettings, signature: Signature, delays: bool = True) -> None:
     """Refuse settings of a file that its matrices or input map contradict: a ValueError."""
-    maps: dict[str, Any] = {each.kind: each for each in Chain.of(signature.input_map).maps}
-    lead, aligned, observed = (
-        maps.get(kind) for kind in ("lead", "probe_alignment", "observables")
-    )
+    chain = Chain.of(signature.input_map)
+    maps: dict[str, Any] = {each.kind: each for each in chain.maps}
+    lead, aligned, observed = maps.get("lead"), chain.alignment, chain.observed
     stated = {"lead": int(settings.lead), "observables": settings.observables}
     fitted = {
         "lead": 0 if lead is None else lead.samples,
         "observables": () if observed is None else observed.observables,
     }
+    if (following := maps.get("following")) is not None:
+        fitted["lead"] = following.ahead
     if aligned is not None:  # an optional one may be left out
         stated["alignment"] = settings.alignment and replace(settings.alignment, surge="none")
         fitted["alignment"] = replace(aligned.settings, surge="none")

@@ -39,9 +39,18 @@ static const double {{ name }}[{{ size }}] = {
 {% for each in kernels %}
 {{ array("kernel_%d" % loop.index0, each) }}
 {% endfor %}
+/* Power of an input that grows like it far out. */
+static double bounded_power(double u, int power, double limit)
+{
+    double calm = u / sqrt(1.0 + u * u / limit), out = u;
+    for (int i = 1; i < power; i++)
+        out *= calm;
+    return out;
+}
+
 {% if kernels %}
 /* Weighted sum of squares of a derivative of one input; u is its sample at the filter's middle. */
-static double slow_square(const double *u, int order, const double *kernel, int half)
+static double slow_square(const double *u, int order, const double *kernel, int half, double top)
 {
     double sum = 0.0;
     for (int k = -half; k <= half; k++) {
@@ -53,7 +62,7 @@ static double slow_square(const double *u, int order, const double *kernel, int 
             value = (at[Q] - 2.0 * at[0] + at[-Q]) / ({{ upper }}_STEP * {{ upper }}_STEP);
         sum += kernel[half - k] * value * value;
     }
-    return sum;
+    return sum > top ? top + {{ slope }} * (sum - top) : sum;
 }
 
 {% endif %}

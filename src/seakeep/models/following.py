@@ -1,0 +1,455 @@
+"""The recursion as an input map: waves where the vessel is, by its own surge.
+
+For each elevation a bank of short filters reads the wave at places on a grid about the vessel
+(:mod:`seakeep.signals.carriers`); the vessel's place is a weighted sum of its last surges, measured
+ones in training and before a start, predicted ones after it (:mod:`seakeep.core.recursion`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import ClassVar, Self
+
+import numpy as np
+import xarray as xr
+
+from seakeep.arrays import FloatArray
+from seakeep.core.recursion import Place, read_table
+from seakeep.errors import DataError, RequestError
+from seakeep.models import labelled
+from seakeep.models.checks import typed
+from seakeep.models.inputs import MAPS, FittedAlignment, Measured, depth_of
+from seakeep.models.interface import Drive, Follows, Json, Regressors, Span, plain
+from seakeep.models.labelled import ChannelLabel
+from seakeep.models.observables import Observed
+from seakeep.signals.carriers import carried, carriers, mean_spectrum, position_taps
+from seakeep.sizes import MOST_CARRIED, check_size
+from seakeep.waves import wavenumber
+
+__all__ = ["SQUARED", "Bank", "Followed", "Following"]
+
+SQUARED = ChannelLabel("slow_surge_squared", "m^2", "slow surge about its mean, squared")
+BACK = 3.0
+"""Encounter periods before an instant from which carriers read the probes.
+
+Half a period is enough for a vessel that drifts down-wave of its probe; up-wave of it the other
+probes tell, which saw the wave before (ANRMSE on the virtual tank .115 → .110)."""
+LEAD = 0.56
+"""Encounter periods by which carried waves lead at least; where probes are read no further, those
+up-wave say what is there."""
+PER_WAVE = 40
+"""Places of the grid per length of the peak's wave: four times as far apart cost 0.015 SD."""
+BEYOND = 1.5
+"""Part of the trained range of surge by which the grid goes beyond either end of it."""
+REACH = 0.5
+"""Error of a carrier, per SD of the waves, beyond which it reads nothing of use."""
+
+
+@dataclass(frozen=True, eq=False)
+class Following:
+    """Waves carried to where the vessel is, its slow surge squared, and observables of both.
+
+    Parameters
+    ----------
+    alignment : FittedAlignment
+        Elevations, positions, depth.
+    inputs : tuple of ChannelLabel
+        Inputs of the model.
+    dt : float
+        Time step, s.
+    ahead : int
+        Samples after an instant up to which its row reads the probes.
+    lead : int
+        Samples after an instant at which the carried wave is wanted.
+    back : int
+        Samples before an instant from which its row reads the probes.
+    band : tuple of float
+        Lowest and highest frequency of the spectrum, rad/s.
+    power : tuple of float
+        Spectrum of the waves of training; the powers sum to one.
+    place : Place
+        Weights of the surge, and the grid.
+    observed : Observed or None
+        Observables: delayed ones are functions of the carried waves, others of the measured.
+    """
+
+    kind: ClassVar[str] = "following"
+    reads_surge: ClassVar[bool] = False
+    alignment: FittedAlignment
+    inputs: tuple[ChannelLabel, ...]
+    dt: float
+    ahead: int
+    lead: int
+    back: int
+    band: tuple[float, float]
+    power: tuple[float, ...] = field(repr=False)
+    place: Place
+    observed: Observed | None = None
+
+    @classmethod
+    def fit(
+        cls,
+        alignment: FittedAlignment,
+        runs: Mapping[str, xr.Dataset],
+        window: int | None,
+        look_ahead: int,
+        observed: Observed | None,
+    ) -> Self:
+        """Fit taps of the position, grid and spectrum to training runs.
+
+        Raises
+        ------
+        RequestError
+            If a look-ahead below ``LEAD`` meets no probe up-wave of another.
+        DataError
+            If a run is shorter than eight encounter periods.
+        """
+        last = slice(None if window is None else -window, None)
+        windows = {name: run.isel(time=last) for name, run in runs.items()}
+        names = [each for each, yes in zip(alignment.inputs, alignment.carried, strict=True) if yes]
+        first_name, first = next(iter(windows.items()))
+        dt, period = labelled.run_step(first, first_name), labelled.mean_period(windows, names)
+        least = math.ceil(LEAD * period)
+        if look_ahead < least and len({alignment.positions[c] for c in alignment.placed}) < 2:
+            raise RequestError(
+                f"a look-ahead of {look_ahead} samples ({look_ahead / period:.2g} encounter "
+                "periods) takes a probe up-wave: two elevations at stated positions ([rig."
+                f"positions]). State them, or read {least} samples ahead or more: lead = "
+                f"{round(0.75 * period)}."
+            )
+        records, surges = [], []
+        for name, run in windows.items():
+            time = np.asarray(run["time"].values, dtype=float)
+            values = labelled.channel_matrix(run, [*names, alignment.settings.surge_channel], name)
+            labelled.check_finite(values, [*names, alignment.settings.surge_channel], name, 0, time)
+            records.append(values[:, :-1])
+            surges.append(values[:, -1])
+        highest = alignment.highest_frequency
+        omega, power = mean_spectrum(
+            records, dt, period * dt, np.inf if highest is None else highest
+        )
+        count = max(round(period), 2)
+        if short := [n for n, each in zip(windows, surges, strict=True) if len(each) < 8 * count]:
+            raise DataError(
+                f"{short[0]} is too short to follow its surge: eight encounter periods ("
+                f"{8 * count} samples) are needed. Give a longer run, or set alignment surge = "
+                "'none'."
+            )
+        every = np.concatenate(surges)
+        low, high = float(every.min()), float(every.max())
+        margin = BEYOND * (high - low)
+        assert alignment.water_depth is not None
+        peak = wavenumber(omega[[np.argmax(power)]], alignment.water_depth)[0]
+        spacing = 2 * np.pi / float(peak) / PER_WAVE
+        places = int(np.ceil((high - low + 2 * margin) / spacing)) + 2
+        check_size("the surge spans so many waves that waves are read at", places, MOST_CARRIED,
+                   "places", "Check the units of the surge (m).")  # fmt: skip
+        return cls(
+            alignment=alignment,
+            inputs=labelled.channel_labels(first, alignment.inputs),
+            dt=dt,
+            ahead=look_ahead,
+            lead=max(look_ahead, least),
+            back=round(BACK * period),
+            band=(float(omega[0]), float(omega[-1])),
+            power=tuple(power.tolist()),
+            place=Place(
+                position_taps(surges, period, count, max(look_ahead, least)),
+                low - margin,
+                spacing,
+                places,
+                float(every.mean()),
+            ),
+            observed=observed,
+        )
+
+    @property
+    def follows(self) -> Follows:
+        """Place of the vessel, and the state that it is a sum of."""
+        settings = self.alignment.settings
+        return Follows(self.place, self.alignment.states.index(settings.surge_channel))
+
+    @property
+    def lead_samples(self) -> int:
+        """Samples of input after an instant that its row reads."""
+        return self.reads(Span(0, 0, 1)).stop - 1
+
+    @cached_property
+    def _around(self) -> tuple[int, int]:
+        """Samples before and after an instant that its direct columns read."""
+        direct = () if self.observed is None else [b for b in self.observed.bound if not b.delayed]
+        return max([0, *(b.before for b in direct)]), max([0, *(b.ahead for b in direct)])
+
+    def history(self, input_delays: int) -> int:
+        """Samples of input before the start that a forecast with these delays reads."""
+        return -self.reads(Span(-input_delays, 0, 1)).first
+
+    def reads(self, span: Span) -> Span:
+        """Samples that rows read; as many surges are read before as the place is a sum of."""
+        before, after = self._around
+        back = max(self.back, self.place.taps.size - 1)
+        first = min(span.first - back, span.known - before)
+        return Span(first, span.known, span.stop + max(self.ahead, after))
+
+    def regressors(
+        self, inputs: tuple[ChannelLabel, ...]
+    ) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
+        """Labels of the carried waves with their observables, and of what has no delays."""
+        delayed, direct = (
+            (inputs, ()) if self.observed is None else self.observed.regressors(inputs)
+        )
+        return delayed, (*direct, SQUARED)
+
+    @property
+    def stretch(self) -> tuple[FloatArray, FloatArray]:
+        """Factors of the standard deviations that columns are divided by."""
+        delayed, direct = np.ones(len(self.inputs)), np.ones(0)
+        if self.observed is not None:
+            delayed, direct = self.observed.stretch
+        return delayed, np.append(direct, 1.0)
+
+    def wrap(self, drive: Drive, run: xr.Dataset | None, spans: Sequence[Span]) -> Followed:
+        """Drive of a run, or of plain arrays that lie as in training."""
+        assert isinstance(drive, Measured)
+        return Followed(self, drive, self.banks(run))
+
+    def banks(self, run: xr.Dataset | None) -> tuple[Bank, ...]:
+        """Carriers of each elevation for the rig of a run; those of training without one.
+
+        Raises
+        ------
+        RequestError
+            If the probes of the run stand beyond the reach of the carriers.
+        """
+        if run is None or not self.alignment.is_elsewhere(run):
+            return self._trained
+        found = self._banks(run)
+        for bank in found:
+            if bank.errors[self._known].min() > REACH:
+                raise RequestError(
+                    f"the probe of '{self.inputs[bank.column].name}' stands "
+                    f"{self.alignment.offsets(run)[bank.column]:+.3g} m from where it stood in "
+                    "training, too far for carriers of "
+                    f"{(self.back + self.ahead) * self.dt:.3g} s. Correct its position, or fit "
+                    "with alignment surge = 'measured' or 'none'."
+                )
+        return found
+
+    @cached_property
+    def _trained(self) -> tuple[Bank, ...]:
+        return self._banks(None)
+
+    @property
+    def _known(self) -> slice:
+        """Places of the grid that training reached."""
+        margin = BEYOND / (1 + 2 * BEYOND) * (self.place.count - 2)
+        return slice(int(margin), self.place.count - int(margin))
+
+    def _banks(self, run: xr.Dataset | None) -> tuple[Bank, ...]:
+        aligned = self.alignment
+        omega, power = np.linspace(*self.band, len(self.power)), np.array(self.power)
+        offsets = np.zeros(len(self.inputs)) + aligned.settings.offset
+        here = aligned.positions
+        depth = aligned.water_depth
+        if run is not None:
+            offsets, here = aligned.offsets(run), aligned.positions_in(run)
+            depth = depth_of(run, "the run", depth)
+        assert depth is not None
+        out = []
+        for column in np.flatnonzero(aligned.carried).tolist():
+            own = here[column]
+            columns = [column] if own is None else list(aligned.placed)
+            apart = [0.0 if c == column else here[c] - own for c in columns]  # type: ignore[operator]
+            taps, errors = carriers(
+                omega,
+                power,
+                depth,
+                self.dt,
+                targets=self.place.grid + offsets[column],
+                probes=apart,
+                back=self.back,
+                ahead=self.ahead,
+                leads=np.full(self.place.count, self.lead),
+            )
+            out.append(Bank(column, tuple(columns), taps, errors))
+        return tuple(out)
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Places between which every carrier errs less than ``REACH``, m."""
+        errors = np.max([bank.errors for bank in self._trained], axis=0)
+        sound = self.place.grid[errors <= REACH]
+        return (float(sound[0]), float(sound[-1])) if sound.size else (0.0, 0.0)
+
+    def look_ahead(self, run: xr.Dataset | None, dt: float) -> float:
+        """Seconds of input after an instant that its row reads."""
+        return self.lead_samples * dt
+
+    def notes(self, run: xr.Dataset) -> dict[str, str | float]:
+        """What a forecast's attributes report of the alignment."""
+        return self.alignment.notes(run)
+
+    def describe(self, dt: float) -> list[str]:
+        """Lines of a summary."""
+        low, high = self.reach
+        known = np.max([bank.errors[self._known] for bank in self._trained], axis=0)
+        lines = [
+            f"  alignment     mode {self.alignment.settings.mode}; surge predicted, in each step",
+            f"    carriers    of all probes, {self.back * dt:.3g} s back and {self.ahead * dt:.3g} s "
+            "ahead",
+            f"    errors      {known.min():.2g} to {known.max():.2g} SD of the waves in the range of "
+            "training",
+            f"    reach       {low:.3g} to {high:.3g} m of slow surge, where they err less than "
+            f"{REACH:g} SD",
+        ]
+        return lines + ([] if self.observed is None else self.observed.describe(dt))
+
+    def to_json(self) -> Json:
+        """All that was fitted."""
+        place = {"taps": self.place.taps.tolist()} | {
+            key: getattr(self.place, key) for key in ("lowest", "spacing", "count", "centre")
+        }
+        content = {
+            "alignment": self.alignment.to_json(),
+            "inputs": [
+                {"name": each.name, "units": each.units, "long_name": each.long_name}
+                for each in self.inputs
+            ],
+            "place": place,
+            "observed": None if self.observed is None else self.observed.to_json(),
+        }
+        content |= {key: getattr(self, key) for key in _Kept.PLAIN}
+        made: Json = plain(content)
+        return made
+
+    @classmethod
+    def from_json(cls, content: Json) -> Self:
+        """Rebuild from :meth:`to_json`; what does not fit together raises a ValueError."""
+        kept = typed(_Kept, content)
+        place, low, high = kept.place, *kept.band
+        if (
+            len(place.taps) < 2
+            or not 1 < place.count <= MOST_CARRIED
+            or not place.spacing > 0
+            or not 0 < low < high
+            or len(kept.power) < 2
+            or min(kept.power) < 0
+            or not 0 < sum(kept.power) < np.inf
+            or min(kept.ahead, kept.back) < 0
+            or not kept.ahead <= kept.lead
+            or kept.alignment.settings.surge_channel not in kept.alignment.states
+            or kept.alignment.water_depth is None
+            or not np.all(np.isfinite(place.taps))
+        ):
+            raise ValueError("the carriers of the inputs are not those of a vessel in waves")
+        taps = np.array(place.taps)
+        made = Place(taps, place.lowest, place.spacing, place.count, place.centre)
+        return cls(
+            **{key: getattr(kept, key) for key in _Kept.PLAIN},
+            alignment=kept.alignment,
+            inputs=kept.inputs,
+            place=made,
+            observed=None if kept.observed is None else Observed.from_json(kept.observed),
+        )
+
+
+@dataclass(frozen=True)
+class _KeptPlace:
+    """What a file holds of a place."""
+
+    taps: tuple[float, ...]
+    lowest: float
+    spacing: float
+    count: int
+    centre: float
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """What a file holds of the map."""
+
+    PLAIN: ClassVar[tuple[str, ...]] = ("dt", "ahead", "lead", "back", "band", "power")
+    alignment: FittedAlignment
+    inputs: tuple[ChannelLabel, ...]
+    dt: float
+    ahead: int
+    lead: int
+    back: int
+    band: tuple[float, float]
+    power: tuple[float, ...]
+    place: _KeptPlace
+    observed: Json | None
+
+
+@dataclass(frozen=True, eq=False)
+class Bank:
+    """Carriers of one elevation.
+
+    Parameters
+    ----------
+    column : int
+        Place of the elevation among the inputs.
+    columns : tuple of int
+        Probes that it is read from.
+    taps : ndarray, shape (place, probe, back + ahead + 1)
+        Weights, oldest sample first.
+    errors : ndarray, shape (place,)
+        RMS error by design, per SD of the waves.
+    """
+
+    column: int
+    columns: tuple[int, ...]
+    taps: FloatArray
+    errors: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """Waves of a run about the vessel, and where it is by its measured surge."""
+
+    made: Following
+    measured: Measured
+    banks: tuple[Bank, ...]
+
+    def table(self, first: int, stop: int) -> FloatArray:
+        """Delayed regressors of samples at all places, shape (time, place, n)."""
+        made, low = self.made, self.measured.first
+        values = self.measured.values[first - made.back - low : stop + made.ahead - low]
+        count = made.place.count
+        out = np.empty((stop - first, count, len(made.inputs)))
+        out[:] = values[made.back : made.back + stop - first, None]
+        for bank in self.banks:
+            out[:, :, bank.column] = carried(bank.taps, values[:, bank.columns])
+        if made.observed is None:
+            return out
+        return made.observed.with_delayed(out.reshape(-1, out.shape[2])).reshape(
+            stop - first, count, -1
+        )
+
+    def direct(self, first: int, stop: int) -> FloatArray:
+        """Columns without delays that no state drives, shape (time, m − 1)."""
+        made, low = self.made, self.measured.first
+        if made.observed is None:
+            return np.empty((stop - first, 0))
+        before, after = made._around
+        begin = max(first - before, low)
+        values = self.measured.values[begin - low : stop + after - low]
+        return made.observed.direct(values)[first - begin : first - begin + stop - first]
+
+    def rows(self, first: int, stop: int) -> Regressors:
+        """Regressors by the measured surge; without one, of a vessel at rest in the mean place."""
+        place, low = self.made.place, self.measured.first
+        if self.measured.surge is None:
+            places = np.full(stop - first, place.centre)
+        else:
+            places = place.of(self.measured.surge[first - low - place.taps.size + 1 : stop - low])
+        table = self.table(first, stop)
+        delayed = read_table(place, table, np.arange(stop - first), places)
+        squared = place.squared(places)[:, None]
+        return Regressors(delayed, np.concatenate([self.direct(first, stop), squared], axis=1))
+
+
+MAPS[Following.kind] = Following
