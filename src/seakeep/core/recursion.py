@@ -162,25 +162,28 @@ def recursion(
     states[..., steps * N :] = histories[:, ::-1].reshape(windows, -1)
     inputs = np.empty((count, windows, steps * n + width - n))
     inputs[..., steps * n :] = delayed[:, ::-1].reshape(windows, -1)
-    a, b = (np.ascontiguousarray(each.transpose(0, 2, 1)) for each in
-            (models.on_states, models.on_inputs))  # fmt: skip
+    a = np.ascontiguousarray(models.on_states.transpose(0, 2, 1))
+    b = np.ascontiguousarray(models.on_inputs.transpose(0, 2, 1))
+    parts = (states, inputs, a, b, models.on_square[:, None], forcing)
+    # One model alone needs no axis of its own, which saves a third of the time.
+    x, u, a, b, d, v = (each[0] for each in parts) if count == 1 else parts
     taps, still = models.gain * place.taps, models.offset * place.taps.sum()
     highest, reach = float(place.grid[-1]), len(taps) * N
-    on_square = models.on_square[:, None]
     with np.errstate(over="ignore", invalid="ignore"):
         for step in range(steps):
             at, to = (steps - step) * N, (steps - 1 - step) * n
-            surge = states[..., at + models.column : at + models.column + reach : N]
-            here = surge @ taps
+            here = x[..., at + models.column : at + models.column + reach : N] @ taps
             here += still
             # A run that is lost keeps a place; its states stay lost.
             here = np.fmin(np.fmax(here, place.lowest), highest)
-            inputs[..., to : to + n] = read_table(place, table, starts + step, here)
-            found = states[..., at : at + size] @ a
-            found += inputs[..., to : to + width] @ b
-            found += on_square * ((here - place.centre) ** 2)[..., None]
-            found += forcing[:, :, step]
-            states[..., at - N : at] = found
+            u[..., to : to + n] = read_table(place, table, starts + step, here)
+            found = x[..., at : at + size] @ a
+            found += u[..., to : to + width] @ b
+            here -= place.centre
+            here *= here
+            found += d * here[..., None]
+            found += v[..., step, :]
+            x[..., at - N : at] = found
     out = states[..., : steps * N].reshape(count, windows, steps, N)
     driving = inputs[..., : steps * n].reshape(count, windows, steps, n)
     return out[:, :, ::-1], driving[:, :, ::-1]

@@ -34,8 +34,7 @@ def write_c(model: Model, folder: str | Path, name: str = "rom") -> list[Path]:
     Parameters
     ----------
     model : Model
-        A single linear model. Its observables and read-outs are part of the code; its inputs are
-        aligned already (:meth:`HankelDMDcModel.aligned_inputs`).
+        A single linear model. Its carriers, observables and read-outs are part of the code.
     folder : str or Path
         Where to write; it is made if it does not exist.
     name : str, optional
@@ -83,7 +82,9 @@ def sources(program: Program, name: str) -> dict[str, str]:
         "name": name,
         "upper": name.upper(),
         "mark": f"{MARK}: {KIND}, written by seakeep {metadata.version('seakeep')}:",
-        "aligned": program.is_aligned,
+        "following": program.following,
+        "banks": program.banks,
+        "x_rows": signature.state_samples,
         "dt": signature.dt,
         "N": len(signature.states),
         "Q": len(signature.inputs),

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import ClassVar, Self
+from functools import cached_property, lru_cache
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 import xarray as xr
@@ -224,58 +224,67 @@ class Following:
         RequestError
             If the probes of the run stand beyond the reach of the carriers.
         """
-        if run is None or not self.alignment.is_elsewhere(run):
-            return self._trained
-        found = self._banks(run)
+        rig = self._rig(run)
+        found = _banks(self, rig)
         for bank in found:
             if bank.errors[self._known].min() > REACH:
                 raise RequestError(
                     f"the probe of '{self.inputs[bank.column].name}' stands "
-                    f"{self.alignment.offsets(run)[bank.column]:+.3g} m from where it stood in "
-                    "training, too far for carriers of "
-                    f"{(self.back + self.ahead) * self.dt:.3g} s. Correct its position, or fit "
-                    "with alignment surge = 'measured' or 'none'."
+                    f"{rig.offsets[bank.column]:+.3g} m from where it stood in training, too far "
+                    f"for carriers of {(self.back + self.ahead) * self.dt:.3g} s. Correct its "
+                    "position, or fit with alignment surge = 'measured' or 'none'."
                 )
         return found
 
-    @cached_property
+    def foresight(self, run: xr.Dataset | None, count: int) -> tuple[FloatArray, tuple[int, ...]]:
+        """Filters that predict placed elevations from all of them, in the rig of a run.
+
+        Returns
+        -------
+        taps : ndarray, shape (count, probe, probe, back + 1)
+            Of each of the next samples and of each probe; oldest sample first.
+        placed : tuple of int
+            Elevations at stated positions, by their places among the inputs.
+        """
+        rig = self._rig(run)
+        placed = self.alignment.placed or tuple(np.flatnonzero(self.alignment.carried).tolist()[:1])
+        at = [rig.positions[column] or 0.0 for column in placed]
+        taps, _ = carriers(
+            *self._waves,
+            rig.depth,
+            self.dt,
+            targets=np.tile(at, count),
+            probes=at,
+            back=self.back,
+            ahead=0,
+            leads=np.repeat(np.arange(1, count + 1), len(at)),
+        )
+        return taps.reshape(count, len(at), *taps.shape[1:]), placed
+
+    @property
+    def _waves(self) -> tuple[FloatArray, FloatArray]:
+        """Frequencies and powers that filters are designed for."""
+        return np.linspace(*self.band, len(self.power)), np.array(self.power)
+
+    def _rig(self, run: xr.Dataset | None) -> Rig:
+        """Offsets, positions and depth of a run; those of training without one."""
+        aligned, depth = self.alignment, self.alignment.water_depth
+        offsets, here = np.full(len(self.inputs), aligned.settings.offset), aligned.positions
+        if run is not None:
+            offsets, here = aligned.offsets(run), aligned.positions_in(run)
+            depth = depth_of(run, "the run", depth)
+        assert depth is not None
+        return Rig(tuple(offsets.tolist()), here, depth)
+
+    @property
     def _trained(self) -> tuple[Bank, ...]:
-        return self._banks(None)
+        return _banks(self, self._rig(None))
 
     @property
     def _known(self) -> slice:
         """Places of the grid that training reached."""
         margin = BEYOND / (1 + 2 * BEYOND) * (self.place.count - 2)
         return slice(int(margin), self.place.count - int(margin))
-
-    def _banks(self, run: xr.Dataset | None) -> tuple[Bank, ...]:
-        aligned = self.alignment
-        omega, power = np.linspace(*self.band, len(self.power)), np.array(self.power)
-        offsets = np.zeros(len(self.inputs)) + aligned.settings.offset
-        here = aligned.positions
-        depth = aligned.water_depth
-        if run is not None:
-            offsets, here = aligned.offsets(run), aligned.positions_in(run)
-            depth = depth_of(run, "the run", depth)
-        assert depth is not None
-        out = []
-        for column in np.flatnonzero(aligned.carried).tolist():
-            own = here[column]
-            columns = [column] if own is None else list(aligned.placed)
-            apart = [0.0 if c == column else here[c] - own for c in columns]  # type: ignore[operator]
-            taps, errors = carriers(
-                omega,
-                power,
-                depth,
-                self.dt,
-                targets=self.place.grid + offsets[column],
-                probes=apart,
-                back=self.back,
-                ahead=self.ahead,
-                leads=np.full(self.place.count, self.lead),
-            )
-            out.append(Bank(column, tuple(columns), taps, errors))
-        return tuple(out)
 
     @property
     def reach(self) -> tuple[float, float]:
@@ -298,10 +307,8 @@ class Following:
         known = np.max([bank.errors[self._known] for bank in self._trained], axis=0)
         lines = [
             f"  alignment     mode {self.alignment.settings.mode}; surge predicted, in each step",
-            f"    carriers    of all probes, {self.back * dt:.3g} s back and {self.ahead * dt:.3g} s "
-            "ahead",
-            f"    errors      {known.min():.2g} to {known.max():.2g} SD of the waves in the range of "
-            "training",
+            f"    carriers    {self.back * dt:.3g} s back and {self.ahead * dt:.3g} s ahead of all "
+            f"probes; they err {known.min():.2g} to {known.max():.2g} SD where training was",
             f"    reach       {low:.3g} to {high:.3g} m of slow surge, where they err less than "
             f"{REACH:g} SD",
         ]
@@ -354,6 +361,36 @@ class Following:
             place=made,
             observed=None if kept.observed is None else Observed.from_json(kept.observed),
         )
+
+
+class Rig(NamedTuple):
+    """Distances by which inputs are carried, positions of their probes, and depth, m."""
+
+    offsets: tuple[float, ...]
+    positions: tuple[float | None, ...]
+    depth: float
+
+
+@lru_cache(maxsize=16)
+def _banks(made: Following, rig: Rig) -> tuple[Bank, ...]:
+    """Carriers of each elevation in a rig; a model keeps those of some rigs."""
+    out, aligned = [], made.alignment
+    for column in np.flatnonzero(aligned.carried).tolist():
+        own = rig.positions[column]
+        columns = [column] if own is None else list(aligned.placed)
+        places = [rig.positions[c] or 0.0 for c in columns]
+        taps, errors = carriers(
+            *made._waves,
+            rig.depth,
+            made.dt,
+            targets=made.place.grid + rig.offsets[column] + (own or 0.0),
+            probes=places,
+            back=made.back,
+            ahead=made.ahead,
+            leads=np.full(made.place.count, made.lead),
+        )
+        out.append(Bank(column, tuple(columns), taps, errors))
+    return tuple(out)
 
 
 @dataclass(frozen=True)
@@ -441,15 +478,17 @@ class Followed:
 
     def rows(self, first: int, stop: int) -> Regressors:
         """Regressors by the measured surge; without one, of a vessel at rest in the mean place."""
+        table, places = self.table(first, stop), self.places(first, stop)
+        delayed = read_table(self.made.place, table, np.arange(stop - first), places)
+        squared = self.made.place.squared(places)[:, None]
+        return Regressors(delayed, np.concatenate([self.direct(first, stop), squared], axis=1))
+
+    def places(self, first: int, stop: int) -> FloatArray:
+        """Place of the vessel by its measured surge; at rest in the mean without one."""
         place, low = self.made.place, self.measured.first
         if self.measured.surge is None:
-            places = np.full(stop - first, place.centre)
-        else:
-            places = place.of(self.measured.surge[first - low - place.taps.size + 1 : stop - low])
-        table = self.table(first, stop)
-        delayed = read_table(place, table, np.arange(stop - first), places)
-        squared = place.squared(places)[:, None]
-        return Regressors(delayed, np.concatenate([self.direct(first, stop), squared], axis=1))
+            return np.full(stop - first, place.centre)
+        return place.of(self.measured.surge[first - low - place.taps.size + 1 : stop - low])
 
 
 MAPS[Following.kind] = Following

@@ -519,11 +519,6 @@ class FittedAlignment:
         pairs = zip(found, self.positions, strict=True)
         return tuple(trained if here is None else here for here, trained in pairs)
 
-    def is_elsewhere(self, run: xr.Dataset) -> bool:
-        """Whether probes stand, or water is as deep, as they were not in training."""
-        deep = run.attrs.get("water_depth", self.water_depth)
-        return bool(np.any(self.offsets(run) != self.settings.offset)) or deep != self.water_depth
-
     def carry(
         self, run: xr.Dataset, name: str, samples: slice, surges: tuple[float, float]
     ) -> tuple[CarriedElevation | None, ...]:
