@@ -104,6 +104,7 @@ def sources(program: Program, name: str) -> dict[str, str]:
         "input_labels": signature.input_labels,
         "delayed": [*(f"u[{place}]" for place in range(len(signature.inputs))), *code[True]],
         "direct": code[False],
+        "powers": any("bounded_power" in each for group in code.values() for each in group),
         "kernels": kernels,
         "growth": GROWTH,
         "slope": SLOPE,

@@ -178,7 +178,12 @@ def _model(program: Program, steps: int) -> onnx.ModelProto:
     graph.nodes.append(scan)
 
     x = graph("Add", graph("Mul", "series", scale.std), scale.mean)
-    graph("Slice", graph("Concat", "x_history", x, axis=0), [steps], [END], [0], into="x_after")
+    if following is None:  # delayed rows that are regressed are no past
+        last = graph("Reshape", "last_state", [s + 1, N])
+        last = graph("Gather", last, np.arange(s, -1, -1), axis=0)
+        graph("Add", graph("Mul", last, scale.std), scale.mean, into="x_after")
+    else:
+        graph("Slice", graph("Concat", "x_history", x, axis=0), [steps], [END], [0], into="x_after")
     read = {
         each.column: _hinges(graph, each.function, x)
         for each in signature.readouts

@@ -150,13 +150,11 @@ class Observable(Protocol):
         inputs: Sequence[ChannelLabel],
         period: float | None,
         dt: float,
-        spreads: Sequence[float],
     ) -> Bound:
         """Columns for these inputs.
 
         `period` is the encounter period in samples, None where no observable of the model has a
-        ``period`` to fill in; `dt` is the time step in s; `spreads` are the standard deviations of
-        the inputs in training.
+        ``period`` to fill in; `dt` is the time step in s.
         """
         ...
 
@@ -260,7 +258,6 @@ class SlowSquares:
         inputs: Sequence[ChannelLabel],
         period: float | None,
         dt: float,
-        spreads: Sequence[float],
     ) -> Bound:
         """Columns for these inputs; see :class:`Observable`."""
         places = [_column(inputs, name, self.kind) for name in self.of]
@@ -362,9 +359,12 @@ class Powers:
         inputs: Sequence[ChannelLabel],
         period: float | None,
         dt: float,
-        spreads: Sequence[float],
+        spreads: Sequence[float] = (),
     ) -> Bound:
-        """Columns for these inputs; see :class:`Observable`."""
+        """Columns for these inputs, which vary by `spreads` in training; see :class:`Observable`.
+
+        Without these the powers have no bound.
+        """
         places = [_column(inputs, name, self.kind) for name in self.of]
         pairs = list(combinations(places, 2)) if self.products else []
         labels = [
@@ -385,7 +385,9 @@ class Powers:
             for a, b in pairs
         ]
 
-        limits = np.array([BOUND * spreads[place] ** 2 for place in places]) + TINY
+        limits = np.full(len(places), np.inf)
+        if spreads:
+            limits = np.array([BOUND * spreads[place] ** 2 for place in places]) + TINY
 
         def columns(values: FloatArray) -> FloatArray:
             chosen = values[:, places]
@@ -446,7 +448,6 @@ class Expression:
         inputs: Sequence[ChannelLabel],
         period: float | None,
         dt: float,
-        spreads: Sequence[float],
     ) -> Bound:
         """Columns for these inputs; see :class:`Observable`."""
         parsed = expressions.parse(self.expression)
@@ -597,7 +598,8 @@ class Observed:
         """The observables, ready for these inputs; slow squares below the largest of training."""
         found, tops = [], np.array(self.tops)
         for each in self.observables:
-            made = each.bind(self.inputs, self.period, self.dt, self.spreads)
+            rig = self.inputs, self.period, self.dt
+            made = each.bind(*rig, self.spreads) if isinstance(each, Powers) else each.bind(*rig)
             if isinstance(each, SlowSquares) and tops.size:
                 made = made.below(tops[: len(made.labels)])
             if not made.delayed:

@@ -46,6 +46,7 @@ static const double {{ name }}[{{ size }}] = {
 {% for each in kernels %}
 {{ array("kernel_%d" % loop.index0, each) }}
 {% endfor %}
+{% if powers %}
 /* Power of an input that grows like it far out. */
 static double bounded_power(double u, int power, double limit)
 {
@@ -55,6 +56,7 @@ static double bounded_power(double u, int power, double limit)
     return out;
 }
 
+{% endif %}
 {% if kernels %}
 /* Weighted sum of squares of a derivative of one input; u is its sample at the filter's middle. */
 static double slow_square(const double *u, int order, const double *kernel, int half, double top)
