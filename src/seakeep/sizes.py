@@ -30,6 +30,8 @@ MOST_BINS = 2**21
 """Bins of a density, and points of a grid, that fit into 16 MB; finer ones are summed directly."""
 MOST_PLACES = 100_000
 """Places at which the distance of two probes is looked for: 6000 of the shortest wavelengths."""
+MOST_CARRIED = 2000
+"""Places at which a wave is read beforehand: 80 kB a sample of a run."""
 MOST_TERMS = 4000
 """Polynomials in the distance of a carried wave: each takes as much memory as the record."""
 MOST_PADDING = 10_000_000

@@ -5,8 +5,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 import xarray as xr
+from drifting import drifting_run
 
-from seakeep import Expression, HankelDMDc, HankelDMDcModel, Powers, ReadOut, SlowSquares
+from seakeep import (
+    Expression,
+    HankelDMDc,
+    HankelDMDcModel,
+    Powers,
+    ProbeAlignment,
+    ReadOut,
+    SlowSquares,
+)
 from seakeep.baselines import ARX
 from seakeep.hosts import start_rows
 
@@ -52,10 +61,10 @@ class Case:
         return len(self.u) - len(self.expected)
 
 
-def case_of(model, steps=60, start=200):
-    run = sea_run(9)
-    x = run[STATES].to_array().values.T
-    u = run[INPUTS].to_array().values.T if model.inputs else np.zeros((len(run.time), 0))
+def case_of(model, steps=60, start=200, run=None):
+    run = sea_run(9) if run is None else run
+    x = run[model.states].to_array().values.T
+    u = run[model.inputs].to_array().values.T if model.inputs else np.zeros((len(run.time), 0))
     now, end = start + 1, start + steps + model.lead_samples
     expected = model.forecast_arrays(x[:now], u[:now], u[now:end], steps)
     x_history, u_history = start_rows(model, run, start * DT)
@@ -76,4 +85,15 @@ def cases():
         "autonomous": HankelDMDc(4, 0, 1.0, delay_rows="exact").fit(runs, STATES, []),
         "unstable": replace(short, coefficients=1.3 * short.coefficients),
     }
-    return {name: case_of(model) for name, model in models.items()}
+    made = {name: case_of(model) for name, model in models.items()}
+    # Of a vessel that drifts: by waves ahead, and by those that the probe up-wave has seen.
+    drifting, test = [drifting_run(seed) for seed in (1, 2)], drifting_run(7)
+    for name, lead in (("following", 12), ("following_now", 0)):
+        spec = HankelDMDc(
+            4, 12, 1e-3, delay_rows="exact", lead=lead,
+            alignment=ProbeAlignment(mode="dispersion", surge="predicted"),
+            observables=(SlowSquares("eta_cog", lags=(0, 1), lead=0), Powers("eta_cog")),
+        )  # fmt: skip
+        model = spec.fit(drifting, ["surge", "heave"], ["eta_fwd", "eta_cog"])
+        made[name] = case_of(model, run=test)
+    return made

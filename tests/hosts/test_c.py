@@ -14,7 +14,7 @@ from seakeep.hosts import write_c
 from seakeep.hosts.c import identifier
 from seakeep.models import OBSERVABLES, Bound, ChannelLabel, HankelDMDc
 
-NAMES = ["full", "short", "arx", "autonomous", "unstable"]
+NAMES = ["full", "short", "arx", "autonomous", "unstable", "following", "following_now"]
 FINITE, REFUSED, LOST = 0, 1, 2
 
 
@@ -153,27 +153,9 @@ def test_a_file_name_becomes_an_identifier(file, name):
     assert identifier(file) == name
 
 
-def test_a_file_that_seakeep_did_not_write_stays(tmp_path, cases):
-    (tmp_path / "rom.c").write_text("int main(void) { return 0; }")
-    with pytest.raises(RequestError, match="exists and is not a C source that seakeep wrote"):
-        write_c(cases["arx"].model, tmp_path)
-    assert not (tmp_path / "rom.h").exists()
-    (tmp_path / "rom.c").unlink()
-    write_c(cases["arx"].model, tmp_path)
-    write_c(cases["arx"].model, tmp_path)
-
-
-def test_a_model_on_aligned_waves_says_so(tmp_path, make_run, channels):
-    for number, offset in enumerate((0.5, 0.0)):  # without an offset nothing is carried
-        waves = ProbeAlignment(surge="none", celerity=2.0, offset=offset)
-        model = HankelDMDc(2, 2, 1.0, alignment=waves).fit(make_run(), **channels)
-        header = write_c(model, tmp_path, f"rom_{number}")[0].read_text()
-        assert ("Give it inputs carried likewise" in header) == (offset > 0)
-
-
 def test_an_alignment_that_was_left_out_leaves_nothing_to_be_carried(tmp_path, make_run, channels):
     optional = ProbeAlignment(mode="dispersion", surge="predicted", optional=True)
-    spec = HankelDMDc(2, 2, 1.0, lead=2)
+    spec = HankelDMDc(2, 2, 1.0, delay_rows="exact", lead=2)
     made, plain = (
         write_c(replace(spec, alignment=each).fit(make_run(), **channels), tmp_path / str(number))
         for number, each in enumerate((optional, None))  # the runs state no depth

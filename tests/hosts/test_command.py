@@ -3,7 +3,7 @@
 import pytest
 from drifting import INPUTS, STATES, drifting_run
 
-from seakeep import HankelDMDc, ProbeAlignment, cli
+from seakeep import HankelDMDc, ProbeAlignment, RequestError, cli
 from seakeep.hosts.program import program_of
 
 
@@ -23,21 +23,25 @@ def test_sources_take_the_name_of_the_model_and_the_instants_are_told(run, tmp_p
     status, said = run("--c", "library")
     assert status == 0
     assert {path.name for path in (tmp_path / "library").iterdir()} == {"my_model.c", "my_model.h"}
-    lead = "A step of 0.1 s takes the inputs 16 samples (1.6 s) after the instant that it starts"
+    lead = "A step of 0.1 s takes the inputs 6 samples (0.6 s) after the instant that it starts"
     assert lead in said
 
 
-def test_what_an_alignment_leaves_to_the_host_is_told(make_run, channels):
-    for offset in (0.0, 0.5):
-        alignment = ProbeAlignment(surge="none", celerity=2.0, offset=offset)
-        model = HankelDMDc(2, 2, 1.0, alignment=alignment).fit(make_run(), **channels)
-        carries = "as model.aligned_inputs(run) makes them." in program_of(model).timing
-        assert carries == (offset != 0)
-    assert program_of(model).timing.endswith("as model.aligned_inputs(run) makes them.")
-    predicted = ProbeAlignment(mode="dispersion", surge="predicted")
-    model = HankelDMDc(2, 2, 1.0, alignment=predicted).fit(drifting_run(), STATES, INPUTS)
-    said = program_of(model).timing
-    assert said.endswith("reads the whole forecast at once, and stays in Python.")
+def test_waves_that_no_host_can_carry_are_refused_with_the_way_out(make_run, channels):
+    alignment = ProbeAlignment(surge="none", celerity=2.0, offset=0.5)
+    model = HankelDMDc(2, 2, 1.0, alignment=alignment).fit(make_run(), **channels)
+    with pytest.raises(RequestError, match=r"carried over whole records, .* surge = 'predicted'"):
+        program_of(model)
+    measured = ProbeAlignment(mode="dispersion", surge="measured")
+    model = HankelDMDc(2, 2, 1.0, alignment=measured).fit(drifting_run(), STATES, INPUTS)
+    with pytest.raises(RequestError, match="to the measured surge, which no step can make"):
+        program_of(model)
+    followed = ProbeAlignment(mode="dispersion", surge="predicted")
+    spec = HankelDMDc(2, 2, 1.0, delay_rows="exact", alignment=followed)
+    model = spec.fit(drifting_run(), STATES, INPUTS)
+    assert "the probes as measured, where they stood in training" in program_of(model).timing
+    with pytest.raises(RequestError, match="its own surge takes it, which no linear system"):
+        model.to_state_space()
 
 
 def test_an_fmu_without_a_compiler_is_announced(run, monkeypatch, tmp_path):

@@ -18,7 +18,9 @@ def given(case, x_history, u):
     return {"x_history": x_history} | ({"u": u} if case.model.inputs else {})
 
 
-@pytest.mark.parametrize("name", ["full", "short", "arx", "autonomous"])
+@pytest.mark.parametrize(
+    "name", ["full", "short", "arx", "autonomous", "following", "following_now"]
+)
 def test_a_horizon_is_that_of_forecast_arrays(name, cases, tmp_path):
     case = cases[name]
     graph = session(case.model, tmp_path / "m.onnx", steps=len(case.expected))
@@ -27,7 +29,7 @@ def test_a_horizon_is_that_of_forecast_arrays(name, cases, tmp_path):
     np.testing.assert_allclose(found, case.expected, rtol=1e-12, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["full", "short"])
+@pytest.mark.parametrize("name", ["full", "short", "following"])
 def test_steps_one_after_the_other_are_the_horizon(name, cases, tmp_path):
     case = cases[name]
     graph, history = session(case.model, tmp_path / "m.onnx"), case.x_history

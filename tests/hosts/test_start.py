@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seakeep import DataError, HankelDMDc, ProbeAlignment, RequestError
+from seakeep import DataError, HankelDMDc, RequestError
 from seakeep.hosts import start_rows
 
 
@@ -13,16 +13,6 @@ def test_rows_end_at_the_start_and_inputs_where_the_first_step_takes_over(make_r
     x, u = start_rows(model, run, run.time.values[50])
     np.testing.assert_array_equal(x, run[model.states].to_array().values.T[47:51])
     np.testing.assert_array_equal(u, run[model.inputs].to_array().values.T[42:54])
-
-
-def test_inputs_are_carried_as_in_training(make_run, channels):
-    run = make_run(samples=300)
-    alignment = ProbeAlignment(surge="none", celerity=2.0, offset=0.5)
-    model = HankelDMDc(3, 8, 1.0, alignment=alignment).fit(run, **channels)
-    _, u = start_rows(model, run, run.time.values[50])
-    carried = model.aligned_inputs(run)[model.inputs].to_array().values.T
-    np.testing.assert_array_equal(u, carried[42:50])
-    assert np.abs(u - run[model.inputs].to_array().values.T[42:50]).max() > 0.01
 
 
 def test_what_a_run_does_not_hold_is_refused(make_run, channels):

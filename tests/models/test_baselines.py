@@ -162,4 +162,9 @@ def test_settings_that_a_baseline_does_not_have_are_refused():
     with pytest.raises(RequestError, match=r"order = 40 is more than the 8 values of 4 future"):
         Subspace(state_delays=3, input_delays=4, order=40).fit(linear_run(1), STATES, INPUTS)
     with pytest.raises(RequestError, match=r"cannot be aligned to the surge that it predicts"):
-        Subspace(state_delays=3, input_delays=4, order=4, alignment={"surge": "predicted"})
+        Subspace(
+            state_delays=3,
+            input_delays=4,
+            order=4,
+            alignment={"mode": "dispersion", "surge": "predicted"},
+        )

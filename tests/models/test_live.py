@@ -10,8 +10,6 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import seakeep
 from seakeep import HankelDMDc, ProbeAlignment, RequestError, load_live
-from seakeep.models import growth
-from seakeep.models.growth import LeadErrors
 from seakeep.models.live import LEAST_RECORD
 from seakeep.signals import predict_waves
 from seakeep.waves import group_speed
@@ -287,53 +285,6 @@ def test_what_the_probe_up_wave_has_seen_is_foreseen_down_wave(models, run):
         expected = 3.67 / group_speed(2 * np.pi * 0.384, 3.6) if words == "up-wave" else 0.0
         assert found == pytest.approx(expected, rel=0.15)
     assert apart["up-wave"][1] < 0.1 * apart["alone"][1]  # heave: surge answers no wave
-
-
-def test_bands_hold_what_they_say_on_a_vessel_that_is_known(make_dataset):
-    """x(k+1) = 1.6 x(k) - 0.8 x(k-1) + 0.3 u(k) + w: the variance after j steps is that of w times
-    the sum of the squared impulse response."""
-    rng, count, dt = np.random.default_rng(5), 6500, 0.1
-    names, sizes = [f"x{each}" for each in range(4)], np.array([0.2, 0.1, 0.3, 0.2])
-    u = signal.lfilter([1.0], [1.0, -1.7, 0.9], rng.standard_normal(count))
-    noise = sizes * rng.standard_normal((count, 4))
-    x = signal.lfilter([0.0, 1.0], [1.0, -1.6, 0.8], 0.3 * u[:, None] + noise, axis=0)
-    run = make_dataset(dt * np.arange(count), u=u, **dict(zip(names, x.T, strict=True)))
-    train, test = run.isel(time=slice(4000)), slice(4000, None)
-    model = HankelDMDc(1, 0, 1e-9, delay_rows="exact").fit(train, names, ["u"])
-    impulse = signal.lfilter([1.0], [1.0, -1.6, 0.8], np.eye(1, 40)[0])
-    truth = np.sqrt(np.cumsum(impulse**2))[:, None] * sizes
-    live, inside, steps = model.live(), [], 40
-    for at, (given, measured) in enumerate(zip(u[test, None], x[test], strict=True)):
-        live.step(given, measured)
-        if at % 12 == 11 and at < 2450:
-            found = live.forecast(steps, u[4000:, None][at + 1 : at + 1 + steps])
-            low, high = (matrix(found.sel(statistic=each), names) for each in ("lower", "upper"))
-            later = x[test][at + 1 : at + 1 + steps]
-            inside.append((low <= later) & (later <= high))
-    covered = 100 * np.mean(inside, axis=(0, 2))
-    # 800 samples at each lead, and deviations from 48 free runs, known to a tenth.
-    assert abs(covered[0] - 95) < 2
-    assert abs(covered[-20:].mean() - 95) < 2
-    claimed = matrix(found.sel(statistic="std"), names)
-    np.testing.assert_allclose(claimed, truth, rtol=0.3)
-    # Covariance of 1024 residuals: three of sqrt(2 / 1024).
-    np.testing.assert_allclose(np.diagonal(model.errors.residual), sizes**2, rtol=0.13)
-
-
-def test_what_the_end_of_a_forecast_adds_to_its_errors(models, tmp_path):
-    errors = np.random.default_rng(3).standard_normal((24, 40, 1))
-    alone, square = errors[:, :20].copy(), np.mean(errors[:, 17:20] ** 2, axis=0)
-    alone[:, 17:] *= np.array([[1.0], [2.0], [3.0]])
-    added = growth._ending(alone, errors)
-    np.testing.assert_allclose(added[:2, 0] ** 2, ([3.0, 8.0] * square[1:, 0])[::-1])
-    np.testing.assert_array_equal(added[2:], 0.0)
-    told = LeadErrors(np.eye(1), *(np.array([each]).T for each in ([1.0, 2, 3], [4.0, 3, 2, 1])))
-    np.testing.assert_allclose(told.of_forecast(3), [[1 + 4 / 2], [4 + 9], [9 + 16]])
-    np.testing.assert_allclose(told.of_forecast(1, since=1), [[4 + 16 / 2]])
-    kept = seakeep.load_model(models["aligned"].save(tmp_path / "model.nc")).errors.ending
-    np.testing.assert_array_equal(kept, models["aligned"].errors.ending)
-    assert kept.any()
-    assert not len(models["plain"].errors.ending)
 
 
 def test_a_lost_sample_takes_predicted_inputs(models, run):

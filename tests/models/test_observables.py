@@ -1,4 +1,4 @@
-"""Observables, lead and passes: from a measured run to the columns that drive a model."""
+"""Observables and lead: from a measured run to the columns that drive a model."""
 
 import json
 
@@ -9,8 +9,7 @@ import xarray as xr
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.errors import RequestError
 from seakeep.models import HankelDMDc
-from seakeep.models import inputs as inputs_module
-from seakeep.models.inputs import Chain, Measured, ProbeAlignment
+from seakeep.models.inputs import Chain, Measured
 from seakeep.models.interface import Regressors, Span
 from seakeep.models.labelled import channel_labels
 from seakeep.models.observables import OBSERVABLES, Expression, Powers, SlowSquares, from_json
@@ -44,20 +43,17 @@ INPUTS = ["eta_fwd", "eta_cog"]
 CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3), products=True))
 
 
-def fitted(run, lead=12, surge="predicted", chosen=CHOSEN, inputs=INPUTS) -> Chain:
-    alignment = None if surge is None else ProbeAlignment(mode="dispersion", surge=surge)
-    spec = HankelDMDc(
-        8, 3 * PERIOD, 1.0, delay_rows="exact", alignment=alignment, lead=lead, observables=chosen
-    )
-    return Chain(tuple(each.fit({"run": run}, ["surge"], inputs, None) for each in spec.maps))
+def fitted(run, lead=12, chosen=CHOSEN) -> Chain:
+    spec = HankelDMDc(8, 3 * PERIOD, 1.0, lead=lead, observables=chosen)
+    return spec.input_map({"run": run}, ["surge"], INPUTS, None)
 
 
-def rows(chain, run, first, stop, known=None, states=None, inputs=INPUTS) -> Regressors:
-    span = Span(first, stop - 1 if known is None else known, stop)
-    values = np.stack([run[name].values for name in inputs], axis=-1)
+def rows(chain, run, first, stop) -> Regressors:
+    span = Span(first, first, stop)
+    values = np.stack([run[name].values for name in INPUTS], axis=-1)
     read = chain.reads(span)
     measured = Measured(values[read.first : read.stop], read.first)
-    return chain.wrap(measured, run, [span]).rows(first, stop, known, states)
+    return chain.wrap(measured, run, [span]).rows(first, stop)
 
 
 def test_the_low_pass_filter_keeps_a_constant_and_damps_the_waves():
@@ -115,72 +111,46 @@ def test_columns_are_named_with_units_and_stand_in_two_groups():
     }
     assert len(direct) == 18
     assert direct[6].units == "(m/s)^2"
-    # The squares look two periods ahead, which is more than the lead of the waves.
-    assert chain.lead_samples == 2 * PERIOD
+    # The squares look three quarters of a period ahead, as far as the waves.
+    assert chain.lead_samples == 12
     # Five periods of lags and twice the filter's half width less the look-ahead.
-    assert chain.history(3 * PERIOD) == 5 * PERIOD + 2 * (24 + 1) - 2 * PERIOD
+    assert chain.history(3 * PERIOD) == 5 * PERIOD + 2 * (8 + 1) - 12
 
 
 def test_the_lead_shifts_the_inputs_and_not_the_squares():
     run = irregular()
-    ahead = rows(fitted(run, surge=None), run, 200, 300, 200)
-    plain = rows(fitted(run, surge=None, lead=0), run, 200, 300, 200)
+    ahead = rows(fitted(run), run, 200, 300)
+    plain = rows(fitted(run, lead=0), run, 200, 300)
     np.testing.assert_array_equal(ahead.delayed[:, 0], run["eta_fwd"].values[212:312])
     # The same sums, started at another sample of the convolution.
     np.testing.assert_allclose(ahead.direct, plain.direct, rtol=1e-10)
     assert np.isfinite(ahead.direct).all()
 
 
-@pytest.mark.parametrize("surge", ["predicted", "none"])
-def test_no_surge_after_the_start_and_no_wave_beyond_the_look_ahead_is_read(surge):
+def test_powers_grow_like_the_input_far_out_and_weigh_more_in_the_ridge():
     run = irregular()
-    chain = fitted(run, surge=surge)
-    start, steps = 500, 100
-    poisoned = run.copy(deep=True)
-    poisoned["surge"].values[start + 1 :] = np.nan
-    for name in INPUTS:
-        poisoned[name].values[start + steps + chain.lead_samples :] = 1e9
-    first = start - 3 * PERIOD
-    clean = rows(chain, run, first, start + steps, start)
-    dirty = rows(chain, poisoned, first, start + steps, start)
-    assert np.isfinite(clean.delayed).all()
-    assert np.isfinite(clean.direct[3 * PERIOD :]).all()
-    for one, other in zip(clean, dirty, strict=True):
-        np.testing.assert_array_equal(one, other)
+    chain = fitted(run, chosen=(Powers("eta_cog", (2, 3)),))
+    sigma = float(run["eta_cog"].std())
+    u = sigma * np.array([0.01, 2.0, 60.0])
+    found = chain.observed.with_delayed(np.stack([0 * u, u], axis=1))[:, 2:]
+    expected = np.stack([u**q / (1 + u**2 / (36 * sigma**2)) ** ((q - 1) / 2) for q in (2, 3)], 1)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)  # rounding
+    np.testing.assert_allclose(found[2] / u[2], [6 * sigma, 36 * sigma**2], rtol=0.01)  # 36/60²
+    spec = HankelDMDc(8, 3, 1.0, observables=(Powers("eta_cog", (2,)),))
+    scale = spec.fit(run, ["surge"], INPUTS).input_scale
+    np.testing.assert_allclose(scale.std / scale.spread, [1, 1, 10])  # √100 of λ
 
 
-def test_the_second_pass_follows_the_surge_that_the_first_predicted():
+def test_slow_squares_above_those_of_training_grow_by_seven_tenths():
     run = irregular()
-    chain = fitted(run, chosen=())
-    measured = rows(chain, run, 452, 600)  # as in training
-    held = rows(chain, run, 452, 600, 500)
-    known = run["surge"].values[501:600, None]
-    followed = rows(chain, run, 452, 600, 500, known)
-    inside = slice(0, -3 * PERIOD)  # where the low-pass filter has not met the end yet
-    errors = [
-        np.sqrt(np.mean((each.delayed - measured.delayed)[inside] ** 2)) / measured.delayed.std()
-        for each in (held, followed)
-    ]
-    # A surge that was predicted exactly gives the rows of training.
-    assert errors[1] < 0.02
-    assert errors[0] > 5 * errors[1]
-
-
-def test_the_record_is_carried_once_for_all_windows_and_passes(monkeypatch):
-    run = irregular()
-    chain = fitted(run)
-    carried = []
-    carry = inputs_module.carry_by_dispersion
-    monkeypatch.setattr(
-        inputs_module, "carry_by_dispersion", lambda *given: carried.append(1) or carry(*given)
-    )
-    spans = [Span(at - 48, at, at + 100) for at in (200, 300, 400)]
-    values = np.stack([run[name].values for name in INPUTS], axis=-1)
-    drive = chain.wrap(Measured(values), run, spans)
-    for span in spans:
-        drive.rows(*span[:1], span.stop, span.known)
-        drive.rows(span.first, span.stop, span.known, np.full((100, 1), 0.4))
-    assert len(carried) == len(INPUTS)
+    chain = fitted(run, chosen=(SlowSquares("eta_cog", orders=(0,), lags=(0,)),))
+    record = np.stack([run[name].values for name in INPUTS], axis=1)
+    inside = chain.observed.direct(record)[:, 0]
+    top = np.nanmax(inside)
+    twice = chain.observed.direct(np.sqrt(2.0) * record)[:, 0]
+    expected = np.where(2 * inside > top, top + 0.7 * (2 * inside - top), 2 * inside)
+    np.testing.assert_allclose(twice, expected, rtol=1e-12)
+    assert (2 * inside > top).any()
 
 
 def test_a_map_is_the_same_after_a_round_trip_through_json():

@@ -303,7 +303,7 @@ class TestRefused:
                 spec.fit(runs, STATES, INPUTS)
 
     def test_the_surge_that_the_alignment_follows(self):
-        with pytest.raises(RequestError, match="surge is the surge that the alignment follows"):
+        with pytest.raises(RequestError, match="is the surge that the model follows from step"):
             replace(
                 SPEC,
                 alignment={"mode": "dispersion", "surge": "predicted"},

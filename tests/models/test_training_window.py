@@ -209,7 +209,7 @@ def test_the_recommended_preset_uses_all_of_the_runs_and_exact_rows():
         window=None,
         delay_rows="exact",
         ridge_scale="per_snapshot",
-        alignment={"mode": "dispersion", "surge": "predicted", "passes": 3, "optional": True},
+        alignment={"mode": "dispersion", "surge": "predicted", "optional": True},
         lead=24,
         readouts="auto",
         select={"observables": True, "horizon": (15, 45), "period": 1.64},

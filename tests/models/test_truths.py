@@ -42,7 +42,7 @@ def drifting(seed: int, samples: int = 1500) -> tuple[xr.Dataset, np.ndarray]:
 def test_a_quadratic_drift_is_recovered_to_its_noise():
     runs = [drifting(seed)[0] for seed in range(4)]
     spec = HankelDMDc(10, 0, 1e-6, delay_rows="exact", ridge_scale="per_snapshot")
-    observed = replace(spec, observables=(SlowSquares("eta", orders=(0,), lags=(0,)),))
+    observed = replace(spec, observables=(SlowSquares("eta", (0,), 1 / 3, 2.0, lags=(0,)),))
     run, true = drifting(9)
     errors = []
     for each in (spec, observed):

@@ -14,6 +14,7 @@ from seakeep.arrays import BoolArray, FloatArray
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, SlowSquares, is_ensemble
 from seakeep.models.engine import Windows
+from seakeep.models.following import Following
 from seakeep.models.inputs import Chain, Lead, Measured
 from seakeep.models.interface import Span
 from seakeep.models.labelled import channel_matrix, check_step
@@ -131,7 +132,7 @@ def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
         states = channel_matrix(run, model.states, name)
         try:
             inputs = channel_matrix(run, model.inputs, name)
-            if isinstance(model, HankelDMDcModel) and model.alignment is not None:
+            if isinstance(model, HankelDMDcModel):
                 aligned = model.aligned_inputs(run)
                 inputs = channel_matrix(aligned, model.inputs, name)
         except DataError as error:
@@ -257,7 +258,8 @@ def one_step(model: Model, run: xr.Dataset, first: int, last: int) -> FloatArray
     z, s, count = signature.input_delays, signature.state_delays, last - first
     values = channel_matrix(run, model.inputs, name)
     spans = [Span(first - z, first, first + 1), Span(first - z, last - 1, last)]
-    drive = signature.input_map.wrap(Measured(values), run, spans)
+    surge = _surge(model, run)
+    drive = signature.input_map.wrap(Measured(values, 0, surge), run, spans)
     rows = drive.rows(first - z, last)
     states = channel_matrix(run, model.states, name)[first - s : last]
     made = model.free_runs(  # type: ignore[attr-defined]
@@ -275,6 +277,13 @@ def one_step(model: Model, run: xr.Dataset, first: int, last: int) -> FloatArray
     )[0]
     result: FloatArray = made[:, :, 0].mean(axis=0)
     return result
+
+
+def _surge(model: Model, run: xr.Dataset) -> FloatArray | None:
+    """Surge of a run, where the model follows it."""
+    if (follows := model.signature.input_map.follows) is None:
+        return None
+    return channel_matrix(run, [model.states[follows.column]], "the run")[:, 0]
 
 
 def _windowed(values: FloatArray, length: int) -> FloatArray:
@@ -323,14 +332,19 @@ def regressors(model: Model, part: Part) -> FloatArray:
     out = np.full((size, width), np.nan)
     if stop > first:
         values = channel_matrix(run, model.inputs, "the run")
-        drive = chain.wrap(Measured(values), run, [Span(first, first, stop)])
+        drive = chain.wrap(Measured(values, 0, _surge(model, run)), run, [Span(first, first, stop)])
         out[first:stop] = np.concatenate(drive.rows(first, stop), axis=1)
     return out
 
 
 def _at_once(each: InputMap) -> InputMap:
-    if not isinstance(each, Observed):
-        return each
+    if isinstance(each, Following):
+        observed = None if each.observed is None else _observed_at_once(each.observed)
+        return replace(each, lead=0, observed=observed)
+    return _observed_at_once(each) if isinstance(each, Observed) else each
+
+
+def _observed_at_once(each: Observed) -> Observed:
     now = [
         replace(one, lags=(0,), lead=HALF_WIDTH / one.cutoff)  # the middle of its filter
         if isinstance(one, SlowSquares)

@@ -26,6 +26,7 @@ from seakeep.core.spectra import Spectra, cross_spectra, segment_length
 from seakeep.errors import DataError, RequestError, SeakeepError, warn
 from seakeep.models import HankelDMDcModel, HankelEnsemble, Model
 from seakeep.models.engine import Dynamics
+from seakeep.models.following import Following
 from seakeep.models.inputs import Chain, Lead
 
 __all__ = ["measured_response", "response", "transfer", "validation"]
@@ -131,8 +132,10 @@ def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> Complex
 
 
 def _lead(model: Model) -> int:
+    """Samples by which delayed columns lead."""
     maps = Chain.of(model.signature.input_map).maps
-    return sum(each.samples for each in maps if isinstance(each, Lead))
+    carried = sum(each.lead for each in maps if isinstance(each, Following))
+    return carried + sum(each.samples for each in maps if isinstance(each, Lead))
 
 
 def _dynamics(model: Model) -> list[Dynamics]:

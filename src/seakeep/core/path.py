@@ -2,9 +2,8 @@ r"""Many ridge regressions of the same delayed series: folds, delays and λ from
 
 The columns of all candidates are built once, standardised once for all runs. A fold is the sum of
 the moments of its runs, with an affine correction for its own means and standard deviations; a
-choice of delays and of columns is a part of the Gram matrix; and with its eigenvalues
-:math:`C = V \Lambda V^T` the coefficients at every λ are
-:math:`H V (\Lambda + \lambda I)^{-1} V^T`.
+choice of delays and of columns is a part of the Gram matrix; and a Cholesky
+factorisation gives the coefficients at each λ, :math:`H (C + \lambda I)^{-1}`.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg
 
 from seakeep.arrays import FloatArray, IntArray
 
@@ -114,17 +114,18 @@ def ridge_path(gram: FloatArray, right: FloatArray, ridges: Sequence[float]) -> 
     right : ndarray, shape (N, p)
         Products of the targets with the regressors.
     ridges : sequence of float
-        λ > 0, each.
+        λ > 0, each; what is below the rounding of the Gram matrix is raised to it.
 
     Returns
     -------
     ndarray, shape (len(ridges), N, p)
     """
-    values, vectors = np.linalg.eigh(gram)
-    turned = right @ vectors
-    weights = 1.0 / (np.maximum(values, 0.0) + np.asarray(ridges)[:, None])
-    result: FloatArray = (turned * weights[:, None, :]) @ vectors.T
-    return result
+    found, least = np.empty((len(ridges), *right.shape)), _rounding(gram, gram.diagonal().max())
+    for out, ridge in zip(found, ridges, strict=True):
+        shifted = gram.copy()
+        shifted[np.diag_indices_from(shifted)] += max(ridge, least)
+        out[:] = linalg.solve(shifted, right.T, overwrite_a=True, assume_a="pos").T
+    return found
 
 
 def truncated_path(gram: FloatArray, right: FloatArray, ranks: Sequence[int]) -> FloatArray:
@@ -145,11 +146,15 @@ def truncated_path(gram: FloatArray, right: FloatArray, ranks: Sequence[int]) ->
     """
     values, vectors = np.linalg.eigh(gram)
     values, vectors = values[::-1], vectors[:, ::-1]
-    # Below this an eigenvalue of the Gram matrix is rounding.
-    sound = int(np.count_nonzero(values > len(gram) * np.finfo(float).eps * values[0]))
+    sound = int(np.count_nonzero(values > _rounding(gram, values[0])))
     turned = (right @ vectors[:, :sound]) / values[:sound]
     kept = [min(rank, sound) for rank in ranks]
     return np.stack([turned[:, :rank] @ vectors[:, :rank].T for rank in kept])
+
+
+def _rounding(gram: FloatArray, largest: float) -> float:
+    """Value below which an eigenvalue of a Gram matrix is rounding."""
+    return len(gram) * float(np.finfo(float).eps * largest)
 
 
 def lagged(series: FloatArray, first: int, count: int, lags: int) -> FloatArray:

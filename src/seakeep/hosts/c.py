@@ -17,7 +17,7 @@ from seakeep.files import MARK, check_output, make_folder, replacing
 from seakeep.hosts.program import Program, program_of
 from seakeep.models import Model
 from seakeep.models.engine import GROWTH, fading
-from seakeep.models.observables import Formula, Product, Term
+from seakeep.models.observables import SLOPE, Formula, Power, Product, Term
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -35,8 +35,7 @@ def write_c(model: Model, folder: str | Path, name: str = "rom") -> list[Path]:
     Parameters
     ----------
     model : Model
-        A single linear model. Its observables and read-outs are part of the code; its inputs are
-        aligned already (:meth:`HankelDMDcModel.aligned_inputs`).
+        A single linear model. Its carriers, observables and read-outs are part of the code.
     folder : str or Path
         Where to write; it is made if it does not exist.
     name : str, optional
@@ -94,7 +93,9 @@ def content_of(program: Program, name: str) -> dict[str, Any]:
         "name": name,
         "upper": name.upper(),
         "mark": f"{MARK}: {KIND}, written by seakeep {metadata.version('seakeep')}:",
-        "aligned": program.is_aligned,
+        "following": program.following,
+        "banks": program.banks,
+        "x_rows": signature.state_samples,
         "dt": signature.dt,
         "N": len(signature.states),
         "Q": len(signature.inputs),
@@ -114,9 +115,11 @@ def content_of(program: Program, name: str) -> dict[str, Any]:
         "input_labels": signature.input_labels,
         "delayed": [*(f"u[{place}]" for place in range(len(signature.inputs))), *code[True]],
         "direct": code[False],
+        "powers": any("bounded_power" in each for group in code.values() for each in group),
         "kernels": kernels,
         "growth": GROWTH,
         "fade": fading(signature),
+        "slope": SLOPE,
         "readouts": [
             {"column": each.column, "code": _hinges(each.function)}
             for each in signature.readouts
@@ -167,13 +170,15 @@ def _term(term: Term, kernels: list[FloatArray]) -> str:
     """Expression of C in u, the inputs of the row; a filter is put beside the other ones."""
     if isinstance(term, Product):
         return " * ".join(f"u[{place}]" for place in term.places)
+    if isinstance(term, Power):
+        return f"bounded_power(u[{term.place}], {term.power}, {_number(term.limit)})"
     if isinstance(term, Formula):
         return term.expression.fold(_number, lambda name: f"u[{term.places[name]}]", _operation)
     number = next((k for k, each in enumerate(kernels) if each is term.kernel), len(kernels))
     if number == len(kernels):
         kernels.append(term.kernel)
     middle, half = f"u + ({term.shift}) * Q + {term.place}", len(term.kernel) // 2
-    return f"slow_square({middle}, {term.order}, kernel_{number}, {half})"
+    return f"slow_square({middle}, {term.order}, kernel_{number}, {half}, {_number(term.top)})"
 
 
 def _operation(name: str, values: list[str]) -> str:

@@ -40,7 +40,7 @@ def write_estimator(
     """
     program = program_of(model)
     fitted, signature = program.model, program.model.signature
-    if program.lead or program.observed is not None or program.is_aligned:
+    if program.lead or program.observed is not None or program.following is not None:
         raise RequestError(
             "an estimator in C takes models whose steps read waves as they are measured, and this "
             "one has a look-ahead, observables or carried waves. Run model.live() in Python, or "

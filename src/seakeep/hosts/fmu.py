@@ -143,7 +143,7 @@ def _description(program: Program, start: list[float]) -> dict[str, Any]:
     signature = program.model.signature
     inputs, states = signature.input_labels, signature.state_labels
     lengths = [program.history + signature.lead_samples] * len(inputs)
-    lengths += [signature.state_delays + 1] * len(states)
+    lengths += [signature.state_samples] * len(states)
     channels = [
         _Channel(_part(label.name), label.units, label.long_name, value, rows, place >= len(inputs))
         for place, (label, value, rows) in enumerate(

@@ -1,8 +1,7 @@
-"""What a model computes in one step, for any host: sizes, coefficients, and observables.
+"""What a model computes in one step, for any host: sizes, coefficients, carriers, and observables.
 
 A step from instant k takes the inputs of instant k + ``lead_samples``, so that every model whose
-observables have a finite reach is causal in its newest input. Inputs are aligned already, as
-``forecast_arrays`` takes them.
+observables and carriers have a finite reach is causal in its newest input. Inputs are as measured.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError
 from seakeep.models import FittedAlignment, HankelDMDcModel, Model, is_ensemble, labelled
+from seakeep.models.following import Bank, Following
 from seakeep.models.inputs import Chain, Lead
 from seakeep.models.interface import Scale
 from seakeep.models.observables import Bound, Observed, Term
@@ -31,14 +31,17 @@ class Program:
     model : HankelDMDcModel
         The model.
     lead : int
-        Samples by which delayed regressors look ahead.
+        Samples by which delayed regressors look ahead; 0 where carriers do.
     observed : Observed or None
         Observables beside the inputs.
+    following : Following or None
+        Carriers and place of a model that follows its own surge.
     """
 
     model: HankelDMDcModel
     lead: int
     observed: Observed | None = field(repr=False)
+    following: Following | None = field(repr=False)
 
     @property
     def sizes(self) -> tuple[int, int]:
@@ -71,13 +74,13 @@ class Program:
     @property
     def back(self) -> int:
         """Samples of input before the instant of a step that its newest regressors read."""
-        return max([0, *(each.before - self.lead * each.delayed for each in self.bound)])
+        carriers = 0 if self.following is None else self.following.back
+        return max([carriers, *(each.before - self.lead * each.delayed for each in self.bound)])
 
     @property
-    def is_aligned(self) -> bool:
-        """Whether the model was trained on inputs carried to the vessel."""
-        alignment = self.model.alignment
-        return alignment is not None and alignment.settings.carries
+    def banks(self) -> tuple[Bank, ...]:
+        """Carriers of each elevation, with the probes as they stood in training."""
+        return () if self.following is None else self.following.banks(None)
 
     @property
     def timing(self) -> str:
@@ -89,15 +92,11 @@ class Program:
                 f"A step of {model.dt:g} s takes the inputs {ahead} samples ({ahead * model.dt:g} "
                 "s) after the instant that it starts from."
             )
-        if (alignment := model.alignment) is not None and self.is_aligned:
+        if self.following is not None:
             said += (
-                " They are waves carried to the vessel, as model.aligned_inputs(run) makes them."
+                " They are the probes as measured, where they stood in training: the step carries "
+                "the waves to the vessel by its own surge."
             )
-            if alignment.settings.surge == "predicted":
-                said += (
-                    " The loop in which the predicted surge moves them reads the whole forecast at "
-                    "once, and stays in Python."
-                )
         return said
 
 
@@ -116,8 +115,8 @@ def program_of(model: Model) -> Program:
     Raises
     ------
     RequestError
-        If the model is an ensemble or another kind, or has an observable or an input map that was
-        added from outside.
+        If the model is an ensemble or another kind, is driven by waves that are carried to a
+        measured surge, or has an observable or an input map that was added from outside.
     """
     if is_ensemble(model):
         raise RequestError(
@@ -129,15 +128,20 @@ def program_of(model: Model) -> Program:
             f"a model of kind '{model.kind}' cannot be exported; those of delayed states and "
             "inputs can: hankel_dmdc, arx, fir."
         )
-    lead, observed = 0, None
-    for each in Chain.of(model.signature.input_map).maps:
-        if isinstance(each, Lead):
-            lead = each.samples
-        elif isinstance(each, Observed):
-            observed = each
-        elif not isinstance(each, FittedAlignment):
-            raise RequestError(_strange("input map", each.kind))
-    program = Program(model, lead, observed)
+    chain = Chain.of(model.signature.input_map)
+    known = (Lead, Following, FittedAlignment, Observed)
+    if strange := [each.kind for each in chain.maps if not isinstance(each, known)]:
+        raise RequestError(_strange("input map", strange[0]))
+    following = next((each for each in chain.maps if isinstance(each, Following)), None)
+    if following is None and chain.alignment is not None and chain.alignment.settings.carries:
+        raise RequestError(
+            "the model is driven by waves that are carried over whole records"
+            f"{' to the measured surge' if chain.reads_surge else ''}, which no step can make. Fit "
+            "it with alignment mode = 'dispersion', surge = 'predicted': that recursion runs on "
+            "every host, fed with the probes as they are measured; or without alignment."
+        )
+    lead = sum(each.samples for each in chain.maps if isinstance(each, Lead))
+    program = Program(model, lead, chain.observed, following)
     for bound in program.bound:
         if not bound.terms:
             raise RequestError(_strange("observable", bound.labels[0].name))
@@ -152,13 +156,13 @@ def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray,
     model : Model
         As for :func:`seakeep.hosts.write_c`.
     run : Dataset
-        As for :meth:`HankelDMDcModel.forecast`; its inputs are aligned here, if the model does so.
+        As for :meth:`HankelDMDcModel.forecast`.
     start : float
         Instant k of the last measured state, s.
 
     Returns
     -------
-    x_history : ndarray, shape (s + 1, N)
+    x_history : ndarray, shape (rows, N)
         States up to instant k, oldest first.
     u_history : ndarray, shape (rows, Q)
         Inputs up to instant k − 1 + ``lead_samples``, oldest first. The first step takes the row
@@ -179,11 +183,10 @@ def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray,
     labelled.check_units(run, signature.state_labels + signature.input_labels, name)
     time = np.asarray(run["time"].values, dtype=float)
     at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
-    aligned = program.model.aligned_inputs(run)
     rows = []
-    for source, names, first, stop in (
-        (run, signature.states, at - signature.state_delays, at + 1),
-        (aligned, signature.inputs, at - program.history, at + signature.lead_samples),
+    for names, first, stop in (
+        (signature.states, at + 1 - signature.state_samples, at + 1),
+        (signature.inputs, at - program.history, at + signature.lead_samples),
     ):
         if first < 0 or stop > time.size:
             raise RequestError(
@@ -191,7 +194,7 @@ def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray,
                 f"{', '.join(names)} that the model starts from: {at - first} before it and "
                 f"{max(stop - at - 1, 0)} after it. Choose an instant further inside the run."
             )
-        values = labelled.channel_matrix(source, names, name, slice(first, stop))
+        values = labelled.channel_matrix(run, names, name, slice(first, stop))
         labelled.check_finite(values, names, name, first, time)
         rows.append(values)
     return rows[0], rows[1]

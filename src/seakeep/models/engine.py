@@ -20,14 +20,16 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, whole_number
+from seakeep.arrays import FloatArray, IntArray, whole_number
+from seakeep.core.recursion import Recursion, recursion
 from seakeep.core.rollout import rollouts
 from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice
 from seakeep.models.executor import Progress, in_order
+from seakeep.models.following import Followed
 from seakeep.models.inputs import Measured
-from seakeep.models.interface import Drive, Scale, Signature, Span
+from seakeep.models.interface import Drive, Follows, Scale, Signature, Span
 from seakeep.models.readouts import FittedReadOut, read_out
 from seakeep.signals.prediction import predict_waves
 from seakeep.signals.time_axis import instant_text
@@ -37,7 +39,9 @@ __all__ = [
     "Windows",
     "array_windows",
     "cut_lost",
+    "driven",
     "first_lost",
+    "followed_runs",
     "group_series",
     "linear_runs",
     "member_series",
@@ -75,22 +79,21 @@ class Windows:
         Instants forecast from each start.
     time : tuple of Variable, each of shape (steps,)
         These instants.
-    histories : ndarray, shape (window, s + 1, N)
+    histories : ndarray, shape (window, at least s + 1, N)
         Measured states up to each start, physical units.
     delayed : ndarray, shape (window, z + steps, n)
-        Delayed regressors that drive these steps; with predicted states, those of the first pass.
+        Delayed regressors that drive these steps; those before the start, shape (window, z, n),
+        where the model follows its own surge.
     direct : ndarray, shape (window, steps, m)
-        Direct regressors from the start on; likewise.
+        Direct regressors from the start on; then without the slow surge squared.
     look_ahead : tuple of float
         Seconds of input after the instant a step starts from that drive it.
     notes : dict
         What a forecast's attributes report of the input map, for the first run.
-    drives : tuple of Drive
-        One per window where predicted states drive the input, else none; runs share theirs.
-    spans : tuple of Span
-        Samples of the regressors of each window in its run.
-    passes : int
-        How often a forecast runs.
+    table : ndarray, shape (time, place, n), optional
+        What would drive a step at each place, where the model follows its own surge.
+    starts : ndarray of int, shape (window,), optional
+        Samples of the table from which the windows start.
     predicted : tuple of int
         First step of each window that reads predicted input, or −1.
     """
@@ -103,9 +106,8 @@ class Windows:
     direct: FloatArray
     look_ahead: tuple[float, ...] = ()
     notes: Mapping[str, str | float] = field(default_factory=dict)
-    drives: tuple[Drive, ...] = ()
-    spans: tuple[Span, ...] = ()
-    passes: int = 1
+    table: FloatArray | None = None
+    starts: IntArray | None = None
     predicted: tuple[int, ...] = ()
 
     def __len__(self) -> int:
@@ -124,6 +126,8 @@ class Dynamics:
         s and z.
     state_scale, input_scale, direct_scale : Scale
         Moments of the states and of both kinds of regressors.
+    follows : Follows or None
+        Place of the vessel where the model follows its own surge.
     """
 
     coefficients: FloatArray
@@ -132,6 +136,7 @@ class Dynamics:
     state_scale: Scale
     input_scale: Scale
     direct_scale: Scale
+    follows: Follows | None = None
 
     @property
     def matrices(self) -> tuple[FloatArray, FloatArray]:
@@ -213,17 +218,8 @@ def _windows(
 ) -> Windows:
     """Windows of one length from their runs."""
     input_map = signature.input_map
-    follows = input_map.reads_states == "predicted"
-    rows = [
-        drive.rows(
-            span.first,
-            span.stop if signature.inputs else span.known + 1,
-            span.known if follows else None,
-        )
-        for (_, drive), span in zip(sources, spans, strict=True)
-    ]
     runs = [run for run, _ in sources]
-    return Windows(
+    windows = Windows(
         places=tuple(
             (run.name, float(run.time[span.known])) for run, span in zip(runs, spans, strict=True)
         ),
@@ -232,16 +228,48 @@ def _windows(
         histories=np.stack(
             [run.history(signature, span) for run, span in zip(runs, spans, strict=True)]
         ),
-        delayed=np.stack([each.delayed for each in rows]),
-        direct=np.stack([each.direct[signature.input_delays :] for each in rows]),
+        delayed=np.empty(0),
+        direct=np.empty(0),
         look_ahead=tuple(input_map.look_ahead(run.run, signature.dt) for run in runs),
         notes=input_map.notes(runs[0].run),
-        drives=tuple(drive for _, drive in sources) if follows else (),
-        spans=tuple(spans),
-        passes=input_map.passes,
         predicted=tuple(
             run.first_predicted(signature, span) for run, span in zip(runs, spans, strict=True)
         ),
+    )
+    return driven(windows, signature, [drive for _, drive in sources], spans)
+
+
+def driven(
+    windows: Windows, signature: Signature, drives: Sequence[Drive], spans: Sequence[Span]
+) -> Windows:
+    """Windows with the regressors that drive them, each from its run's drive."""
+    z = signature.input_delays
+    if signature.input_map.follows is None:
+        stops = [span.stop if signature.inputs else span.known + 1 for span in spans]
+        rows = [
+            drive.rows(span.first, stop)
+            for drive, span, stop in zip(drives, spans, stops, strict=True)
+        ]
+        return replace(
+            windows,
+            delayed=np.stack([each.delayed for each in rows]),
+            direct=np.stack([each.direct[z:] for each in rows]),
+        )
+    found = [drive for drive in drives if isinstance(drive, Followed)]
+    pairs = list(zip(found, spans, strict=True))
+    tables, starts, first = [], {}, 0
+    for drive in dict.fromkeys(found):
+        mine = [span for each, span in pairs if each is drive]
+        begin, end = min(span.known for span in mine), max(span.stop for span in mine)
+        starts[drive] = first - begin
+        tables.append(drive.table(begin, end))
+        first += end - begin
+    return replace(
+        windows,
+        delayed=np.stack([drive.rows(span.first, span.known).delayed for drive, span in pairs]),
+        direct=np.stack([drive.direct(span.known, span.stop) for drive, span in pairs]),
+        table=np.concatenate(tables),
+        starts=np.array([starts[drive] + span.known for drive, span in pairs]),
     )
 
 
@@ -309,7 +337,7 @@ class _Opened:
         missing = [end if start < end < stop else None for end in ends]
         if all(end is None for end in missing):
             return self
-        if signature.input_map.reads_states == "measured":
+        if signature.input_map.reads_surge:
             raise RequestError(
                 f"ahead = 'predict' continues inputs, and those of {self.name} are carried to the "
                 "measured surge, which nothing continues. Forecast fewer steps, or fit a model "
@@ -345,11 +373,18 @@ class _Opened:
         for each in read:
             wanted = values[each.first - first : max(each.stop - first, 0)]
             labelled.check_finite(wanted, names, self.name, each.first, self.time)
-        return signature.input_map.wrap(Measured(values, first), self.run, spans)
+        surge = None
+        if (follows := signature.input_map.follows) is not None:
+            last = max(span.known for span in spans) + 1  # no later state is read
+            channel = signature.states[follows.column]
+            surge = labelled.channel_matrix(self.run, [channel], self.name, slice(first, last))[
+                :, 0
+            ]
+        return signature.input_map.wrap(Measured(values, first, surge), self.run, spans)
 
     def history(self, signature: Signature, span: Span) -> FloatArray:
         """States up to the start."""
-        first = span.known - signature.state_delays
+        first = span.known + 1 - signature.state_samples
         samples = slice(first, span.known + 1)
         states = labelled.channel_matrix(self.run, signature.states, self.name, samples)
         labelled.check_finite(states, signature.states, self.name, first, self.time)
@@ -376,9 +411,13 @@ def _sound_tail(values: FloatArray) -> FloatArray:
 
 
 def array_windows(
-    signature: Signature, histories: FloatArray, inputs: FloatArray, steps: int
+    signature: Signature,
+    histories: FloatArray,
+    inputs: FloatArray,
+    steps: int,
+    rig: xr.Dataset | None = None,
 ) -> Windows:
-    """Windows of plain arrays, inputs aligned already.
+    """Windows of plain arrays, inputs aligned already to a measured surge.
 
     Parameters
     ----------
@@ -390,6 +429,9 @@ def array_windows(
         Inputs from the same sample on; the history of at least z + 1 samples.
     steps : int
         Instants forecast.
+    rig : Dataset, optional
+        Whose attributes state positions and depth for a model that follows its own surge; by
+        default those of training.
 
     Returns
     -------
@@ -398,19 +440,25 @@ def array_windows(
     """
     history = inputs.shape[1] - (steps - 1) - signature.lead_samples
     span = Span(history - 1 - signature.input_delays, history - 1, history - 1 + steps)
-    rows = [
-        signature.input_map.wrap(Measured(each), None, [span]).rows(span.first, span.stop)
-        for each in inputs
-    ]
+    follows = signature.input_map.follows
+    drives = []
+    for values, states in zip(inputs, histories, strict=True):
+        surge = None
+        if follows is not None:
+            known = states[-history:, follows.column]
+            surge = np.concatenate([np.full(history - len(known), np.nan), known])
+        measured = Measured(values, 0, surge)
+        drives.append(signature.input_map.wrap(measured, rig, [span]))
     time = xr.Variable(("time",), signature.dt * np.arange(1, steps + 1))
-    return Windows(
+    windows = Windows(
         places=(("these arrays", 0.0),) * len(histories),
         steps=steps,
         time=(time,) * len(histories),
         histories=histories,
-        delayed=np.stack([each.delayed for each in rows]),
-        direct=np.stack([each.direct[signature.input_delays :] for each in rows]),
+        delayed=np.empty(0),
+        direct=np.empty(0),
     )
+    return driven(windows, signature, drives, [span] * len(drives))
 
 
 def linear_runs(
@@ -420,7 +468,7 @@ def linear_runs(
 ) -> list[FloatArray]:
     """Free runs of linear members, each of shape (member, window, steps, N), physical units.
 
-    Read-outs see each member's series when its last pass is done.
+    Read-outs see each member's series when its run is done.
     """
     found = [[read_out(readouts, values) for values in _runs(member, groups)] for member in members]
     # One member needs no copy.
@@ -430,26 +478,54 @@ def linear_runs(
 
 
 def _runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
-    """Free runs in passes: each one is driven by what the states of the one before make of it."""
-    found = _open_runs(member, groups)
-    for _ in range(max(windows.passes for windows in groups) - 1):
-        followed = [_following(*each) for each in zip(groups, found, strict=True)]
-        found = _open_runs(member, followed)
-    return found
+    if all(windows.table is None for windows in groups):
+        return _open_runs(member, groups)
+    return [followed_runs(member, member.coefficients[None], windows)[0] for windows in groups]
 
 
-def _following(windows: Windows, found: FloatArray) -> Windows:
-    """Windows driven by what the states of a pass make of their inputs."""
-    delays = windows.delayed.shape[1] - windows.steps
-    rows = [
-        drive.rows(span.first, span.stop, span.known, states)
-        for drive, span, states in zip(windows.drives, windows.spans, found, strict=True)
-    ]
-    return replace(
-        windows,
-        delayed=np.stack([each.delayed for each in rows]),
-        direct=np.stack([each.direct[delays:] for each in rows]),
+def followed_runs(scales: Dynamics, coefficients: FloatArray, windows: Windows) -> FloatArray:
+    """Free runs of models that follow their own surge, (model, window, steps, N), physical units.
+
+    Parameters
+    ----------
+    scales : Dynamics
+        Delays and moments of all models.
+    coefficients : ndarray, shape (model, N, N(s+1) + n(z+1) + m)
+        [Â B̂] of each.
+    windows : Windows
+        With a table.
+    """
+    assert windows.table is not None
+    assert windows.starts is not None
+    follows, z, s = scales.follows, scales.input_delays, scales.state_delays
+    assert follows is not None
+    x, u, w = scales.state_scale, scales.input_scale, scales.direct_scale
+    size = len(x.mean) * (s + 1)
+    inputs = size + len(u.mean) * (z + 1)
+    # On regressors in physical units; their means are part of what is constant.
+    on_inputs = coefficients[..., size:inputs] / np.tile(u.std, z + 1)
+    on_direct = coefficients[..., inputs:] / w.std
+    constant = on_inputs @ np.tile(u.mean, z + 1) + on_direct @ w.mean
+    forcing = np.einsum("wtm,lnm->lwtn", windows.direct, on_direct[..., :-1], optimize=True)
+    forcing -= constant[:, None, None]
+    models = Recursion(
+        coefficients[..., :size],
+        on_inputs,
+        on_direct[..., -1],
+        gain=float(x.std[follows.column]),
+        offset=float(x.mean[follows.column]),
+        column=follows.column,
     )
+    delayed = windows.delayed[:, windows.delayed.shape[1] - z :]
+    found, used = recursion(
+        models, follows.place, x.deviations(windows.histories), delayed,
+        windows.table, windows.starts, forcing,
+    )  # fmt: skip
+    with np.errstate(over="ignore", invalid="ignore"):  # a run that is lost is cut just below
+        for values, each in zip(found, used, strict=True):
+            driving = np.concatenate([delayed, each], axis=1)
+            cut_lost(x.physical(values, out=values), scales, replace(windows, delayed=driving))
+    return found
 
 
 def _open_runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
@@ -479,13 +555,15 @@ def _excess(scales: Dynamics | Signature, windows: Windows) -> FloatArray:
     first = windows.delayed.shape[1] - scales.input_delays - windows.steps
     if first < 0:  # without inputs
         return np.ones((len(windows), windows.steps))
-    delayed, direct = (
-        (np.abs(values - scale.centre) / scale.bound).max(axis=2, initial=1.0)
-        for scale, values in (
-            (scales.input_scale, windows.delayed[:, first:]),
-            (scales.direct_scale, windows.direct),
-        )
-    )
+    parts = []
+    for scale, values in (
+        (scales.input_scale, windows.delayed[:, first:]),
+        (scales.direct_scale, windows.direct),
+    ):
+        count = values.shape[2]  # the slow surge squared is no input
+        relative = np.abs(values - scale.centre[:count]) / scale.bound[:count]
+        parts.append(relative.max(axis=2, initial=1.0))
+    delayed, direct = parts
     found: FloatArray = np.maximum(delayed[:, scales.input_delays :], direct)
     last, fade = delayed[:, : scales.input_delays].max(axis=1, initial=1.0), fading(scales)
     for now in found.T:

@@ -399,9 +399,12 @@ def check_arrays(
     whole_number(steps, "steps")
     check_choice("ahead", ahead, ("refuse", "predict"))
     states, inputs, count = signature.states, signature.inputs, int(steps)
-    s = signature.state_delays
+    rows = signature.state_samples
     z = signature.input_map.history(signature.input_delays)
-    x = _finite("x_history", rows_by_name("x_history", x_history, s + 1, states, "s + 1")[-s - 1 :])
+    meaning = (
+        "s + 1" if rows == signature.state_delays + 1 else "the surge before the delayed waves"
+    )
+    x = _finite("x_history", rows_by_name("x_history", x_history, rows, states, meaning)[-rows:])
     if not inputs:
         return engine.array_windows(signature, x[None], np.zeros((1, z + count, 0)), count)
     past = rows_by_name("u_history", u_history, z + 1, inputs, "z + 1")

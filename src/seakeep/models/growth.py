@@ -24,12 +24,8 @@ WINDOWS = 48
 """Free runs that the errors are averaged over; a root mean square is known to a tenth then."""
 STEPS = 1024
 """Single steps that the covariance of the residuals is taken from, at most."""
-CARRIED = 2
-"""Runs, the longest ones, in which the free runs lie where waves are carried to the vessel."""
 REACH = 3
 """Longest delays of the model that the free runs last."""
-RECORD = 10
-"""Lengths of a free run that the waves of one alone are carried over."""
 LEAST = 64
 """Steps that they last at least: errors of a lightly damped vessel outgrow short delays."""
 
@@ -44,10 +40,6 @@ class LeadErrors:
         Covariance of the one-step residuals.
     rms : ndarray, shape (steps, N)
         Root mean square error of free runs, 1 … steps samples after their starts; it never falls.
-    ending : ndarray, shape (last, N)
-        Root of what the mean square is larger by at the last instants of a forecast, its last one
-        first: no surge is predicted after them, which moves the waves that they look ahead to.
-        Empty where no predicted surge moves the waves.
 
     Notes
     -----
@@ -56,19 +48,10 @@ class LeadErrors:
 
     residual: FloatArray
     rms: FloatArray
-    ending: FloatArray
 
     def of_forecast(self, steps: int, since: int = 0) -> FloatArray:
-        """Mean squares over a forecast, shape (steps, N), `since` samples after measured states.
-
-        What the end adds comes about over half as many steps as it is told for.
-        """
-        leads = np.arange(1, steps + 1)
-        variances: FloatArray = self.at(leads + since) ** 2
-        last = min(steps, len(self.ending))
-        if last:
-            part = np.minimum(2.0 * leads[-last:] / len(self.ending), 1.0)[:, None]
-            variances[-last:] += part * self.ending[last - 1 :: -1] ** 2
+        """Mean squares over a forecast, shape (steps, N), `since` samples after measured states."""
+        variances: FloatArray = self.at(np.arange(1, steps + 1) + since) ** 2
         return variances
 
     def at(self, leads: npt.ArrayLike) -> FloatArray:
@@ -79,11 +62,9 @@ class LeadErrors:
 
     def to_variables(self) -> dict[str, tuple[tuple[str, ...], FloatArray]]:
         """Variables of a file."""
-        ending = {"ending_errors": (("from_end", "state"), self.ending)}
         return {
             "residual_covariance": (("state", "other_state"), self.residual),
             "lead_errors": (("lead", "state"), self.rms),
-            **(ending if len(self.ending) else {}),
         }
 
     @classmethod
@@ -91,13 +72,8 @@ class LeadErrors:
         """Rebuild from :meth:`to_variables`; None where a file keeps none."""
         if "lead_errors" not in dataset:
             return None
-        residual, rms = (
-            store.numbers(dataset, key) for key in ("residual_covariance", "lead_errors")
-        )
-        ending = np.zeros((0, rms.shape[1]))
-        if "ending_errors" in dataset:
-            ending = store.numbers(dataset, "ending_errors")
-        return cls(residual, rms, ending)
+        keys = ("residual_covariance", "lead_errors")
+        return cls(*(store.numbers(dataset, key) for key in keys))
 
 
 class Source(NamedTuple):
@@ -134,9 +110,6 @@ class Stretch:
         """What free runs from these samples read."""
         if self.source is not None and steps > 1:
             signature, name, run, begin = self.source
-            if len(starts) == 1:  # as a forecast reads it: the record up to there
-                begin_at = begin + (starts[0] - RECORD * steps) * signature.dt
-                run = run.sel(time=slice(begin_at, None))
             places = [(name, begin + at * signature.dt) for at in starts]
             return read_windows(signature, {name: run}, places, steps)
         return Windows(
@@ -170,8 +143,7 @@ def lead_errors(
         ]
     )
     longest_first = sorted(stretches, key=lambda each: each.first - each.last)
-    carried = any(each.source for each in stretches)
-    places = _places(longest_first[: CARRIED if carried else None], steps, WINDOWS)
+    places = _places(longest_first, steps, WINDOWS)
     errors = np.concatenate(
         [_errors(members, each, starts, s, z, steps, readouts) for each, starts in places]
     )
@@ -186,27 +158,7 @@ def lead_errors(
     grown = np.stack([isotonic_regression(each).x for each in square.T], axis=1)
     factor = _unseen(members, stretches)
     residual = factor * residuals.T @ residuals / len(residuals)
-    ending = np.zeros((0, square.shape[1]))
-    if carried and steps > 4:
-        every = [(each, start) for each, starts in places for start in starts]
-        alone = [
-            _errors(members, each, [start], s, z, steps // 2, readouts)
-            for each, start in every[::2]
-        ]
-        ending = _ending(np.concatenate(alone), errors[::2])
-    return LeadErrors(residual, np.sqrt(factor * grown), np.sqrt(factor) * ending)
-
-
-def _ending(alone: FloatArray, errors: FloatArray) -> FloatArray:
-    """Root of what errors of runs that are read up to their ends have more than longer ones."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        more = alone**2 - errors[:, : alone.shape[1]] ** 2
-    known = np.isfinite(more)
-    mean = np.where(known, more, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    last = mean[: -1 - alone.shape[1] // 2 : -1]
-    falling = [isotonic_regression(each, increasing=False).x for each in last.T]
-    result: FloatArray = np.sqrt(np.maximum(np.stack(falling, axis=1), 0.0))
-    return result
+    return LeadErrors(residual, np.sqrt(factor * grown))
 
 
 def _unseen(members: Sequence[Dynamics], stretches: Sequence[Stretch]) -> float:
@@ -261,7 +213,7 @@ def training_errors(
     for number, name in enumerate(data.names):
         window = data.windows[number]
         begin = data.first_instants[number] - window.first * data.dt
-        follows = signature.input_map.reads_states == "predicted"
+        follows = signature.input_map.follows is not None
         stretches.append(
             Stretch(
                 data.state_scale.physical(data.states[number]),

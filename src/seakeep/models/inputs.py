@@ -1,9 +1,11 @@
 """Input maps: how measured inputs become what drives a model.
 
 A :class:`Chain` of maps is fitted with a model, and opened once per run: its :class:`Drive` then
-serves all members, windows and steps. There are three maps: the identity (an empty chain),
-:class:`Lead`, by which waves that have not yet arrived drive a step, and :class:`ProbeAlignment`,
-which carries the elevation to a vessel that moves:
+serves all members, windows and steps. There are four maps: the identity (an empty chain),
+:class:`Lead`, by which waves that have not yet arrived drive a step, :class:`ProbeAlignment`,
+which carries the elevation to a vessel whose position is measured, and
+:class:`~seakeep.models.following.Following`, in which the model itself says where it is. The
+elevation is carried by
 
     distance = surge + offset + (position of the probe in training − its position in the run) + the
     run's own ``attrs["probe_offset"]``,
@@ -17,18 +19,16 @@ import math
 import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 import xarray as xr
-from scipy import signal
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice, check_integer, of_json, settings_of
-from seakeep.models.interface import Drive, InputMap, Json, Regressors, Span, plain
+from seakeep.models.checks import check_choice, of_json, settings_of
+from seakeep.models.interface import Drive, Follows, InputMap, Json, Regressors, Span, plain
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.observables import Observed
 from seakeep.signals.propagation import (
@@ -40,32 +40,24 @@ from seakeep.signals.propagation import (
 )
 from seakeep.waves import group_speed
 
-__all__ = ["MAPS", "Chain", "FittedAlignment", "Lead", "Measured", "ProbeAlignment"]
+__all__ = ["MAPS", "Chain", "FittedAlignment", "Lead", "Measured", "ProbeAlignment", "depth_of"]
 
 Mode = Literal["effective", "dispersion"]
 Surge = Literal["measured", "predicted", "none"]
 
-SURGE_CUTOFF = 0.2
-"""A model that predicts its surge follows it below this frequency, per encounter period.
-
-Surge at wave frequency is part of the response that the model learns from the wave; following its
-prediction too feeds its error back. Between 0.1 and 0.33 the skill on the virtual tank is flat."""
-SETTLED = 15.0
-"""Encounter periods after which the low-pass filter of the surge has settled: three of its own."""
-BEYOND = 0.5
-"""A predicted surge is followed this part of the trained range beyond either end of it."""
-
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Inputs as they are: shape (time, Q), physical units, from the sample `first` of a run on."""
+    """Inputs as they are: shape (time, Q), physical units, from the sample `first` of a run on.
+
+    `surge`, shape (time,), is that of the vessel at the same samples, where it is known.
+    """
 
     values: FloatArray
     first: int = 0
+    surge: FloatArray | None = None
 
-    def rows(
-        self, first: int, stop: int, known: int | None = None, states: FloatArray | None = None
-    ) -> Regressors:
+    def rows(self, first: int, stop: int) -> Regressors:
         """Inputs of a stretch."""
         values = self.values[first - self.first : stop - self.first]
         return Regressors(values, np.empty((stop - first, 0)))
@@ -82,6 +74,8 @@ class Lead:
     """
 
     kind: ClassVar[str] = "lead"
+    reads_surge: ClassVar[bool] = False
+    follows: ClassVar[None] = None
     samples: int
 
     @property
@@ -89,29 +83,9 @@ class Lead:
         """The look-ahead."""
         return self.samples
 
-    @property
-    def passes(self) -> int:
-        """One: no predicted state is read."""
-        return 1
-
     def history(self, input_delays: int) -> int:
         """The delays themselves."""
         return input_delays
-
-    @property
-    def reads_states(self) -> str:
-        """No states are read."""
-        return "no"
-
-    def fit(
-        self,
-        runs: dict[str, xr.Dataset],
-        states: Sequence[str],
-        inputs: Sequence[str],
-        window: int | None,
-    ) -> Self:
-        """Nothing is fitted."""
-        return self
 
     def regressors(
         self, inputs: tuple[ChannelLabel, ...]
@@ -157,10 +131,8 @@ class _Ahead:
     inner: Drive
     samples: int
 
-    def rows(
-        self, first: int, stop: int, known: int | None = None, states: FloatArray | None = None
-    ) -> Regressors:
-        return self.inner.rows(first + self.samples, stop + self.samples, known, states)
+    def rows(self, first: int, stop: int) -> Regressors:
+        return self.inner.rows(first + self.samples, stop + self.samples)
 
 
 @dataclass(frozen=True)
@@ -174,8 +146,8 @@ class ProbeAlignment:
         paper, or linear dispersion, frequency by frequency.
     surge : {"measured", "predicted", "none"}, optional
         Position that the elevation is carried to: the measured surge (an output read during the
-        forecast, which is then conditional on it), the surge that the model itself predicts, or
-        none, the place at rest.
+        forecast, which is then conditional on it), the slow surge that the model itself predicts,
+        step by step, which takes mode "dispersion", or none, the place at rest.
     celerity : float or "common", optional
         c of mode "effective", m/s. By default each run's own, ``attrs["celerity"]``, which
         ``prepare`` finds by correlation; a run without it is carried as "common" has it: with the
@@ -192,10 +164,6 @@ class ProbeAlignment:
     highest_frequency : float, optional
         Highest frequency of the waves in mode "dispersion", Hz; by default the one below which
         99.9 % of the variance of the training input lies.
-    passes : int, optional
-        With a predicted surge, how often a forecast runs: the first pass holds the surge at its
-        mean over the last encounter period before the start, each further one follows the slow
-        part of the surge that the pass before predicted.
     optional : bool, optional
         Whether a model goes without the alignment where the training runs do not carry what it
         needs: water depth and elevations; and without the surge where that is no state, or no
@@ -214,7 +182,6 @@ class ProbeAlignment:
     surge_channel: str = "surge"
     channels: tuple[str, ...] | None = None
     highest_frequency: float | None = None
-    passes: int = 2
     optional: bool = False
 
     @property
@@ -223,13 +190,17 @@ class ProbeAlignment:
         return self.surge != "none" or self.offset != 0.0
 
     def __post_init__(self) -> None:
-        check_integer("alignment: passes", self.passes, 1)
         if not isinstance(self.optional, bool):
             raise RequestError(
                 f"alignment: optional must be True or False; received {self.optional!r:.{SHOWN}}."
             )
         check_choice("alignment: mode", self.mode, ("effective", "dispersion"))
         check_choice("alignment: surge", self.surge, ("measured", "predicted", "none"))
+        if self.surge == "predicted" and self.mode != "dispersion":
+            raise RequestError(
+                "alignment: surge = 'predicted' carries waves by their dispersion; received mode = "
+                f"'{self.mode}'. Write mode = 'dispersion', or take surge = 'measured'."
+            )
         if not (isinstance(self.celerity, str) and self.celerity == "common"):
             meant = "a positive number, 'common' or None"
             _check_number("celerity", self.celerity, "m/s", meant)
@@ -332,7 +303,7 @@ class ProbeAlignment:
         spread, limit = None, self.highest_frequency
         elevations = [channel for channel, yes in zip(inputs, carried, strict=True) if yes]
         if self.mode == "dispersion":
-            depth = _depth(first, first_name, depth)
+            depth = depth_of(first, first_name, depth)
             if limit is None:
                 limit = float(
                     np.median([_band(run, name, elevations) for name, run in windows.items()])
@@ -349,10 +320,6 @@ class ProbeAlignment:
             celerity_spread=spread,
             water_depth=depth,
             highest_frequency=limit,
-            surge_range=(0.0, 0.0)
-            if self.surge == "none"
-            else _surge_range(windows, self.surge_channel),
-            period=labelled.mean_period(windows, elevations) if self.surge == "predicted" else None,
         )
 
     def missing(
@@ -412,14 +379,11 @@ class FittedAlignment:
         m, of the training runs.
     highest_frequency : float or None
         Hz (mode "dispersion").
-    surge_range : (float, float)
-        Range within which a predicted surge is followed, m.
-    period : float or None
-        Encounter period, samples (surge "predicted").
     """
 
     kind: ClassVar[str] = "probe_alignment"
     lead_samples: ClassVar[int] = 0
+    follows: ClassVar[None] = None
     settings: ProbeAlignment
     inputs: tuple[str, ...]
     states: tuple[str, ...]
@@ -429,32 +393,21 @@ class FittedAlignment:
     celerity_spread: float | None = None
     water_depth: float | None = None
     highest_frequency: float | None = None
-    surge_range: tuple[float, float] = (0.0, 0.0)
-    period: float | None = None
 
     @property
-    def passes(self) -> int:
-        """Passes of a predicted surge, else one."""
-        return self.settings.passes if self.settings.surge == "predicted" else 1
+    def placed(self) -> tuple[int, ...]:
+        """Elevations at stated positions, by their places among the inputs."""
+        every = enumerate(zip(self.carried, self.positions, strict=True))
+        return tuple(column for column, (yes, at) in every if yes and at is not None)
 
     def history(self, input_delays: int) -> int:
         """The delays themselves."""
         return input_delays
 
     @property
-    def reads_states(self) -> str:
-        """Whether surge is read after the start, measured or predicted."""
-        return "no" if self.settings.surge == "none" else self.settings.surge
-
-    def fit(
-        self,
-        runs: dict[str, xr.Dataset],
-        states: Sequence[str],
-        inputs: Sequence[str],
-        window: int | None,
-    ) -> FittedAlignment | Chain:
-        """Fit the settings anew."""
-        return self.settings.fit(runs, states, inputs, window)
+    def reads_surge(self) -> bool:
+        """Whether the measured surge is read after the start."""
+        return self.settings.surge == "measured"
 
     def regressors(
         self, inputs: tuple[ChannelLabel, ...]
@@ -493,7 +446,7 @@ class FittedAlignment:
         if (celerity := self.celerity_of(run)) is not None:
             return celerity
         assert self.highest_frequency is not None
-        depth = _depth(run, "the run", self.water_depth)
+        depth = depth_of(run, "the run", self.water_depth)
         return float(group_speed(2 * np.pi * self.highest_frequency, depth))
 
     def notes(self, run: xr.Dataset) -> dict[str, str | float]:
@@ -549,6 +502,12 @@ class FittedAlignment:
                 out[column] += reference - float(here)
         return out
 
+    def positions_in(self, run: xr.Dataset) -> tuple[float | None, ...]:
+        """Position of each input's probe in a run, m; that in training where it states none."""
+        found = [_position(run, channel) for channel in self.inputs]
+        pairs = zip(found, self.positions, strict=True)
+        return tuple(trained if here is None else here for here, trained in pairs)
+
     def carry(
         self, run: xr.Dataset, name: str, samples: slice, surges: tuple[float, float]
     ) -> tuple[CarriedElevation | None, ...]:
@@ -564,7 +523,7 @@ class FittedAlignment:
                 celerity = self._speed(run)
                 out.append(carry_by_celerity(values[:, column], dt, reach, celerity))
             else:
-                depth = _depth(run, name, self.water_depth)
+                depth = depth_of(run, name, self.water_depth)
                 limit = self.highest_frequency
                 out.append(carry_by_dispersion(values[:, column], dt, reach, depth, limit))
         return tuple(out)
@@ -587,9 +546,6 @@ class _Carried:
     surge: FloatArray
     offsets: FloatArray
     stretches: tuple[_Stretch, ...]
-    column: int
-    followed: tuple[float, float]
-    period: float | None
 
     @classmethod
     def of(cls, map_: FittedAlignment, run: xr.Dataset, spans: Sequence[Span]) -> Self:
@@ -599,24 +555,18 @@ class _Carried:
         dt = labelled.run_step(run, name)
         last = max(span.stop for span in spans) + math.ceil(map_.look_ahead(run, dt) / dt)
         values = labelled.channel_matrix(run, map_.inputs, name)[:last]
-        size, is_predicted = len(values), settings.surge == "predicted"
-        surge = np.zeros(size)
-        reach = map_.surge_range if is_predicted else (np.inf, -np.inf)
+        size = len(values)
+        surge, reach = np.zeros(size), (0.0, 0.0)
         if settings.surge != "none":
             time = np.asarray(run["time"].values, dtype=float)
             surge = labelled.channel_matrix(run, [settings.surge_channel], name)[:, 0]
             for span in spans:  # read where it is allowed, and no further
-                stop = min(span.stop, span.known + 1 if is_predicted else span.stop)
-                read = slice(min(span.first, stop - 1), stop)
+                read = surge[span.first : span.stop]
                 labelled.check_finite(
-                    surge[read][:, None], [settings.surge_channel], name, read.start, time
+                    read[:, None], [settings.surge_channel], name, span.first, time
                 )
-                reach = (
-                    min(reach[0], float(surge[read].min())),
-                    max(reach[1], float(surge[read].max())),
-                )
-        else:
-            reach = (0.0, 0.0)
+            every = np.concatenate([surge[span.first : span.stop] for span in spans])
+            reach = float(every.min()), float(every.max())
         sound = np.all(np.isfinite(values), axis=1)
         gaps = np.flatnonzero(~sound)
         found: list[_Stretch] = []
@@ -628,25 +578,10 @@ class _Carried:
             stop = int(after[0]) if after.size else size
             carriers = map_.carry(run, name, slice(first, stop), reach)
             found.append(_Stretch(first, stop, carriers))
-        column = map_.states.index(settings.surge_channel) if is_predicted else 0
-        offsets, period = map_.offsets(run), map_.period
-        return cls(values, surge, offsets, tuple(found), column, map_.surge_range, period)
+        return cls(values, surge, map_.offsets(run), tuple(found))
 
-    def rows(
-        self, first: int, stop: int, known: int | None = None, states: FloatArray | None = None
-    ) -> Regressors:
-        end = stop if self.period is None or known is None else known + 1
-        begin = min(first, end)  # a look-ahead beyond the delays starts after what is known
-        surge = self.surge[begin:end]
-        if self.period is not None:
-            # The low-pass filter settles on what was measured before.
-            before = self.surge[max(first - round(SETTLED * self.period), 0) : begin]
-            gaps = np.flatnonzero(~np.isfinite(before))
-            before = before[gaps[-1] + 1 :] if gaps.size else before
-            later = None if states is None else states[:, self.column]
-            after = self._after(surge if surge.size else before, stop, known, later)
-            followed = _slow(np.concatenate([before, surge, after]), self.period)
-            surge = followed[len(followed) - (stop - first) :]
+    def rows(self, first: int, stop: int) -> Regressors:
+        surge = self.surge[first:stop]
         stretch = self._stretch(first)
         out = self.values[first:stop].copy()
         inside = slice(first - stretch.first, stop - stretch.first)
@@ -655,37 +590,8 @@ class _Carried:
                 out[:, column] = carrier.at(surge + self.offsets[column], inside)[:, 0]
         return Regressors(out, np.empty((stop - first, 0)))
 
-    def _after(
-        self, surge: FloatArray, stop: int, known: int | None, predicted: FloatArray | None
-    ) -> FloatArray:
-        """Surge that is followed after sample `known`: held, or as it was predicted."""
-        assert self.period is not None
-        count = 0 if known is None else max(stop - known - 1, 0)
-        held = np.full(count, surge[-max(round(self.period), 1) :].mean())
-        if predicted is not None:
-            number = min(count, len(predicted))
-            held[:number] = np.nan_to_num(predicted[:number], nan=held[0] if count else 0.0)
-            held[number:] = held[number - 1] if number else 0.0
-        result: FloatArray = np.clip(held, *self.followed)
-        return result
-
     def _stretch(self, sample: int) -> _Stretch:
         return next(each for each in self.stretches if each.first <= sample < each.stop)
-
-
-def _slow(surge: FloatArray, period: float) -> FloatArray:
-    """Surge below ``SURGE_CUTOFF``, without delay; `period` in samples."""
-    result: FloatArray = signal.sosfiltfilt(
-        _sections(period), surge, padlen=min(len(surge) - 1, round(5 * period))
-    )
-    return result
-
-
-@lru_cache
-def _sections(period: float) -> FloatArray:
-    """Low-pass filter of the surge: its design takes longer than its use."""
-    result: FloatArray = signal.butter(4, 2 * SURGE_CUTOFF / period, output="sos")
-    return result
 
 
 @dataclass(frozen=True)
@@ -721,30 +627,31 @@ class Chain:
         return max(input_delays, -self.reads(Span(-input_delays, 0, 1)).first)
 
     @property
-    def passes(self) -> int:
-        """Those of the map that has most."""
-        return max((each.passes for each in self.maps), default=1)
+    def reads_surge(self) -> bool:
+        """Whether a map reads the measured surge after the start."""
+        return any(each.reads_surge for each in self.maps)
 
     @property
-    def reads_states(self) -> str:
-        """That of the map which reads most."""
-        found = {each.reads_states for each in self.maps}
-        return next((word for word in ("predicted", "measured") if word in found), "no")
+    def follows(self) -> Follows | None:
+        """Place of the vessel that a map follows, and the state that it is a sum of."""
+        return next((each.follows for each in self.maps if each.follows is not None), None)
 
     @property
     def alignment(self) -> FittedAlignment | None:
-        """The alignment among the maps."""
-        return next((each for each in self.maps if isinstance(each, FittedAlignment)), None)
+        """The alignment among the maps, or that of one which follows the predicted surge."""
+        found = (getattr(each, "alignment", each) for each in self.maps)
+        return next((each for each in found if isinstance(each, FittedAlignment)), None)
 
-    def fit(
-        self,
-        runs: dict[str, xr.Dataset],
-        states: Sequence[str],
-        inputs: Sequence[str],
-        window: int | None,
-    ) -> Chain:
-        """Fit each map."""
-        return Chain(tuple(each.fit(runs, states, inputs, window) for each in self.maps))
+    @property
+    def observed(self) -> Observed | None:
+        """Observables among the maps, or those of one which follows the predicted surge."""
+        found = (getattr(each, "observed", each) for each in self.maps)
+        return next((each for each in found if isinstance(each, Observed)), None)
+
+    @property
+    def stretch(self) -> tuple[FloatArray, FloatArray] | None:
+        """Factors of the standard deviations that the columns are divided by; None for ones."""
+        return next((each.stretch for each in self.maps if hasattr(each, "stretch")), None)
 
     def regressors(
         self, inputs: tuple[ChannelLabel, ...]
@@ -803,7 +710,7 @@ class Chain:
 MAPS: dict[str, type[InputMap]] = {
     each.kind: each for each in (Lead, FittedAlignment, Observed, Chain)
 }
-"""Input maps by their kind, as files name them."""
+"""Input maps by their kind, as files name them; the one that follows the surge adds itself."""
 
 
 def _is_number(value: object) -> bool:
@@ -847,7 +754,8 @@ def _position(run: xr.Dataset, channel: str) -> float | None:
     return None if value is None else float(value)
 
 
-def _depth(run: xr.Dataset, name: str, otherwise: float | None) -> float:
+def depth_of(run: xr.Dataset, name: str, otherwise: float | None) -> float:
+    """Water depth of a run, m: its own, or another one where it states none."""
     depth = run.attrs.get("water_depth", otherwise)
     if depth is None:
         raise RequestError(
@@ -871,12 +779,6 @@ def _sound(run: xr.Dataset, name: str, channels: Sequence[str]) -> FloatArray:
 
 def _band(run: xr.Dataset, name: str, elevations: Sequence[str]) -> float:
     return band_limit(_sound(run, name, elevations), labelled.run_step(run, name))
-
-
-def _surge_range(windows: Mapping[str, xr.Dataset], channel: str) -> tuple[float, float]:
-    surges = np.concatenate([_sound(run, name, [channel])[:, 0] for name, run in windows.items()])
-    low, high = float(surges.min()), float(surges.max())
-    return low - BEYOND * (high - low), high + BEYOND * (high - low)
 
 
 def _celerity(

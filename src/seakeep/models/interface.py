@@ -17,12 +17,13 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
+from seakeep.core.recursion import Place
 from seakeep.models.labelled import ChannelLabel, Runs, Stop
 from seakeep.models.readouts import FittedReadOut
 
 __all__ = [
     "Drive",
-    "Fittable",
+    "Follows",
     "InputMap",
     "Json",
     "Model",
@@ -89,10 +90,7 @@ class Scale:
 
 
 class Span(NamedTuple):
-    """Samples of a run that are wanted: from `first` to before `stop`.
-
-    States may be read up to the sample `known`, that one included, and not after.
-    """
+    """Samples of a run that are wanted: from `first` to before `stop`; `known` is the start."""
 
     first: int
     known: int
@@ -111,18 +109,21 @@ class Regressors(NamedTuple):
 
 
 class Drive(Protocol):
-    """Regressors of one run, made once and shared by members, windows and passes."""
+    """Regressors of one run, made once and shared by members and windows."""
 
-    def rows(
-        self, first: int, stop: int, known: int | None = None, states: FloatArray | None = None
-    ) -> Regressors:
+    def rows(self, first: int, stop: int) -> Regressors:
         """Regressors of the samples from `first` to before `stop`, shape (sample, channel).
 
-        Measured states are read up to sample `known` and not after, by default all of them.
-        `states`, shape (steps, N), are predicted ones of the samples after `known`; without them
-        the last known ones are held. Rows are NaN where they need inputs that are not there.
+        Rows are NaN where they need inputs that are not there.
         """
         ...
+
+
+class Follows(NamedTuple):
+    """Place of the vessel that a model follows, and the state whose last values it sums."""
+
+    place: Place
+    column: int
 
 
 class InputMap(Protocol):
@@ -134,10 +135,10 @@ class InputMap(Protocol):
         Its word in :data:`seakeep.models.inputs.MAPS`.
     lead_samples : int
         Samples of input after the one a step starts from that drive the step.
-    passes : int
-        How often a forecast runs: more than once where predicted states drive it.
-    reads_states : {"no", "measured", "predicted"}
-        Whether regressors depend on states, and on which after the start.
+    reads_surge : bool
+        Whether the measured surge is read after the start of a forecast.
+    follows : Follows or None
+        Where waves are read by what the model itself predicts: the place, and the state behind it.
     """
 
     kind: ClassVar[str]
@@ -148,23 +149,13 @@ class InputMap(Protocol):
         ...
 
     @property
-    def passes(self) -> int:
-        """How often a forecast runs."""
+    def reads_surge(self) -> bool:
+        """Whether the measured surge is read after the start."""
         ...
 
     @property
-    def reads_states(self) -> str:
-        """Which states are read: "no", "measured" or "predicted"."""
-        ...
-
-    def fit(
-        self,
-        runs: dict[str, xr.Dataset],
-        states: Sequence[str],
-        inputs: Sequence[str],
-        window: int | None,
-    ) -> InputMap:
-        """Complete the map from training runs that end where training ends."""
+    def follows(self) -> Follows | None:
+        """Place that the model follows."""
         ...
 
     def regressors(
@@ -204,20 +195,6 @@ class InputMap(Protocol):
     @classmethod
     def from_json(cls, content: Json) -> Self:
         """Rebuild from :meth:`to_json`."""
-        ...
-
-
-class Fittable(Protocol):
-    """What completes itself to an input map from training runs: settings, or a map itself."""
-
-    def fit(
-        self,
-        runs: dict[str, xr.Dataset],
-        states: Sequence[str],
-        inputs: Sequence[str],
-        window: int | None,
-    ) -> InputMap:
-        """Return the map, from training runs that end where training ends."""
         ...
 
 
@@ -274,6 +251,13 @@ class Signature:
     def history_samples(self) -> int:
         """Samples a forecast needs up to its start, that one included."""
         return max(self.state_delays, self.input_map.history(self.input_delays)) + 1
+
+    @property
+    def state_samples(self) -> int:
+        """Samples of the states among these: where the vessel was counts for delayed waves too."""
+        follows = self.input_map.follows
+        where = 0 if follows is None else self.input_delays + follows.place.taps.size
+        return max(self.state_delays + 1, where)
 
     @property
     def lead_samples(self) -> int:

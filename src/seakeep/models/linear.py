@@ -236,13 +236,14 @@ class HankelDMDcModel(SingleModel, store.Saved):
             signature.state_scale,
             signature.input_scale,
             signature.direct_scale,
+            signature.input_map.follows,
         )
 
     def aligned_inputs(self, run: xr.Dataset) -> xr.Dataset:
         """Inputs of a run as the model wants them: carried to the measured position.
 
-        What :meth:`forecast_arrays` and the exported systems take. Without an alignment, the
-        inputs as they are.
+        What :meth:`forecast_arrays` and the exported systems take. Without an alignment, and for
+        a model that follows its own surge, the inputs as they are.
 
         Parameters
         ----------
@@ -262,7 +263,8 @@ class HankelDMDcModel(SingleModel, store.Saved):
         name = labelled.run_name(run, "the run")
         labelled.check_run(run, name)
         values = labelled.channel_matrix(run, self.inputs, name)
-        if (alignment := self.alignment) is not None:
+        alignment = self.alignment
+        if alignment is not None and self.signature.input_map.follows is None:
             time = np.asarray(run["time"].values, dtype=float)
             labelled.check_finite(values, self.inputs, name, 0, time)
             span = Span(0, len(values) - 1, len(values))
@@ -437,6 +439,12 @@ class HankelDMDcModel(SingleModel, store.Saved):
         return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
 
     def _system(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        if self.signature.input_map.follows is not None:
+            raise RequestError(
+                "the model reads the waves where its own surge takes it, which no linear system "
+                "can represent. Export C sources, an FMU or an ONNX graph, use forecast_arrays, or "
+                "fit a model with alignment surge = 'measured' or 'none'."
+            )
         if more := self.regressors[len(self.inputs) :]:
             raise RequestError(
                 f"the model is driven by observables too ({', '.join(more)}), which a state-space "

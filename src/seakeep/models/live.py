@@ -30,11 +30,13 @@ from seakeep.arrays import (
     whole_number,
 )
 from seakeep.core.kalman import DelayFilter, process_noise
+from seakeep.core.recursion import read_table
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import load_sealed, write_sealed_array
 from seakeep.models import engine, store
 from seakeep.models.engine import Dynamics, Windows
 from seakeep.models.executor import one_blas_thread
+from seakeep.models.following import Followed, Following
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import WINDOWS, LeadErrors
 from seakeep.models.inputs import Chain, FittedAlignment, Measured
@@ -130,7 +132,10 @@ class Live:
         signature = self.signature
         self._rig = _rig(signature, like)
         self._noise = _noise(signature, noise)
-        self._alignment = Chain.of(signature.input_map).alignment
+        chain = Chain.of(signature.input_map)
+        self._follows = signature.input_map.follows
+        # What carries waves by the measured record, of which a model that follows has no need.
+        self._alignment = chain.alignment if self._follows is None else None
         if (aligned := self._alignment) is not None and aligned.settings.surge == "measured":
             channel = aligned.settings.surge_channel
             if channel not in signature.states:
@@ -139,7 +144,7 @@ class Live:
                     f"takes from its states, and these are {', '.join(signature.states)}. Fit it "
                     f"with '{channel}' among them, or with surge = 'predicted' or 'none'."
                 )
-        self._places, self._depth = _places(signature, self._alignment, self._rig)
+        self._places, self._depth = _places(signature, chain.alignment, self._rig)
         self._offset, self._a, self._b, self._d = _mean_predictor(members, signature)
         count, s = len(signature.states), signature.state_delays
         size, variances = count * (s + 1), self._noise**2
@@ -152,6 +157,13 @@ class Live:
         none = self._run(0, np.zeros((0, len(signature.inputs))))
         ahead = signature.input_map.look_ahead(none, signature.dt)
         self._ahead = math.ceil(ahead / signature.dt - 1e-6)
+        # Of a model that follows its own surge: the map with its carriers in this rig, and filters
+        # that predict the probes from one another; rows at all places of the samples to come.
+        self._following = next((each for each in chain.maps if isinstance(each, Following)), None)
+        self._table = (0, np.empty(0))
+        if self._following is not None:
+            self._banks = self._following.banks(none)
+            self._foresight = self._following.foresight(none, max(self._ahead, 1))
         self._block = 1 if self._alignment is None else BLOCK
         longest = max(s, signature.input_delays) + 1
         needed = 2 * (signature.history_samples + self._ahead + self._block)
@@ -354,6 +366,9 @@ class Live:
     def _foreseen(self) -> FloatArray:
         """Inputs of a sample that was lost: from each record, and from the probe up-wave."""
         known, placed = self._known_inputs(), np.count_nonzero(np.isfinite(self._places))
+        if self._following is not None and self.ready:
+            first: FloatArray = self._expected(known, 1)[0]
+            return first
         expected: FloatArray
         if placed < 2 or not self.ready:
             expected = predict_waves(known, 1)[0]
@@ -362,6 +377,20 @@ class Live:
         pair = draw_sea(known, 1, 1, rng, dt=dt, positions=self._places, depth=self._depth)
         expected = pair.mean(axis=0)[0]  # the draws lie about it
         return expected
+
+    def _expected(self, known: FloatArray, count: int) -> FloatArray:
+        """Inputs of the next samples: in waves as those of training, or from each record."""
+        if self._following is None or not self.ready:
+            return predict_waves(known, count)
+        taps, placed = self._foresight
+        means = self.signature.input_scale.mean[: known.shape[1]]
+        out = np.repeat(known[-1:], count, axis=0)
+        last = known[len(known) - taps.shape[3] :, placed] - means[list(placed)]
+        out[:, placed] = np.einsum("cqpt,tp->cq", taps[:count], last) + means[list(placed)]
+        others = [each for each in range(known.shape[1]) if each not in placed]
+        if others:
+            out[:, others] = predict_waves(known[:, others], count)
+        return out
 
     def _known_inputs(self) -> FloatArray:
         """Inputs that waves are predicted from: the last ones, always as many once there are."""
@@ -427,7 +456,7 @@ class Live:
             return
         known = self._known_inputs()
         if self._ahead and self.signature.inputs:
-            known = np.concatenate([known, predict_waves(known, self._ahead)])
+            known = np.concatenate([known, self._expected(known, self._ahead)])
         self._find_rows(at, known)
         self._advance(self._history.copy(), place["final"] + 1, at)
 
@@ -459,12 +488,18 @@ class Live:
 
     def _predicted(self, history: FloatArray, at: int) -> FloatArray:
         """One-step prediction from the sample `at`."""
-        z = self.signature.input_delays
+        z, kept = self.signature.input_delays, self._kept
+        if self._follows is not None:
+            place, column = self._follows
+            first, table = self._table
+            here = place.of(self._x[at + 1 - place.taps.size : at + 1, column])
+            kept["delayed"][at] = read_table(place, table, np.array([at - first]), here)[0]
+            kept["direct"][at, -1] = place.squared(here)[0]
         out = self._a @ history.ravel()
         out += self._offset
-        out += self._b @ self._kept["delayed"][at - z : at + 1].ravel()
+        out += self._b @ kept["delayed"][at - z : at + 1].ravel()
         if self._d.size:
-            out += self._d @ self._kept["direct"][at]
+            out += self._d @ kept["direct"][at]
         return out
 
     def _judge(self, at: int, slot: int, innovation: FloatArray) -> None:
@@ -504,6 +539,18 @@ class Live:
         # Direct regressors are wanted from the first prediction on.
         spans = [Span(first, max(first, self._at["begins"] - 1), stop)]
         run = None
+        if self._following is not None and self._follows is not None:
+            surge = self._x[begin : self._at["filled"], self._follows.column]
+            drive = Followed(self._following, Measured(known, begin, surge), self._banks)
+            self._table = (first, drive.table(first, stop))
+            self._kept["delayed"][first:stop] = read_table(
+                self._follows.place,
+                self._table[1],
+                np.arange(stop - first),
+                drive.places(first, stop),
+            )
+            self._kept["direct"][first:stop, :-1] = drive.direct(first, stop)
+            return
         if self._alignment is not None:
             spans.append(Span(first, stop - 1, stop))
             run = self._run(begin, known)
@@ -664,14 +711,15 @@ class Live:
             runs = {str(number): self._run(begin, each) for number, each in enumerate(futures)}
             places = [(name, self._time) for name in runs]
             return engine.read_windows(signature, runs, places, steps)
-        history = self._x[filled - 1 - signature.state_delays : filled]
+        history = self._x[filled - signature.state_samples : filled]
         back = signature.input_map.history(signature.input_delays) + 1
         size = min(filled, self._record)
         inputs = np.stack([each[size - back :] for each in futures])
         if not signature.inputs:
             inputs = np.zeros((1, signature.input_delays + steps, 0))
         histories = np.broadcast_to(history, (len(inputs), *history.shape))
-        return engine.array_windows(signature, histories, inputs, steps)
+        rig = None if self._follows is None else self._run(0, inputs[0, :0])
+        return engine.array_windows(signature, histories, inputs, steps, rig)
 
     def _error_variances(self, steps: int) -> FloatArray:
         """Variances of the model's errors and the estimate's, never above the open loop's."""

@@ -12,6 +12,7 @@ from seakeep.core.embedding import TrainingWindow, training_window
 from seakeep.core.solve import Solution, identify
 from seakeep.models.draws import Draw
 from seakeep.models.engine import Dynamics
+from seakeep.models.inputs import Chain
 from seakeep.models.interface import InputMap
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import lengthened, scales_of
@@ -102,7 +103,9 @@ def identify_member(
             ]
         )
     groups = list(zip(*parts, strict=True))
-    scales = scales_of(groups, windows, arrays.channels, settings.standardize)
+    scales = scales_of(
+        groups, windows, arrays.channels, settings.standardize, Chain.of(input_map).stretch
+    )
     states, delayed, direct = (
         [scale.deviations(values) for values in series]
         for scale, series in zip(scales, groups, strict=True)
@@ -120,7 +123,9 @@ def identify_member(
         all_rows=settings.delay_rows == "ridge",
         radius=settings.radius,
     )
-    dynamics = Dynamics(solution.coefficients, draw.state_delays, draw.input_delays, *scales)
+    x, u, w = scales
+    delays, follows = (draw.state_delays, draw.input_delays), input_map.follows
+    dynamics = Dynamics(solution.coefficients, *delays, x, u, w, follows)
     return Member(dynamics, solution, tuple(chosen), tuple(windows))
 
 

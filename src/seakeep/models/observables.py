@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from itertools import combinations
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
@@ -33,6 +33,7 @@ __all__ = [
     "Observable",
     "Observed",
     "Observing",
+    "Power",
     "Powers",
     "Product",
     "SlowSquare",
@@ -43,8 +44,15 @@ __all__ = [
 HALF_WIDTH = 0.5
 """Half of the length of the low-pass filter of :class:`SlowSquares`, in periods of its cutoff.
 
-With a cutoff of 1/3 per encounter period that is 1.5 encounter periods: a wave of half the
-encounter period's frequency is damped to a fifth, one at the encounter frequency to a hundredth."""
+With a cutoff of one per encounter period the filter lasts one encounter period in all: twice the
+wave's frequency, at which a square swings, is damped to a thousandth."""
+BOUND = 36.0
+"""Squared standard deviations of an input at which its powers begin to grow like the input."""
+STIFF = 100.0
+"""How much more λ weighs on powers: an error of a high wave is an error of its cube."""
+TINY = float(np.finfo(float).tiny)
+SLOPE = 0.7
+"""Slope of slow squares above the largest of training: a force does not grow for ever."""
 
 
 class Product(NamedTuple):
@@ -53,16 +61,29 @@ class Product(NamedTuple):
     places: tuple[int, ...]
 
 
+class Power(NamedTuple):
+    """A column as a power of an input that grows like it far out.
+
+    It is u^power / (1 + u²/limit)^((power − 1)/2).
+    """
+
+    place: int
+    power: int
+    limit: float
+
+
 class SlowSquare(NamedTuple):
     """A column as the low-pass filtered square of a derivative of an input.
 
-    The middle of the filter lies `shift` samples after the instant of the row.
+    The middle of the filter lies `shift` samples after the instant of the row. Above `top` the
+    column grows with the slope ``SLOPE``.
     """
 
     place: int
     order: int
     kernel: FloatArray
     shift: int
+    top: float = np.inf
 
 
 class Formula(NamedTuple):
@@ -72,7 +93,7 @@ class Formula(NamedTuple):
     places: Mapping[str, int]
 
 
-Term = Product | SlowSquare | Formula
+Term = Product | Power | SlowSquare | Formula
 """A column as hosts other than Python compute it."""
 
 
@@ -91,8 +112,10 @@ class Bound:
     columns : callable
         From the inputs, shape (time, Q), to the columns, shape (time, len(labels)); rows are NaN
         where they need samples that are not there.
-    terms : tuple of Product, SlowSquare or Formula, optional
+    terms : tuple of Product, Power, SlowSquare or Formula, optional
         The columns for hosts other than Python; without them the model cannot be exported.
+    stiffness : float, optional
+        How much more λ weighs on the columns than on others.
     """
 
     labels: tuple[ChannelLabel, ...]
@@ -101,6 +124,20 @@ class Bound:
     ahead: int
     columns: Callable[[FloatArray], FloatArray]
     terms: tuple[Term, ...] = ()
+    stiffness: float = 1.0
+
+    def below(self, tops: FloatArray) -> Bound:
+        """Columns of slow squares that grow with the slope ``SLOPE`` above some values."""
+
+        def columns(values: FloatArray) -> FloatArray:
+            found = self.columns(values)
+            over = np.maximum(found - tops, 0.0)
+            result: FloatArray = found - (1.0 - SLOPE) * over
+            return result
+
+        pairs = zip(self.terms, tops.tolist(), strict=True)
+        terms = tuple(t._replace(top=top) if isinstance(t, SlowSquare) else t for t, top in pairs)
+        return replace(self, columns=columns, terms=terms)
 
 
 class Observable(Protocol):
@@ -108,7 +145,12 @@ class Observable(Protocol):
 
     kind: ClassVar[str]
 
-    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
+    def bind(
+        self,
+        inputs: Sequence[ChannelLabel],
+        period: float | None,
+        dt: float,
+    ) -> Bound:
         """Columns for these inputs.
 
         `period` is the encounter period in samples, None where no observable of the model has a
@@ -166,7 +208,8 @@ class SlowSquares:
     """Slow parts of squares of an elevation and of its derivatives.
 
     Slow drift and the loads of mooring lines go with them. They stand among the regressors without
-    the delays of the model, at lags of their own.
+    the delays of the model, at lags of their own. Above the largest of training they grow by 0.7
+    of what they would.
 
     Parameters
     ----------
@@ -191,8 +234,8 @@ class SlowSquares:
 
     of: tuple[str, ...]
     orders: tuple[int, ...] = (0, 1, 2)
-    cutoff: float = 1 / 3
-    lead: float = 2.0
+    cutoff: float = 1.0
+    lead: float = 0.75
     lags: tuple[float, ...] = (0, 1, 2, 3, 4, 5)
     period: float | None = None
     kind: ClassVar[str] = "slow_squares"
@@ -210,7 +253,12 @@ class SlowSquares:
         if self.period is not None:
             _numbers((self.period,), f"{what}: period", "seconds above 0", lambda n: n > 0)
 
-    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
+    def bind(
+        self,
+        inputs: Sequence[ChannelLabel],
+        period: float | None,
+        dt: float,
+    ) -> Bound:
         """Columns for these inputs; see :class:`Observable`."""
         places = [_column(inputs, name, self.kind) for name in self.of]
         period = period if self.period is None else self.period / dt
@@ -269,9 +317,11 @@ class SlowSquares:
 
 @dataclass(frozen=True)
 class Powers:
-    """Powers of inputs, and products of pairs of them, with the input delays of the model.
+    r"""Powers of inputs, and products of pairs of them, with the input delays of the model.
 
     Steep waves move a vessel at wave frequency by more than a linear map of the elevation makes.
+    Powers stay bounded by the input far out, :math:`u^q/(1 + u^2/36σ^2)^{(q-1)/2}`, and λ weighs
+    a hundred times on them, so that seas above those of training are not answered by their cubes.
 
     Parameters
     ----------
@@ -304,8 +354,17 @@ class Powers:
                 f"powers: products must be true or false; received {self.products!r:.{SHOWN}}."
             )
 
-    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
-        """Columns for these inputs; see :class:`Observable`."""
+    def bind(
+        self,
+        inputs: Sequence[ChannelLabel],
+        period: float | None,
+        dt: float,
+        spreads: Sequence[float] = (),
+    ) -> Bound:
+        """Columns for these inputs, which vary by `spreads` in training; see :class:`Observable`.
+
+        Without these the powers have no bound.
+        """
         places = [_column(inputs, name, self.kind) for name in self.of]
         pairs = list(combinations(places, 2)) if self.products else []
         labels = [
@@ -326,14 +385,24 @@ class Powers:
             for a, b in pairs
         ]
 
+        limits = np.full(len(places), np.inf)
+        if spreads:
+            limits = np.array([BOUND * spreads[place] ** 2 for place in places]) + TINY
+
         def columns(values: FloatArray) -> FloatArray:
             chosen = values[:, places]
-            parts = [chosen**power for power in self.powers]
+            calm = np.sqrt(1.0 + chosen * chosen / limits)
+            parts = [chosen * (chosen / calm) ** (power - 1) for power in self.powers]
             parts += [values[:, [a]] * values[:, [b]] for a, b in pairs]
             return np.concatenate(parts, axis=1)
 
-        factors = [(place,) * power for power in self.powers for place in places] + pairs
-        return Bound(tuple(labels), True, 0, 0, columns, tuple(map(Product, factors)))
+        terms: list[Term] = [
+            Power(place, power, float(limit))
+            for power in self.powers
+            for place, limit in zip(places, limits, strict=True)
+        ]
+        terms += [Product(pair) for pair in pairs]
+        return Bound(tuple(labels), True, 0, 0, columns, tuple(terms), STIFF)
 
     def reach(self, dt: float) -> tuple[int, int]:
         """0, 0: the instant itself."""
@@ -374,7 +443,12 @@ class Expression:
             )
         expressions.parse(self.expression)
 
-    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
+    def bind(
+        self,
+        inputs: Sequence[ChannelLabel],
+        period: float | None,
+        dt: float,
+    ) -> Bound:
         """Columns for these inputs; see :class:`Observable`."""
         parsed = expressions.parse(self.expression)
         places = {name: _column(inputs, name, self.kind) for name in parsed.channels}
@@ -466,7 +540,12 @@ class Observing:
         labels = labelled.channel_labels(first, inputs)
         counts = any(getattr(each, "period", 0.0) is None for each in self.observables)
         period = labelled.mean_period(runs, list(inputs)) if counts else None
-        made = Observed(self.observables, self.lead, labels, labelled.run_step(first, name), period)
+        last = slice(None if window is None else -window, None)
+        records = [labelled.channel_matrix(run, inputs, name)[last] for name, run in runs.items()]
+        spreads = np.nanstd(np.concatenate(records), axis=0)
+        dt = labelled.run_step(first, name)
+        made = Observed(self.observables, self.lead, labels, dt, period, tuple(spreads.tolist()))
+        made = replace(made, tops=tuple(made.largest(records)))
         names = [label.name for group in made.regressors(labels) for label in group]
         for each in names:
             if names.count(each) > 1:
@@ -493,16 +572,22 @@ class Observed:
         Time step, s.
     period : float or None
         Encounter period, samples, where an observable counts in it.
+    spreads : tuple of float
+        Standard deviations of the inputs in training.
+    tops : tuple of float
+        Largest value in training of each column without delays.
     """
 
     kind: ClassVar[str] = "observables"
-    passes: ClassVar[int] = 1
-    reads_states: ClassVar[str] = "no"
+    reads_surge: ClassVar[bool] = False
+    follows: ClassVar[None] = None
     observables: tuple[Observable, ...]
     lead: int
     inputs: tuple[ChannelLabel, ...]
     dt: float
     period: float | None
+    spreads: tuple[float, ...]
+    tops: tuple[float, ...] = ()
 
     def __getstate__(self) -> dict[str, Any]:
         """Fields alone: what is bound are functions, which a worker makes anew."""
@@ -510,8 +595,40 @@ class Observed:
 
     @cached_property
     def bound(self) -> tuple[Bound, ...]:
-        """The observables, ready for these inputs."""
-        return tuple(each.bind(self.inputs, self.period, self.dt) for each in self.observables)
+        """The observables, ready for these inputs; slow squares below the largest of training."""
+        found, tops = [], np.array(self.tops)
+        for each in self.observables:
+            rig = self.inputs, self.period, self.dt
+            made = each.bind(*rig, self.spreads) if isinstance(each, Powers) else each.bind(*rig)
+            if isinstance(each, SlowSquares) and tops.size:
+                made = made.below(tops[: len(made.labels)])
+            if not made.delayed:
+                tops = tops[len(made.labels) :]
+            found.append(made)
+        return tuple(found)
+
+    def largest(self, records: Sequence[FloatArray]) -> list[float]:
+        """Largest value in some records of each column without delays."""
+        direct = [self.direct(each) for each in records]
+        return [float(each) for each in np.fmax.reduce(np.concatenate(direct), axis=0, initial=0.0)]
+
+    def with_delayed(self, inputs: FloatArray) -> FloatArray:
+        """Inputs, shape (time, Q), beside the columns that take the input delays."""
+        more = [bound.columns(inputs) for bound in self.bound if bound.delayed]
+        return np.concatenate([inputs, *more], axis=1)
+
+    def direct(self, inputs: FloatArray) -> FloatArray:
+        """Columns that stand as they are, of inputs of shape (time, Q)."""
+        found = [bound.columns(inputs) for bound in self.bound if not bound.delayed]
+        return np.concatenate([np.empty((len(inputs), 0)), *found], axis=1)
+
+    @property
+    def stretch(self) -> tuple[FloatArray, FloatArray]:
+        """Factors of the standard deviations that the columns are divided by."""
+        groups: tuple[list[float], list[float]] = [1.0] * len(self.inputs), []
+        for bound in self.bound:
+            groups[not bound.delayed].extend([math.sqrt(bound.stiffness)] * len(bound.labels))
+        return np.array(groups[0]), np.array(groups[1])
 
     @cached_property
     def _around(self) -> tuple[int, int, int]:
@@ -529,16 +646,6 @@ class Observed:
     def history(self, input_delays: int) -> int:
         """Samples of input before the start that a forecast with these delays reads."""
         return -self.reads(Span(-input_delays, 0, 1)).first
-
-    def fit(
-        self,
-        runs: Mapping[str, xr.Dataset],
-        states: Sequence[str],
-        inputs: Sequence[str],
-        window: int | None,
-    ) -> Observed:
-        """Fit the observables anew."""
-        return Observing(self.observables, self.lead).fit(runs, states, inputs, window)
 
     def regressors(
         self, inputs: tuple[ChannelLabel, ...]
@@ -589,6 +696,8 @@ class Observed:
             "inputs": [asdict(label) for label in self.inputs],
             "dt": self.dt,
             "period": self.period,
+            "spreads": list(self.spreads),
+            "tops": list(self.tops),
         }
 
     @classmethod
@@ -596,7 +705,8 @@ class Observed:
         """Rebuild from :meth:`to_json`."""
         inputs = tuple(ChannelLabel(**each) for each in content["inputs"])
         made = tuple(from_json(each) for each in content["observables"])
-        return cls(made, content["lead"], inputs, content["dt"], content["period"])
+        moments = tuple(content["spreads"]), tuple(content["tops"])
+        return cls(made, content["lead"], inputs, content["dt"], content["period"], *moments)
 
 
 @dataclass(frozen=True, eq=False)
@@ -608,22 +718,15 @@ class _Seen:
     low: int
     high: int
 
-    def rows(
-        self, first: int, stop: int, known: int | None = None, states: FloatArray | None = None
-    ) -> Regressors:
+    def rows(self, first: int, stop: int) -> Regressors:
         before, after, _ = self.made._around
         start, end = max(first - before, self.low), min(stop + after, self.high)
-        inner = self.inner.rows(start, end, known, states)
-        delayed, direct = [inner.delayed], [inner.direct]
-        for bound in self.made.bound:
-            columns = bound.columns(inner.delayed)
-            if bound.delayed:
-                delayed.append(columns)
-            else:  # these inputs look ahead already, by the lead
-                shifted = np.full_like(columns, np.nan)
-                shifted[self.made.lead :] = columns[: len(columns) - self.made.lead]
-                direct.append(shifted)
+        inner = self.inner.rows(start, end)
+        direct, lead = self.made.direct(inner.delayed), self.made.lead
+        shifted = np.full_like(direct, np.nan)  # these inputs look ahead already, by the lead
+        shifted[lead:] = direct[: len(direct) - lead]
         inside = slice(first - start, stop - start)
         return Regressors(
-            np.concatenate(delayed, axis=1)[inside], np.concatenate(direct, axis=1)[inside]
+            self.made.with_delayed(inner.delayed)[inside],
+            np.concatenate([inner.direct, shifted], axis=1)[inside],
         )

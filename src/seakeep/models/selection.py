@@ -13,7 +13,7 @@ import json
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import astuple, dataclass, field, replace
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 import xarray as xr
@@ -23,18 +23,13 @@ from seakeep.core import metrics
 from seakeep.core.path import Moments, free_runs, lagged, ridge_path, truncated_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
+from seakeep.models.engine import Dynamics, Windows, followed_runs
 from seakeep.models.executor import Progress, in_order
-from seakeep.models.inputs import (
-    Chain,
-    FittedAlignment,
-    Measured,
-    Mode,
-    ProbeAlignment,
-    Surge,
-)
-from seakeep.models.interface import Drive, Span
+from seakeep.models.following import LEAD, Followed
+from seakeep.models.inputs import FittedAlignment, Measured, Mode, ProbeAlignment, Surge
+from seakeep.models.interface import Scale
 from seakeep.models.labelled import mean_period
-from seakeep.models.observables import Observable, Observed, Powers, SlowSquares, named
+from seakeep.models.observables import Observable, Powers, SlowSquares, named
 from seakeep.models.readouts import FittedReadOut, ReadOut, readouts_asked
 from seakeep.models.settings import Folds, HankelSettings, Select
 from seakeep.models.stacking import PERIODS, Held, fit_readouts
@@ -66,6 +61,8 @@ Scales = tuple[
     tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]
 ]
 """Mean and standard deviation of the states, of the delayed and of the direct regressors."""
+Variant = tuple[ProbeAlignment | None, int | None]
+"""An alignment, and the look-ahead in samples where it is part of it: columns of their own."""
 Settings = TypeVar("Settings", bound=HankelSettings)
 Chosen = TypeVar("Chosen")
 ALIKE = 0.03
@@ -78,6 +75,8 @@ FALLBACK = 1e-3
 """λ per snapshot pair where nothing can be held out."""
 RANKS = tuple(round(2 ** (exponent / 2)) for exponent in range(18, 7, -1))
 """Numbers of singular values that are tried, half an octave apart: 512 to 16."""
+LEADS = (0.0, 0.5, 0.75, 1.0)
+"""Look-aheads that are tried, encounter periods."""
 VARIED = (
     *("ridge", "rank", "observables", "lead", "input_delays", "state_delays", "alignment"),
     "readouts",
@@ -158,7 +157,7 @@ class Problem:
     data : TrainingData
         Gathered with the longest delays, the longest lead and all observables.
     drives : tuple of Drive
-        One per run.
+        One per run, where the model follows its own surge.
     offsets : tuple of int
         Sample of each run at which its arrays in `data` start.
     widest : Candidate
@@ -166,11 +165,9 @@ class Problem:
     owners : tuple of int
         For each delayed column the observable that made it, −1 for an input itself.
     direct_owners : tuple of int
-        For each direct column the observable that made it.
+        For each direct column the observable that made it, −1 for the slow surge squared.
     horizons : tuple of int
         Lengths of the windows, samples.
-    passes : int
-        Passes of a predicted surge; 0 where no predicted state drives the input.
     is_per_snapshot : bool
         Whether λ counts per snapshot pair.
     groups : tuple of str
@@ -178,13 +175,12 @@ class Problem:
     """
 
     data: TrainingData
-    drives: tuple[Drive, ...]
+    drives: tuple[Followed, ...]
     offsets: tuple[int, ...]
     widest: Candidate
     owners: tuple[int, ...]
     direct_owners: tuple[int, ...]
     horizons: tuple[int, ...]
-    passes: int
     is_per_snapshot: bool
     groups: tuple[str, ...]
     moments: tuple[Moments, ...] = field(init=False, repr=False)
@@ -209,7 +205,7 @@ class Problem:
         N, Q = self.data.states[0].shape[1], self.data.delayed[0].shape[1]
         states = np.arange(N * (candidate.state_delays + 1))
         kept = np.flatnonzero(self._delayed(candidate))
-        ahead = self.widest.lead - candidate.lead
+        ahead = self._ahead(candidate)
         lags = np.arange(ahead, ahead + candidate.input_delays + 1)
         first = N * (self.widest.state_delays + 1)
         delayed = (first + Q * lags[:, None] + kept).ravel()
@@ -217,11 +213,15 @@ class Problem:
         direct = first + np.flatnonzero(self._direct(candidate))
         return np.concatenate([states, delayed, direct])
 
+    def _ahead(self, candidate: Candidate) -> int:
+        """Samples that delayed columns look ahead too far; none where the model follows."""
+        return 0 if self.data.input_map.follows else self.widest.lead - candidate.lead
+
     def _delayed(self, candidate: Candidate) -> BoolArray:
         return np.isin(self.owners, (-1, *candidate.observables))
 
     def _direct(self, candidate: Candidate) -> BoolArray:
-        return np.isin(self.direct_owners, candidate.observables)
+        return np.isin(self.direct_owners, (-1, *candidate.observables))
 
     def levels(self, candidate: Candidate, ridges: Sequence[float]) -> tuple[float, ...]:
         """What is tried of a candidate: these λ, or ranks below its number of columns."""
@@ -313,6 +313,8 @@ class Problem:
 
         They are in the standardised deviations of `data`.
         """
+        if self.data.input_map.follows is not None:
+            return self._followed(candidate, held, steps)
         data, s, z = self.data, candidate.state_delays, candidate.input_delays
         fold, (x, u, w), weights = held.fold, held.scales, held.weights
         kept, direct = self._delayed(candidate), self._direct(candidate)
@@ -322,41 +324,55 @@ class Problem:
         histories = np.concatenate(
             [lagged((data.states[fold] - x[0]) / x[1], at, 1, s) for at in starts]
         )
-        predicted = np.empty(0)
-        for number in range(max(self.passes, 1)):
-            # The first pass is the same for every λ: the surge is held.
-            models = 1 if number == 0 else len(weights)
-            rows = [
-                [
-                    self._rows(fold, int(at), steps, predicted[model, place] if number else None)
-                    for place, at in enumerate(starts)
-                ]
-                for model in range(models)
-            ]
-            forcing = np.empty((len(weights), len(starts), steps, len(x[0])))
-            ahead = self.widest.lead - candidate.lead
-            for model, each in enumerate(rows):
-                driving = np.stack(
-                    [
-                        np.concatenate(
-                            [
-                                lagged(
-                                    ((delayed - u[0]) / u[1])[:, kept],
-                                    self.widest.input_delays - ahead,
-                                    steps,
-                                    z,
-                                ),
-                                ((straight - w[0]) / w[1])[:, direct],
-                            ],
-                            axis=1,
-                        )
-                        for delayed, straight in each
-                    ]
+        ahead = self._ahead(candidate)
+        delayed = ((data.delayed[fold] - u[0]) / u[1])[:, kept]
+        straight = ((data.direct[fold] - w[0]) / w[1])[:, direct]
+        driving = np.stack(
+            [
+                np.concatenate(
+                    [lagged(delayed, at - ahead, steps, z), straight[at : at + steps]], axis=1
                 )
-                chosen = slice(None) if models == 1 else slice(model, model + 1)
-                forcing[chosen] = np.einsum("wtp,lnp->lwtn", driving, rest[chosen], optimize=True)
-            predicted = free_runs(top, histories, forcing) * x[1] + x[0]
-        return predicted
+                for at in starts
+            ]
+        )
+        forcing = np.einsum("wtp,lnp->lwtn", driving, rest, optimize=True)
+        return free_runs(top, histories, forcing) * x[1] + x[0]
+
+    def _followed(self, candidate: Candidate, held: _Regression, steps: int) -> FloatArray:
+        """As :meth:`_forecast`, of models that follow their own surge."""
+        data, fold, follows = self.data, held.fold, self.data.input_map.follows
+        assert follows is not None
+        kept, direct = self._delayed(candidate), self._direct(candidate)
+        x, u, w = (
+            _scale(own, moments, part)
+            for own, moments, part in zip(
+                (data.state_scale, data.input_scale, data.direct_scale),
+                held.scales,
+                (slice(None), kept, direct),
+                strict=True,
+            )
+        )
+        drive, offset = self.drives[fold], self.offsets[fold]
+        starts = self._starts(fold, steps)
+        known, rows = starts + offset, max(candidate.state_delays + 1, follows.place.taps.size)
+        states = data.state_scale.physical(data.states[fold])
+        delayed = data.input_scale.physical(data.delayed[fold])[:, kept]
+        every = data.direct_scale.physical(data.direct[fold])[:, direct][:, :-1]
+        windows = Windows(
+            places=(("a run held out", 0.0),) * len(starts),
+            steps=steps,
+            time=(),
+            histories=np.stack([states[at + 1 - rows : at + 1] for at in starts]),
+            delayed=np.stack([delayed[at - candidate.input_delays : at] for at in starts]),
+            direct=np.stack([every[at : at + steps] for at in starts]),
+            table=drive.table(int(known[0]), int(known[-1]) + steps)[:, :, kept],
+            starts=known - known[0],
+        )
+        scales = Dynamics(
+            held.weights[0], candidate.state_delays, candidate.input_delays, x, u, w, follows
+        )
+        found = followed_runs(scales, held.weights, windows)
+        return data.state_scale.deviations(np.nan_to_num(found, nan=np.inf))
 
     def _system(
         self, candidate: Candidate, runs: Sequence[int]
@@ -365,6 +381,8 @@ class Problem:
         data, s, z = self.data, candidate.state_delays, candidate.input_delays
         x, u = (_pooled(series, data, runs, False) for series in (data.states, data.delayed))
         w = _pooled(data.direct, data, runs, True)
+        if (stretch := data.input_map.stretch) is not None:
+            u, w = ((each[0], each[1] * by) for each, by in zip((u, w), stretch, strict=True))
         kept, direct = self._delayed(candidate), self._direct(candidate)
         mean, scale = (
             np.concatenate(
@@ -376,20 +394,11 @@ class Problem:
         system = total.chosen(self.columns(candidate)).standardised(mean, scale, *x)
         return (x, u, w), *system, total.count
 
-    def _rows(
-        self, run: int, at: int, steps: int, predicted: FloatArray | None
-    ) -> tuple[FloatArray, FloatArray]:
-        """Standardised delayed (z + steps rows) and direct regressors (steps rows) of a window."""
-        data, z = self.data, self.widest.input_delays
-        if not self.passes:
-            return data.delayed[run][at - z : at + steps], data.direct[run][at : at + steps]
-        known = at + self.offsets[run]
-        states = None if predicted is None else data.state_scale.physical(predicted)
-        found = self.drives[run].rows(known - z, known + steps, known, states)
-        return (
-            data.input_scale.deviations(found.delayed),
-            data.direct_scale.deviations(found.direct[z:]),
-        )
+
+def _scale(own: Scale, moments: tuple[FloatArray, FloatArray], part: Any) -> Scale:
+    """Moments of some columns in physical units, of moments of standardised deviations."""
+    mean, std = own.mean + own.std * moments[0], own.std * moments[1]
+    return Scale(*(each[part] for each in (mean, std, own.spread, own.centre, own.reach)))
 
 
 def _pooled(
@@ -725,18 +734,10 @@ def select(
     if "readouts" in vary:
         asked = readouts or readouts_asked("auto", labels)
         readouts = tuple(replace(each, kind="auto") for each in asked)
-    alignments = [settings.alignment]
-    if "alignment" in vary:
-        alignments = _alignments(settings.alignment, runs, states, inputs)
+    variants = list(_variants(settings, runs, states, inputs, vary, samples))
     wanted = [settings.observables]
     if "observables" in vary and not settings.observables:
-        elevations = [
-            label.name
-            for label in labelled.common_labels(runs, inputs)
-            if label.units in ("", "m")  # not their rates
-        ]
-        defaults = default_observables(elevations, samples * step, folds == "sea_state")
-        wanted = list(dict.fromkeys([defaults, defaults[1:], ()]))
+        wanted = _defaults(settings, runs, inputs, samples * step, folds == "sea_state")
     base = Candidate(
         settings.state_delays,
         settings.input_delays,
@@ -747,23 +748,27 @@ def select(
         settings = replace(settings, ridge=FALLBACK, ridge_scale="per_snapshot")
         ridges = RIDGES
     for chosen in wanted:  # runs may be too short for the longest
-        options = _options(settings, vary, samples, len(chosen))
-        options["alignment"] = list(range(len(alignments)))
+        options = _options(vary, samples, len(chosen), variants)
         made = [
             _problem(
-                replace(settings, observables=chosen, alignment=alignment),
+                replace(
+                    settings,
+                    observables=chosen,
+                    alignment=alignment,
+                    lead=base.lead if lead is None else lead,
+                ),
                 runs,
                 states,
                 inputs,
-                base,
-                options,
+                base if lead is None else replace(base, lead=lead),
+                options if lead is None else {**options, "lead": []},
                 tuple(max(round(each * samples), 1) for each in horizon),
                 apart,
             )
-            for alignment in alignments
+            for alignment, lead in variants
         ]
         problems = [problem for problem in made if problem is not None and problem.folds()]
-        if len(problems) == len(alignments):
+        if len(problems) == len(variants):
             break
     else:
         longest = max(run.sizes["time"] for run in runs.values())
@@ -800,13 +805,14 @@ def select(
     found = replace(found, trials=tuple(trials.items()))
     best = trials[taken]
     score = float(best.means[best.levels.index(found.level)])
+    alignment, lead = variants[taken.alignment]
     complete = replace(
         settings,
         state_delays=found.candidate.state_delays,
         input_delays=found.candidate.input_delays,
-        lead=found.candidate.lead,
+        lead=found.candidate.lead if lead is None else lead,
         observables=tuple(chosen[number] for number in found.candidate.observables),
-        alignment=alignments[taken.alignment],
+        alignment=alignment,
         rank=int(found.level) if taken.truncated else None,
         ridge=0.0 if taken.truncated else found.level,
     )
@@ -827,7 +833,7 @@ def select(
     groups = problems[0].groups
     if folds == "sea_state" or len(set(groups)) < len(groups):
         note += f"; {_words_of_groups(groups, folds == 'sea_state')}"
-    rows = tuple(_rows_of(found, chosen, alignments, seed))
+    rows = tuple(_rows_of(found, chosen, variants, seed))
     fitted: tuple[FittedReadOut, ...] = ()
     if readouts:
         problem = problems[taken.alignment]
@@ -939,27 +945,33 @@ def _measured(
 
 
 def default_observables(
-    inputs: Sequence[str], period: float | None = None, unseen: bool = False
+    inputs: Sequence[str],
+    period: float | None = None,
+    unseen: bool = False,
+    looks_ahead: bool = True,
 ) -> tuple[Observable, ...]:
     """Slow squares of the elevation at the vessel, or of all, and powers of all elevations.
 
     `period` is the encounter period, s; by default that of the training runs. Where what is chosen
     must hold in sea states that are `unseen`, several elevations give their envelopes alone,
     without a look-ahead: few training seas do not tell how a force is weighed by frequency, and
-    probes away from the vessel see the waves before it.
+    probes away from the vessel see the waves before it. A model that does not look ahead takes
+    those of all elevations: the ones up-wave tell what comes.
     """
     elevations = tuple(name for name in inputs if name.startswith("eta"))
     if not elevations:
         return ()
     at_vessel = tuple(name for name in elevations if name == "eta_cog") or elevations
     slow = SlowSquares(at_vessel, period=period)
-    if unseen and len(at_vessel) > 1:
+    if not looks_ahead:
+        slow = SlowSquares(elevations, lead=0.0, period=period)
+    elif unseen and len(at_vessel) > 1:
         slow = replace(slow, orders=(0,), lead=0.0)
     return slow, Powers(elevations)
 
 
 def _options(
-    settings: HankelSettings, vary: Sequence[str], period: float, observables: int
+    vary: Sequence[str], period: float, observables: int, variants: Sequence[Variant]
 ) -> dict[str, list[Any]]:
     """Values to try of the fields of a candidate."""
     found: dict[str, list[Any]] = {}
@@ -967,7 +979,7 @@ def _options(
         every = tuple(range(observables))
         found["observables"] = list(dict.fromkeys([(), *((number,) for number in every), every]))
     for name, periods in (
-        ("lead", (0.0, 0.5, 0.75, 1.0)),
+        ("lead", LEADS),
         ("input_delays", (2.0, 3.0, 5.0)),
         ("state_delays", (0.5, 1.0, 1.5)),
     ):
@@ -975,6 +987,9 @@ def _options(
             found[name] = [round(each * period) for each in periods]
     if "rank" in vary:
         found["truncated"] = [False, True]
+    if all(lead is not None for _, lead in variants):
+        found.pop("lead", None)
+    found["alignment"] = list(range(len(variants)))
     return found
 
 
@@ -993,6 +1008,8 @@ def _alignments(
     modes: tuple[Mode, ...] = ("dispersion", "effective")
     surges: tuple[Surge, ...] = ("predicted", "none")
     for mode, surge in itertools.product(modes, surges):
+        if surge == "predicted" and mode == "effective":
+            continue
         made = replace(
             base,
             mode=mode,
@@ -1010,6 +1027,46 @@ def _alignments(
     found.append(None)
     first = None if stated is None else replace(stated, optional=False)
     return sorted(found, key=lambda each: each != first)
+
+
+def _defaults(
+    settings: HankelSettings,
+    runs: Mapping[str, xr.Dataset],
+    inputs: Sequence[str],
+    period: float,
+    unseen: bool,
+) -> list[tuple[Observable, ...]]:
+    """Observables to choose among, and fewer of them for runs that are too short."""
+    elevations = [
+        label.name
+        for label in labelled.common_labels(runs, inputs)
+        if label.units in ("", "m")  # not their rates
+    ]
+    follows = settings.alignment is not None and settings.alignment.surge == "predicted"
+    looks_ahead = settings.lead > 0 or not follows
+    defaults = default_observables(elevations, period, unseen, looks_ahead)
+    return list(dict.fromkeys([defaults, defaults[1:], ()]))
+
+
+def _variants(
+    settings: HankelSettings,
+    runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+    vary: Sequence[str],
+    period: float,
+) -> Iterator[Variant]:
+    """Alignments, with each look-ahead that is tried where the model follows its own surge."""
+    stated = int(settings.lead)
+    tried = [round(part * period) for part in LEADS if part > LEAD and "lead" in vary]
+    alignments = [settings.alignment]
+    if "alignment" in vary:
+        alignments = _alignments(settings.alignment, runs, states, inputs)
+    for each in alignments:
+        if each is None or each.surge != "predicted":
+            yield each, None
+        else:
+            yield from ((each, ahead) for ahead in dict.fromkeys([stated, *tried]))
 
 
 def _problem(
@@ -1040,8 +1097,7 @@ def _problem(
         ridge=1.0,
         standardize=True,
     )
-    made = [each.fit(dict(runs), states, inputs, settings.window) for each in wide.maps]
-    chain = Chain(tuple(made))
+    chain = wide.input_map(dict(runs), states, inputs, settings.window)
     before = max(widest.state_delays, chain.history(delays))
     after = max(chain.lead_samples - 1, 0)
     pieces = split(runs, folds, before, after) if isinstance(folds, int) else dict(runs)
@@ -1051,15 +1107,15 @@ def _problem(
     chain, drives, offsets = data.input_map, [], []
     for (name, run), x in zip(pieces.items(), data.states, strict=True):
         size = run.sizes["time"]
-        span = Span(0, size - 1, size - chain.lead_samples)
-        values = labelled.channel_matrix(run, list(inputs), name)
-        drives.append(chain.wrap(Measured(values), run, [span]))
         offsets.append(size - max(chain.lead_samples - 1, 0) - len(x))
+        if chain.follows is not None:
+            values = labelled.channel_matrix(run, list(inputs), name)
+            drives.append(cast("Followed", chain.wrap(Measured(values), run, [])))
     owners: list[int] = [-1] * len(inputs)
     direct: list[int] = []
-    observed = [each for each in chain.maps if isinstance(each, Observed)]
-    for number, bound in enumerate(observed[0].bound if observed else ()):
+    for number, bound in enumerate(() if chain.observed is None else chain.observed.bound):
         (owners if bound.delayed else direct).extend([number] * len(bound.labels))
+    direct += [-1] * (chain.follows is not None)  # the slow surge squared
     return Problem(
         data=data,
         drives=tuple(drives),
@@ -1068,7 +1124,6 @@ def _problem(
         owners=tuple(owners),
         direct_owners=tuple(direct),
         horizons=horizons,
-        passes=chain.passes if chain.reads_states == "predicted" else 0,
         is_per_snapshot=settings.ridge_scale == "per_snapshot",
         groups=tuple(pieces if isinstance(folds, int) else folds.values()),
     )
@@ -1106,7 +1161,7 @@ def _words_of_groups(groups: Sequence[str], by_sea: bool) -> str:
 def _rows_of(
     found: Choice,
     observables: Sequence[Observable],
-    alignments: Sequence[ProbeAlignment | None],
+    variants: Sequence[Variant],
     seed: int,
 ) -> Iterator[dict[str, Any]]:
     """Rows of the table: windows are drawn again 400 times for the interval of each score."""
@@ -1117,12 +1172,12 @@ def _rows_of(
         weights = trial.weights[drawn]
         totals = (trial.scores[:, drawn] * weights).sum(axis=2) / weights.sum(axis=1)
         lower, upper = np.quantile(totals, [0.025, 0.975], axis=1)
-        aligned = alignments[candidate.alignment]
+        aligned, lead = variants[candidate.alignment]
         for number, (level, score) in enumerate(zip(trial.levels, trial.means, strict=True)):
             yield {
                 "state_delays": candidate.state_delays,
                 "input_delays": candidate.input_delays,
-                "lead": candidate.lead,
+                "lead": candidate.lead if lead is None else lead,
                 "observables": ", ".join(observables[k].kind for k in candidate.observables)
                 or "none",
                 "alignment": "none" if aligned is None else f"{aligned.mode}, {aligned.surge}",

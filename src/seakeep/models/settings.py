@@ -16,9 +16,10 @@ from seakeep.core.embedding import History
 from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice, check_integer, check_keys, settings_of
+from seakeep.models.following import Following
 from seakeep.models.html import settings_html
-from seakeep.models.inputs import Lead, ProbeAlignment
-from seakeep.models.interface import Fittable, Json, Needs, plain
+from seakeep.models.inputs import Chain, FittedAlignment, Lead, ProbeAlignment
+from seakeep.models.interface import Json, Needs, plain
 from seakeep.models.observables import Observable, Observing, observables_of
 from seakeep.models.observables import to_json as observable_json
 from seakeep.models.priors import Prior, prior_json
@@ -332,8 +333,14 @@ class HankelSettings:
         named = () if self.readouts == "auto" else self.readouts
         if followed in [each.channel for each in named]:
             raise RequestError(
-                f"readouts: {followed} is the surge that the alignment follows from pass to pass, "
+                f"readouts: {followed} is the surge that the model follows from step to step, "
                 "before any read-out. Read off another channel, or set alignment surge = 'none'."
+            )
+        if followed is not None and self.delay_rows != "exact":
+            raise RequestError(
+                "alignment surge = 'predicted' follows the last surges from step to step, which "
+                f"takes delay_rows = 'exact'; received '{self.delay_rows}'. Change it, or take "
+                "surge = 'measured' or 'none'."
             )
         learns = self.readouts == "auto" or any(each.kind != "hinge" for each in named)
         if learns and (self.delay_rows != "exact" or self.rank is not None):
@@ -352,12 +359,32 @@ class HankelSettings:
         return STABLE_RADIUS if self.stable is True else float(self.stable)
 
     @property
-    def maps(self) -> tuple[Fittable, ...]:
-        """Input maps, not fitted yet: the alignment, the lead, and the observables on both."""
-        alignment = () if self.alignment is None else (self.alignment,)
-        lead = (Lead(self.lead),) if self.lead else ()
-        observed = (Observing(self.observables, self.lead),) if self.observables else ()
-        return (*alignment, *lead, *observed)
+    def is_mapped(self) -> bool:
+        """Whether inputs drive the model otherwise than as they are."""
+        return bool(self.alignment is not None or self.lead or self.observables)
+
+    def input_map(
+        self,
+        runs: dict[str, xr.Dataset],
+        states: Sequence[str],
+        inputs: Sequence[str],
+        window: int | None,
+    ) -> Chain:
+        """Fit the input map to training runs that end where training ends.
+
+        Where the model follows its own surge, that is one map; else the alignment, the look-ahead,
+        and the observables on both.
+        """
+        arguments, lead = (runs, states, inputs, window), self.lead
+        aligned = None if self.alignment is None else self.alignment.fit(*arguments)
+        follows = isinstance(aligned, FittedAlignment) and aligned.settings.surge == "predicted"
+        observed = None
+        if self.observables:
+            observed = Observing(self.observables, 0 if follows else lead).fit(*arguments)
+        if isinstance(aligned, FittedAlignment) and follows:
+            return Chain((Following.fit(aligned, runs, window, lead, observed),))
+        found = (aligned, Lead(lead) if lead else None, observed)
+        return Chain(tuple(each for each in found if each is not None))
 
     def around(self, dt: float, input_delays: int | None = None) -> tuple[int, int]:
         """Samples of input before and after the start that the rows of a forecast read.

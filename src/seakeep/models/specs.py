@@ -49,9 +49,8 @@ __all__ = ["BayesianHankelDMDc", "HankelDMDc"]
 PAPER_RIDGE = 100.0
 STATE_PERIODS, INPUT_PERIODS, LEAD_PERIODS = 1.0, 3.0, 0.75
 """Delays and look-ahead that we recommend; a search from there gains a twentieth at most."""
-ALIGNMENT = ProbeAlignment(mode="dispersion", surge="predicted", passes=3, optional=True)
-"""Of what we recommend. Two passes err as little in most windows of irregular waves on the virtual
-tank; the third takes 7 % off the median, and costs a quarter more (benchmarks/results/)."""
+ALIGNMENT = ProbeAlignment(mode="dispersion", surge="predicted", optional=True)
+"""Of what we recommend."""
 STATED = "nothing: all is stated; seakeep tune finds the error without each observable"
 """How the settings of a model were chosen that leave nothing open, where it has observables."""
 
@@ -176,7 +175,11 @@ class HankelDMDc(HankelSettings):
 
     @classmethod
     def recommended(
-        cls, encounter_period: float, dt: float | None = None, runs: Runs | None = None
+        cls,
+        encounter_period: float,
+        dt: float | None = None,
+        runs: Runs | None = None,
+        look_ahead: float = LEAD_PERIODS,
     ) -> Self:
         """Settings we recommend: what the data do not decide is stated, the rest `fit` chooses.
 
@@ -188,13 +191,16 @@ class HankelDMDc(HankelSettings):
             Time step, s; by default that of `runs`.
         runs : Dataset or collection of Datasets, optional
             Training runs, whose step this must be.
+        look_ahead : float, optional
+            How far ahead waves are read, encounter periods. Below 0.56, a vessel whose surge is
+            followed needs a probe up-wave, and its waves are those which that one has seen.
 
         Returns
         -------
         HankelDMDc
-            All of the runs, exact delay rows, s one period, z three periods, waves read 0.75
-            periods ahead and carried by dispersion to the surge predicted in three passes, where
-            surge is a state and the runs state water depth and positions of the probes.
+            All of the runs, exact delay rows, s one period, z three periods, waves carried by
+            dispersion to the surge that the model predicts step by step, where surge is a state
+            and the runs state water depth and positions of the probes.
             Observables (none, slow squares and powers of the elevations, or both), λ, and read-outs
             of the loads are chosen by free runs of 15 and 45 periods on training runs that are held
             out in turn; where nothing can be held out there are none, and λ is 1e-3 per snapshot
@@ -212,7 +218,7 @@ class HankelDMDc(HankelSettings):
             delay_rows="exact",
             ridge_scale="per_snapshot",
             alignment=ALIGNMENT,
-            lead=samples(LEAD_PERIODS),
+            lead=samples(look_ahead),
             readouts="auto",
             select=Select(observables=True, period=encounter_period),
         )
@@ -723,10 +729,10 @@ class BayesianHankelDMDc(HankelSettings):
         spec = spec.resolved(dt, spec.encounter_period)
         shared = spec.shared(dt)
         labels = labelled.common_labels(named, states), labelled.common_labels(named, inputs)
-        if shared.maps:
+        if shared.is_mapped:
             named, stops = until(named, stops), dict.fromkeys(named)
         states, inputs = list(states), list(inputs)
-        input_map = Chain(tuple(each.fit(named, states, inputs, None) for each in shared.maps))
+        input_map = shared.input_map(named, states, inputs, None)
         samples = [
             last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name) + 1
             for name, run in named.items()
@@ -817,7 +823,7 @@ def _training_arrays(
         x = labelled.channel_matrix(run, states, name, slice(first, end))
         labelled.check_finite(x, states, name, first, time)
         span = Span(first, end - 1, max(end - input_map.lead_samples, first))
-        found = run_regressors(input_map, run, inputs, name, span)
+        found = run_regressors(input_map, run, states, inputs, name, span)
         for values in (x, *found):
             values.flags.writeable = False
         read.append((x, *found))

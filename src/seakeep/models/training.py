@@ -201,7 +201,7 @@ def gather(
     """
     check_names(states, inputs)
     states, inputs = list(states), list(inputs)  # arrays of names are welcome too
-    maps, window, history = settings.maps, settings.window, settings.history
+    window, history = settings.window, settings.history
     state_delays, input_delays = settings.state_delays, settings.input_delays
     rows = len(states) * (state_delays + 1)
     check_numbers(
@@ -213,9 +213,9 @@ def gather(
     stops = stop_instants(stop, list(runs))
     dt = labelled.common_step(runs)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
-    if maps:
+    if settings.is_mapped:
         runs, stops = until(runs, stops), dict.fromkeys(runs)
-    input_map = Chain(tuple(each.fit(dict(runs), states, inputs, window) for each in maps))
+    input_map = settings.input_map(dict(runs), states, inputs, window)
     lead, reach = input_map.lead_samples, max(state_delays, input_map.history(input_delays))
     pieces = []
     for name, run in runs.items():
@@ -231,7 +231,7 @@ def gather(
         labelled.check_finite(here[needed - begin :], states, name, needed, time)
         needed = min(place.first, place.first_column - input_delays)
         span = Span(begin, last, last + 1 - lead)
-        found = run_regressors(input_map, run, inputs, name, span, needed)
+        found = run_regressors(input_map, run, states, inputs, name, span, needed)
         u, v = (lengthened(values, len(here)) for values in found)
         shifted = TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
         read = labelled.channel_matrix(run, inputs, name, slice(place.first, last + 1))
@@ -244,7 +244,7 @@ def gather(
     channels = [
         [label.name for label in group] for group in (labels[0], delayed_labels, direct_labels)
     ]
-    scales = scales_of(series, windows, channels, settings.standardize)
+    scales = scales_of(series, windows, channels, settings.standardize, input_map.stretch)
     if len(names) > 1:
         _warn_of_dead(names, series[0], windows, scales[0], channels[0])
         _warn_of_dead(names, series[1], windows, scales[1], channels[1])
@@ -274,6 +274,7 @@ def gather(
 def run_regressors(
     input_map: Chain,
     run: xr.Dataset,
+    states: Sequence[str],
     inputs: Sequence[str],
     name: str,
     span: Span,
@@ -288,7 +289,10 @@ def run_regressors(
     time = np.asarray(run.variables["time"].values, dtype=float)
     first = read.first if needed is None or input_map.maps else needed
     labelled.check_finite(values[first : read.stop], inputs, name, first, time)
-    found = input_map.wrap(Measured(values), run, [span]).rows(span.first, span.stop)
+    surge = None
+    if (follows := input_map.follows) is not None:
+        surge = labelled.channel_matrix(run, [states[follows.column]], name)[:, 0]
+    found = input_map.wrap(Measured(values, 0, surge), run, [span]).rows(span.first, span.stop)
     if not missing:
         return found
     return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in found))
@@ -449,19 +453,26 @@ def scales_of(
     windows: Sequence[TrainingWindow],
     channels: Sequence[Sequence[str]],
     standardize: bool,
+    stretch: tuple[FloatArray, FloatArray] | None = None,
 ) -> list[Scale]:
     """Moments of states, delayed and direct regressors.
 
-    Direct regressors count from the first snapshot pair on: before it they may need inputs that
-    are not there.
+    What regressors are divided by is stretched where λ weighs more on them. Direct ones count from
+    the first snapshot pair on: before it they may need inputs that are not there.
     """
     later = windows
     if channels[2]:
         later = [replace(each, first=max(each.first, each.first_column)) for each in windows]
-    return [
+    found = [
         moments(values, spans, names, standardize)
         for values, spans, names in zip(series, (windows, windows, later), channels, strict=True)
     ]
+    if stretch is None or not standardize:
+        return found
+    more = [
+        replace(scale, std=scale.std * by) for scale, by in zip(found[1:], stretch, strict=True)
+    ]
+    return [found[0], *more]
 
 
 def moments(

@@ -12,6 +12,13 @@ enum {
     DELAYED = {{ n }},         /* regressors with input delays, each newest first */
     DELAYS = {{ z }},
     DIRECT = {{ m }},          /* regressors without */
+{% if following %}
+    PLACES = {{ following.place.count }},          /* on the grid where waves are read */
+    PAST = {{ following.place.taps | length }},            /* surges that the place of the vessel is a sum of */
+    SURGE = {{ following.follows.column }},
+    BACK = {{ following.back }},            /* samples that carriers read, before and after */
+    TAPS = {{ following.back + following.ahead + 1 }},
+{% endif %}
     ROWS = {{ rows }},            /* rows of the coefficients: all, or those of the newest states */
     COLUMNS = EXTENDED + DELAYED * (DELAYS + 1) + DIRECT,
     WINDOW = {{ window }},          /* rows of inputs that are remembered */
@@ -39,9 +46,20 @@ static const double {{ name }}[{{ size }}] = {
 {% for each in kernels %}
 {{ array("kernel_%d" % loop.index0, each) }}
 {% endfor %}
+{% if powers %}
+/* Power of an input that grows like it far out. */
+static double bounded_power(double u, int power, double limit)
+{
+    double calm = u / sqrt(1.0 + u * u / limit), out = u;
+    for (int i = 1; i < power; i++)
+        out *= calm;
+    return out;
+}
+
+{% endif %}
 {% if kernels %}
 /* Weighted sum of squares of a derivative of one input; u is its sample at the filter's middle. */
-static double slow_square(const double *u, int order, const double *kernel, int half)
+static double slow_square(const double *u, int order, const double *kernel, int half, double top)
 {
     double sum = 0.0;
     for (int k = -half; k <= half; k++) {
@@ -53,10 +71,36 @@ static double slow_square(const double *u, int order, const double *kernel, int 
             value = (at[Q] - 2.0 * at[0] + at[-Q]) / ({{ upper }}_STEP * {{ upper }}_STEP);
         sum += kernel[half - k] * value * value;
     }
+    return sum > top ? top + {{ slope }} * (sum - top) : sum;
+}
+
+{% endif %}
+{% if following %}
+{{ array("surge_taps", following.place.taps) }}
+{% for bank in banks %}
+{{ array("carriers_%d" % bank.column, bank.taps) }}
+{% endfor %}
+/* Elevation at a place of the grid; u is the first row that a carrier reads. */
+static double carried(const double *u, const double *taps, int place, int probes, const int *probe)
+{
+    double sum = 0.0;
+    taps += place * probes * TAPS;
+    for (int c = 0; c < probes; c++)
+        for (int i = 0; i < TAPS; i++)
+            sum += *taps++ * u[i * Q + probe[c]];
     return sum;
 }
 
 {% endif %}
+/* What has delays, of the inputs u of an instant. */
+static void observe(const double *u, double *v)
+{
+{% for each in delayed %}
+    v[{{ loop.index0 }}] = {{ each }};
+{% endfor %}
+    (void)u, (void)v;
+}
+
 /* Take one more row of inputs, and make the regressors of the next step. */
 static void push({{ name }}_model *m, const double *u)
 {
@@ -66,18 +110,37 @@ static void push({{ name }}_model *m, const double *u)
     memmove(v + DELAYED, v, DELAYS * DELAYED * sizeof(double));
     for (int i = 0; i < Q; i++)
         newest[i] = u[i];
-{% if n %}
-    u = m->inputs + (NOW + {{ lead }}) * Q;
-{% endif %}
-{% for each in delayed %}
-    v[{{ loop.index0 }}] = {{ each }};
+{% if following %}
+    double here = 0.0, on_grid, sides[2][DELAYED];
+    for (int i = 0; i < PAST; i++)
+        here += surge_taps[i] * m->surge[i];
+    here = fmin(fmax(here, {{ following.place.lowest | hex }}), {{ following.place.grid[-1] | hex }});
+    on_grid = (here - {{ following.place.lowest | hex }}) / {{ following.place.spacing | hex }};
+    int below = (int)fmin(on_grid, PLACES - 2);
+    for (int side = 0; side < 2; side++) {
+        double at[Q];
+        memcpy(at, m->inputs + NOW * Q, sizeof at);
+        u = m->inputs + (NOW - BACK) * Q;
+{% for bank in banks %}
+        static const int probes_{{ bank.column }}[] = { {{ bank.columns | join(", ") }} };
+        at[{{ bank.column }}] = carried(u, carriers_{{ bank.column }}, below + side, {{ bank.columns | length }}, probes_{{ bank.column }});
 {% endfor %}
+        observe(at, sides[side]);
+    }
+    for (int i = 0; i < DELAYED; i++)
+        v[i] = sides[0][i] + (on_grid - below) * (sides[1][i] - sides[0][i]);
+{% else %}
+    observe(m->inputs + (NOW + {{ lead }}) * Q, v);
+{% endif %}
 {% if m %}
     u = m->inputs + NOW * Q;
 {% endif %}
 {% for each in direct %}
     direct[{{ loop.index0 }}] = {{ each }};
 {% endfor %}
+{% if following %}
+    direct[DIRECT - 1] = pow(here - {{ following.place.centre | hex }}, 2.0);
+{% endif %}
     for (int i = 0; i < DELAYED; i++)
         v[i] = (v[i] - delayed_mean[i]) / delayed_std[i];
     for (int i = 0; i < DIRECT; i++)
@@ -93,7 +156,7 @@ static void widen({{ name }}_model *m, int delays)
         double value = delayed_mean[c] + delayed_std[c] * v[i];
         m->excess = fmax(m->excess, fabs(value - delayed_centre[c]) / delayed_reach[c]);
     }
-    for (int i = 0; i < DIRECT; i++) {
+    for (int i = 0; i < DIRECT{{ " - 1" if following }}; i++) {
         double value = direct_mean[i] + direct_std[i] * direct[i];
         m->excess = fmax(m->excess, fabs(value - direct_centre[i]) / direct_reach[i]);
     }
@@ -109,21 +172,33 @@ static int all_finite(const double *values, int count)
 
 int {{ name }}_start({{ name }}_model *m, const double *x_history, const double *u_history)
 {
-    if (!all_finite(x_history, EXTENDED) || !all_finite(u_history, {{ upper }}_U_ROWS * Q))
+    if (!all_finite(x_history, {{ upper }}_X_ROWS * N) || !all_finite(u_history, {{ upper }}_U_ROWS * Q))
         return 1;
     memset(m, 0, sizeof *m);
     m->excess = 1.0;
+    const double *last = x_history + ({{ upper }}_X_ROWS - 1) * N;
     for (int i = 0; i < N; i++) {
-        m->x[i] = x_history[EXTENDED - N + i];
+        m->x[i] = last[i];
         m->limit[i] = state_reach[i];
-        for (int row = 0; row < EXTENDED / N; row++) {
-            double value = x_history[EXTENDED - (row + 1) * N + i];
-            m->regressors[row * N + i] = (value - state_mean[i]) / state_std[i];
+        for (int row = 0; row < {{ upper }}_X_ROWS; row++) {
+            double value = last[i - row * N];
+            if (row * N < EXTENDED)
+                m->regressors[row * N + i] = (value - state_mean[i]) / state_std[i];
             m->limit[i] = fmax(m->limit[i], fabs(value - state_centre[i]));
         }
     }
-    for (int row = 0; row < {{ upper }}_U_ROWS; row++)
+    for (int row = 0; row < {{ upper }}_U_ROWS; row++) {
+{% if following %}
+        int before = {{ upper }}_U_ROWS - row;
+        for (int i = 0; before <= DELAYS && i < PAST; i++)
+            m->surge[i] = last[SURGE - (before + i) * N];
+{% endif %}
         push(m, u_history + row * Q);
+    }
+{% if following %}
+    for (int i = 0; i < PAST; i++)
+        m->surge[i] = last[SURGE - i * N];
+{% endif %}
     if (DELAYS > 0)
         widen(m, DELAYS - 1);
     return 0;
@@ -151,6 +226,10 @@ int {{ name }}_step({{ name }}_model *m, const double *u)
         if (!(fabs(x[i] - state_centre[i]) <= {{ growth }} * m->limit[i] * m->excess))
             lost = 1;
     }
+{% if following %}
+    memmove(m->surge + 1, m->surge, (PAST - 1) * sizeof(double));
+    m->surge[0] = x[SURGE];
+{% endif %}
     for (int i = 0; lost && i < N; i++)
         x[i] = m->regressors[i] = NAN;
     memcpy(m->x, x, sizeof x);

@@ -10,8 +10,9 @@
  *
  * Instant k is that of the last row of x_history. The step from k to k + 1 takes the inputs of
  * instant k + {{ upper }}_LEAD: where the model looks ahead, its time is that much behind its input.
-{% if aligned %}
- * This model was trained on waves carried to the vessel. Give it inputs carried likewise.
+{% if following %}
+ * Inputs are the probes as measured, where they stood in training: a step carries the waves to the
+ * vessel by its own surge.
 {% endif %}
  */
 #ifndef {{ upper }}_H
@@ -24,7 +25,7 @@ extern "C" {
 #define {{ upper }}_STATES {{ N }}
 #define {{ upper }}_INPUTS {{ Q }}
 #define {{ upper }}_LEAD {{ lead_samples }}
-#define {{ upper }}_X_ROWS {{ s + 1 }} /* of x_history: instants k - {{ s }} to k */
+#define {{ upper }}_X_ROWS {{ x_rows }} /* of x_history: instants k - {{ x_rows - 1 }} to k */
 #define {{ upper }}_U_ROWS {{ history + lead_samples }} /* of u_history: instants k - {{ history }} to k - 1 + {{ upper }}_LEAD */
 #define {{ upper }}_STEP {{ dt | hex }} /* s */
 
@@ -37,6 +38,9 @@ typedef struct {
     double regressors[{{ N * (s + 1) + n * (z + 1) + m }}];
     double inputs[{{ [1, window * Q] | max }}];
     double limit[{{ N }}];
+{% if following %}
+    double surge[{{ following.place.taps | length }}]; /* newest first */
+{% endif %}
     double excess;
 } {{ name }}_model;
 

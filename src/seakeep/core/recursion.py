@@ -1,0 +1,189 @@
+r"""Free runs of a model whose waves are read where the vessel is: one causal recursion.
+
+The place of the vessel at instant j is a weighted sum of its last surges,
+:math:`p_j = \sum_i h_i\, x_{j-i}`. What drives the step from j is a table over places, linear
+between them:
+
+.. math:: u_j = (1 - f)\, U_{j,g} + f\, U_{j,g+1}, \qquad
+          x_{j+1} = A [x_j; …; x_{j-s}] + B [u_j; …; u_{j-z}] + D\, (p_j - \bar p)^2 + v_j .
+
+Nothing but the table and the states up to j enters the step. Models of several λ and windows run
+side by side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from seakeep.arrays import FloatArray, IntArray
+
+__all__ = ["Place", "Recursion", "read_table", "recursion"]
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where waves are read: a weighted sum of the last surges, on a grid.
+
+    Parameters
+    ----------
+    taps : ndarray, shape (P,)
+        Weights of the last surges, newest first.
+    lowest, spacing : float
+        First place of the grid and the distance between two, m.
+    count : int
+        Number of places.
+    centre : float
+        Place about which the slow surge is squared, m.
+    """
+
+    taps: FloatArray = field(repr=False)
+    lowest: float
+    spacing: float
+    count: int
+    centre: float
+
+    @property
+    def grid(self) -> FloatArray:
+        """Places, m."""
+        result: FloatArray = self.lowest + self.spacing * np.arange(float(self.count))
+        return result
+
+    def of(self, surge: FloatArray) -> FloatArray:
+        """Places of the samples from the P-th on, of a surge of shape (time,)."""
+        found: FloatArray = np.convolve(surge, self.taps, "valid")
+        result: FloatArray = np.clip(found, self.lowest, self.grid[-1])
+        return result
+
+    def squared(self, place: FloatArray) -> FloatArray:
+        """Slow surge squared."""
+        result: FloatArray = (place - self.centre) ** 2
+        return result
+
+
+def read_table(
+    place: Place, table: FloatArray, samples: IntArray, places: FloatArray
+) -> FloatArray:
+    """Rows of a table at samples and places, linear between two places.
+
+    Parameters
+    ----------
+    place : Place
+        The grid.
+    table : ndarray, shape (time, place, column)
+        What would drive a step at each sample and place.
+    samples : ndarray of int, shape (…)
+        Samples.
+    places : ndarray, shape (…)
+        Places within the grid, m.
+
+    Returns
+    -------
+    ndarray, shape (…, column)
+    """
+    on_grid = (places - place.lowest) / place.spacing
+    below = np.minimum(on_grid.astype(np.intp), place.count - 2)
+    part = (on_grid - below)[..., None]
+    flat = table.reshape(-1, table.shape[2])
+    rows = samples * place.count + below
+    lower = flat.take(rows, axis=0)
+    result: FloatArray = lower + part * (flat.take(rows + 1, axis=0) - lower)
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class Recursion:
+    """Models of equal delays that run side by side.
+
+    Parameters
+    ----------
+    on_states : ndarray, shape (model, N, N(s+1))
+        A, newest block first.
+    on_inputs : ndarray, shape (model, N, n(z+1))
+        B, newest block first.
+    on_square : ndarray, shape (model, N)
+        D.
+    gain, offset : float
+        Surge of the vessel, m, of the state of the surge: offset + gain · x.
+    column : int
+        Place of the surge among the states.
+    """
+
+    on_states: FloatArray
+    on_inputs: FloatArray
+    on_square: FloatArray
+    gain: float
+    offset: float
+    column: int
+
+
+def recursion(
+    models: Recursion,
+    place: Place,
+    histories: FloatArray,
+    delayed: FloatArray,
+    table: FloatArray,
+    starts: IntArray,
+    forcing: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Free runs of several models over several windows, side by side.
+
+    Parameters
+    ----------
+    models : Recursion
+        A, B and D.
+    place : Place
+        Where waves are read.
+    histories : ndarray, shape (window, at least max(s + 1, P), N)
+        States up to each start, oldest first.
+    delayed : ndarray, shape (window, z, n)
+        What drove the steps before each start, oldest first.
+    table : ndarray, shape (time, place, n)
+        What would drive the steps from each start on, at each place.
+    starts : ndarray of int, shape (window,)
+        Samples of the table from which the windows start.
+    forcing : ndarray, shape (model, window, steps, N)
+        v: what everything else adds at each step.
+
+    Returns
+    -------
+    states : ndarray, shape (model, window, steps, N)
+        States after the starts; not finite from where a run is lost.
+    driving : ndarray, shape (model, window, steps, n)
+        What drove the steps.
+    """
+    count, windows, steps, N = forcing.shape
+    back, size = histories.shape[1], models.on_states.shape[2]
+    table = np.ascontiguousarray(table)
+    n, width = table.shape[2], models.on_inputs.shape[2]
+    # Newest first, so that the extended state of each step is a block of one buffer.
+    states = np.empty((count, windows, (steps + back) * N))
+    states[..., steps * N :] = histories[:, ::-1].reshape(windows, -1)
+    inputs = np.empty((count, windows, steps * n + width - n))
+    inputs[..., steps * n :] = delayed[:, ::-1].reshape(windows, -1)
+    a = np.ascontiguousarray(models.on_states.transpose(0, 2, 1))
+    b = np.ascontiguousarray(models.on_inputs.transpose(0, 2, 1))
+    parts = (states, inputs, a, b, models.on_square[:, None], forcing)
+    # One model alone needs no axis of its own, which saves a third of the time.
+    x, u, a, b, d, v = (each[0] for each in parts) if count == 1 else parts
+    taps, still = models.gain * place.taps, models.offset * place.taps.sum()
+    highest, reach = float(place.grid[-1]), len(taps) * N
+    with np.errstate(over="ignore", invalid="ignore"):
+        for step in range(steps):
+            at, to = (steps - step) * N, (steps - 1 - step) * n
+            here = x[..., at + models.column : at + models.column + reach : N] @ taps
+            here += still
+            # A run that is lost keeps a place; its states stay lost.
+            here = np.fmin(np.fmax(here, place.lowest), highest)
+            u[..., to : to + n] = read_table(place, table, starts + step, here)
+            found = x[..., at : at + size] @ a
+            found += u[..., to : to + width] @ b
+            here -= place.centre
+            here *= here
+            found += d * here[..., None]
+            found += v[..., step, :]
+            x[..., at - N : at] = found
+    out = states[..., : steps * N].reshape(count, windows, steps, N)
+    driving = inputs[..., : steps * n].reshape(count, windows, steps, n)
+    return out[:, :, ::-1], driving[:, :, ::-1]

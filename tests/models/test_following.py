@@ -1,0 +1,206 @@
+"""The recursion: a model that carries waves to where its own surge takes the vessel."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from drifting import DT, INPUTS, POSITIONS, STATES, drifting_run
+
+from seakeep import HankelDMDc, Powers, ProbeAlignment, RequestError, SlowSquares, load_model
+from seakeep.core.recursion import Place, Recursion, recursion
+from seakeep.models.inputs import Chain, Measured
+from seakeep.models.interface import Span
+
+FOLLOWED = ProbeAlignment(mode="dispersion", surge="predicted")
+OBSERVABLES = (SlowSquares("eta_cog", lags=(0, 1)), Powers(("eta_fwd", "eta_cog")))
+SPEC = HankelDMDc(
+    10, 40, 1e-3, delay_rows="exact", alignment=FOLLOWED, lead=12, observables=OBSERVABLES
+)
+
+
+@pytest.fixture(scope="module")
+def models():
+    runs = [drifting_run(seed) for seed in (1, 2)]
+    return {
+        name: each.fit(runs, STATES, INPUTS)
+        for name, each in {
+            "ahead": SPEC,
+            "now": replace(SPEC, lead=0, observables=()),
+            "rest": replace(SPEC, alignment=None),
+        }.items()
+    }
+
+
+def table_of(run, names):
+    return np.stack([run[name].values for name in names], axis=1)
+
+
+def heave_error(model, run):
+    forecast = model.forecast(run, start=60.0, steps=300)
+    measured = run["heave"].sel(time=forecast["time"])
+    return float(np.sqrt(np.mean((forecast["heave"] - measured) ** 2)) / measured.std())
+
+
+def test_the_wave_is_read_where_the_vessel_goes(models):
+    errors = {name: heave_error(model, drifting_run(7)) for name, model in models.items()}
+    assert errors["ahead"] < 0.12  # what the forecast of surge is off
+    assert errors["now"] < 0.2  # and what a probe 3.7 m up-wave does not tell
+    assert errors["rest"] > 0.35
+
+
+@pytest.mark.parametrize("name", ["ahead", "now"])
+def test_nothing_is_read_beyond_the_look_ahead_and_no_state_after_the_start(models, name):
+    model, run, steps, start = models[name], drifting_run(7), 80, 600
+    expected = model.forecast(run, start=start * DT, steps=steps)
+    poisoned = run.copy(deep=True)
+    for channel in STATES:
+        poisoned[channel].values[start + 1 :] = np.nan
+        poisoned[channel].values[: start + 1 - model.signature.state_samples] = np.nan
+    for channel in INPUTS:  # the last step starts an instant before the last state
+        poisoned[channel].values[start + steps + model.lead_samples :] = np.nan
+        poisoned[channel].values[: start + 1 - model.history_samples] = np.nan
+    xr.testing.assert_identical(model.forecast(poisoned, start=start * DT, steps=steps), expected)
+    assert model.lead_samples == {"ahead": 12, "now": 0}[name]
+    assert expected.attrs["reads_input_until"] == pytest.approx((model.lead_samples - 1) * DT)
+
+
+@pytest.mark.parametrize("name", ["ahead", "now"])
+def test_runs_arrays_members_and_service_are_one_recursion(models, name):
+    model, run, steps, start = models[name], drifting_run(7), 60, 600
+    x, u = table_of(run, STATES), table_of(run, INPUTS)
+    expected = table_of(model.forecast(run, start=start * DT, steps=steps), STATES)
+    past, after = slice(start + 1), slice(start + 1, None)
+    arrays = model.forecast_arrays(x[past], u[past], u[after], steps)
+    live = model.live(like=run)
+    for row in range(start + 1):
+        live.step(u[row], x[row])
+    served = live.forecast(steps, u[after]).isel(statistic=0)
+    for found in (arrays, table_of(served, STATES)):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)  # rounding
+    many = model.forecast_windows(run, [start * DT, 50.0], steps=steps)
+    np.testing.assert_allclose(
+        np.stack([many[each][0] for each in STATES], axis=1), expected, rtol=0, atol=1e-12
+    )
+
+
+def test_a_step_is_the_equation(models):
+    """x' = A x̂ + B û + D v with each part computed by itself, as a host does."""
+    model, run, start = models["ahead"], drifting_run(7), 600
+    signature, x, u = model.signature, table_of(run, STATES), table_of(run, INPUTS)
+    follows = signature.input_map.follows
+    made = Chain.of(signature.input_map).maps[0]
+    z, taps = signature.input_delays, follows.place.taps
+    rows = []
+    for at in range(start - z, start + 1):
+        surge = x[at - taps.size + 1 : at + 1, 0][::-1]
+        place = float(np.clip(taps @ surge, follows.place.grid[0], follows.place.grid[-1]))
+        on_grid = (place - follows.place.lowest) / follows.place.spacing
+        below = int(on_grid)
+        sides = []
+        for side in (below, below + 1):
+            wave = [
+                np.sum(bank.taps[side] * u[at - made.back : at + made.ahead + 1, bank.columns].T)
+                for bank in made.banks(None)
+            ]
+            sides.append(made.observed.with_delayed(np.array([wave]))[0])
+        part = on_grid - below
+        rows.append((1 - part) * sides[0] + part * sides[1])
+    direct = made.observed.direct(u)[start]
+    direct = np.append(direct, (place - follows.place.centre) ** 2)
+    regressors = np.concatenate(
+        [
+            signature.state_scale.deviations(x[start - 10 : start + 1])[::-1].ravel(),
+            signature.input_scale.deviations(np.array(rows))[::-1].ravel(),
+            signature.direct_scale.deviations(direct),
+        ]
+    )
+    expected = signature.state_scale.physical(model.coefficients @ regressors)
+    found = model.forecast(run, start=start * DT, steps=1)
+    np.testing.assert_allclose([found[each].values[0] for each in STATES], expected, atol=1e-12)
+
+
+def test_training_is_the_recursion_on_the_measured_surge(models):
+    model, run = models["ahead"], drifting_run(1)
+    surge = run["surge"].values
+    drive = model.signature.input_map.wrap(
+        Measured(table_of(run, INPUTS), 0, surge), run, [Span(500, 500, 600)]
+    )
+    found = drive.rows(500, 600)
+    later = surge.copy()
+    later[560:] = 9.0
+    other = model.signature.input_map.wrap(
+        Measured(table_of(run, INPUTS), 0, later), run, [Span(500, 500, 600)]
+    ).rows(500, 600)
+    np.testing.assert_array_equal(other.delayed[:60], found.delayed[:60])
+    assert not np.allclose(other.delayed[60:], found.delayed[60:])
+
+
+def test_a_probe_that_was_moved_and_says_so_changes_little(models):
+    run = drifting_run(7, moved=0.5)
+    wrong = heave_error(models["ahead"], run)
+    for name, x in POSITIONS.items():
+        run[name].attrs["x_position"] = x + 0.5
+    assert heave_error(models["ahead"], run) < 0.15 < 0.3 < wrong
+    for name, x in POSITIONS.items():
+        run[name].attrs["x_position"] = x + 300.0
+    with pytest.raises(RequestError, match=r"stands -300 m from where it stood in training, too"):
+        models["ahead"].forecast(run, start=60.0, steps=10)
+
+
+def test_a_file_holds_the_recursion_and_refuses_what_is_none(models, tmp_path):
+    model, run = models["ahead"], drifting_run(7)
+    again = load_model(model.save(tmp_path / "rom.nc"))
+    forecasts = [each.forecast(run, start=60.0, steps=50) for each in (again, model)]
+    xr.testing.assert_identical(*forecasts)
+    kind = Chain.of(model.signature.input_map).maps[0]
+    for key, wrong in (("power", [-1.0, 1.0]), ("band", [2.0, 1.0]), ("back", -1)):
+        content = json.loads(json.dumps(kind.to_json())) | {key: wrong}
+        with pytest.raises(ValueError, match="carriers of the inputs are not those of a vessel"):
+            type(kind).from_json(content)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"lead": 3}, r"a look-ahead of 3 samples .* takes a probe up-wave: two elevations"),
+        ({"delay_rows": "ridge"}, r"takes delay_rows = 'exact'; received 'ridge'"),
+        ({"alignment": {"surge": "predicted"}}, r"waves by their dispersion; received mode"),
+    ],
+)
+def test_what_cannot_follow_is_refused(change, message):
+    with pytest.raises(RequestError, match=message):
+        replace(SPEC, observables=(), **change).fit(drifting_run(), STATES, ["eta_cog"])
+
+
+def test_models_and_windows_side_by_side_are_each_alone():
+    rng = np.random.default_rng(0)
+    N, s, n, z, P, places, steps = 2, 3, 2, 4, 5, 9, 30
+    place = Place(np.full(P, 1 / P), -1.0, 0.25, places, 0.1)
+    a, b, d = (0.1 * rng.standard_normal((3, N, each)) for each in (N * (s + 1), n * (z + 1), 1))
+    models = Recursion(a, b, d[..., 0], 0.7, 0.2, 1)
+    histories, delayed = rng.standard_normal((2, 6, N)), rng.standard_normal((2, z, n))
+    table, starts = rng.standard_normal((60, places, n)), np.array([0, 25])
+    forcing = rng.standard_normal((3, 2, steps, N))
+    found, used = recursion(models, place, histories, delayed, table, starts, forcing)
+    for model in range(3):
+        for window in range(2):
+            x, u = list(histories[window]), list(delayed[window])
+            for step in range(steps):
+                surge = [0.2 + 0.7 * each[1] for each in x[-P:]]
+                here = min(max(np.mean(surge), -1.0), 1.0)
+                row = [
+                    np.interp(here, place.grid, table[starts[window] + step, :, column])
+                    for column in range(n)
+                ]
+                u.append(np.array(row))
+                following = (
+                    a[model] @ np.concatenate(x[: -s - 2 : -1])
+                    + b[model] @ np.concatenate(u[: -z - 2 : -1])
+                    + d[model, :, 0] * (here - 0.1) ** 2
+                    + forcing[model, window, step]
+                )
+                x.append(following)
+            np.testing.assert_allclose(found[model, window], x[6:], rtol=1e-10, atol=1e-12)
+            np.testing.assert_allclose(used[model, window], u[z:], rtol=1e-10, atol=1e-12)

@@ -1,0 +1,97 @@
+"""Carriers and the slow position against waves and oscillations that are known."""
+
+import numpy as np
+import pytest
+
+from seakeep.signals.carriers import (
+    carried,
+    carriers,
+    mean_spectrum,
+    position_taps,
+    slow_position,
+)
+from seakeep.waves import wavenumber
+
+DT, PERIOD, DEPTH = 0.05, 1.6, 2.0  # s, s, m
+PROBES, BACK, AHEAD, LEAD = (-3.0, 0.0), 96, 24, 20
+
+
+def sea(seed: int, samples: int = 4000, lines: int = 120):
+    """Elevation of a sum of waves at any place and instant."""
+    rng = np.random.default_rng(seed)
+    omega = 2 * np.pi * rng.uniform(0.4, 1.1, lines) / PERIOD * 1.3
+    amplitude = 0.02 * np.exp(-((omega * PERIOD / (2 * np.pi) - 1) ** 2) / 0.05)
+    k, phase = wavenumber(omega, DEPTH), rng.uniform(0, 2 * np.pi, lines)
+    time = DT * np.arange(samples)
+
+    def elevation(place, lead=0):
+        angles = np.outer(time + lead * DT, omega) - k * place + phase
+        return (amplitude * np.cos(angles)).sum(axis=1)
+
+    return elevation
+
+
+@pytest.fixture(scope="module")
+def spectrum():
+    records = [np.stack([sea(seed)(x) for x in PROBES], axis=1) for seed in (1, 2, 3)]
+    return mean_spectrum(records, DT, PERIOD)
+
+
+def designed(spectrum, targets, **changes):
+    options = {"probes": PROBES, "back": BACK, "ahead": AHEAD} | changes
+    leads = np.full(len(targets), options.pop("lead", LEAD))
+    return carriers(*spectrum, DEPTH, DT, targets=np.array(targets), leads=leads, **options)
+
+
+def test_a_carried_wave_is_that_of_linear_dispersion_to_the_error_of_the_design(spectrum):
+    places, elevation = (-0.4, 0.0, 0.7, 1.3), sea(9)
+    taps, errors = designed(spectrum, places)
+    record = np.stack([elevation(x) for x in PROBES], axis=1)
+    found = carried(taps, record)
+    for column, place in enumerate(places):
+        true = elevation(place, LEAD)[BACK : len(record) - AHEAD]
+        off = float(np.std(found[:, column] - true) / true.std())
+        # The design weighs all frequencies of training and noise; this sea has lines of its own.
+        assert off < 1.5 * errors[column] + 0.02
+        assert errors[column] < 0.12
+    # At the probe itself, within what was read, the wave is the sample.
+    assert errors[1] < 0.02
+
+
+def test_probes_up_wave_tell_what_has_not_come_yet(spectrum):
+    alone, both = (
+        designed(spectrum, (0.0,), probes=probes, ahead=0, lead=32)[1][0]
+        for probes in ((0.0,), PROBES)
+    )
+    assert alone > 0.5  # a whole period ahead
+    assert both < 0.1  # the probe 3 m up-wave has seen it
+
+
+def test_a_carrier_reads_its_own_samples_alone(spectrum):
+    taps, _ = designed(spectrum, (0.3,))
+    record = np.random.default_rng(0).standard_normal((400, 2))
+    expected = carried(taps, record)
+    row = 100  # belongs to sample row + BACK
+    record[:row] = record[row + BACK + AHEAD + 1 :] = 1e9
+    np.testing.assert_array_equal(carried(taps, record)[row], expected[row])
+    record[row + BACK + AHEAD] += 1.0
+    assert carried(taps, record)[row, 0] - expected[row, 0] == pytest.approx(taps[0, :, -1].sum())
+
+
+def test_the_position_follows_a_slow_oscillation_and_holds_at_rest():
+    samples, period, ahead = 6000, 32, 24
+    t = np.arange(samples)
+    rng = np.random.default_rng(4)
+    slow = sum(0.3 * np.sin(2 * np.pi * t / (32 * p) + rng.uniform(0, 6.28)) for p in (11, 17, 26))
+    quick = 0.05 * np.sin(2 * np.pi * t / 32.7)
+    taps = position_taps([slow + quick], period, period, ahead)
+    assert taps.sum() == pytest.approx(1.0, abs=1e-12)  # a vessel at rest is where it is
+    place = np.convolve(slow + quick, taps, "valid")
+    true = slow[period - 1 + ahead :]
+    # Thirty-two samples tell a rate, which 24 samples later is that of another phase.
+    assert np.std(place[: len(true)] - true) < 0.15 * slow.std()
+    held = np.std(np.convolve(slow, np.ones(period) / period, "valid")[: len(true)] - true)
+    assert np.std(place[: len(true)] - true) < 0.5 * held
+    # Without delay: what the weights are fitted to.
+    middle = slice(400, -400)
+    np.testing.assert_allclose(slow_position(slow + quick, period)[middle], slow[middle], atol=0.02)
