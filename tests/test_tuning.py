@@ -96,8 +96,11 @@ def test_a_search_that_was_interrupted_goes_on(tmp_path):
     assert len(counted) == 2  # of three folds
     whole = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["ridge"], horizon=(15,))
     assert again.table.identical(whole.table)
-    with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
-        seakeep.tune(SPEC, runs(2), STATES, INPUTS, **more)
+    later = {name: run.assign_coords(time=run.time + 1.0) for name, run in runs().items()}
+    deeper = {name: run.assign_attrs(water_depth=2.0) for name, run in runs().items()}
+    for others in (runs(2), later, deeper):
+        with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
+            seakeep.tune(SPEC, others, STATES, INPUTS, **more)
     kept.write_text("[]")
     with pytest.raises(RequestError, match="keeps no scores of a search"):
         seakeep.tune(SPEC, runs(), STATES, INPUTS, **more)
@@ -125,6 +128,9 @@ def test_the_figure_has_a_line_per_candidate_and_units():
     pytest.importorskip("matplotlib")
     result = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["lead"], horizon=(15,))
     figure = result.figure()
+    from matplotlib import pyplot
+
+    assert not pyplot.get_fignums()  # pyplot would keep it for good
     (axes,) = figure.axes
     words = [text.get_text() for text in axes.get_legend().get_texts()]
     leads = np.unique(result.table["lead"].values)

@@ -201,7 +201,9 @@ def _digest(asked: object, runs: dict[str, xr.Dataset], channels: Sequence[str])
     """Checksum of what a search depends on."""
     found = hashlib.sha256(json.dumps(asked, sort_keys=True).encode())
     for name, run in runs.items():
-        found.update(name.encode())
+        words = [run.attrs, *(run[each].attrs for each in channels)]
+        found.update((name + json.dumps(words, sort_keys=True, default=str)).encode())
+        found.update(np.asarray(run["time"].values, dtype=float).tobytes())
         found.update(np.ascontiguousarray(channel_matrix(run, channels, name)).tobytes())
     return found.hexdigest()
 

@@ -6,6 +6,7 @@ import xarray as xr
 from moored import moored_run
 
 from seakeep import HankelDMDc, check
+from seakeep.check.parts import reference_probe
 from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
 from seakeep.errors import DataError, RequestError
 from seakeep.waves import wavenumber
@@ -107,6 +108,14 @@ def test_points_of_irregular_waves_hold_the_truth_up_to_the_edges_of_the_spectru
         inside.append(error < at.amplitude_uncertainty.values)
     # Circles of 95 %; without what leakage adds they hold 79 %.
     assert 0.9 < np.mean(np.concatenate(inside)) < 0.99
+
+
+def test_a_rate_of_an_elevation_is_no_reference(sea):
+    rate = np.gradient(sea["eta_cog"].values, DT)
+    given = sea.assign(eta_cog_rate=("time", rate, {"units": "m/s", "x_position": 1.0}))
+    names = ["eta_fwd", "eta_cog", "eta_cog_rate"]
+    model = HankelDMDc(4, 8, 1.0, delay_rows="exact").fit(given, ["heave"], names)
+    assert model.inputs[reference_probe(model, {"sea": given})] == "eta_cog"
 
 
 def test_measured_points_hold_the_truth_in_their_intervals(sea, model):

@@ -11,6 +11,7 @@ import xarray as xr
 from scipy import fft
 
 from seakeep.arrays import BoolArray, FloatArray
+from seakeep.conventions import is_elevation
 from seakeep.core.wave_bands import PER_OCTAVE, band_edges, band_energy
 from seakeep.models import labelled, store
 from seakeep.models.checks import typed
@@ -176,7 +177,7 @@ class Coverage:
                     is_gap=bool(inside[0] < peak < inside[-1] and not known[peak]),
                     height=float(heights[column]),
                     highest=float(self.heights[column]),
-                    steepness=float(steep[column]) if channel.startswith("eta") else np.nan,
+                    steepness=float(steep[column]) if is_elevation(channel) else np.nan,
                     steepest=float(self.steepnesses[column]),
                 )
             )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
+
+from seakeep.report.style import new_figure
 
 __all__ = ["Figure", "tuning_figure"]
 
@@ -30,10 +31,9 @@ def tuning_figure(table: xr.Dataset) -> Figure:
     shown = [("ridge", "ridge per snapshot pair (1)", ~truncated)]
     if truncated.any():
         shown.append(("rank", "singular values kept (1)", truncated))
-    figure, panels = plt.subplots(
+    figure = new_figure(7.0, 4.2)
+    panels = figure.subplots(
         *(1, len(shown)),
-        figsize=(7.0, 4.2),
-        layout="constrained",
         sharey=True,
         squeeze=False,
         width_ratios=[2, 1][: len(shown)],
