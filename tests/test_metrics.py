@@ -433,6 +433,24 @@ def test_bounds_take_the_place_of_the_value():
         metrics.error_over_time(**pair, interval=0.9)
     with pytest.raises(RequestError, match="interval must lie between 0 and 1"):
         metrics.nrmse(**pair, interval=95)
+    with pytest.raises(RequestError, match="is_slack says yes or no, and has no interval"):
+        metrics.is_slack(**pair, interval=0.9)
+
+
+def test_a_forecast_that_ends_in_nan_has_no_interval():
+    measured = np.random.default_rng(0).standard_normal((400, 2))
+    predicted = 0.9 * measured
+    predicted[-1, 1] = np.nan
+    pair = both(predicted, measured)
+    np.testing.assert_array_equal(
+        np.isnan(metrics.nrmse(**pair, interval=0.9)), [[False, True], [False, True]]
+    )
+    assert np.isnan(metrics.anrmse(**pair, interval=0.9)).all()
+    sets = [[labelled(0.9 * measured)], [labelled(predicted)]]
+    found = metrics.anrmse_differences(sets, [labelled(measured)])
+    for key in ("lower", "upper", "anrmse_lower", "all_upper"):
+        assert np.isnan(found[key].values.ravel()[1])
+        assert np.isfinite(found[key].values.ravel()[0])
 
 
 def test_errors_that_models_share_cancel_in_their_difference():

@@ -186,14 +186,18 @@ def _valued(
     level: float | None,
 ) -> Any:
     """A measure, or its bounds over redrawn blocks of instants, shape (2, …)."""
+    value = np.asarray(measure(**arrays, **known))
     if level is None:
-        return measure(**arrays, **known)
+        return value
+    if value.dtype == bool:
+        raise RequestError(f"{measure.__name__} says yes or no, and has no interval.")
     p, m, _, _ = core.paired(arrays["predicted"], arrays["measured"], None)
     tails = fraction(level, "interval")
     block = _block(p, m)
     axis = max(p.ndim, m.ndim) - 2  # of the draws, behind members and windows
     found = _redrawn(measure, p, m, known, block)
-    return _bounds(found, m.shape[-2] / block, tails, axis)
+    # Draws without the instants that make the value NaN say nothing of it.
+    return np.where(np.isnan(value), np.nan, _bounds(found, m.shape[-2] / block, tails, axis))
 
 
 def _block(p: FloatArray, m: FloatArray) -> int:
@@ -343,7 +347,9 @@ def _anrmse_of_run(
     redrawn = [
         _redrawn(core.anrmse, p, m, k, block, seed) for (p, m), k in zip(arrays, known, strict=True)
     ]
-    return np.array(own, dtype=float), np.stack(redrawn), arrays[0][1].shape[-2] / block
+    values = np.array(own, dtype=float)
+    draws = np.where(np.isnan(values)[:, None], np.nan, np.stack(redrawn))
+    return values, draws, arrays[0][1].shape[-2] / block
 
 
 is_slack: Measure[xr.Dataset, BoolArray] = labelled(core.is_slack, "channel", label="slackness")

@@ -122,7 +122,7 @@ class TestLead:
         with pytest.raises(RequestError, match=r"model's lead takes 5\. At most 395 steps"):
             model.forecast(run, start=20.0, steps=396)
 
-    @pytest.mark.parametrize(("lead", "samples"), [(5, 5), (0.25, 4)])
+    @pytest.mark.parametrize(("lead", "samples"), [(5, 5), ("0.25 T", 4)])
     def test_an_ensemble_counts_it_in_samples_or_periods(self, lead, samples, tmp_path):
         run = sea(ahead=3)
         fitted = ensemble(lead=lead).fit(run, ["heave"], ["eta"])
@@ -135,6 +135,11 @@ class TestLead:
         )
         back = load_model(fitted.save(tmp_path / "e.nc"))
         xr.testing.assert_identical(back.forecast(run, start=20.0, steps=30), members)
+
+    @pytest.mark.parametrize("lead", [2.0, -1, True, "-1 T", "2 /T", "inf T"])
+    def test_a_number_is_samples_and_a_text_periods(self, lead):
+        with pytest.raises(RequestError, match=r"lead must be zero or more, a whole number of sam"):
+            ensemble(lead=lead)
 
 
 @dataclass(frozen=True)
@@ -299,7 +304,7 @@ class TestRegistry:
         [
             HankelDMDc(3, np.int64(8), 1.0, lead=2, alignment={"mode": "dispersion"}),
             HankelDMDc.recommended(1.6, 0.1),
-            ensemble(seed=np.random.default_rng(3), lead=0.5, ridge=seakeep.Fixed(2.0)),
+            ensemble(seed=np.random.default_rng(3), lead="0.5 T", ridge=seakeep.Fixed(2.0)),
             BayesianHankelDMDc.paper(1.6, n_members=3, seed=np.random.SeedSequence(5).spawn(2)[1]),
         ],
     )
@@ -324,7 +329,7 @@ class TestRegistry:
     def test_needs_of_specs(self):
         single = HankelDMDc(3, 8, 1.0, window=100, lead=2).needs(0.1)
         assert (single.snapshots, single.history, single.inside, single.lead) == (100, 8, False, 2)
-        many = ensemble(train_length=Uniform(10, 20), lead=0.5).needs(0.1)
+        many = ensemble(train_length=Uniform(10, 20), lead="0.5 T").needs(0.1)
         assert (many.snapshots, many.history, many.lead) == (320, 16, 8)
 
     @pytest.mark.parametrize("period", [1.0, 0.5])

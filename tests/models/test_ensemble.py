@@ -500,7 +500,7 @@ def test_the_presets():
     assert (paper.delay_rows, paper.ridge_scale, paper.n_members) == ("ridge", "absolute", 100)
     ours = BayesianHankelDMDc.recommended(encounter_period=1.64, n_members=5)
     assert (ours.train_length, ours.delay_rows) == (None, "exact")
-    assert (ours.ridge, ours.lead, ours.alignment.passes) == ("rollout", 0.75, 3)
+    assert (ours.ridge, ours.lead, ours.alignment.passes) == ("rollout", "0.75 T", 3)
     assert [ours.input_delay.ppf(q) for q in (0, 0.5, 1)] == [2, 3, 4]
 
 

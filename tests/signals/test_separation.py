@@ -98,7 +98,7 @@ def test_bad_records_are_refused():
         probe_separation(wave, wave[:-1], DT, DEPTH, 1.0)
     with pytest.raises(RequestError, match=r"1e.06 m is too far .* Correct the positions"):
         probe_separation(wave, wave, DT, DEPTH, 1e6)
-    with pytest.raises(RequestError, match="stated must be a number"):
+    with pytest.raises(RequestError, match="the stated separation must be a number"):
         probe_separation(wave, wave, DT, DEPTH, float("nan"))
     with pytest.raises(DataError, match="second record is constant"):
         probe_separation(wave, 0 * wave, DT, DEPTH, 1.0)

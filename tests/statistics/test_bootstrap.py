@@ -10,6 +10,7 @@ from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.statistics import (
     block_length,
     choose_block_length,
+    jsd_interval,
     lag_one_correlation,
     moving_block_bootstrap,
 )
@@ -240,8 +241,11 @@ def test_blocks_longer_than_a_segment():
         moving_block_bootstrap(NOISE, 3, 40, np.random.default_rng(0), segments=[70, 30])
 
 
-def test_a_seed_is_no_generator_and_gaps_are_not_redrawn():
-    with pytest.raises(RequestError, match=r"such as numpy.random.default_rng.* received 0"):
-        moving_block_bootstrap(NOISE, 3, 4, 0)
+def test_a_rule_that_counts_in_periods_says_where_they_are_stated():
+    with pytest.raises(RequestError, match=r"State both to block_length\(\), or a block length in"):
+        jsd_interval(NOISE, NOISE, block_length="encounter_periods", rng=np.random.default_rng(0))
+
+
+def test_gaps_are_not_redrawn():
     with pytest.raises(DataError, match="NaN or infinite"):
         moving_block_bootstrap([1.0, np.nan, 2.0], 3, 1, np.random.default_rng(0))

@@ -55,6 +55,7 @@ from seakeep.models.training import (
 )
 from seakeep.models.validity import Coverage
 from seakeep.sizes import LONG_MEMBERS, MOST_MEMBERS, check_size
+from seakeep.toml import parse_length
 
 __all__ = ["BayesianHankelDMDc", "HankelDMDc"]
 
@@ -409,8 +410,9 @@ class BayesianHankelDMDc:
         120, and none is of regular waves (``attrs["waves"]``), and all runs otherwise.
     dt : float, optional
         Time step the runs must have, s; None takes theirs.
-    lead : int or float, optional
-        Look-ahead of the waves: samples as an integer, encounter periods as a float.
+    lead : int or str, optional
+        Look-ahead of the waves: a number of samples, or a text such as ``"0.75 T"`` in encounter
+        periods.
     history, delay_rows, ridge_scale, rank, standardize, observables, stable, select
         As in :class:`HankelDMDc`.
     alignment
@@ -449,7 +451,7 @@ class BayesianHankelDMDc:
     rank: int | None = None
     standardize: bool = True
     alignment: ProbeAlignment | None = None
-    lead: int | float = 0
+    lead: int | str = 0
     observables: tuple[Observable, ...] = ()
     readouts: ReadOuts = ()
     stable: bool | float = False
@@ -469,7 +471,6 @@ class BayesianHankelDMDc:
         check_seconds("encounter_period", period)
         # Without dt any step shorter than the period will do; the runs' own is checked at fit.
         periods_to_samples(1, period, 0.5 * period if self.dt is None else self.dt)
-        _check_lead(self.lead)
         check_choice("sampling", self.sampling, ("monte_carlo", "sobol"))
         check_choice("train_on", self.train_on, get_args(TrainOn))
         object.__setattr__(self, "observables", observables_of(self.observables))
@@ -484,9 +485,6 @@ class BayesianHankelDMDc:
 
     def shared(self, dt: float) -> HankelSettings:
         """What all members share; its delays, window and λ are not used."""
-        lead = self.lead
-        if not isinstance(lead, int):
-            lead = periods_to_samples(lead, self.encounter_period, dt) if lead else 0
         return HankelSettings(
             state_delays=0,
             input_delays=0,
@@ -497,7 +495,7 @@ class BayesianHankelDMDc:
             rank=self.rank,
             standardize=self.standardize,
             alignment=self.alignment,
-            lead=lead,
+            lead=_lead_samples(self.lead, self.encounter_period, dt),
             observables=self.observables,
             readouts=self.readouts,
             stable=self.stable,
@@ -661,7 +659,7 @@ class BayesianHankelDMDc:
             delay_rows="exact",
             ridge_scale="per_snapshot",
             alignment=ALIGNMENT,
-            lead=LEAD_PERIODS,
+            lead=f"{LEAD_PERIODS} T",
             readouts="auto",
             train_on="auto",
             select=Select(observables=True, period=encounter_period),
@@ -870,12 +868,17 @@ def _step_of(dt: float | None, runs: Runs | None) -> float:
     return step
 
 
-def _check_lead(lead: object) -> None:
-    if isinstance(lead, bool) or not isinstance(lead, int | float) or not 0 <= lead < np.inf:
+def _lead_samples(lead: int | str, encounter_period: float, dt: float) -> int:
+    """Look-ahead in samples, of a number of samples or a text in encounter periods."""
+    if isinstance(lead, int) and not isinstance(lead, bool) and lead >= 0:
+        return lead
+    length = parse_length(lead) if isinstance(lead, str) else None
+    if length is None or length.unit != "T" or not 0 <= length.value < np.inf:
         raise RequestError(
-            f"lead must be zero or more, an integer of samples or a float of encounter periods; "
+            f"lead must be zero or more, a whole number of samples or a text such as '0.75 T'; "
             f"received {lead!r:.{SHOWN}}."
         )
+    return periods_to_samples(length.value, encounter_period, dt) if length.value else 0
 
 
 def _training_arrays(
