@@ -493,3 +493,12 @@ def test_the_interval_of_the_mean_over_runs_holds_it_as_often_as_it_says():
         held += bool(found["all_lower"] <= truth <= found["all_upper"])
     # 150 repetitions know a coverage of 95 % to 1.8 % (one SD); 500 gave 92.6 %.
     assert 0.91 <= held / len(draws) <= 0.99
+
+
+def test_a_channel_is_judged_where_less_than_half_of_its_variance_is_noise():
+    measured = np.tile([[1.0, 1.0], [-1.0, -1.0]], (50, 1))
+    spread = measured.std(axis=0, ddof=1)
+    for part, slack in ((0.49, False), (0.51, True)):
+        pair = both(measured, measured)
+        found = metrics.is_slack(**pair, noise_std=np.sqrt(part) * spread)
+        np.testing.assert_array_equal(found, [slack, slack])

@@ -104,3 +104,16 @@ def test_a_short_test_says_so(run):
     shorter = run.isel(time=slice(0, 2)).assign_attrs(test_span=(0.0, 0.1))
     with pytest.raises(DataError, match=r"no run can be forecast\. short: "):
         check.residuals(fitted(run, 3), {"short": shorter})
+
+
+def test_limits_and_past_inputs_are_those_of_the_errors_by_hand(run):
+    model = fitted(run, 0)
+    found = check.residuals(model, {"run": run})
+    assert float(found.limit) == pytest.approx(1.96 / np.sqrt(1499), rel=1e-12)
+    first, last = 1500, 2999  # the last measured state before each step of the test part
+    error = one_step(model, run, first, last)[:, 0] - run.heave.values[first + 1 : last + 1]
+    inputs = run.eta.values[first + 1 : last + 1]
+    e, u = error - error.mean(), inputs - inputs.mean()
+    for lag in (0, 1, 2):
+        expected = e[lag:] @ u[: len(u) - lag] / np.sqrt((e @ e) * (u @ u))
+        assert float(found.input_correlation[0, 0, lag]) == pytest.approx(expected, abs=1e-10)

@@ -183,3 +183,10 @@ def test_what_cannot_be_judged_says_why(sea, model):
         check.measured_response(model, {"dead": dead})
     with pytest.raises(DataError, match="it has no frequency"):
         dominant_frequency(np.ones(100), 0.1)
+
+
+def test_type_a_uncertainty_is_that_of_the_mean_of_few_windows():
+    ratios = np.array([1.0, 1.2, 1.1])[:, None].astype(complex)
+    found = estimate(ratios, np.zeros(1))
+    # Student's t of two degrees of freedom times 0.1/√3.
+    assert found.amplitude[0] == pytest.approx(4.302653 * 0.1 / np.sqrt(3), rel=1e-6)

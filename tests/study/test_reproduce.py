@@ -11,11 +11,20 @@ from seakeep.files import write_netcdf
 from seakeep.report.tables import MISSING
 from seakeep.study import read_result, read_study
 from seakeep.study.plan import make_plan
-from seakeep.study.reproduce import ACTS, SLOW, Size, read_reproduction, reproduce, study_text
+from seakeep.study.reproduce import (
+    ACTS,
+    HIGH_PASS,
+    SLOW,
+    Size,
+    read_reproduction,
+    reproduce,
+    study_text,
+)
 
 pytest.importorskip("seakeep.tank.play", reason="the virtual tank needs its libraries")
 from seakeep.tank.delivery import campaign_text, write_record
 from seakeep.tank.instruments import Column, Record
+from seakeep.tank.settings import default_settings
 
 SMALL = Size(training=2, tests=2, members=2, series=4)
 RATE = 50.0
@@ -179,3 +188,9 @@ def test_the_page_over_the_acts_links_to_theirs(played, results):
         assert act.title in page
     for name in ("acts", "claims", "channels_irregular", "waves", "positions"):
         assert f'id="table-{name}"' in page
+
+
+def test_the_edge_of_the_drift_lies_between_drift_and_waves():
+    slowest = default_settings().runs["irregular_1"].spectrum.band[0]
+    # A filter of 60 s bends within some tenths of its edge; the drift is at 0.03 Hz.
+    assert 4 * 0.03 < HIGH_PASS < slowest / 1.5
