@@ -407,6 +407,7 @@ def test_panels_fill_their_rows(channels, rows):
 
 
 def test_letters_that_latex_reads_otherwise():
+    assert latex_text("τ̂ and T̂, not τ") == r"$\hat\tau$ and $\hat T$, not $\tau$"
     assert latex_text("50 % of a_b & λ") == r"50 \% of a\_b \& $\lambda$"
 
 

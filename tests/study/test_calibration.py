@@ -116,8 +116,7 @@ def test_where_runs_are_left_out_each_is_forecast_by_the_others_and_the_test_run
     again = margins({**runs, "unseen": spoilt})
     np.testing.assert_array_equal(again["margin"], found["margin"])
     # The margin of one run alone is another: both count.
-    fewer = {**runs, "second": runs["second"] * 1.5}
-    fewer["second"].attrs = runs["second"].attrs
+    fewer = {**runs, "second": runs["second"].map(lambda each: each * 1.5, keep_attrs=True)}
     assert (margins(fewer)["margin"] != found["margin"]).any()
 
 

@@ -112,6 +112,8 @@ def test_start_and_steps_of_the_user_are_taken(halves):
     (judged,) = compare(fit_campaign(whole), whole, ["all"], start=150.0, steps=20)
     assert judged.forecast.sizes["time"] == 20
     assert float(judged.forecast.time[0]) == pytest.approx(150.1)
+    with pytest.raises(RequestError, match=r"steps must be a whole number of .* received 4\.7"):
+        compare(fit_campaign(whole), whole, ["all"], start=150.0, steps=4.7)
 
 
 def test_steps_one_past_the_record_are_judged_where_there_is_a_measurement(halves):

@@ -19,6 +19,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray, IntArray
+from seakeep.conventions import is_elevation
 from seakeep.core import metrics
 from seakeep.core.path import Moments, free_runs, lagged, ridge_path, truncated_path
 from seakeep.errors import DataError, RequestError, did_you_mean
@@ -126,7 +127,7 @@ class Trial:
     scores : ndarray, shape (level, window)
         NRMSE averaged over the channels, by window of all folds and horizons.
     weights : ndarray, shape (window,)
-        They sum to one; folds and horizons count alike.
+        They sum to one; folds count alike, and the horizons of a fold.
     """
 
     levels: tuple[float, ...]
@@ -539,10 +540,10 @@ def _judged(
             horizons = [each for each in found if each.shape[1]]  # in others nothing moves
             scores += horizons
             weights += [
-                np.full(each.shape[1], 1.0 / (len(folds) * len(horizons) * each.shape[1]))
-                for each in horizons
+                np.full(each.shape[1], 1.0 / (len(horizons) * each.shape[1])) for each in horizons
             ]
-        kept = np.concatenate(scores, axis=1), np.concatenate(weights)
+        joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
+        kept = np.concatenate(scores, axis=1), joined / joined.sum()
         yield candidate, Trial(levels(candidate), *kept)
 
 
@@ -730,12 +731,7 @@ def select(
         alignments = _alignments(settings.alignment, runs, states, inputs)
     wanted = [settings.observables]
     if "observables" in vary and not settings.observables:
-        elevations = [
-            label.name
-            for label in labelled.common_labels(runs, inputs)
-            if label.units in ("", "m")  # not their rates
-        ]
-        defaults = default_observables(elevations, samples * step, folds == "sea_state")
+        defaults = default_observables(inputs, samples * step, folds == "sea_state")
         wanted = list(dict.fromkeys([defaults, defaults[1:], ()]))
     base = Candidate(
         settings.state_delays,
@@ -948,7 +944,7 @@ def default_observables(
     without a look-ahead: few training seas do not tell how a force is weighed by frequency, and
     probes away from the vessel see the waves before it.
     """
-    elevations = tuple(name for name in inputs if name.startswith("eta"))
+    elevations = tuple(name for name in inputs if is_elevation(name))
     if not elevations:
         return ()
     at_vessel = tuple(name for name in elevations if name == "eta_cog") or elevations

@@ -17,6 +17,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray
+from seakeep.conventions import is_elevation
 from seakeep.core import metrics
 from seakeep.core.bands import band_error_over_time
 from seakeep.errors import DataError, SeakeepError
@@ -439,7 +440,7 @@ def _noise(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray:
 
 def wave_heights(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray | None:
     """Twice the envelope of the first elevation in windows, (window, time), or None."""
-    name = next((name for name in plan.inputs if name.startswith("eta_")), None)
+    name = next((name for name in plan.inputs if is_elevation(name)), None)
     if name is None:
         return None
     out = []
