@@ -232,6 +232,9 @@ def test_distributions_of_scipy_are_named_in_the_table():
             "'norm' with these 'parameters' has no median; correct them",
         ),
         ("-1", "state_delays must be an integer of at least 0; received -1"),
+        ('"1 /T"', "state_delays must be a length that is not negative, .* received '1 /T'"),
+        ('"-1 T"', "state_delays must be a length that is not negative, .* received '-1 T'"),
+        ("1\nridge = '1 T'", "ridge must be a number, zero or positive, or the word rollout"),
         ('"1 Q"', "state_delays: a text in place of a number counts in encounter periods"),
         ("1\nriddge = 2", "has no key 'riddge'. Did you mean 'ridge'"),
         (
