@@ -20,19 +20,13 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.pipeline import flag_samples
+from seakeep.quality.agreement import FEWEST_STEPS, LATE, RUN_AWAY, compare_sensors
+from seakeep.quality.faults import MISSING, flag_attributes
 from seakeep.quality.record import Record, Redundant
 from seakeep.quality.samples import constant, flagged, levels
-from seakeep.quality.sensors import held, redundant
+from seakeep.quality.sensors import redundant
 from seakeep.signals import bridge, integrate
-from seakeep.signals.quality import (
-    FEWEST_STEPS,
-    LATE,
-    MISSING,
-    RUN_AWAY,
-    compare_sensors,
-    dominant_period,
-    flag_attributes,
-)
+from seakeep.signals.waves import dominant_period
 from seakeep.tank.instruments import record_run
 from seakeep.tank.play import check_settings, generator, play_run
 from seakeep.tank.settings import default_settings
@@ -125,7 +119,7 @@ def kinds(x: np.ndarray, trusted: np.ndarray, dt: float) -> set[str]:
     group = flag_samples(group, replaced=False)
     both = group.assign(trusted=("time", trusted, {"units": "m"}))[["trusted", "heave"]]
     record = Record("run", both, {"": group}, redundant=PAIRS)
-    checks = (flagged, constant, levels, redundant, held)
+    checks = (flagged, constant, levels, redundant)
     found = {each.kind.word for one in checks for each in one(record) if each.channel == "heave"}
     return {SAME.get(word, word) for word in found}
 

@@ -108,6 +108,11 @@ def test_a_search_that_was_interrupted_goes_on(tmp_path):
     assert again.table.identical(whole.table)
     with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
         seakeep.tune(SPEC, runs(2), STATES, INPUTS, **more)
+    shifted = {name: run.assign_coords(time=run["time"] + 1.0) for name, run in runs().items()}
+    longer = {name: run.assign_attrs(encounter_period=2.0) for name, run in runs().items()}
+    for others in (shifted, longer):  # the same values
+        with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
+            seakeep.tune(SPEC, others, STATES, INPUTS, **more)
     kept.write_text("[]")
     with pytest.raises(RequestError, match="keeps no scores of a search"):
         seakeep.tune(SPEC, runs(), STATES, INPUTS, **more)
@@ -132,9 +137,11 @@ def test_folds_that_are_no_number_of_parts_are_refused():
 
 
 def test_the_figure_has_a_line_per_candidate_and_units():
-    pytest.importorskip("matplotlib")
+    pyplot = pytest.importorskip("matplotlib.pyplot")
     result = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["lead"], horizon=(15,))
+    before = pyplot.get_fignums()
     figure = result.figure()
+    assert pyplot.get_fignums() == before  # pyplot keeps what it makes until it is closed
     (axes,) = figure.axes
     words = [text.get_text() for text in axes.get_legend().get_texts()]
     leads = np.unique(result.table["lead"].values)

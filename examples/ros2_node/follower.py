@@ -3,83 +3,107 @@
 Nothing here knows ROS: `node.py` does.
 """
 
-from collections import deque
+from collections import Counter
 from math import isfinite, nan
 
 STARTING = 4
-"""Complete samples with which a live model must start."""
+"""Samples with all inputs that a live model starts with."""
 
 
 class Follower:
-    """Feeds a live model with what arrived.
+    """Feed a live model with what arrived.
 
-    A sample belongs to the instant that is nearest to its stamp, within half a step; of several,
-    the nearest counts. An instant is over half a step after it, plus `patience` for messages that
-    come late. Inputs that are missing then are predicted, states that are missing are estimated.
+    A value counts if its stamp is within `patience` of the clock when it arrives. It belongs to
+    the instant of the model's grid that is nearest to its stamp; of several, the nearest one
+    counts. An instant is over half a step and `patience` after it, so the order of arrival does
+    not matter. Inputs that are missing then are predicted, states that are missing are estimated.
 
     Parameters
     ----------
-    model : model or HeldEnsemble
-        What has a method ``live()``.
+    start : callable
+        Makes a new live model: ``lambda: model.live(like=run)``.
     live : Live, optional
         A state to continue from; by default the follower starts when all inputs arrive.
     patience : float
-        How late a message may be, s.
+        How far a stamp may be before or after the clock, s.
     longest : float
-        After a gap of all inputs that is longer than this, s, the follower starts anew.
+        The follower starts anew after this time without any input, s. It also does so where the
+        clock is set back by more than `patience`.
+
+    Attributes
+    ----------
+    live : Live
+        The live model.
+    lost : Counter
+        Numbers by channel and reason: values that came "late", "early" or "not finite", and
+        instants for which one was "missing". Starts are counted under "all".
     """
 
-    def __init__(self, model, live=None, patience=0.0, longest=60.0):
-        self.model, self.live = model, model.live() if live is None else live
+    def __init__(self, start, live=None, *, patience=0.1, longest=60.0):
+        self.start, self.live = start, start() if live is None else live
         self.patience, self.longest = patience, longest
-        self.dt, self.inputs = model.dt, list(model.inputs)
-        self.waiting = {name: deque() for name in [*model.inputs, *model.states]}
-        self.next = self.live.time + self.dt  # NaN before the start
+        signature = self.live.signature
+        self.dt, self.inputs, self.states = signature.dt, signature.inputs, signature.states
+        self.waiting = {name: [] for name in [*self.inputs, *self.states]}
         self.steps = 0 if live is None else STARTING
+        self.first = self.live.time - (STARTING - 1) * self.dt  # instant of the first step
+        self.fed = self.live.time  # when the last input came; NaN before
+        self.lost = Counter()
 
-    def receive(self, channel, stamp, value):
-        """Take one measured value; one that is not finite or comes too late is left out."""
-        if isfinite(value) and not stamp < self.next - self.dt / 2:
+    def receive(self, channel, stamp, value, now):
+        """Take a measured value that arrived when the clock showed `now`."""
+        self._check_clock(now)
+        if not isfinite(value):
+            self.lost[channel, "not finite"] += 1
+        elif now - stamp > self.patience:
+            self.lost[channel, "late"] += 1
+        elif stamp - now > self.patience:
+            self.lost[channel, "early"] += 1
+        else:
             self.waiting[channel].append((stamp, value))
+            if channel in (self.inputs or self.states):
+                self.fed = now
 
     def advance(self, now):
         """Estimates of the instants that are over: a list of (instant, states)."""
-        found = []
-        if not isfinite(self.next) and not self._begin():
-            return found
-        if now - self.next > self.longest:
-            self._restart()
-            return found
-        while self.next + self.dt / 2 + self.patience <= now:
-            inputs = {name: self._nearest(name) for name in self.inputs}
-            states = {name: self._nearest(name) for name in self.model.states}
-            complete = all(map(isfinite, inputs.values()))
-            if not complete and self.steps < STARTING:
-                self._restart()
-                return found
-            state = self.live.step(inputs if complete else None, states, time=self.next)
-            found.append((self.next, state))
-            self.next, self.steps = self.next + self.dt, self.steps + 1
+        self._check_clock(now)
+        found, over = [], now - self.patience - self.dt / 2
+        while (instant := self._next()) <= over:
+            sample = {name: self._nearest(name, instant) for name in self.waiting}
+            missing = [name for name, value in sample.items() if not isfinite(value)]
+            if self.steps < STARTING and set(missing) & set(self.inputs):
+                self._start_anew("waiting for all inputs")
+                continue
+            self.lost.update((name, "missing") for name in missing)
+            self.first = self.first if self.steps else instant
+            u, y = ([sample[name] for name in of] for of in (self.inputs, self.states))
+            found.append((instant, self.live.step(u, y, time=instant)))
+            self.steps += 1
+        if not self.steps:  # no instant can need what is older
+            for name, waiting in self.waiting.items():
+                self.waiting[name] = [each for each in waiting if each[0] > over - self.dt]
         return found
 
-    def _begin(self):
-        """Start where the first samples of the inputs end, when all of them are there."""
-        firsts = [self.waiting[name] for name in self.inputs or self.model.states]
-        if not all(firsts):
-            return False
-        self.next = max(each[0][0] for each in firsts)
-        return True
+    def _next(self):
+        """The instant to come: without one before, the first for which an input is there."""
+        if self.steps:
+            return self.first + self.steps * self.dt  # a sum of steps would drift
+        driving = self.inputs or self.states
+        return min((stamp for name in driving for stamp, _ in self.waiting[name]), default=nan)
 
-    def _restart(self):
-        self.live, self.next, self.steps = self.model.live(), nan, 0
-        for each in self.waiting.values():
-            each.clear()
-
-    def _nearest(self, channel):
+    def _nearest(self, channel, instant):
         """Value nearest to the instant, NaN without one; what is older is forgotten."""
-        waiting, best, value = self.waiting[channel], self.dt / 2, nan
-        while waiting and waiting[0][0] < self.next + self.dt / 2:
-            stamp, each = waiting.popleft()
-            if abs(stamp - self.next) <= best:
-                best, value = abs(stamp - self.next), each
-        return value
+        half, waiting = self.dt / 2, self.waiting[channel]
+        self.waiting[channel] = [each for each in waiting if each[0] >= instant + half]
+        near = [(abs(stamp - instant), stamp, value) for stamp, value in waiting]
+        return min((each for each in near if each[0] <= half), default=(0, 0, nan))[2]
+
+    def _check_clock(self, now):
+        if now - self.fed > self.longest or self.fed - now > self.patience:
+            self._start_anew("no input for long, or a clock that was set")
+            self.fed, self.waiting = nan, {name: [] for name in self.waiting}
+
+    def _start_anew(self, why):
+        if self.steps:
+            self.live, self.steps = self.start(), 0
+        self.lost["all", why] += 1

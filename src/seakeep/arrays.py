@@ -7,7 +7,7 @@ of unequal length. The message says what was received and how to correct it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ __all__ = [
     "ComplexArray",
     "FloatArray",
     "IntArray",
+    "Progress",
     "as_bundle",
     "as_real",
     "as_series",
@@ -36,6 +37,9 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.intp]
 ComplexArray = npt.NDArray[np.complex128]
+
+Progress = Callable[[int, int, str], None]
+"""Takes how many steps are done, how many there are, and the name of one."""
 
 _REMEDIES = {
     "c": "Give its real part or its modulus",

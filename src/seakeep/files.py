@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     import h5py
     import xarray as xr
 
+    from seakeep.arrays import FloatArray
+
 __all__ = [
     "MARK",
     "check_output",
@@ -40,6 +42,7 @@ __all__ = [
     "sha256_of",
     "write_netcdf",
     "write_sealed",
+    "write_sealed_array",
 ]
 
 FORMAT = 4
@@ -300,6 +303,10 @@ def write_netcdf(
     made = io.BytesIO()
     with h5netcdf.File(made, "w") as file:
         dataset.dump_to_store(H5NetCDFStore(file, mode="a"), encoding=encoding or {})
+    _seal(path, made)
+
+
+def _seal(path: Path, made: io.BytesIO) -> None:
     with path.open("wb") as whole, made.getbuffer() as content:
         whole.write(content)
         whole.write(SEAL + hashlib.sha256(content).hexdigest().encode())
@@ -389,10 +396,31 @@ def write_sealed(
     """
     target = Path(path)
     check_output(target, kind)
-    head = {MARK: kind, "seakeep_format": FORMAT, "seakeep_version": metadata.version("seakeep")}
     with replacing(target) as temporary:
-        write_netcdf(temporary, dataset.assign_attrs(head))
+        write_netcdf(temporary, dataset.assign_attrs(_head(kind)))
     return target
+
+
+def write_sealed_array(
+    values: FloatArray, attrs: Mapping[str, str], path: Path | str, kind: str
+) -> Path:
+    """Write one series ``values`` as :func:`write_sealed` does, in a few milliseconds."""
+    import h5py
+
+    target, made = Path(path), io.BytesIO()
+    check_output(target, kind)
+    with h5py.File(made, "w") as file:
+        file.attrs.update({**attrs, **_head(kind)})
+        file["values"] = values
+        file["values"].make_scale("values")  # a dimension of NetCDF
+    with replacing(target) as temporary:
+        _seal(temporary, made)
+    return target
+
+
+def _head(kind: str) -> dict[str, Any]:
+    version = metadata.version("seakeep")
+    return {MARK: kind, "seakeep_format": FORMAT, "seakeep_version": version}
 
 
 def load_sealed(path: Path | str, kind: str) -> xr.Dataset:
@@ -568,10 +596,10 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def _mark_of_netcdf(path: Path) -> str | None:
-    import h5netcdf
+    import h5py  # a tenth of the time of h5netcdf
 
     try:
-        with h5netcdf.File(read_sealed(path), "r") as file:
+        with h5py.File(read_sealed(path), "r") as file:
             return str(file.attrs.get(MARK))
     except (DataError, OSError):  # not ours
         return None

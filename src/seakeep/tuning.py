@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, MutableMapping, Sequence
+from collections.abc import MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.errors import RequestError
 from seakeep.files import read_bytes, replacing
 from seakeep.models import HankelDMDc
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from seakeep.report.figures.tuning import Figure
 
 __all__ = ["TuneResult", "tune"]
-
-Progress = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,45 +203,35 @@ def _digest(asked: object, runs: dict[str, xr.Dataset], channels: Sequence[str])
     found = hashlib.sha256(json.dumps(asked, sort_keys=True).encode())
     for name, run in runs.items():
         found.update(name.encode())
-        found.update(np.ascontiguousarray(channel_matrix(run, channels, name)).tobytes())
+        facts = {key: run[key].attrs for key in channels} | {"run": run.attrs}
+        found.update(repr(facts).encode())
+        for values in (run["time"].values, channel_matrix(run, channels, name)):
+            found.update(np.ascontiguousarray(values).tobytes())
     return found.hexdigest()
 
 
-class _Kept(MutableMapping[str, Any]):
+class _Kept(dict[str, Any]):
     """Scores in a file: each one that is added is written."""
 
     def __init__(self, path: Path, digest: str) -> None:
-        self.path = path
-        self.content: dict[str, Any] = {"digest": digest, "scores": {}}
+        self.path, self.digest = path, digest
         if path.exists():
             try:
                 content = json.loads(read_bytes(path))
-                kept, scores = content["digest"], dict(content["scores"])
+                known, scores = content["digest"], dict(content["scores"])
             except (ValueError, LookupError, TypeError) as error:
                 raise RequestError(
                     f"{path} keeps no scores of a search ({error}). Name another file, or remove "
                     "it."
                 ) from None
-            if kept != digest:
+            if known != digest:
                 raise RequestError(
                     f"{path} keeps scores of other runs or settings. Name another file, or remove "
                     "it to start anew."
                 )
-            self.content["scores"] = scores
-
-    def __getitem__(self, key: str) -> Any:
-        return self.content["scores"][key]
+            self.update(scores)
 
     def __setitem__(self, key: str, value: Any) -> None:
-        self.content["scores"][key] = value
+        super().__setitem__(key, value)
         with replacing(self.path) as place:
-            place.write_text(json.dumps(self.content), encoding="utf-8")
-
-    def __delitem__(self, key: str) -> None:
-        del self.content["scores"][key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.content["scores"])
-
-    def __len__(self) -> int:
-        return len(self.content["scores"])
+            place.write_text(json.dumps({"digest": self.digest, "scores": self}), encoding="utf-8")

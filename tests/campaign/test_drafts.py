@@ -15,7 +15,7 @@ from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.quality import findings_of
-from seakeep.signals.quality import BRIDGED
+from seakeep.quality.faults import BRIDGED
 
 ASSUMED = "{} is taken as .*, which is assumed: no file states its unit"
 

@@ -69,6 +69,27 @@ def test_how_rows_are_cut_up_does_not_matter(campaign, rows):
     assert whole.push({}).sizes["time"] == 0
 
 
+def test_a_chain_that_was_saved_goes_on_to_the_last_bit(campaign, rows, tmp_path):
+    def cut(first, stop):
+        at = np.searchsorted(rows["t"], [first, stop])
+        return {"": {name: each[slice(*at)] for name, each in rows.items()}}
+
+    settings = {"delay": "1 T", "window": "20 T"}
+    whole, again, late = (campaign.live_chain("unseen", **settings) for _ in range(3))
+    whole.push(cut(0, 30))
+    again.resume(whole.save(tmp_path / "chain.nc"))
+    for first in (30, 34, 38):
+        xr.testing.assert_identical(
+            again.push(cut(first, first + 4)), whole.push(cut(first, first + 4))
+        )
+    late.resume(late.save(tmp_path / "chain.nc"))  # before the first row
+    assert late.push(cut(0, 10)).sizes["time"] > 0
+    rig = seakeep.read_campaign(ground.write(tmp_path) / "campaign.toml")
+    other = rig.live_chain("one", delay=2.0, window=20.0)
+    with pytest.raises(RequestError, match="a chain with other loggers, columns or steps"):
+        whole.resume(other.save(tmp_path / "other.nc"))
+
+
 def test_a_gap_is_masked_and_what_follows_it_is_as_if_there_were_none(campaign, rows):
     assert campaign.settings.preparation.gaps == "refuse"
     time = rows["t"]

@@ -87,6 +87,13 @@ def test_what_cannot_be_judged_says_why(model):
     rates = HankelDMDc(1, 0, 1.0).fit(run, ["heave_rate"], ["eta"])
     with pytest.raises(RequestError, match="no state of the model is a rigid motion"):
         check.decay(rates)
+    named = run.rename(heave="heave_mru")
+    words = r"If heave_mru is the vessel's heave, call it heave in the campaign file"
+    by_device = HankelDMDc(1, 0, 1.0).fit(named, ["heave_rate", "heave_mru"], ["eta"])
+    with pytest.raises(RequestError, match=words):
+        check.decay(by_device)
+    with pytest.raises(RequestError, match=words):
+        check.measured_decay(by_device, {"run": named})
     spec = BayesianHankelDMDc(
         encounter_period=3.0, window=Fixed("3 T"), state_delays=Fixed("0.1 T"),
         input_delays=Fixed("0.1 T"), ridge=Fixed(1.0), n_members=2, seed=0,

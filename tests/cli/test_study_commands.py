@@ -56,7 +56,7 @@ def test_a_study_ends_with_its_table_and_the_place_of_its_report(folder, capfd, 
     told = capfd.readouterr()
     assert "ANRMSE median" in told.out
     assert told.out.rstrip().endswith(f"Report: {out / 'report.html'}")
-    assert "Study 2/4" in told.err
+    assert "Study 4/4" in told.err
     (out / "report.html").unlink()
     assert cli.main(["report", str(out)]) == 0
     assert capfd.readouterr().out.strip() == str(out / "report.html")
@@ -68,7 +68,7 @@ def test_a_study_ends_with_its_table_and_the_place_of_its_report(folder, capfd, 
     [
         (["study", "missing.toml"], "missing.toml does not exist"),
         (["report", "nowhere"], "nowhere holds no finished study"),
-        (["reproduce", "--preset", "papers"], "--preset must be paper or recommended"),
+        (["reproduce", "--preset", "papers"], "'papers' is not one of 'paper', 'recommended'"),
         (
             ["reproduce", "--workers", "2", "--scheduler", "tcp://127.0.0.1:8786"],
             "--workers 2 counts processes on this machine, and --scheduler tcp://127.0.0.1:8786 "

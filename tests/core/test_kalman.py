@@ -56,18 +56,32 @@ def test_it_is_the_textbook_filter_with_rows_missing():
         np.testing.assert_allclose(covariance, textbook.P, rtol=0, atol=1e-10)
 
 
-def test_without_measurements_the_covariance_grows_to_the_open_loop_and_not_beyond():
+def test_without_measurements_the_covariance_is_the_sum_of_all_that_disturbed_it():
     filter_ = DelayFilter(A, PROCESS, np.zeros(N), np.zeros((SIZE, SIZE)))
-    forced = np.zeros((SIZE, SIZE))
-    forced[-N:, -N:] = PROCESS
-    limit = linalg.solve_discrete_lyapunov(companion(), forced)
-    before = 0.0
+    disturbed = np.zeros((SIZE, SIZE))
+    disturbed[-N:, -N:] = PROCESS
+    expected, carried = np.zeros((SIZE, SIZE)), disturbed
     for _ in range(400):
         filter_.shift()
-        now = filter_.covariance[-1, -1]
-        assert before <= now <= limit[-1, -1] * (1 + 1e-9)  # rounding of the solver
-        before = now
+        expected, carried = expected + carried, companion() @ carried @ companion().T
+        # Sums of hundreds of terms of the size of the covariance itself.
+        np.testing.assert_allclose(filter_.covariance, expected, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(filter_.covariance, filter_.covariance.T)
+    limit = linalg.solve_discrete_lyapunov(companion(), disturbed)
     np.testing.assert_allclose(filter_.covariance, limit, rtol=1e-9)
+
+
+@pytest.mark.parametrize("seen", [[True, True], [False, True]])
+def test_the_whitening_gives_the_distance_of_an_innovation(seen):
+    covariance = np.diag(np.arange(1.0, SIZE + 1))
+    covariance[-1, -2] = covariance[-2, -1] = 2.0
+    noise, rows = np.array([0.3, 0.1]), np.flatnonzero(seen)
+    _, whitening = DelayFilter(A, PROCESS, noise, covariance).measure(np.array(seen))
+    expected = np.zeros((N, N))
+    places = SIZE - N + rows
+    inverse = np.linalg.inv(covariance[np.ix_(places, places)] + np.diag(noise[rows]))
+    expected[np.ix_(rows, rows)] = inverse
+    np.testing.assert_allclose(whitening.T @ whitening, expected, rtol=1e-13)  # rounding
 
 
 def test_a_state_measured_without_noise_is_known():

@@ -20,7 +20,10 @@ def test_the_page_runs_and_its_c_prints_what_python_does(tmp_path, monkeypatch):
     shutil.copytree(DOCS / "tutorial", tmp_path / "tutorial")
     monkeypatch.chdir(tmp_path / "tutorial")
     play(PAGE, "hosts.md")
-    Path("main.c").write_text(re.findall(r"^```c\n(.*?)^```$", PAGE, re.M | re.S)[0], "utf-8")
-    shell = re.findall(r"^```sh\n(.*?)^```$", PAGE, re.M | re.S)[0]
-    done = subprocess.run(shell, shell=True, check=True, capture_output=True, text=True)
-    assert done.stdout in PAGE
+    programs, shells = (
+        re.findall(rf"^```{kind}\n(.*?)^```$", PAGE, re.M | re.S) for kind in ("c", "sh")
+    )
+    for name, program, shell in zip(("main.c", "follow.c"), programs, shells, strict=True):
+        Path(name).write_text(program, "utf-8")
+        done = subprocess.run(shell, shell=True, check=True, capture_output=True, text=True)
+        assert done.stdout in PAGE

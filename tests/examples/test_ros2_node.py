@@ -1,16 +1,23 @@
-"""The logic of the ROS 2 example: which samples become which step, without ROS."""
+"""The ROS 2 example: which samples become which step, and the node under a stand-in of rclpy."""
 
 import importlib.util
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
 
 from seakeep import HankelDMDc
 
 EXAMPLE = Path(__file__).parents[2] / "examples/ros2_node"
 DT = 0.05
 CLOCK = 1.7e9  # seconds since 1970, as ROS counts them
+COUNT = 60
+PATIENCE = 0.3
 
 
 def loaded(name):
@@ -20,78 +27,264 @@ def loaded(name):
     return module
 
 
+Follower = loaded("follower").Follower
+
+
 @pytest.fixture(scope="module")
-def follower_class():
-    return loaded("follower").Follower
+def model(make_run):
+    spec = HankelDMDc(3, 8, 1.0, delay_rows="exact")
+    return spec.fit(make_run(), ["heave", "pitch"], ["eta_fwd", "eta_cog"])
 
 
-@pytest.fixture
-def model(make_run, channels):
-    return HankelDMDc(3, 8, 1.0, delay_rows="exact").fit(make_run(), **channels)
+@pytest.fixture(scope="module")
+def run(make_run):
+    return make_run(seed=5)
 
 
-def play(follower, run, samples, lost=(), jitter=0.0, seed=0):
-    """Feed samples of a run as messages, and collect the estimates."""
-    rng, found = np.random.default_rng(seed), []
+def messages(model, run, samples=range(COUNT), jitter=0.0, delay=0.01):
+    """Values of a run as (arrival, channel, stamp, value)."""
+    rng, found = np.random.default_rng(0), []
     for sample in samples:
-        for channel in [*follower.model.inputs, *follower.model.states]:
-            if (channel, sample) not in lost:
-                stamp = CLOCK + sample * DT + jitter * DT * rng.uniform(-0.45, 0.45)
-                follower.receive(channel, stamp, float(run[channel].values[sample]))
-        found += follower.advance(CLOCK + (sample + 0.6) * DT)
+        for channel in [*model.inputs, *model.states]:
+            stamp = CLOCK + (sample + jitter * rng.uniform(-0.45, 0.45)) * DT
+            found.append((stamp + delay, channel, stamp, float(run[channel].values[sample])))
     return found
 
 
-def test_complete_samples_are_the_steps_of_the_live_model(follower_class, model, make_run):
-    run, expected = make_run(seed=5), model.live()
-    found = play(follower_class(model), run, range(60))
+def play(follower, sent):
+    """Estimates of messages in the order of their arrival, by instant."""
+    found = []
+    for arrival, channel, stamp, value in sorted(sent):
+        found += follower.advance(arrival)
+        follower.receive(channel, stamp, value, arrival)
+    last = max(stamp for arrival, _, stamp, _ in sent if stamp <= arrival)
+    return found + follower.advance(last + follower.patience + 0.9 * DT)
+
+
+def states(found):
+    return np.array([state for _, state in found])
+
+
+def test_complete_samples_are_the_steps_of_the_live_model(model, run):
+    expected, follower = model.live(), Follower(model.live)
+    found = play(follower, messages(model, run, jitter=0.2))
     for sample, (instant, state) in enumerate(found):
         u, y = ([run[name].values[sample] for name in of] for of in (model.inputs, model.states))
         np.testing.assert_array_equal(state, expected.step(u, y))
-        assert instant == pytest.approx(CLOCK + sample * DT, abs=1e-3)
-    assert len(found) == 60
+        assert instant == pytest.approx(CLOCK + sample * DT, abs=0.1 * DT)
+    assert len(found) == COUNT
+    assert not follower.lost
 
 
-def test_stamps_between_instants_go_to_the_nearest(follower_class, model, make_run):
-    run = make_run(seed=5)
-    exact = play(follower_class(model), run, range(60))
-    follower = follower_class(model)
-    first = play(follower, run, range(1))  # sets the grid
-    shifted = first + play(follower, run, range(1, 60), jitter=1.0)
-    np.testing.assert_array_equal([s for _, s in shifted], [s for _, s in exact])
+def test_any_order_of_arrival_within_patience_gives_the_same_estimates(model, run):
+    sent = messages(model, run, range(30), jitter=1.0, delay=0.0)
+    within = arrays(float, len(sent), elements=st.floats(0, 0.99 * PATIENCE))
+
+    @settings(max_examples=25)
+    @given(within)
+    def same(delays):
+        late = [(each[2] + delay, *each[1:]) for each, delay in zip(sent, delays, strict=True)]
+        both = [Follower(model.live, patience=PATIENCE) for _ in range(2)]
+        found = [play(each, stream) for each, stream in zip(both, (sent, late), strict=True)]
+        assert [instant for instant, _ in found[0]] == [instant for instant, _ in found[1]]
+        np.testing.assert_array_equal(states(found[0]), states(found[1]))
+        assert both[0].lost == both[1].lost
+
+    same()
 
 
-def test_lost_messages_are_estimated_and_late_ones_left_out(follower_class, model, make_run):
-    run = make_run(seed=5)
-    lost = {("eta_fwd", 40), ("heave", 41), ("heave", 42), ("pitch", 42)}
-    follower = follower_class(model)
-    found = play(follower, run, range(60), lost)
-    assert len(found) == 60
-    assert np.all(np.isfinite([state for _, state in found]))
-    measured = np.stack([run[name].values[:60] for name in model.states], axis=1)
-    differs = np.any(np.array([state for _, state in found]) != measured, axis=1)
-    assert set(np.flatnonzero(differs)) == {41, 42}
-    follower.receive("heave", CLOCK + 42 * DT, 1e3)
-    assert not follower.waiting["heave"]
+def test_what_is_lost_is_estimated_and_counted(model, run):
+    """A stamp an hour ahead, one that comes late, a value that is none, and messages never sent."""
+    odd = {("heave", 20): (3600.0, 0.0), ("pitch", 25): (0.0, 0.5), ("eta_cog", 30): (0.0, 0.5)}
+    sent, kept = [], []
+    for number, (arrival, channel, stamp, value) in enumerate(messages(model, run)):
+        ahead, late = odd.get((channel, number // 4), (0.0, 0.0))
+        if (channel, number // 4) == ("heave", 35):
+            value = np.nan
+        elif not ahead + late and number // 4 != 40:
+            kept.append((arrival, channel, stamp, value))
+        if number // 4 != 40:
+            sent.append((arrival + late, channel, stamp + ahead, value))
+    follower = Follower(model.live)
+    found = play(follower, sent)
+    assert len(found) == COUNT
+    np.testing.assert_array_equal(states(found), states(play(Follower(model.live), kept)))
+    assert follower.lost == {
+        ("heave", "early"): 1,
+        ("pitch", "late"): 1,
+        ("eta_cog", "late"): 1,
+        ("heave", "not finite"): 1,
+        ("heave", "missing"): 3,
+        ("pitch", "missing"): 2,
+        ("eta_cog", "missing"): 2,
+        ("eta_fwd", "missing"): 1,
+    }
+    measured = np.stack([run[name].values[:COUNT] for name in model.states], axis=1)
+    differs = np.any(states(found) != measured, axis=1)
+    assert set(np.flatnonzero(differs)) == {20, 25, 35, 40}
 
 
-def test_it_waits_for_all_inputs_and_starts_anew_after_a_long_gap(follower_class, model, make_run):
-    run, follower = make_run(seed=5), follower_class(model, longest=2.0)
-    assert play(follower, run, range(10), {("eta_cog", each) for each in range(10)}) == []
-    assert len(play(follower, run, range(10, 30))) == 20
-    assert follower.advance(CLOCK + 30 * DT + 2.5) == []
+@pytest.mark.parametrize("jump", [-100.0, 100.0])
+def test_a_clock_that_is_set_starts_it_anew_as_it_was_started(model, run, jump):
+    first, then = messages(model, run), messages(model, run, range(60, 120))
+    moved = [(arrival + jump, channel, stamp + jump, v) for arrival, channel, stamp, v in then]
+    starts = []
+    follower = Follower(lambda: starts.append(0) or model.live(noise={"heave": 0.01}))
+    found = play(follower, first)
+    # By arrival, and not by the clock.
+    found += play(follower, moved)
+    assert len(found) == 2 * COUNT
+    assert found[COUNT][0] == pytest.approx(CLOCK + 60 * DT + jump)
+    assert [key[0] for key in follower.lost] == ["all"]
+    assert len(starts) == 2
+    assert follower.live.covariance[0, 0] > 0  # a measured state has noise, as at the start
+
+
+def test_it_follows_a_gap_of_inputs_and_starts_anew_after_a_long_one(model, run):
+    follower, end = Follower(model.live, longest=2.0), CLOCK + COUNT * DT
+    assert len(play(follower, messages(model, run))) == COUNT
+    blind = follower.advance(end + 1.5)
+    assert len(blind) == 28  # those that are over: half a step and patience ago
+    assert follower.advance(end + 2.5) == []
     assert np.isnan(follower.live.time)
-    assert len(play(follower, run, range(100, 120))) == 20
+    assert len(play(follower, messages(model, run, range(120, 140)))) == 20
 
 
-def test_it_continues_from_a_state(follower_class, model, make_run):
-    run = make_run(seed=5)
-    whole, first = follower_class(model), follower_class(model)
-    expected = play(whole, run, range(60))[40:]
-    play(first, run, range(40))
-    found = play(follower_class(model, first.live), run, range(40, 60))
-    np.testing.assert_array_equal([s for _, s in found], [s for _, s in expected])
+def test_a_constant_delay_beyond_patience_is_reported_and_one_within_does_nothing(model, run):
+    starts, sent = [], messages(model, run, delay=0.25)
+    strict = Follower(lambda: starts.append(0) or model.live(), patience=0.1)
+    assert play(strict, sent) == []
+    assert len(starts) == 1
+    assert strict.lost == {(name, "late"): COUNT for name in [*model.inputs, *model.states]}
+    patient = Follower(model.live, patience=PATIENCE)
+    assert len(play(patient, sent)) == COUNT
+    assert not patient.lost
 
 
-def test_the_node_is_sound_python():
-    compile((EXAMPLE / "node.py").read_text("utf-8"), "node.py", "exec")
+def test_it_waits_for_all_inputs_without_growing(model, run):
+    follower = Follower(model.live)
+    sent = messages(model, run)
+    assert play(follower, [each for each in sent if each[1] != "eta_cog"]) == []
+    assert set(follower.lost) == {("all", "waiting for all inputs")}
+    assert play(Follower(model.live), [each for each in sent if each[1] in model.states]) == []
+    assert max(map(len, follower.waiting.values())) < 10
+
+
+def test_it_continues_from_a_state(model, run):
+    sent = messages(model, run)
+    whole, first = Follower(model.live), Follower(model.live)
+    expected = play(whole, sent)[40:]
+    play(first, sent[: 4 * 40])
+    found = play(Follower(model.live, first.live), sent[4 * 40 :])
+    np.testing.assert_array_equal(states(found), states(expected))
+
+
+@pytest.fixture
+def node(monkeypatch):
+    pytest.importorskip("rosbags")
+    import stand_in_ros
+
+    stand_in_ros.install(monkeypatch)
+    monkeypatch.setitem(sys.modules, "follower", loaded("follower"))
+    return loaded("node")
+
+
+def recorded(path, run, samples, lost):
+    """Record a run as a vessel would: odometry, and two probes, messages out of order."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from stand_in_ros import STORE, message
+
+    def header(stamp):
+        sec, nanosec = divmod(stamp, 10**9)
+        time = message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
+        return message("std_msgs/msg/Header")(stamp=time, frame_id="vessel")
+
+    def pose(at):
+        angles = [0.3, float(run["pitch"].values[at]), 0.02]  # yaw, pitch, roll
+        turned = Rotation.from_euler("ZYX", angles).as_quat()
+        quaternion = message("geometry_msgs/msg/Quaternion")(
+            **dict(zip("xyzw", map(float, turned), strict=True))
+        )
+        point = message("geometry_msgs/msg/Point")(z=float(run["heave"].values[at]))
+        return message("geometry_msgs/msg/Pose")(position=point, orientation=quaternion)
+
+    zeros, rng = [0.0] * 36, np.random.default_rng(0)
+    sent = []
+    for at in samples:
+        stamp = int(CLOCK) * 10**9 + round(at * DT * 1e9)
+        odometry = message("nav_msgs/msg/Odometry")(
+            header=header(stamp),
+            pose=message("geometry_msgs/msg/PoseWithCovariance")(pose=pose(at), covariance=zeros),
+            twist=message("geometry_msgs/msg/TwistWithCovariance")(covariance=zeros),
+        )
+        each = {"/vessel/odometry": odometry}
+        for name in ("fwd", "cog"):
+            point = message("geometry_msgs/msg/Point")(z=float(run[f"eta_{name}"].values[at]))
+            each[f"/wave_probe/{name}"] = message("geometry_msgs/msg/PointStamped")(
+                header=header(stamp), point=point
+            )
+        for topic, made in each.items():
+            if (topic, at) not in lost:
+                sent.append((stamp + int(rng.integers(80_000_000)), topic, made))
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        kinds = {topic: made.__msgtype__ for _, topic, made in sent}
+        connections = {
+            topic: writer.add_connection(topic, kind, typestore=STORE)
+            for topic, kind in kinds.items()
+        }
+        for received, topic, made in sorted(sent, key=lambda each: each[0]):
+            writer.write(connections[topic], received, STORE.serialize_cdr(made, kinds[topic]))
+
+
+def test_the_node_follows_a_recorded_bag(node, model, run, make_run, tmp_path):
+    run = make_run(seed=5).assign_attrs(water_depth=3.0)
+    for name, place in (("eta_fwd", -1.0), ("eta_cog", 0.0)):
+        run[name].attrs["x_position"] = place
+    run.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
+    model.save(tmp_path / "model.nc")
+    lost = {("/wave_probe/fwd", 50), ("/vessel/odometry", 60), ("/vessel/odometry", 61)}
+    recorded(tmp_path / "first", run, range(240), lost)
+    recorded(tmp_path / "second", run, range(240, 300), ())
+    names = ("model", "run", "state")
+    node.SeakeepNode.given = {name: str(tmp_path / f"{name}.nc") for name in names}
+    vessel = node.SeakeepNode()
+    vessel.play(tmp_path / "first")
+
+    estimates = vessel.published["~/estimate"]
+    assert len(estimates) > 230
+    for at, each in enumerate(estimates):
+        stamp = each.header.stamp.sec + 1e-9 * each.header.stamp.nanosec
+        assert stamp == pytest.approx(CLOCK + at * DT, abs=1e-6)
+        assert list(each.name) == model.states
+        if at not in (60, 61):
+            measured = [float(run[name].values[at]) for name in model.states]
+            np.testing.assert_allclose(each.position, measured, atol=1e-12)  # via a quaternion
+    forecast = vessel.published["~/forecast"][-1]
+    assert list(forecast.joint_names) == model.states
+    assert len(forecast.points) == round(10.0 / DT)
+    assert np.all(np.isfinite([each.positions for each in forecast.points]))
+    assert vessel.warnings == [
+        "lost in the last 10 s: eta_fwd missing: 1, heave missing: 2, pitch missing: 2"
+    ]
+    assert vessel.follower.live.forecast(2).attrs["predictable"] > 0  # it serves in this rig
+
+    again = node.SeakeepNode()  # from the state that the first one saved in its last second
+    again.play(tmp_path / "second")
+    first = again.published["~/estimate"][0].header.stamp
+    assert first.sec + 1e-9 * first.nanosec <= CLOCK + 241 * DT
+    last = [float(run[name].values[len(estimates)]) for name in model.states]
+    assert np.all(np.isfinite(again.published["~/estimate"][-1].position))
+    assert np.all(np.isfinite(last))
+
+
+@pytest.mark.parametrize("turn", [(0.4, -0.2, 0.7), (0.0, np.pi / 2, 0.0), (-3.0, 0.1, 3.1)])
+def test_angles_of_a_quaternion(node, turn):
+    from stand_in_ros import message
+
+    turned = Rotation.from_euler("ZYX", turn).as_quat()
+    found = message("geometry_msgs/msg/Quaternion")(**dict(zip("xyzw", turned, strict=True)))
+    angles = [node.read(found, name) for name in ("yaw", "pitch", "roll")]
+    if turn[1] == np.pi / 2:
+        assert angles[1] == pytest.approx(turn[1], abs=1e-7)  # asin is steep there
+    else:
+        np.testing.assert_allclose(angles, turn, atol=1e-12)

@@ -62,7 +62,7 @@ def run_file(what: str, text: str, trail: tuple[str, ...] = ()) -> None:
         command("study", "study.toml", "-o", "o", "--workers", 1)
     elif what == "tank":
         command("tank", "--settings", "tank.toml", "--out", "o")
-    elif trail[:1] in (("models",), ("model",)):
+    elif trail[:1] == ("model",) or (len(trail) > 1 and trail[0] == "models"):
         named = ("--model", trail[1]) if trail[0] == "models" else ()
         command("fit", "campaign.toml", *named, "-o", "o.nc")
     else:

@@ -35,18 +35,21 @@ def pointer(values):
     return np.ascontiguousarray(values).ctypes.data_as(ctypes.POINTER(ctypes.c_double))
 
 
-@pytest.fixture(scope="module")
-def library(cases, tmp_path_factory):
+def compiled(models, folder):
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("there is no C compiler")
-    folder = tmp_path_factory.mktemp("library")
-    files = [path for name in NAMES for path in write_c(cases[name].model, folder, name)]
+    files = [path for name, model in models.items() for path in write_c(model, folder, name)]
     sources = [path.name for path in files if path.suffix == ".c"]
     flags = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
     command = [compiler, *flags, "-o", "models.so", *sources, "-lm"]
     subprocess.run(command, cwd=folder, check=True)
     return ctypes.CDLL(str(folder / "models.so"))
+
+
+@pytest.fixture(scope="module")
+def library(cases, tmp_path_factory):
+    return compiled({name: cases[name].model for name in NAMES}, tmp_path_factory.mktemp("library"))
 
 
 @pytest.fixture
@@ -111,10 +114,36 @@ def test_a_start_from_what_is_not_finite_is_refused(library, cases):
     assert not any(run.memory)
 
 
-def test_names_and_units_are_text_of_c(library, cases):
-    texts = ctypes.c_char_p * 2
-    assert list(texts.in_dll(library, "full_input_names")) == [b"eta", b"wave probe"]
-    assert list(texts.in_dll(library, "full_state_units")) == [b"m", b"N"]
+def test_names_and_units_are_text_of_c(tmp_path, make_run):
+    names = ["η_fwd 1", 'a"b\\n?', "größe", "ñ\n", "三7"]
+    run = make_run()
+    runs = run.assign({name: run["heave"] + np.sin(at * run.time) for at, name in enumerate(names)})
+    runs[names[1]].attrs["units"] = "m·s⁻¹"
+    model = HankelDMDc(2, 2, 1.0).fit(runs, names, ["eta_fwd"])
+    found = compiled({"rom": model}, tmp_path)
+    texts = (ctypes.c_char_p * len(names)).in_dll
+    assert [each.decode() for each in texts(found, "rom_state_names")] == names
+    assert texts(found, "rom_state_units")[1].decode() == "m·s⁻¹"
+
+
+def test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python(tmp_path, make_run):
+    """A state grows by itself, and a spike a hundred times as high as training is before it."""
+    model = HankelDMDc(0, 0, 1.0, delay_rows="exact").fit(make_run(), ["heave"], ["eta_fwd"])
+    model = replace(model, coefficients=np.array([[1.001, 0.0]]))
+    (mean,), (reach,) = model.state_scale.centre, model.state_scale.reach
+    steps, u = 6000, np.full((6000, 1), model.input_scale.centre)
+    u[3] += 100 * model.input_scale.reach
+    start = np.array([[mean + reach]])
+    expected = model.forecast_arrays(start, u[:1], u[1:], steps)
+    since = np.arange(steps)
+    limit = 10 * (1 + 99 * (since >= 3) * (1 - 1 / (20 * 64)) ** (since - 3))
+    last = int(np.argmax(1.001 ** (since + 1) > limit))
+    assert 3500 < last < 4500  # 6910 where the spike is never forgotten
+    assert int(np.argmax(np.isnan(expected[:, 0]))) == last
+    run = Host(compiled({"rom": model}, tmp_path), "rom", 1)
+    assert run.start(run.memory, pointer(start), pointer(u[:0])) == FINITE
+    statuses = [run.step(run.memory, pointer(row)) for row in u[: last + 1]]
+    assert statuses == [FINITE] * last + [LOST]
 
 
 @pytest.mark.parametrize(

@@ -205,6 +205,17 @@ def test_what_is_known_is_not_found_again():
     assert again.rows == first.rows
 
 
+def test_progress_counts_all_that_is_tried_once():
+    told = []
+    vary = ("ridge", "observables", "lead")
+    select(SPEC, runs(), STATES, INPUTS, vary=vary, horizon=(15.0,),
+           progress=lambda *each: told.append(each[:2]))  # fmt: skip
+    done, totals = zip(*told, strict=True)
+    assert list(done) == [*range(1, len(told) + 1)]
+    # None, slow squares, powers, both; three more leads; three folds.
+    assert set(totals) == {3 * (4 + 3)}
+
+
 @pytest.mark.parametrize(
     ("spec", "vary", "message"),
     [

@@ -9,17 +9,10 @@ import xarray as xr
 
 from seakeep.errors import SeakeepWarning
 from seakeep.quality import Finding, Record, Redundant, as_json, findings_of, warn_of
+from seakeep.quality.agreement import LARGEST_NRMSE, LATE, RUN_AWAY, compare_sensors
+from seakeep.quality.faults import reading_step
 from seakeep.quality.samples import SamplesKind
 from seakeep.quality.sensors import redundant
-from seakeep.signals.quality import (
-    LARGEST_NRMSE,
-    LATE,
-    RUN_AWAY,
-    find_outliers,
-    find_saturation,
-    find_stuck,
-    reading_step,
-)
 
 DT = 0.04
 T = DT * np.arange(3000)
@@ -108,31 +101,29 @@ class TestRedundantSensors:
         assert ("RESOLUTION" in kinds(read, step=reading_step(read))) is told
 
 
-class TestSamples:
-    def test_a_signal_that_freezes_for_its_last_second(self):
-        x = waves()
-        x[-25:] = x[-25]
-        assert np.flatnonzero(find_stuck(x, DT, PERIOD)).tolist() == list(range(2975, 3000))
+class TestLags:
+    def test_lag_is_positive_where_the_sensor_is_late(self):
+        late, early = waves(0.5), waves(-0.5)
+        found = compare_sensors(late, waves(), DT)
+        # A parabola through samples 0.04 s apart: within a tenth of them.
+        assert found.lag == pytest.approx(0.5, abs=0.004)
+        assert compare_sensors(early, waves(), DT).lag == pytest.approx(-0.5, abs=0.004)
 
-    def test_a_coarse_signal_does_not_freeze_at_its_last_crest(self):
-        x = np.round(waves())
-        assert not find_stuck(x[: 3000 - np.argmax(np.diff(x[::-1]) != 0)], DT, PERIOD).any()
+    def test_lag_that_runs_away_beyond_half_a_period(self):
+        stretched = np.interp(T * (1 - 1.2 / T[-1]), T, waves())
+        found = compare_sensors(stretched, waves(), DT)
+        assert 0.9 < found.growth < 1.2  # the middles of the first and last windows
 
-    def test_a_line_that_sticks_and_slips_has_no_outliers(self):
-        rng = np.random.default_rng(0)
-        load = np.repeat(np.cumsum(rng.normal(0, 1, 150)), 20) + rng.normal(0, 1e-3, T.size)
-        assert not find_outliers(load).any()
-        load[1007] += 30.0
-        assert np.flatnonzero(find_outliers(load)).tolist() == [1007]
-
-    def test_a_camera_that_repeats_frames_is_not_saturated(self):
-        x = np.repeat(waves()[::10], 10)
-        assert not find_saturation(x).any()
-        x = waves()  # repeats now and then, at its highest value too
-        for start in (200, 900, 1500, int(np.argmax(x))):
-            x[start : start + 12] = x[start]
-        assert not find_saturation(x).any()
-        assert find_saturation(np.clip(waves(), -4.0, 4.0)).any()
+    def test_what_stands_still_has_no_lag(self):
+        """A sensor that runs away and then freezes: the windows that it froze in say nothing."""
+        stretched = np.interp(T * (1 - 1.2 / T[-1]), T, waves())
+        frozen = np.where(np.arange(T.size) < 2600, stretched, stretched[2600])
+        held = np.arange(T.size) >= 2600
+        found = compare_sensors(frozen, waves(), DT, held=held)
+        assert found.growth == pytest.approx(
+            1.2 * 2600 / T.size, abs=0.15
+        )  # windows of 3 s at the ends
+        assert found.centre[-1] < 2600 * DT
 
 
 class TestFindings:

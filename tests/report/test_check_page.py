@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+import xarray as xr
 from moored import moored_run
 from tutorial_study import put_tutorial
 
@@ -93,15 +94,55 @@ def test_a_page_says_what_cannot_be_judged():
     assert possible.notices == ("Cannot be judged: all runs are regular.",)
 
 
+def test_a_motion_that_swings_farther_than_it_was_moved_is_named():
+    left = np.array([[1.0, -0.8, 0.5, -0.3], [1.0, -3.04, 2.0, -0.9]])
+    none = ("motion", [np.nan, np.nan])
+    found = xr.Dataset(
+        {
+            "displacement": (("motion", "time"), left),
+            "period": none,
+            "damping_ratio": none,
+            "p": none,
+        },
+        coords={"motion": ["heave", "pitch"], "time": np.arange(4.0)},
+    )
+    decay = check_sections(Checked({"decay": found}, {}, {}))[3]
+    (only,) = decay.points
+    assert only.startswith("pitch: after its release the model swings to 3 times the offset")
+
+
+def test_the_error_of_a_response_is_shown_with_the_digits_of_its_uncertainty():
+    point = {"error": 2255.3387, "uncertainty": 1159.329, "within": 0.0}
+    found = xr.Dataset(
+        {key: (("state", "point"), [[value]]) for key, value in point.items()},
+        coords={
+            "state": ["mooring_bow"],
+            "units": ("state", ["N"]),
+            "kind": ("point", ["regular"]),
+            "frequency": ("point", [0.5]),
+        },
+    )
+    response = xr.Dataset(
+        {"amplitude": (("input", "state", "frequency"), np.ones((1, 1, 2)))},
+        coords={"input": ["wave"], "state": ["mooring_bow"], "frequency": [0.4, 0.6]},
+        attrs={"reference": "eta"},
+    )
+    section = check_sections(Checked({"response": response, "validation": found}, {}, {}))[1]
+    (table,) = section.tables
+    assert table.rows[0][-3:] == ("2255", "0.500", "2300 ± 1200")
+    assert "RAO" in section.title
+    assert "RAO" in section.words[0]
+
+
 @pytest.mark.parametrize(
     ("change", "section", "words"),
     [
         ("regular", "What is possible", r"all runs \(run\) are in regular waves"),
         ("regular", "Statistics of responses", "takes a run in irregular waves"),
         ("short", "What is possible", "has 3.5 s, and spectra take a segment of 16 s"),
-        ("short", "Response", "no run gives a measured response"),
+        ("short", "Response (RAO)", "no run gives a measured response"),
         ("dead", "What is possible", r"the inputs \(eta\) hold no energy"),
-        ("dead", "Response", "eta holds no energy: it is constant"),
+        ("dead", "Response (RAO)", "eta holds no energy: it is constant"),
         ("dead", "Validity", "eta holds no energy: it is constant"),
     ],
 )

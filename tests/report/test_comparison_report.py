@@ -74,7 +74,7 @@ def ensemble(half=0.2, diverged=1, slack=False):
 def block_of(table):
     errors, intervals, extremes = comparison_blocks(table)
     low, high = (float(table[f"anrmse_{bound}"][0]) for bound in ("lower", "upper"))
-    told = f"{low:.3f}–{high:.3f}" if np.isfinite(low) else "–"
+    told = f"{low:.3f} to {high:.3f}" if np.isfinite(low) else "–"
     assert intervals.rows[-1][:2] == ("average", told)
     assert extremes.rows[0][2] == f"{float(table['measured_min'][0, 0]):.4g}"
     return errors
@@ -289,8 +289,8 @@ def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path)
     assert extremes.title.endswith("extremes of ours")
     assert averages.columns == ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
     assert averages.rows[0][:2] == ("ours", "0.100")
-    assert skill.columns == ("model", "below hold last", "below best linear")
-    assert skill.rows[0][1:] == ("+50 %", "-100 %")  # errors of 0.1 against 0.2 and 0.05
+    assert skill.columns == ("model", "from hold last", "from best linear")
+    assert skill.rows == (("ours", "−50 %", "2 times"),)  # errors of 0.1 against 0.2 and 0.05
     assert channels.rows[0] == ("heave", "0.100", "0.200", "0.050", "0.300")
     path = write_comparison(tables, tmp_path / "t.csv")
     rows = list(csv.DictReader(path.read_text().splitlines()))
@@ -318,7 +318,7 @@ def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
     assert by_run.rows[-1] == ("mean", "", "0.100", "0.200")
     assert changes.rows[0] == ("ours", "0.100", "", "", "")
     # Twice the error at every instant, in every draw.
-    assert changes.rows[1] == ("theirs", "0.200", "+100 %", "+100 to +100 %", "worse")
+    assert changes.rows[1] == ("theirs", "0.200", "2 times", "2 to 2 times", "worse")
     path = write_differences(table, tmp_path / "d.csv")
     rows = list(csv.DictReader(path.read_text().splitlines()))
     assert [(row["run"], row["model"]) for row in rows] == [

@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ from seakeep.report.sections.summary import (
     summary,
 )
 from seakeep.report.style import LINES
-from seakeep.report.tables import latex_text, number, probability, small_number
+from seakeep.report.tables import Table, latex_text, number, probability, small_number
 from seakeep.study import StudyResult, read_result, read_study, run_study
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
@@ -38,6 +39,8 @@ from seakeep.report.figures.eigenvalues import eigenvalue_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import write_page, write_report
 from seakeep.report.section import Drawing, Section
+
+ROOT = Path(__file__).parents[2]
 
 STUDY = """
 [study]
@@ -610,3 +613,52 @@ def test_each_of_many_models_has_a_colour_of_its_own():
     told = {name: {"ensemble": name == "bayesian"} for name in names}
     result = StudyResult(None, {"models": json.dumps(told)}, {})
     assert len({model_colour(result, name) for name in names}) == len(names)
+
+
+@pytest.fixture(scope="module")
+def wide_page(tmp_path_factory):
+    """A page with the tables of errors that a check of several baselines prints."""
+    of_runs = ("test", "model", "95 %", "hold_last", "mean", "fir", "arx", "subspace")
+    row = ("mean, regular waves", "0.481", "0.422 to 0.555", *["0.530"] * 5)
+    runs = tuple(f"3102_{number}" for number in range(16))
+    errors = ("mooring_starboard", *["0.284"] * 16)
+    tables = (
+        Table("runs", "Errors of runs", of_runs, (row,), "A note.", tuple(range(1, 8)), heat=(1,)),
+        Table("states", "Errors", ("state", *runs), (errors,), "", tuple(range(1, 17)), heat=(6,)),
+    )
+    stamp = {"description": "", "finished": ""}
+    section = Section("worth", "Worth", tables=tables)
+    return write_page(tmp_path_factory.mktemp("wide"), "A page", stamp, [section])
+
+
+@pytest.mark.parametrize(("width", "table"), [(1440, "runs"), (1440, "states"), (420, "runs")])
+def test_tables_of_errors_show_all_their_columns(browser, wide_page, width, table):
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    browser.get(wide_page.as_uri())
+    room = f"document.querySelector('#table-{table} .scroll')"
+    shown, needed = browser.execute_script(f"return [{room}.clientWidth, {room}.scrollWidth]")
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    assert needed <= shown + 1  # widths are rounded to pixels
+
+
+def test_captions_and_notes_are_no_larger_than_their_tables_on_paper(browser, wide_page):
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    browser.get(wide_page.as_uri())
+    size = "return parseFloat(getComputedStyle(document.querySelector(arguments[0])).fontSize)"
+    cell = browser.execute_script(size, "#table-runs td")
+    for words in ("#table-runs .caption", "#table-runs .note"):
+        assert browser.execute_script(size, words) <= cell
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+
+
+def test_code_in_tables_of_the_docs_breaks_between_words_alone(browser, tmp_path):
+    style = (ROOT / "docs" / "_static" / "style.css").as_uri()
+    words = "what a key of a table of the reference means, in as many words as it needs"
+    (tmp_path / "page.html").write_text(
+        f'<link rel="stylesheet" href="{style}"><div style="width: 12em"><table class="docutils">'
+        f'<tr><td>{words}</td><td></td><td><code>"slow_squares"</code></td></tr></table></div>'
+    )
+    browser.get((tmp_path / "page.html").as_uri())
+    lines = "return document.querySelector('code').getClientRects().length"
+    assert browser.execute_script(lines) == 1

@@ -92,8 +92,9 @@ class TestShipSection:
 
 
 def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
+    from seakeep.quality.agreement import LATE, Agreement
+    from seakeep.quality.faults import FLAGS
     from seakeep.report.quality_sheet import channel_rows, quality_figure
-    from seakeep.signals.quality import FLAGS, LATE, Agreement
 
     time = np.linspace(0.0, 10.0, 101)
     heave = 3.0 + np.sin(time)
@@ -114,7 +115,7 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
     centre, lags = np.array([1.0, 2.0, 5.0, 6.0]), np.array([0.01, 0.02, 0.01, 0.02])
     found = Agreement(
         period=6.0, motion=0.7, step=np.nan, lag=0.015, lag_spread=0.005, growth=0.0,
-        correlation=1.0, nrmse=0.0, at_zero=1.0, gain=1.0, centre=centre, lags=lags,
+        correlation=1.0, nrmse=0.0, gain=1.0, centre=centre, lags=lags,
     )  # fmt: skip
     figure = quality_figure(run, {"heave": found})
     top, pitch, lag = figure.axes
@@ -142,8 +143,8 @@ def test_a_constant_channel_is_drawn_as_one():
 def test_a_channel_with_findings_keeps_its_line_and_shows_its_marks():
     from matplotlib.colors import to_rgb
 
+    from seakeep.quality.faults import FLAGS
     from seakeep.report.quality_sheet import quality_figure
-    from seakeep.signals.quality import FLAGS
 
     time = np.linspace(0.0, 10.0, 101)
     flags = np.zeros(time.size, dtype=np.int16)

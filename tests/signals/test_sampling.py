@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seakeep.signals.quality import WAVES, energy_above
+from seakeep.signals.waves import WAVES, energy_above
 
 
 def sea(seed, noise=0.0):

@@ -278,7 +278,6 @@ def test_video_against_mru(tracked):
     for channel, true, limit in (("heave", heave, 1e-3), ("pitch", pitch, np.deg2rad(0.1))):
         found = compare_motion(tracked[channel], tracked.time, true, time, max_lag=0.4)
         assert found.correlation > 0.999
-        assert found.correlation_at_zero < 0.95
         # Ends of the low-pass filter weigh in a record of 3 s; a frame lasts 0.033 s.
         assert found.lag == pytest.approx(late, abs=2e-3)
         assert found.rms < limit
@@ -483,7 +482,7 @@ def test_a_varying_frame_rate(plain, monkeypatch):
         ({"region": (0, 0, 0, 10)}, r"region is \(left, top, width, height\) in pixels"),
         ({"bridge": -0.1}, "bridge is a time in s, 0 for none; received -0.1"),
         ({"tolerance": float("nan")}, "tolerance must be a number"),
-        ({"level": float("nan")}, "level must be finite; received nan"),
+        ({"camera_pitch": float("nan")}, "camera_pitch must be finite; received nan"),
         ({"origin": (0.0, float("inf"))}, "origin must be finite"),
         ({"passband": -1.0}, r"passband must be positive \(Hz\)"),
     ],
@@ -565,7 +564,7 @@ def test_the_command_compares_bridges_and_writes_netcdf(disturbed, tmp_path, cap
     [
         (["absent.mp4"], 2, "absent.mp4 does not exist"),
         (["absent.mp4", "-o", "a.txt"], 2, "a track is written as .csv or .nc"),
-        (["absent.mp4", "--level", "nan"], 2, "level must be finite; received nan"),
+        (["absent.mp4", "--camera-pitch", "nan"], 2, "camera_pitch must be finite; received nan"),
         (["absent.mp4", "--passband", "nan"], 2, "passband must be a number"),
         (["absent.mp4", "--contact-sheet", "a.jpg"], 2, "a contact sheet is written as PNG"),
         (["absent.mp4", "--panel", "0.1", "0.1"], 2, "the length at least 1.2 times the height"),

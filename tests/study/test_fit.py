@@ -13,12 +13,14 @@ import seakeep
 from seakeep import BayesianHankelDMDc, Fixed, LogUniform, ProbeAlignment, Uniform
 from seakeep.campaign import ModelSettings
 from seakeep.campaign.store import write_prepared
+from seakeep.cli import main
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import KINDS
 from seakeep.study import (
     build_spec,
     compare,
     comparison_table,
+    fit_baselines,
     fit_campaign,
     training_runs,
 )
@@ -510,10 +512,15 @@ def sines(folder: Path, periods: dict[str, tuple[float, ...]]) -> str:
 
 
 @pytest.mark.parametrize(
-    ("period", "words"), [(2.0, "in a gap of the periods"), (8.0, "outside the periods")]
+    ("period", "words"),
+    [
+        # The middles of the bands, a sixth of an octave wide, that hold 0.5 s, 1 s and 4 s.
+        (2.0, r"between the periods that trained the model \(1\.06 and 3\.78 s, with none bet"),
+        (8.0, r"outside the periods that trained the model \(0\.472 to 4\.24 s\)"),
+    ],
 )
 def test_waves_of_periods_that_were_not_trained_are_warned_of(tmp_path, period, words):
-    runs = sines(tmp_path, {"short": (1.0,), "long": (4.0,), "new": (period,)})
+    runs = sines(tmp_path, {"shorter": (0.5,), "short": (1.0,), "long": (4.0,), "new": (period,)})
     asked = campaign(tmp_path, EXACT, runs)
     model = fit_campaign(asked)
     with pytest.warns(SeakeepWarning, match=rf"new: eta_fwd: .* lies {words}.*Train in such"):
@@ -521,6 +528,26 @@ def test_waves_of_periods_that_were_not_trained_are_warned_of(tmp_path, period, 
     write_prepared(asked)
     with pytest.warns(SeakeepWarning, match=rf"new: eta_fwd: .* lies {words}"):
         fit_campaign(asked)
+
+
+def test_a_setting_has_one_score_whether_fit_or_tune_chose_it(halves, capsys):
+    lengths = 'state_delays = "1 T"\ninput_delays = "1 T"\nridge = "rollout"\ndelay_rows = "exact"'
+    asked = campaign(halves, f"{lengths}\n[campaign]\nencounter_period = 2.5")  # 2 s is measured
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeakeepWarning)
+        chosen = fit_campaign(asked)
+        assert main(["tune", str(asked.path), "--vary", "ridge"]) == 0
+    assert capsys.readouterr().out.startswith(chosen.selection)
+
+
+def test_a_baseline_that_is_left_out_names_what_to_write(halves):
+    asked = campaign(halves, EXACT + "\n[campaign]\nencounter_period = 0.8")
+    with pytest.warns(SeakeepWarning, match=r"'subspace' is left out: .*the key order, or raise.*"
+                      r"\[models\.subspace\], fit it with --model subspace"):  # fmt: skip
+        fit_baselines(asked, ["heave"], ["eta_fwd"])
+    own = '\n[models.subspace]\nkind = "subspace"\norder = 2\nfuture = 4\nstate_delays = 4\n'
+    own += 'input_delays = 4\nstates = ["heave"]\ninputs = ["eta_fwd"]\n'
+    assert fit_campaign(campaign(halves, EXACT + own), "subspace").kind == "subspace"
 
 
 def test_waves_of_trained_periods_are_not_warned_of(tmp_path, recwarn):

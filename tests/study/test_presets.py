@@ -9,7 +9,8 @@ import pytest
 from seakeep import Uniform
 from seakeep.campaign import ModelSettings, read_campaign
 from seakeep.campaign.settings import is_elevation
-from seakeep.study import describe, judge, read_study
+from seakeep.signals.waves import paper_welch
+from seakeep.study import judge, read_study
 from seakeep.study.reproduce import ACTS, Size, study_text
 from seakeep.study.resolve import build_spec, can_align, resolve_model
 
@@ -118,7 +119,7 @@ def paper(found):
             21: study.statistics.n_series == 100,
             22: variant["joins"] is True and test.placement == "random",
             25: (test.length, test.windows) == (15.0, 10),
-            26: (describe.PAPER_SEGMENT * 500, describe.PAPER_OVERLAP * 500) == (4096, 128),
+            26: paper_welch(1 / 500)[:2] == (4096, 128),
         }
     return out
 

@@ -12,13 +12,23 @@ import numpy as np
 import pytest
 import xarray as xr
 from started import started
+from tutorial_study import put_tutorial
 
 from seakeep.errors import SeakeepWarning
+from seakeep.models.executor import make_executor
 from seakeep.report.acts import write_reproduction
 from seakeep.report.tables import MISSING
 from seakeep.study import read_study
 from seakeep.study.plan import make_plan
-from seakeep.study.reproduce import ACTS, SLOW, Size, read_reproduction, reproduce, study_text
+from seakeep.study.reproduce import (
+    ACTS,
+    SLOW,
+    Size,
+    prepare_campaigns,
+    read_reproduction,
+    reproduce,
+    study_text,
+)
 
 pytest.importorskip("seakeep.tank.play", reason="the virtual tank needs its libraries")
 from seakeep.tank.delivery import campaign_text, write_record
@@ -26,6 +36,8 @@ from seakeep.tank.instruments import Column, Record
 
 SMALL = Size(training=2, tests=2, members=2, series=4)
 RATE = 50.0
+RUNS = ("first", "second", "unseen")
+"""Of the tutorial."""
 
 
 def record(name, seconds, rng):
@@ -234,3 +246,17 @@ def test_the_page_over_the_acts_links_to_theirs(played, results):
         assert act.title in page
     for name in ("acts", "claims", "channels_irregular", "waves", "positions"):
         assert f'id="table-{name}"' in page
+
+
+def test_runs_that_are_prepared_beside_others_are_counted_one_by_one(tmp_path):
+    campaigns = []
+    for name in ("measured", "detrended"):
+        (tmp_path / name).mkdir()
+        put_tutorial(tmp_path / name, "")
+        campaigns.append(tmp_path / name / "campaign.toml")
+    counted = []
+    with make_executor(2) as executor:
+        prepare_campaigns(campaigns, executor, lambda *each: counted.append(each))
+    assert counted == [(n, 3, f"preparing {run}") for n, run in enumerate(RUNS, 1)]
+    for campaign in campaigns:
+        assert {each.stem for each in (campaign.parent / "prepared").glob("*.nc")} == set(RUNS)

@@ -49,7 +49,7 @@ def test_files_figures_and_statistics(run, tmp_path):
 
 def test_one_run_alone(run, tmp_path):
     out = tmp_path / "out"
-    assert run("--out", out, "--run", "regular", "--format", "nc").exit_code == 0
+    assert run("--out", out, "--run", "regular", "--raw-format", "nc").exit_code == 0
     assert [p.name for p in (out / "raw").iterdir()] == ["regular"]
     assert (out / "raw" / "regular" / "loads.nc").is_file()
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from seakeep.arrays import Progress
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.files import expanded, make_folder, sha256_of
 
@@ -129,7 +130,7 @@ def state_of(dataset: PublicDataset, folder: Path | None) -> str:
 def fetch(
     dataset: PublicDataset,
     folder: Path,
-    progress: Callable[[int, int, str], None] | None = None,
+    progress: Progress | None = None,
     sources: Sequence[str] | None = None,
 ) -> Path:
     """Download what is missing of a data set and check it.

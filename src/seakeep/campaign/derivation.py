@@ -12,6 +12,7 @@ from seakeep.campaign.settings import CampaignSettings, DerivedSettings, long_na
 from seakeep.campaign.validation import sources_of
 from seakeep.conventions import canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError, SeakeepError
+from seakeep.quality.faults import BRIDGED, MISSING, flag_attributes
 from seakeep.signals import (
     band_pass,
     complementary_filter,
@@ -26,7 +27,6 @@ from seakeep.signals import (
     transfer_velocity,
 )
 from seakeep.signals.expressions import parse
-from seakeep.signals.quality import BRIDGED, MISSING, flag_attributes
 from seakeep.waves import GRAVITY
 
 __all__ = ["derive"]

@@ -18,6 +18,7 @@ from seakeep.errors import DataError
 from seakeep.formats import Columns
 from seakeep.formats.columns import is_unit, named_unit
 from seakeep.signals import encounter_period, repeated_waves, uniform_step, waves_part
+from seakeep.signals.time_axis import over_gaps
 from seakeep.signals.waves import energy_period, tapered_power
 
 __all__ = [
@@ -139,8 +140,7 @@ def _series(file: File, column: str) -> FloatArray | None:
     there = np.isfinite(series)
     if file.rate is None or there.sum() < LONG or not np.ptp(series[there]):
         return None
-    at = np.arange(series.size)
-    return np.interp(at, at[there], series[there])
+    return over_gaps(series)
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -7,6 +7,7 @@ after it are there: it differs from the offline one by what the ends of the wind
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,10 +22,14 @@ from seakeep.campaign.readers import find_column, time_column, time_unit_of
 from seakeep.campaign.settings import CampaignSettings
 from seakeep.conventions import conversion
 from seakeep.errors import RequestError, SeakeepError, did_you_mean
+from seakeep.files import load_sealed, write_sealed_array
 from seakeep.formats import Columns, Options
 from seakeep.signals import Clock
 
 __all__ = ["LiveChain", "Template"]
+
+STATE = "state of a live chain"
+"""Kind of the files of :meth:`LiveChain.save`."""
 
 
 @dataclass(frozen=True)
@@ -140,6 +145,59 @@ class LiveChain:
         except SeakeepError:
             self._rows, self._origin, self._given = before
             raise
+
+    def save(self, path: str | Path) -> Path:
+        """Write the rows that the chain still needs, for :meth:`resume` in another process.
+
+        Parameters
+        ----------
+        path : str or Path
+            File; an earlier state of a chain there is replaced.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        RequestError
+            If the file cannot be written, or another one is there.
+        """
+        rows = [values for table in self._rows.values() for values in table.values()]
+        kept = [self._columns(), self._origin, self._given, [len(values) for values in rows]]
+        return write_sealed_array(np.concatenate(rows), {"kept": json.dumps(kept)}, path, STATE)
+
+    def resume(self, path: str | Path) -> None:
+        """Go on from a state that :meth:`save` wrote, as if the process had never stopped.
+
+        Parameters
+        ----------
+        path : str or Path
+            File of a chain that was made in the same way.
+
+        Raises
+        ------
+        RequestError
+            If the loggers, their columns or the step of the model are others.
+        DataError
+            If the file is damaged, or another one.
+        """
+        dataset = load_sealed(path, STATE)
+        columns, origin, given, sizes = json.loads(dataset.attrs["kept"])
+        if columns != self._columns():
+            raise RequestError(
+                f"{path} is the state of a chain with other loggers, columns or steps. Make the "
+                "chain as the one that was saved, or start without its state."
+            )
+        rows = iter(np.split(dataset["values"].values, np.cumsum(sizes)))
+        self._rows = {
+            key: {name: next(rows) for name in table} for key, table in self._rows.items()
+        }
+        self._origin, self._given = origin, given
+
+    def _columns(self) -> list[object]:
+        return [self.dt, {key: list(table) for key, table in self._rows.items()}]
 
     def _handed_out(self) -> xr.Dataset:
         """Model samples that are ready, and no row kept that none needs any more."""

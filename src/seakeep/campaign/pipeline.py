@@ -53,6 +53,19 @@ from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
 from seakeep.formats import Columns, Options
 from seakeep.formats.columns import is_unit, meant_column, same_unit
 from seakeep.quality import Finding, Rate, Record, Redundant, check
+from seakeep.quality.faults import (
+    BRIDGED,
+    MISSING,
+    OUTLIER,
+    REPLACED,
+    SATURATED,
+    STUCK,
+    find_held,
+    find_outliers,
+    flag_attributes,
+    reading_step,
+    saturated,
+)
 from seakeep.signals import (
     Clock,
     bridge,
@@ -65,20 +78,6 @@ from seakeep.signals import (
     onto_uniform,
     resample,
     uniform_step,
-)
-from seakeep.signals.quality import (
-    BRIDGED,
-    MISSING,
-    OUTLIER,
-    REPLACED,
-    SATURATED,
-    STUCK,
-    dominant_period,
-    find_outliers,
-    find_saturation,
-    find_stuck,
-    flag_attributes,
-    reading_step,
 )
 from seakeep.signals.synchronisation import ASSUMED
 from seakeep.signals.time_axis import instant_text, stretches
@@ -494,13 +493,13 @@ def flag_samples(data: xr.Dataset, replaced: bool) -> xr.Dataset:
         there = (flags & (MISSING | BRIDGED)) == 0
         if np.isfinite(step := reading_step(x)):
             data[name].attrs["reading_step"] = step
-        outlier = find_outliers(x) & there
-        stuck = find_stuck(x, dt, max(dominant_period(x, dt), 5 * dt)) & there
-        for start, end in stretches(stuck):  # what stands before a gap that was filled
-            stuck[start:end] = end - start > 2
+        held = find_held(x, dt) & there
+        for start, end in stretches(held):  # what stands before a gap that was filled
+            held[start:end] = end - start > 2
+        outlier, edge = find_outliers(x) & there & ~held, saturated(x, held)
         flags[outlier] |= OUTLIER
-        flags[find_saturation(x) & there & ~stuck] |= SATURATED
-        flags[stuck] |= STUCK
+        flags[edge] |= SATURATED
+        flags[held & ~edge] |= STUCK
         if replaced and outlier.any():
             filled = bridge(np.where(outlier, np.nan, x), dt, np.inf).values
             data[name] = data[name].copy(data=filled)

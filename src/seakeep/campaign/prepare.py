@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import number, whole_number
+from seakeep.arrays import Progress, number, whole_number
 from seakeep.campaign.live_chain import LiveChain, Template
 from seakeep.campaign.pipeline import (
     Run,
@@ -37,12 +37,11 @@ from seakeep.files import expanded
 from seakeep.formats import Columns, Options, read_columns
 from seakeep.quality import as_json, warn_of
 from seakeep.signals import Clock, uniform_step
-from seakeep.signals.quality import noise_floor
+from seakeep.signals.waves import noise_floor
 from seakeep.toml import in_seconds, lengths, parse_length
 
 __all__ = ["Campaign", "Progress", "read_campaign"]
 
-Progress = Callable[[int, int, str], None]
 """Called after each run with how many are done, how many there are, and the run's name."""
 
 SHOWN_RUNS = 6

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.campaign.pipeline import (
     Reader,
     Run,
@@ -90,7 +91,7 @@ def survey(
     period_runs: Sequence[str],
     channel: str,
     reader: Reader,
-    progress: Callable[[int, int, str], None] | None = None,
+    progress: Progress | None = None,
     asked: Collection[str] = (),
     failures: Failures | None = None,
 ) -> Survey:

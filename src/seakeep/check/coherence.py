@@ -21,14 +21,15 @@ from seakeep.check.parts import (
     used_parts,
 )
 from seakeep.core.harmonics import dominant_frequency
-from seakeep.core.spectra import Spectra, cross_spectra
+from seakeep.core.spectra import Spectra, cross_spectra, segment_length
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Model
 
 __all__ = ["coherence"]
 
-SHORTEST, LONGEST = 16, 64
-"""Encounter periods of a segment of Welch's method: long ones resolve a lightly damped response."""
+LONGEST = 64
+"""Most encounter periods of a segment of Welch's method: long ones resolve a lightly damped
+response."""
 AVERAGES = 10
 """Independent segments per input, and one more, that are kept where the records are long enough."""
 
@@ -107,8 +108,7 @@ def coherence(
         pieces.append((columns[whole][at], np.concatenate(left, axis=1)))
     period = encounter_period_of(model, waves) / model.dt
     samples = sum(len(columns) for columns, _ in pieces)
-    wanted = 2 * samples / (AVERAGES * (len(model.inputs) + 1))
-    segment = round(np.clip(wanted, SHORTEST * period, LONGEST * period))
+    segment = segment_length(samples, AVERAGES * (len(model.inputs) + 1), period, LONGEST)
     further = cross_spectra(pieces, model.dt, segment)
     spectra = further.only(range(len(model.inputs)))
     if not spectra.input_power.max() > 0:

@@ -10,6 +10,7 @@ from typing import Any
 
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.check.coherence import coherence
 from seakeep.check.free import decay, measured_decay, modes
 from seakeep.check.parts import Known, of_part
@@ -81,7 +82,7 @@ class Checked:
 def check_model(
     model: Model,
     runs: Mapping[str, xr.Dataset],
-    progress: Callable[[int, int, str], None] | None = None,
+    progress: Progress | None = None,
     baselines: Mapping[str, Model] | None = None,
 ) -> Checked:
     """Check a model on prepared runs.

@@ -10,6 +10,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.check.parts import single_model
+from seakeep.conventions import canonical_channel
 from seakeep.core.decay import free_decay
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Model
@@ -21,6 +22,22 @@ __all__ = ["MOTIONS", "decay", "measured_decay", "modes"]
 MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 LONGEST, SHORTEST = 20000, 200
 """Samples of a decay."""
+
+
+def _motions(model: Model) -> list[str]:
+    """States that are rigid motions."""
+    found = [name for name in model.states if name in MOTIONS]
+    if not found:
+        free = [name for name in model.states if canonical_channel(name) is None]
+        meant = [(name, motion) for name in free for motion in MOTIONS if motion in name]
+        state, motion = meant[0] if meant else (model.states[0], MOTIONS[2])
+        raise RequestError(
+            f"no state of the model is a rigid motion ({', '.join(MOTIONS)}): states "
+            f"{', '.join(model.states)}. If {state} is the vessel's {motion}, call it {motion} in "
+            f"the campaign file ([channels.{motion}], with column = …, and in states), and fit "
+            "again."
+        )
+    return found
 
 
 def modes(model: Model) -> xr.Dataset:
@@ -80,12 +97,7 @@ def decay(model: Model) -> xr.Dataset:
         If no state is a rigid motion, or the model is none of delayed states.
     """
     single = single_model(model)
-    motions = [name for name in single.states if name in MOTIONS]
-    if not motions:
-        raise RequestError(
-            f"no state of the model is a rigid motion ({', '.join(MOTIONS)}): states "
-            f"{', '.join(single.states)}. There is nothing to release."
-        )
+    motions = _motions(single)
     table = single.modes()
     waves = table["period"].values[table["damping_ratio"].values < 0.7]
     longest = float(waves[np.isfinite(waves)].max(initial=0.0))
@@ -145,10 +157,12 @@ def measured_decay(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     ------
     DataError
         If no run is a decay in still water.
+    RequestError
+        If no state is a rigid motion.
     """
     still = {name: run for name, run in runs.items() if run.attrs.get("waves") == "still"}
-    motions = [name for name in model.states if name in MOTIONS]
-    if not (still and motions):
+    motions = _motions(model)
+    if not still:
         raise DataError(
             "no run is a free decay in still water. State waves = 'still' of such runs, and the "
             "model's decay stands beside theirs."

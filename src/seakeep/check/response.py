@@ -22,7 +22,7 @@ from seakeep.check.parts import (
 )
 from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
 from seakeep.core.response import frequency_response
-from seakeep.core.spectra import Spectra, cross_spectra
+from seakeep.core.spectra import Spectra, cross_spectra, segment_length
 from seakeep.errors import DataError, RequestError, SeakeepError, warn
 from seakeep.models import HankelDMDcModel, HankelEnsemble, Model
 from seakeep.models.engine import Dynamics
@@ -32,8 +32,8 @@ __all__ = ["measured_response", "response", "transfer", "validation"]
 
 WAVE = "wave"
 """Name of the input that is a wave which passes all probes."""
-SHORTEST, LONGEST = 16, 32
-"""Encounter periods of a segment of Welch's method."""
+LONGEST = 32
+"""Most encounter periods of a segment of Welch's method."""
 AVERAGES = 20
 """Independent segments that are kept, where the records are long enough."""
 POWER = 0.02
@@ -312,10 +312,8 @@ def _accuracy(run: xr.Dataset, channel: str) -> float:
 def _irregular_points(model: Model, parts: list[Part], reference: int, period: float) -> xr.Dataset:
     pieces = [(part.inputs[:, [reference]], part.states) for part in parts]
     period /= model.dt
-    wanted = 2 * sum(len(part.time) for part in parts) / AVERAGES
-    spectra, gain, radius = _gain(
-        pieces, model.dt, round(np.clip(wanted, SHORTEST * period, LONGEST * period))
-    )
+    segment = segment_length(sum(len(part.time) for part in parts), AVERAGES, period, LONGEST)
+    spectra, gain, radius = _gain(pieces, model.dt, segment)
     power = spectra.input_power[:, 0]
     if not power.max() > 0:
         raise DataError(

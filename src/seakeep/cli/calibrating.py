@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import messages, print_table, progress_bar, quietly, results
+from seakeep.cli.console import messages, print_table, progress_bar, results
 from seakeep.cli.options import (
     DEFAULT_LEVEL,
     CampaignFile,
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
     from seakeep.campaign import Campaign
     from seakeep.models import HankelEnsemble
-    from seakeep.models.calibration import BandScale
     from seakeep.report.tables import Table
 
 __all__ = ["calibrate"]
@@ -70,7 +69,7 @@ def calibrate(
     ] = None,
     level: Level = None,
     scale: Annotated[
-        str,
+        Literal["constant", "spread", "learnt"],
         typer.Option(
             "--scale",
             help="Half-width of the band: 'spread', a factor times that of the members with a "
@@ -79,7 +78,7 @@ def calibrate(
         ),
     ] = "spread",
     folds: Annotated[
-        str | None,
+        Literal["run"] | None,
         typer.Option(
             "--folds",
             help="'run': members trained on the other runs forecast each training run; by default "
@@ -101,13 +100,11 @@ def calibrate(
     check_place(out, ".nc")
     from seakeep.campaign import load_prepared, read_campaign
     from seakeep.models import is_ensemble, load_model
-    from seakeep.models.calibration import check_scale
     from seakeep.models.forecasts import counted
     from seakeep.quality import warn_of_runs
     from seakeep.signals.time_axis import instant_text, span_text
     from seakeep.study.comparison import samples_of
 
-    check_scale(scale)
     fitted = load_model(ensemble)
     if not is_ensemble(fitted):
         raise RequestError(
@@ -138,10 +135,10 @@ def calibrate(
             parts,
             count,
             DEFAULT_LEVEL if level is None else level,
-            scale=cast("BandScale", scale),
-            folds=cast('Literal["run"] | None', folds),
+            scale=scale,
+            folds=folds,
             executor=executor,
-            progress=quietly(progress),
+            progress=progress,
         )
     print_table(_table(calibrated))
     assert calibrated.calibration is not None

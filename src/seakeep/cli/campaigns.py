@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -34,10 +34,11 @@ def init(
         int | None, typer.Option("--skip-rows", min=0, help="Lines to skip above the header.")
     ] = None,
     delimiter: Annotated[
-        str | None, typer.Option("--delimiter", help="',' or ';' or 'tab' or 'blank'.")
+        Literal[",", ";", "tab", "blank"] | None,
+        typer.Option("--delimiter", help="Mark between columns."),
     ] = None,
     decimal: Annotated[
-        str | None, typer.Option("--decimal", help="Decimal mark, '.' or ','.")
+        Literal[".", ","] | None, typer.Option("--decimal", help="Decimal mark.")
     ] = None,
     group: Annotated[
         str | None, typer.Option("--group", help="Group of HDF5 or TDMS, topic of ROS.")
@@ -56,7 +57,9 @@ def init(
             raise RequestError(f"{out} exists already. Give another name, or --force.")
         check_output(out, "draft", files)
     folder = Path() if out is None else out.parent
-    options = {**_file_options(skip_rows, delimiter, decimal), "group": group}
+    marks = {"tab": "\t", "blank": " "}
+    mark = None if delimiter is None else marks.get(delimiter, delimiter)
+    options = {"skip_rows": skip_rows, "delimiter": mark, "decimal": decimal, "group": group}
     text = draft_campaign(files, folder, options)
     if out is None:
         typer.echo(text, nl=False)
@@ -64,19 +67,6 @@ def init(
     with replacing(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     messages().print(f"Wrote {out}. Read it, then: seakeep prepare {out}")
-
-
-def _file_options(
-    skip_rows: int | None, delimiter: str | None, decimal: str | None
-) -> dict[str, object]:
-    marks = {None: None, ",": ",", ";": ";", "tab": "\t", "\t": "\t", "blank": " ", " ": " "}
-    if delimiter not in marks:
-        raise RequestError(
-            f"--delimiter: received '{delimiter}'. Give ',' or ';' or 'tab' or 'blank'."
-        )
-    if decimal not in (None, ".", ","):
-        raise RequestError(f"--decimal: received '{decimal}'. Give '.' or ','.")
-    return {"skip_rows": skip_rows, "delimiter": marks[delimiter], "decimal": decimal}
 
 
 def prepare(

@@ -2,34 +2,34 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import IO, TYPE_CHECKING
 
 from rich.console import Console
 
+from seakeep.arrays import Progress
 from seakeep.errors import SeakeepWarning
 
 if TYPE_CHECKING:
     from seakeep.report.tables import Table
 
 __all__ = [
-    "Report",
+    "Progress",
     "messages",
     "print_table",
     "progress_bar",
-    "quietly",
     "results",
     "tell_warnings",
     "worker_count",
 ]
 
-Report = Callable[[int, int, str], None]
-"""Takes how many steps are done, how many there are, and the name of the next one."""
 
 SECONDS_BETWEEN_LINES = 5.0
 PIPE_WIDTH = 140
@@ -54,8 +54,16 @@ def print_table(table: Table, note: bool = True) -> None:
 
 
 def messages() -> Console:
-    """Console of messages, on standard error; long lines are left to the terminal."""
-    return Console(file=sys.stderr, highlight=False, soft_wrap=True, markup=False, emoji=False)
+    """Console of messages, on standard error; long lines are left to the terminal.
+
+    It is the same one while a bar is shown, which moves down for a message.
+    """
+    return _console(getattr(sys.stderr, "rich_proxied_file", sys.stderr))
+
+
+@lru_cache(maxsize=1)
+def _console(stream: IO[str]) -> Console:
+    return Console(file=stream, highlight=False, soft_wrap=True, markup=False, emoji=False)
 
 
 def worker_count(workers: int | None) -> int:
@@ -68,37 +76,50 @@ def worker_count(workers: int | None) -> int:
 
 
 @contextmanager
-def progress_bar(what: str) -> Iterator[Report]:
-    """Show progress: a bar on a terminal, one line per step elsewhere, on standard error."""
+def progress_bar(what: str) -> Iterator[Progress]:
+    """Show progress: a bar on a terminal, else a line every few seconds, on standard error."""
     console = messages()
     if not console.is_terminal:
+        told, began = -math.inf, (time.monotonic(), 0)
 
         def line(done: int, total: int, name: str) -> None:
-            console.print(f"{what} {done}/{total}: {name}")
+            nonlocal told, began
+            now = time.monotonic()
+            if done < began[1]:  # a new count
+                began = (now, done)
+            if now - told < SECONDS_BETWEEN_LINES and done < total:
+                return
+            told = now
+            left = (now - began[0]) / max(done - began[1], 1) * (total - done)
+            words = f" (about {left:.0f} s left)" if done > began[1] and left >= 1 else ""
+            console.print(f"{what} {done}/{total}: {name}{words}")
 
         yield line
         return
+    import rich.progress
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
-        Progress,
         TextColumn,
         TimeRemainingColumn,
     )
+    from rich.table import Column
 
-    bar = Progress(
+    bar = rich.progress.Progress(
         TextColumn("{task.description}"),
-        BarColumn(),
+        BarColumn(bar_width=20),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
+        TextColumn("{task.fields[name]}", table_column=Column(ratio=1, no_wrap=True)),
         console=console,
         transient=True,
+        expand=True,
     )
     with bar:
-        task = bar.add_task(what, total=None)
+        task = bar.add_task(what, total=None, name="")
 
         def advance(done: int, total: int, name: str) -> None:
-            bar.update(task, total=total, completed=done, description=f"{what}: {name}")
+            bar.update(task, total=total, completed=done, name=name)
 
         yield advance
 
@@ -128,18 +149,3 @@ def tell_warnings() -> Iterator[None]:
         warnings.simplefilter("always", SeakeepWarning)
         warnings.showwarning = show
         yield
-
-
-def quietly(progress: Report) -> Report:
-    """Print progress every few seconds instead of a line for every step."""
-    if sys.stderr.isatty():
-        return progress
-    told = time.monotonic()
-
-    def tell(done: int, total: int, what: str) -> None:
-        nonlocal told
-        if time.monotonic() - told > SECONDS_BETWEEN_LINES:
-            told = time.monotonic()
-            progress(done, total, what)
-
-    return tell

@@ -24,6 +24,10 @@ def export(
         Path | None,
         typer.Option("--c", help="Folder for C99 sources: a library of two files.", metavar="DIR"),
     ] = None,
+    estimator: Annotated[
+        bool,
+        typer.Option("--estimator", help="Beside the C99 sources, those of an estimator."),
+    ] = False,
     fmu: Annotated[
         Path | None,
         typer.Option("--fmu", help="FMU 2.0 for co-simulation to write.", metavar="FILE.fmu"),
@@ -57,18 +61,18 @@ def export(
     """
     if not any((c, fmu, onnx, mat)):
         raise RequestError("nothing to write. Give --c DIR, --fmu, --onnx or --mat FILE.")
-    if steps is not None and onnx is None:
-        raise RequestError("--steps belongs to --onnx FILE. Leave it out, or write an ONNX graph.")
+    _check_beside(steps is not None, onnx, "--steps belongs to --onnx FILE")
+    _check_beside(estimator, c, "--estimator belongs to --c DIR")
     for path, suffix in ((fmu, ".fmu"), (onnx, ".onnx"), (mat, ".mat")):
         if path is not None:
             check_place(path, suffix)
-    from seakeep.hosts import write_c, write_fmu, write_onnx
+    from seakeep.hosts import write_c, write_estimator, write_fmu, write_onnx
     from seakeep.hosts.program import program_of
 
     program = program_of(_single(model, member))
     written: list[Path] = []
     if c is not None:
-        written += write_c(program.model, c, model.stem)
+        written += (write_estimator if estimator else write_c)(program.model, c, model.stem)
     if fmu is not None:
         written.append(write_fmu(program.model, fmu))
     if onnx is not None:
@@ -79,6 +83,11 @@ def export(
     if fmu is not None:
         messages().print(_binary(fmu), soft_wrap=True)
     messages().print(program.timing, soft_wrap=True)
+
+
+def _check_beside(is_given: bool, target: Path | None, option: str) -> None:
+    if is_given and target is None:
+        raise RequestError(f"{option}. Leave it out, or give both.")
 
 
 def _single(file: Path, member: int | None) -> Model:

@@ -6,15 +6,16 @@ from collections.abc import Mapping
 from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from seakeep.cli.console import messages, print_table, progress_bar, quietly, results
+from seakeep.cli.console import messages, print_table, progress_bar, results
 from seakeep.cli.options import (
     DEFAULT_LEVEL,
     BandKind,
     CampaignFile,
+    Degrees,
     FullScale,
     Level,
     ModelFile,
@@ -71,7 +72,7 @@ def fit(
             identified = fit_campaign(read, model, progress, executor=executor)
         if is_ensemble(identified):
             with progress_bar("Stability") as progress:
-                identified.spectral_radii(executor=executor, progress=quietly(progress))
+                identified.spectral_radii(executor=executor, progress=progress)
     typer.echo(identified.summary())
     identified.save(out)
     messages().print(f"Wrote {out}. Judge it with: seakeep compare {out} {campaign}")
@@ -99,11 +100,9 @@ def forecast(
     workers: Workers = None,
     scheduler: Scheduler = None,
     full_scale: FullScale = False,
-    degrees: Annotated[
-        bool, typer.Option("--degrees", help="Write angles in degrees instead of radians.")
-    ] = False,
+    degrees: Degrees = False,
     ahead: Annotated[
-        str,
+        Literal["refuse", "predict"],
         typer.Option(
             "--ahead",
             help="If the waves end before the model's look-ahead: 'refuse', or 'predict' them "
@@ -169,7 +168,7 @@ def forecast(
             how: dict[str, Any] = {
                 "ahead": ahead,
                 "executor": executor,
-                "progress": quietly(progress),
+                "progress": progress,
             }
             if members:
                 result = identified.forecast(prepared, first, count, **how)
@@ -221,11 +220,9 @@ def compare(
         Path, typer.Option("-o", "--out", help="Folder for the table and the figures.")
     ] = Path("comparison"),
     format_: Annotated[
-        str, typer.Option("--format", help="Format of the figures: png, svg or pdf.")
+        Literal["png", "svg", "pdf"], typer.Option("--format", help="Format of the figures.")
     ] = "png",
-    radians: Annotated[
-        bool, typer.Option("--radians", help="Show angles in radians instead of degrees.")
-    ] = False,
+    degrees: Degrees = True,
     level: Level = None,
     band: BandKind = None,
     workers: Workers = None,
@@ -261,8 +258,6 @@ def compare(
 
     In service: seakeep compare model.nc docs/tutorial/campaign.toml --nowcast --steps '2 T' -o now
     """
-    if format_ not in ("png", "svg", "pdf"):
-        raise RequestError(f"--format must be png, svg or pdf; received '{format_}'.")
     from seakeep.campaign import read_campaign
     from seakeep.models import load_model
     from seakeep.report.comparison import difference_blocks, write_comparison, write_differences
@@ -282,7 +277,16 @@ def compare(
     if baselines:
         fitted = _with_baselines(fitted, read)
     if nowcast:
-        _refuse_in_service({"--start": start is not None, "--full-scale": full_scale})
+        _refuse_in_service(
+            {
+                "--start": start is not None,
+                "--full-scale": full_scale,
+                "--band": band is not None,
+                "--radians": not degrees,
+                "--workers": workers is not None,
+                "--scheduler": scheduler is not None,
+            }
+        )
         serving = {n: each for n, each in fitted.items() if n in names or hasattr(each, "live")}
         _nowcast(serving, read, run or read.test_runs, steps, shown["level"], out, figures, used)
         return
@@ -294,11 +298,11 @@ def compare(
             start,
             steps,
             progress,
-            members=quietly(progress),
+            members=progress,
             **shown,
             executor=executor,
         )
-    found = _displayed(found, _scale(read) if full_scale else None, radians)
+    found = _displayed(found, _scale(read) if full_scale else None, degrees)
     tables = {name: comparison_table(of) for name, of in found.items()}
     _print_comparison(tables, {name: each.kind for name, each in fitted.items()})
     written = [write_comparison(tables, out / TABLE)]
@@ -315,14 +319,14 @@ def compare(
 
 
 def _displayed(
-    found: dict[str, list[Comparison]], scale: float | None, radians: bool
+    found: dict[str, list[Comparison]], scale: float | None, degrees: bool
 ) -> dict[str, list[Comparison]]:
     """Comparisons at full scale, where there is a scale, and in degrees, if wanted."""
     from seakeep.study import at_full_scale, in_degrees
 
     if scale is not None:
         found = {name: [at_full_scale(each, scale) for each in of] for name, of in found.items()}
-    if radians:
+    if not degrees:
         return found
     return {name: [in_degrees(each) for each in of] for name, of in found.items()}
 
@@ -333,7 +337,8 @@ def _refuse_in_service(given: Mapping[str, bool]) -> None:
         if stated:
             raise RequestError(
                 f"{option} and --nowcast do not go together: forecasts start all over the runs, "
-                "and their errors are in training SDs. Leave one of them out."
+                "one after the other, with the band of the filter, and their errors are in "
+                "training SDs. Leave one of them out."
             )
 
 
@@ -468,8 +473,6 @@ def _band(
     scheduler: str | None = None,
 ) -> dict[str, Any]:
     """Level and kind of band that were asked for; a calibrated one knows its level."""
-    if band not in (None, "members", "calibrated"):
-        raise RequestError(f"--band must be members or calibrated; received '{band}'.")
     from seakeep.models import is_ensemble
 
     ensembles = [each for each in models.values() if is_ensemble(each)]

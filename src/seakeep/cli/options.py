@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -20,6 +20,7 @@ __all__ = [
     "DEFAULT_LEVEL",
     "BandKind",
     "CampaignFile",
+    "Degrees",
     "FullScale",
     "Level",
     "ModelFile",
@@ -82,13 +83,14 @@ Scheduler = Annotated[
     ),
 ]
 BandKind = Annotated[
-    str | None,
+    Literal["members", "calibrated"] | None,
     typer.Option(
         "--band",
         help="For an ensemble: 'members', the quantiles of its members, or 'calibrated', which "
         "seakeep calibrate made; by default members.",
     ),
 ]
+Degrees = Annotated[bool, typer.Option("--degrees/--radians", help="Unit of angles.")]
 
 
 def read_files(campaign: Campaign, *others: Path) -> list[Path]:

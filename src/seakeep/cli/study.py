@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import sys
-import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar, cast
+from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 import typer
 
-from seakeep.cli.console import Report, print_table, progress_bar, results
+from seakeep.arrays import Progress
+from seakeep.cli.console import print_table, progress_bar, results
 from seakeep.cli.options import Scheduler, checked_count
-from seakeep.errors import RequestError
 
 if TYPE_CHECKING:
     from seakeep.study import StudyResult
-    from seakeep.study.settings import Preset
 
 __all__ = ["report", "reproduce", "study"]
 
 Found = TypeVar("Found")
+Preset = Literal["paper", "recommended"]
 
 Workers = Annotated[
     int | None,
@@ -72,7 +70,7 @@ def study(
 def _write_study(_: Path, found: StudyResult, __: Executor | None = None) -> Path:
     from seakeep.report.page import write_report
 
-    with _Progress("Report") as tell:
+    with progress_bar("Report") as tell:
         return write_report(found, tell)
 
 
@@ -82,8 +80,8 @@ def reproduce(
         bool, typer.Option("--quick", help="All stages with small counts, in half of the time.")
     ] = False,
     preset: Annotated[
-        str | None,
-        typer.Option("--preset", help="paper or recommended: the acts of this preset alone."),
+        Preset | None,
+        typer.Option("--preset", help="The acts of this preset alone."),
     ] = None,
     seed: Annotated[
         int,
@@ -100,20 +98,17 @@ def reproduce(
 
     Example: seakeep reproduce --quick --out quick
     """
-    if preset not in (None, "paper", "recommended"):
-        raise RequestError(f"--preset must be paper or recommended; received '{preset}'.")
     from seakeep.models.executor import on_this_machine, submitting
     from seakeep.report.acts import acts_table
     from seakeep.study.reproduce import ACTS, Size
     from seakeep.study.reproduce import reproduce as reproduce_study
 
-    chosen = cast("Preset | None", preset)
     size = Size.quick() if quick else Size()
     pictured = _pictured([act.name for act in ACTS if preset in (None, act.preset)])
 
-    def play(executor: Executor | None, tell: Report) -> dict[str, StudyResult]:
+    def play(executor: Executor | None, tell: Progress) -> dict[str, StudyResult]:
         play_acts = partial(
-            reproduce_study, out, chosen, size=size, seed=seed, executor=executor, progress=tell
+            reproduce_study, out, preset, size=size, seed=seed, executor=executor, progress=tell
         )
         if (near := on_this_machine(executor)) is None:
             return play_acts()
@@ -163,9 +158,9 @@ def _write_reproduction(
     from seakeep.report.page import write_report
 
     for name, each in found.items() if on_this_machine(executor) is None else ():
-        with _Progress(f"Report of {each.attrs['study']}") as tell:
+        with progress_bar(f"Report of {each.attrs['study']}") as tell:
             write_report(each, tell, pictures=name == _pictured(found))
-    with _Progress("Report") as tell:
+    with progress_bar("Report") as tell:
         return write_reproduction(folder, found, tell)
 
 
@@ -182,42 +177,11 @@ def _write_act(_: None, item: tuple[StudyResult, bool]) -> None:
     write_report(item[0], pictures=item[1])
 
 
-class _Progress:
-    """Progress with the time that is left, also where it is printed line by line."""
-
-    def __init__(self, what: str) -> None:
-        self._bar = progress_bar(what)
-        self._begin: tuple[float, int] | None = None
-
-    def __enter__(self) -> Report:
-        report = self._bar.__enter__()
-        if sys.stderr.isatty():
-            return report
-        return lambda done, total, name: report(done, total, name + self._left(done, total))
-
-    def __exit__(self, *error: object) -> None:
-        self._bar.__exit__(*error)  # type: ignore[arg-type]
-
-    def _left(self, done: int, total: int) -> str:
-        now = time.monotonic()
-        if self._begin is None or done <= self._begin[1]:
-            self._begin = (now, done)
-            return ""
-        seconds = (now - self._begin[0]) / (done - self._begin[1]) * (total - done)
-        if seconds < 1:
-            return ""
-        return (
-            f" (about {seconds:.0f} s left)"
-            if seconds < 90
-            else (f" (about {seconds / 60:.0f} min left)")
-        )
-
-
 def _run(
     folder: Path,
     workers: int,
     scheduler: str | None,
-    work: Callable[[Executor | None, Report], Found],
+    work: Callable[[Executor | None, Progress], Found],
     write: Callable[[Path, Found, Executor | None], Path],
 ) -> tuple[Found, Path]:
     """Do the work and write its report; interrupted work is kept."""
@@ -225,7 +189,7 @@ def _run(
 
     try:
         with make_executor(workers, scheduler) as executor:
-            with _Progress("Study") as tell:
+            with progress_bar("Study") as tell:
                 found = work(executor, tell)
             return found, write(folder, found, executor)
     except KeyboardInterrupt as stop:

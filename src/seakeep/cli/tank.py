@@ -34,7 +34,7 @@ def tank(
         list[str] | None, typer.Option("--run", help="Play this run only; may be repeated.")
     ] = None,
     kind: Annotated[
-        Literal["csv", "nc"], typer.Option("--format", help="Format of the raw files.")
+        Literal["csv", "nc"], typer.Option("--raw-format", help="Format of the raw files.")
     ] = "csv",
     one_logger: Annotated[
         bool,

@@ -58,7 +58,7 @@ def track(
     downstream: Annotated[
         Literal["right", "left"], typer.Option(help="Side of the picture to which waves run.")
     ] = "right",
-    level: Annotated[
+    camera_pitch: Annotated[
         float, typer.Option(help="Pitch that the picture shows of a level vessel, deg.")
     ] = 0.0,
     origin: Annotated[
@@ -138,7 +138,7 @@ def track(
         panel=panel,
         panel_place=panel_place,
         downstream=downstream,
-        level=math.radians(level),
+        camera_pitch=math.radians(camera_pitch),
         origin=origin,
         lower=threshold,
         region=region,

@@ -93,7 +93,7 @@ def tune(
     assert isinstance(spec, HankelDMDc)
     period = read.encounter_period() if counts_in_periods(settings) else None
     kept = target.with_suffix(".scores.json")
-    chosen = replace(spec.select or Select(), period=period)
+    chosen = spec.select or Select(period=period)
     varied = {*(vary or ["observables"]), *(["observables"] if chosen.observables else [])}
     with member_executor(workers, scheduler) as executor, progress_bar("Tuning") as progress:
         found = search(

@@ -70,8 +70,9 @@ class DelayFilter:
         factor = np.sqrt(variances / np.maximum(found, np.finfo(float).tiny))
         if not exactly:
             factor = np.minimum(factor, 1.0)
-        self.covariance[newest] *= factor[:, None]
-        self.covariance[:, newest] *= factor
+        rows = self.covariance[newest] * factor[:, None]
+        rows[:, newest] = self.covariance[newest, newest] * np.outer(factor, factor)
+        self.covariance[newest], self.covariance[:, newest] = rows, rows.T  # exactly symmetric
 
     def measure(self, seen: BoolArray) -> tuple[FloatArray, FloatArray]:
         """Update by the rows that were measured.
@@ -85,19 +86,21 @@ class DelayFilter:
         -------
         gain : ndarray, shape (N(s+1), N)
             What a unit of innovation adds to the state; zero columns for rows not measured.
-        precision : ndarray, shape (N, N)
-            Inverse covariance of the innovation, zero for rows not measured.
+        whitening : ndarray, shape (N, N)
+            Inverse of the Cholesky factor of the innovation's covariance, which makes an
+            innovation white: its square is the Mahalanobis distance squared. Zero for rows not
+            measured.
         """
         count, size = self.a.shape
-        gain, precision = np.zeros((size, count)), np.zeros((count, count))
+        gain, whitening = np.zeros((size, count)), np.zeros((count, count))
         rows = np.flatnonzero(seen)
         if not rows.size:
-            return gain, precision
+            return gain, whitening
         places = size - count + rows
         cross = self.covariance[:, places]
         innovation = cross[places] + np.diag(self.noise[rows])
-        factor = linalg.cho_factor(innovation, lower=True)
-        found = linalg.cho_solve(factor, cross.T).T
+        factor = linalg.cholesky(innovation, lower=True)
+        found = linalg.cho_solve((factor, True), cross.T).T
         self.covariance -= found @ cross.T
         self.covariance += self.covariance.T.copy()
         self.covariance *= 0.5
@@ -105,8 +108,10 @@ class DelayFilter:
         self.covariance[exact] = 0.0
         self.covariance[:, exact] = 0.0
         gain[:, rows] = found
-        precision[np.ix_(rows, rows)] = linalg.cho_solve(factor, np.eye(rows.size))
-        return gain, precision
+        whitening[np.ix_(rows, rows)] = linalg.solve_triangular(
+            factor, np.eye(rows.size), lower=True
+        )
+        return gain, whitening
 
     def ahead(self, steps: int) -> FloatArray:
         """Variances that today's errors alone leave after 1 … `steps` steps, shape (steps, N)."""

@@ -141,6 +141,14 @@ class Spectra:
         return gain, np.sqrt(squares)
 
 
+def segment_length(samples: float, averages: int, period: float, longest: int) -> int:
+    """Samples of Welch's segments: as long as `averages` of them allow, in 16 to `longest` periods.
+
+    Segments share a half; `period` is that of the waves, in samples.
+    """
+    return round(min(max(2 * samples / averages, 16 * period), longest * period))
+
+
 def cross_spectra(
     pieces: Sequence[tuple[FloatArray, FloatArray]], dt: float, segment: int
 ) -> Spectra:

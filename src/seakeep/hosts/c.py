@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -15,13 +16,13 @@ from seakeep.core.readouts import LinearHinges
 from seakeep.files import MARK, check_output, make_folder, replacing
 from seakeep.hosts.program import Program, program_of
 from seakeep.models import Model
-from seakeep.models.engine import GROWTH
+from seakeep.models.engine import GROWTH, fading
 from seakeep.models.observables import Formula, Product, Term
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-__all__ = ["identifier", "rendered", "sources", "write_c"]
+__all__ = ["content_of", "identifier", "rendered", "sources", "write_c", "write_sources"]
 
 KIND = "C source"
 OPERATORS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
@@ -56,8 +57,12 @@ def write_c(model: Model, folder: str | Path, name: str = "rom") -> list[Path]:
     Numbers are written in hexadecimal, so that none is rounded. ``cc -std=c99 -Wall -Werror``
     compiles the code without a warning.
     """
-    made = sources(program_of(model), identifier(name))
-    targets = {make_folder(Path(folder)) / file: text for file, text in made.items()}
+    return write_sources(sources(program_of(model), identifier(name)), folder)
+
+
+def write_sources(texts: Mapping[str, str], folder: str | Path) -> list[Path]:
+    """Write C files; raises as :func:`write_c`."""
+    targets = {make_folder(Path(folder)) / file: text for file, text in texts.items()}
     for target in targets:
         check_output(target, KIND)
     for target, text in targets.items():
@@ -74,12 +79,18 @@ def identifier(name: str) -> str:
 
 def sources(program: Program, name: str) -> dict[str, str]:
     """Text of the C files by their names."""
+    content = content_of(program, name)
+    return {f"{name}.{end}": rendered(f"model.{end}", **content) for end in ("h", "c")}
+
+
+def content_of(program: Program, name: str) -> dict[str, Any]:
+    """What the templates of C show of a model."""
     signature = program.model.signature
     n, m = program.sizes
     kernels: list[FloatArray] = []
     terms = {delayed: program.terms(delayed) for delayed in (True, False)}
     code = {key: [_term(each, kernels) for each in found] for key, found in terms.items()}
-    content: dict[str, Any] = {
+    return {
         "name": name,
         "upper": name.upper(),
         "mark": f"{MARK}: {KIND}, written by seakeep {metadata.version('seakeep')}:",
@@ -105,13 +116,13 @@ def sources(program: Program, name: str) -> dict[str, str]:
         "direct": code[False],
         "kernels": kernels,
         "growth": GROWTH,
+        "fade": fading(signature),
         "readouts": [
             {"column": each.column, "code": _hinges(each.function)}
             for each in signature.readouts
             if each.function is not None
         ],
     }
-    return {f"{name}.{end}": rendered(f"model.{end}", **content) for end in ("h", "c")}
 
 
 def rendered(template: str, **content: Any) -> str:
@@ -148,9 +159,8 @@ def _numbers(values: FloatArray) -> str:
 
 def _text(value: str) -> str:
     """Literal of C for any text."""
-    plain = (chr(byte) if chr(byte).isalnum() or byte in b" _/^.-" else f"\\{byte:03o}"
-             for byte in value.encode())  # fmt: skip
-    return '"' + "".join(plain) + '"'
+    escaped = re.sub(rb"[^\w /^.-]", lambda found: b"\\%03o" % ord(found[0]), value.encode())
+    return f'"{escaped.decode()}"'
 
 
 def _term(term: Term, kernels: list[FloatArray]) -> str:

@@ -316,7 +316,8 @@ class Subspace(HankelSettings):
         if self.order > most:
             raise RequestError(
                 f"order = {self.order} is more than the {most} values of {future} future instants "
-                f"of {counted(len(data.state_labels), 'state')}. Lower order, or raise future."
+                f"of {counted(len(data.state_labels), 'state')}. In the table of the "
+                "model, lower the key order, or raise the key future."
             )
         space = identify_subspace(
             data.states,

@@ -54,6 +54,9 @@ A linear model answers waves twice as high by twice the motion, so the limit gro
 the highest deviation of the input to that in training. What is left for the factor are transients
 and resonances that training did not show: a tenfold answer is no longer a forecast of a vessel, and
 members that go on from there would make up the mean of an ensemble."""
+MEMORY, LEAST = 20, 64
+"""Longest delays over which the limit falls back after a high wave, or a spike of a probe, and the
+samples that a delay counts at least: slow drift rings for some hundred wave periods."""
 PIECE = 2**18
 """Numbers that are looked at together, so that a long run takes little beside its result."""
 HELD = 32 * 2**20
@@ -469,24 +472,38 @@ def _open_runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
 
 
 def _excess(scales: Dynamics | Signature, windows: Windows) -> FloatArray:
-    """Largest deviation of the input of each window over that in training, at least one."""
+    """Largest deviation of the input over that in training, at least one, shape (window, steps).
+
+    What lies before a step counts less, by ``fading`` of each step in between.
+    """
     first = windows.delayed.shape[1] - scales.input_delays - windows.steps
-    found = np.ones(len(windows))
-    for scale, values in (
-        (scales.input_scale, windows.delayed[:, first:]),
-        (scales.direct_scale, windows.direct),
-    ):
-        reach = np.where(scale.reach > 0, scale.reach, np.inf)
-        relative = np.abs(values - scale.centre) / reach
-        found = np.maximum(found, relative.max(axis=(1, 2), initial=0.0))
+    if first < 0:  # without inputs
+        return np.ones((len(windows), windows.steps))
+    delayed, direct = (
+        (np.abs(values - scale.centre) / scale.bound).max(axis=2, initial=1.0)
+        for scale, values in (
+            (scales.input_scale, windows.delayed[:, first:]),
+            (scales.direct_scale, windows.direct),
+        )
+    )
+    found: FloatArray = np.maximum(delayed[:, scales.input_delays :], direct)
+    last, fade = delayed[:, : scales.input_delays].max(axis=1, initial=1.0), fading(scales)
+    for now in found.T:
+        last = now[:] = np.maximum(now, 1.0 + fade * (last - 1.0))
     return found
+
+
+def fading(scales: Dynamics | Signature) -> float:
+    """Part that is left of an input's excess over the training after one step."""
+    longest = max(scales.state_delays, scales.input_delays) + 1
+    return 1.0 - 1.0 / (MEMORY * max(longest, LEAST))
 
 
 def cut_lost(values: FloatArray, scales: Dynamics | Signature, windows: Windows) -> FloatArray:
     """NaN from where free runs (window, steps, N) are lost, in physical units; they are changed."""
     scale = scales.state_scale
     start = np.abs(windows.histories - scale.centre).max(axis=1, initial=0.0)
-    reach = np.maximum(np.where(scale.reach > 0, scale.reach, np.inf), start)[:, None]
+    reach = np.maximum(scale.bound, start)[:, None]
     limit = None
     length = max(1, PIECE // max(1, values[:, 0].size))
     before = np.zeros((len(values), 1), dtype=bool)
@@ -497,8 +514,8 @@ def cut_lost(values: FloatArray, scales: Dynamics | Signature, windows: Windows)
         if np.all(distance <= GROWTH * reach) and not before.any():
             continue  # for any input
         if limit is None:
-            limit = GROWTH * reach * _excess(scales, windows)[:, None, None]
-        lost = ~np.all(distance <= limit, axis=-1)
+            limit = GROWTH * reach * _excess(scales, windows)[..., None]
+        lost = ~np.all(distance <= limit[:, first : first + length], axis=-1)
         lost[:, :1] |= before
         piece[np.logical_or.accumulate(lost, axis=-1)] = np.nan
         before = np.any(lost, axis=-1, keepdims=True)

@@ -28,6 +28,7 @@ from typing import Any, TypeVar
 
 import threadpoolctl
 
+from seakeep.arrays import Progress
 from seakeep.errors import RequestError, SeakeepError
 
 __all__ = [
@@ -46,7 +47,6 @@ Data = TypeVar("Data")
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 Function = Callable[[Data, Item], Result]
-Progress = Callable[[int, int, str], None]
 """Called as ``progress(done, total, what)``."""
 
 BATCHES = 32
@@ -137,10 +137,11 @@ def as_finished(
                 raise errors[0]
 
 
-def one_blas_thread() -> AbstractContextManager[object]:
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
     """Limit BLAS to one thread: small products side by side beat products spread over cores."""
-    limit: AbstractContextManager[object] = _blas().limit(limits=1, user_api="blas")
-    return limit
+    with _blas().limit(limits=1, user_api="blas"):
+        yield
 
 
 @functools.cache

@@ -72,6 +72,11 @@ class Scale:
         for array in (self.mean, self.std, self.spread, self.centre, self.reach):
             array.flags.writeable = False
 
+    @property
+    def bound(self) -> FloatArray:
+        """Largest deviation in training, infinite for a channel that was constant there."""
+        return np.where(self.reach > 0, self.reach, np.inf)
+
     def deviations(self, values: FloatArray) -> FloatArray:
         """Standardised deviations of physical values, shape (…, channel)."""
         return (values - self.mean) / self.std

@@ -10,9 +10,10 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -30,9 +31,10 @@ from seakeep.arrays import (
 )
 from seakeep.core.kalman import DelayFilter, process_noise
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.files import load_sealed, write_sealed
+from seakeep.files import load_sealed, write_sealed_array
 from seakeep.models import engine, store
 from seakeep.models.engine import Dynamics, Windows
+from seakeep.models.executor import one_blas_thread
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import WINDOWS, LeadErrors
 from seakeep.models.inputs import Chain, FittedAlignment, Measured
@@ -53,13 +55,12 @@ LEAST_RECORD = 512
 BLOCK = 16
 """Samples whose waves an alignment carries together: that costs as much for one as for many."""
 CONSISTENCY = 256
-"""Samples over which the consistency is averaged, as a time constant."""
+"""Samples over which the consistency is averaged, as a time constant; twice as many as a free run
+lasts, at least, where it is that of free runs."""
 SPIKE = 100.0
 """What a single sample adds to the consistency at most: a spike tells of a sensor, for a while."""
 RIG = ("water_depth", "celerity", "probe_offset")
 """Attributes of a run that an alignment reads."""
-Judge = Callable[[int, FloatArray], None]
-"""Takes the slot of a sample and its innovation."""
 
 
 class Servable(Protocol):
@@ -144,9 +145,10 @@ class Live:
         size, variances = count * (s + 1), self._noise**2
         process = process_noise(errors.residual, self._a, variances)
         self._filter = DelayFilter(self._a, process, variances, np.zeros((size, size)))
-        self._precision_known = np.linalg.inv(process)
+        self._whitening_known = np.linalg.inv(np.linalg.cholesky(process))
+        self._deviation_known = np.sqrt(np.diagonal(process) + variances)
         # Samples after an instant whose input is needed before its estimate is final.
-        self._time, self._sum, self._weight = math.nan, 0.0, 0.0
+        self._time = math.nan
         none = self._run(0, np.zeros((0, len(signature.inputs))))
         ahead = signature.input_map.look_ahead(none, signature.dt)
         self._ahead = math.ceil(ahead / signature.dt - 1e-6)
@@ -161,14 +163,20 @@ class Live:
         self._kept = {name: np.full((room, width), np.nan) for name, width in widths.items()}
         slots = self._ahead + self._block + 1
         self._gains = np.zeros((slots, size, count))
-        self._precisions = np.zeros((slots, count, count))
+        self._whitenings = np.zeros((slots, count, count))
+        self._deviations = np.zeros((slots, count))
         self._plain = np.zeros(slots, dtype=bool)
         self._history = np.tile(signature.state_scale.centre, (s + 1, 1))
         self._innovation = np.full(count, np.nan)
+        # Of squares that fade: sums, and weights; of all states, of each, and of each in free runs.
+        self._squares = np.zeros((2, 2 * count + 1))
+        self._fade = np.full(2 * count + 1, 1.0 - 1.0 / CONSISTENCY)
+        self._fade[count + 1 :] = 1.0 - 1.0 / max(CONSISTENCY, 2 * len(errors.rms))
+        self._free = self._history.copy()
         # Places in the record (how much of it is filled, the last final estimate, the first row of
         # regressors that is not, the first sample that is predicted), then counts of samples: all,
-        # those since the whole history was measured and whether anything was seen since then, and
-        # complete ones in a row.
+        # those since the whole history was measured and whether anything was seen since then,
+        # complete ones in a row, and those since the start of a free run.
         self._at = {
             "filled": 0,
             "final": -1,
@@ -178,6 +186,7 @@ class Live:
             "since": 0,
             "partly": 1,
             "complete": 0,
+            "lead": 0,
         }
 
     def __repr__(self) -> str:
@@ -225,7 +234,35 @@ class Live:
         hundred samples. Well above one for longer than that, the model no longer fits the vessel,
         or a sensor its channel; NaN before the first prediction.
         """
-        return self._sum / self._weight if self._weight else math.nan
+        return float(self._mean_squares()[0])
+
+    @property
+    def consistency_by_state(self) -> FloatArray:
+        """The same for each state, shape (2, N): one step ahead, and in free runs.
+
+        Free runs start again and again from the estimate, are driven by the waves as they were
+        measured, and last as long as those of training, whose errors at each lead they are compared
+        with. A small error of each step that is always the same, as in waves outside the training,
+        shows in the second row long before the first. NaN where there is none yet.
+        """
+        return self._mean_squares()[1:].reshape(2, -1)
+
+    def _mean_squares(self) -> FloatArray:
+        with np.errstate(invalid="ignore"):  # 0/0 before the first
+            found: FloatArray = self._squares[0] / self._squares[1]
+        return found
+
+    @property
+    def equations(self) -> dict[str, Any]:
+        """What the filter computes with, for hosts: x' = offset + a x̂ + b û, blocks oldest first.
+
+        Variances of process and measurement noise, mean and spread of the states, errors of free
+        runs by lead, and the samples of input that waves to come are predicted from.
+        """
+        scale, noises = self.signature.state_scale, {"process": self._filter.process}
+        noises |= {"noise": self._filter.noise, "errors": self.errors.rms}
+        moments = {"centre": scale.centre, "spread": scale.spread, "record": self._record}
+        return {"a": self._a, "b": self._b, "offset": self._offset} | noises | moments
 
     @property
     def _last(self) -> int:
@@ -235,6 +272,7 @@ class Live:
     def _x(self) -> FloatArray:
         return self._kept["x"]
 
+    @one_blas_thread()
     def step(
         self,
         u: npt.ArrayLike | Mapping[str, float] | None = None,
@@ -246,11 +284,11 @@ class Live:
         Parameters
         ----------
         u : array_like, shape (Q,), or mapping of names to numbers, optional
-            Measured inputs at this instant, physical units. None where the sample was lost: its
-            inputs are predicted from those before, and from the probe up-wave where positions are
-            known.
+            Measured inputs at this instant, physical units. What is missing (NaN, or left out of
+            a mapping) is predicted from the samples before, and from the probe up-wave where
+            positions are known.
         y : array_like, shape (N,), or mapping of names to numbers, optional
-            Measured states at this instant, NaN for what is missing; a mapping may leave them out.
+            Measured states at this instant, with what is missing as in `u`.
         time : float, optional
             Instant of the sample, s, to check that none was left out. By default one step after
             the last; the first is 0.
@@ -263,17 +301,12 @@ class Live:
         Raises
         ------
         RequestError
-            If a length, a name or the time does not fit, or an input is not finite. Nothing has
+            If a length, a name or the time does not fit, or a value is infinite. Nothing has
             changed then, and the same sample can be given again.
         """
         signature = self.signature
         instant = self._instant(time)
-        states = _sample("y", y, signature.states)
-        if np.any(np.isinf(states)):
-            raise RequestError(
-                "y holds an infinite value. Give NaN for a state that was not measured."
-            )
-        inputs = self._inputs(u)
+        states, inputs = _sample("y", y, signature.states), self._inputs(u)
         self._make_room()
         at = self._at["filled"]
         self._kept["u"][at], self._kept["y"][at] = inputs, states
@@ -307,23 +340,15 @@ class Live:
         )
 
     def _inputs(self, u: npt.ArrayLike | Mapping[str, float] | None) -> FloatArray:
-        names, filled = self.signature.inputs, self._at["filled"]
-        if not names:
-            return _sample("u", u, names)
-        if u is None:
-            if filled < 4:
+        inputs = _sample("u", u, self.signature.inputs)
+        lost = np.isnan(inputs)
+        if lost.any():
+            if (filled := self._at["filled"]) < 4:
                 raise RequestError(
-                    f"the inputs of a lost sample are predicted from those before, and there are "
-                    f"{filled}. Start with at least 4 samples of u."
+                    f"inputs that are missing are predicted from the samples before, and there are "
+                    f"{filled}. Start with at least 4 samples of all of u."
                 )
-            return self._foreseen()
-        inputs = _sample("u", u, names)
-        if not np.all(np.isfinite(inputs)):
-            bad = names[int(np.flatnonzero(~np.isfinite(inputs))[0])]
-            raise RequestError(
-                f"u holds a value of '{bad}' that is not finite. Fill it first, or give u = None: "
-                "all inputs of the sample are predicted then."
-            )
+            inputs[lost] = self._foreseen()[lost]
         return inputs
 
     def _foreseen(self) -> FloatArray:
@@ -360,7 +385,7 @@ class Live:
         plain = is_exact and place["since"] == 0 and at >= place["begins"]
         self._plain[slot] = plain
         if not plain:
-            self._gains[slot], self._precisions[slot] = self._updated(at, seen)
+            self._update(at, seen, slot)
         place["complete"] = place["complete"] + 1 if is_exact else 0
         if place["complete"] > self.signature.state_delays:
             place["since"] = place["partly"] = 0
@@ -370,7 +395,7 @@ class Live:
             place["partly"] |= int(seen.any())
         self._settle(at)
 
-    def _updated(self, at: int, seen: BoolArray) -> tuple[FloatArray, FloatArray]:
+    def _update(self, at: int, seen: BoolArray, slot: int) -> None:
         if at < self._at["begins"]:
             self._filter.shift(np.diag(self.signature.state_scale.spread**2))
         else:
@@ -378,20 +403,21 @@ class Live:
             limit = self.errors.at(self._at["since"] + 1) ** 2
             blind = not (self._at["partly"] or seen.any())
             self._filter.limit(limit, exactly=blind)
-        return self._filter.measure(seen)
+        self._deviations[slot] = np.sqrt(np.diagonal(self.covariance) + self._noise**2)
+        self._gains[slot], self._whitenings[slot] = self._filter.measure(seen)
 
     def _settle(self, at: int) -> None:
         """Bring estimates up to the sample `at`: final ones, then those that waves to come move."""
         place = self._at
         if at < place["begins"]:
-            self._advance(self._history, at, at, None)
+            self._advance(self._history, at, at)
             place["final"] = at
             return
         final = at - max(self._ahead - 1, 0)
         if final - place["final"] >= self._block:
             self._find_rows(final, self._known_inputs())
             place["rows"] = final
-            self._advance(self._history, place["final"] + 1, final, self._judge)
+            self._advance(self._history, place["final"] + 1, final, is_final=True)
             place["final"] = final
         if place["final"] == at:
             return
@@ -403,9 +429,11 @@ class Live:
         if self._ahead and self.signature.inputs:
             known = np.concatenate([known, predict_waves(known, self._ahead)])
         self._find_rows(at, known)
-        self._advance(self._history.copy(), place["final"] + 1, at, None)
+        self._advance(self._history.copy(), place["final"] + 1, at)
 
-    def _advance(self, history: FloatArray, first: int, last: int, judge: Judge | None) -> None:
+    def _advance(
+        self, history: FloatArray, first: int, last: int, *, is_final: bool = False
+    ) -> None:
         """Run the mean through samples, with the gains that were found for them."""
         place, s = self._at, self.signature.state_delays
         for at in range(first, last + 1):
@@ -426,8 +454,8 @@ class Live:
                 history[-1][exact] = measured[exact]
             first_kept = max(at - s, 0)
             self._x[first_kept : at + 1] = history[first_kept - at - 1 :]
-            if judge is not None:
-                judge(slot, innovation)
+            if is_final:
+                self._judge(at, slot, innovation)
 
     def _predicted(self, history: FloatArray, at: int) -> FloatArray:
         """One-step prediction from the sample `at`."""
@@ -439,19 +467,32 @@ class Live:
             out += self._d @ self._kept["direct"][at]
         return out
 
-    def _judge(self, slot: int, innovation: FloatArray) -> None:
-        """Running normalised innovation squared."""
-        self._innovation = innovation
-        precision = self._precision_known if self._plain[slot] else self._precisions[slot]
-        told = np.where(np.isfinite(innovation), innovation, 0.0)
-        number = np.count_nonzero(np.isfinite(innovation))
-        if number:
-            fade = 1.0 - 1.0 / CONSISTENCY
-            with np.errstate(over="ignore", invalid="ignore"):
-                square = float(told @ precision @ told) / number
-            # Not a number where it overflows.
-            self._sum = fade * self._sum + (square if square < SPIKE else SPIKE)
-            self._weight = fade * self._weight + 1.0
+    def _judge(self, at: int, slot: int, innovation: FloatArray) -> None:
+        """Take a sample into the running squares, NaN for what was not measured."""
+        self._innovation, plain, lead = innovation, self._plain[slot], self._at["lead"]
+        measured, seen = self._kept["y"][at], np.isfinite(innovation)
+        one, free = np.full(seen.size + 1, np.nan), np.full(seen.size, np.nan)
+        with np.errstate(over="ignore", invalid="ignore"):
+            if seen.any():
+                # A sum of squares: it may overflow, and is never negative.
+                whitening = self._whitening_known if plain else self._whitenings[slot]
+                white = whitening @ np.where(seen, innovation, 0.0)
+                one[0] = np.fmin(np.sum(white**2) / np.count_nonzero(seen), SPIKE)
+                deviations = self._deviation_known if plain else self._deviations[slot]
+                one[1:] = (innovation / deviations) ** 2
+            if lead:
+                predicted = self._predicted(self._free, at - 1)
+                self._free[:-1], self._free[-1] = self._free[1:], predicted
+                free = ((measured - predicted) / self.errors.at(lead)) ** 2
+        squares = np.concatenate([one, free])
+        taken = ~np.isnan(squares)
+        self._squares[:, taken] *= self._fade[taken]
+        self._squares[0, taken] += np.minimum(squares[taken], SPIKE)
+        self._squares[1, taken] += 1.0
+        lead = (lead + 1) % (len(self.errors.rms) + 1) if lead else 0
+        if not lead and (plain or self._noise.any()):
+            self._free[:], lead = self._history, 1
+        self._at["lead"] = lead
 
     def _find_rows(self, stop: int, known: FloatArray) -> None:
         """Regressors of the samples up to before `stop`; `known` ends with inputs to come."""
@@ -496,6 +537,7 @@ class Live:
             run[name].attrs["x_position"] = position
         return run
 
+    @one_blas_thread()
     def forecast(
         self,
         steps: int,
@@ -643,7 +685,7 @@ class Live:
         return result
 
     def save(self, path: str | Path) -> Path:
-        """Write all that the object holds as plain arrays (NetCDF), to a temporary name first.
+        """Write all that the object needs to go on (NetCDF), to a temporary name first.
 
         Parameters
         ----------
@@ -660,45 +702,48 @@ class Live:
         RequestError
             If the file cannot be written, or another one is there.
         """
-        arrays: dict[str, tuple[tuple[str, ...], FloatArray]] = {
-            name: ((f"{name}_row", name), each) for name, each in self._kept.items()
-        }
-        arrays |= {
-            "gains": (("slot", "entry", "state"), self._gains),
-            "precisions": (("slot", "state", "other_state"), self._precisions),
-            "plain": (("slot",), self._plain.astype(float)),
-            "covariance": (("entry", "other_entry"), self._filter.covariance),
-            "history": (("delay", "state"), self._history),
-            "innovation": (("state",), self._innovation),
-            "running": (("number",), np.array([self._sum, self._weight, self._time])),
-            "noise": (("state",), self._noise),
-        }
-        words = {"places": json.dumps(self._at), "rig": json.dumps(self._rig)}
-        dataset = xr.Dataset(arrays, attrs=words | {"model": self._fingerprint()})
-        return write_sealed(dataset, path, STATE)
+        parts = np.concatenate([each.ravel() for each in self._parts()])
+        covariance = self._filter.covariance
+        rows = np.flatnonzero(covariance.any(axis=1))
+        block = covariance[np.ix_(rows, rows)][np.tril_indices(rows.size)]
+        words = {"places": self._at, "plain": self._plain.tolist(), "time": self._time}
+        words |= {"rig": self._rig, "noise": self._noise.tolist(), "rows": rows.tolist()}
+        attrs = {"settings": json.dumps(words), "model": self._identity}
+        return write_sealed_array(np.concatenate([parts, block]), attrs, path, STATE)
 
-    def _fingerprint(self) -> str:
+    def _parts(self) -> list[FloatArray]:
+        """Views of what samples and forecasts to come read, but for the covariance."""
+        place, signature = self._at, self.signature
+        filled, slots = place["filled"], len(self._plain)
+        longest = max(signature.state_delays, signature.input_delays)
+        record, tail = (max(filled - each, 0) for each in (self._record, slots + longest + 2))
+        first = {"u": record, "x": tail if self._alignment is None else record}
+        kept = [each[first.get(name, tail) : filled] for name, each in self._kept.items()]
+        pending = (place["taken"] - np.arange(filled - 1 - place["final"])) % slots
+        used = [slot for slot in pending if not self._plain[slot]]
+        of_slots = (self._gains, self._whitenings, self._deviations)
+        gains = [each[slot] for slot in used for each in of_slots]
+        return [*kept, *gains, self._history, self._free, self._innovation, self._squares]
+
+    @cached_property
+    def _identity(self) -> str:
         """Identity of the model."""
         found = hashlib.sha256(store.as_json(store.signature_json(self.signature)).encode())
         for each in (self._a, self._b, self._d, self._offset):
             found.update(np.ascontiguousarray(each).tobytes())
         return found.hexdigest()
 
-    def _restore(self, dataset: xr.Dataset) -> None:
+    def _restore(self, kept: dict[str, Any], values: FloatArray) -> None:
         """Restore what :meth:`save` wrote."""
-        kept = {
-            **self._kept,
-            "gains": self._gains,
-            "precisions": self._precisions,
-            "plain": self._plain,
-            "covariance": self._filter.covariance,
-            "history": self._history,
-            "innovation": self._innovation,
-        }
-        for name, values in kept.items():
-            values[:] = dataset[name].values
-        self._sum, self._weight, self._time = map(float, dataset["running"].values)
-        self._at = store.content(dataset, "places")
+        self._at, self._time, self._plain[:] = kept["places"], kept["time"], kept["plain"]
+        at = 0
+        for part in self._parts():
+            part[:] = values[at : at + part.size].reshape(part.shape)
+            at += part.size
+        rows = np.array(kept["rows"], dtype=int)
+        block = np.zeros((rows.size, rows.size))
+        block[np.tril_indices(rows.size)] = values[at:]
+        self._filter.covariance[np.ix_(rows, rows)] = block + np.tril(block, -1).T
 
 
 def load_live(model: Servable, path: str | Path) -> Live:
@@ -724,20 +769,19 @@ def load_live(model: Servable, path: str | Path) -> Live:
         If it is damaged.
     """
     dataset = load_sealed(path, STATE)
-    rig = store.content(dataset, "rig")
+    kept = store.content(dataset, "settings")
+    rig, noise = kept["rig"], zip(model.signature.states, kept["noise"], strict=False)
     like = xr.Dataset(
         {name: ((), 0.0, {"x_position": each}) for name, each in rig["positions"].items()},
         attrs=rig["run"],
     )
-    states = model.signature.states
-    noise = dict(zip(states, dataset["noise"].values.tolist(), strict=False))
-    live = model.live(like=like, noise={name: each for name, each in noise.items() if each})
-    if dataset.attrs["model"] != live._fingerprint():
+    live = model.live(like=like, noise={name: each for name, each in noise if each})
+    if dataset.attrs["model"] != live._identity:
         raise RequestError(
             f"{path} is the state of another model. Load the model that was in service, or start "
             "anew with model.live()."
         )
-    live._restore(dataset)
+    live._restore(kept, dataset["values"].values)
     return live
 
 
@@ -841,7 +885,7 @@ def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArra
 
 
 def _sample(name: str, value: object, names: Sequence[str]) -> FloatArray:
-    """One sample in the order of the model; NaN for what a mapping leaves out."""
+    """One sample in the order of the model, NaN for what is missing."""
     if value is None:
         return np.full(len(names), np.nan)
     if isinstance(value, Mapping):
@@ -858,4 +902,6 @@ def _sample(name: str, value: object, names: Sequence[str]) -> FloatArray:
             f"{name} has shape {array.shape}; one number for each of {', '.join(names) or 'none'} "
             f"is needed: shape ({len(names)},)."
         )
-    return array
+    if np.any(np.isinf(array)):
+        raise RequestError(f"{name} holds an infinite value. Give NaN for what was not measured.")
+    return array.copy()

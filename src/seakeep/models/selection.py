@@ -481,10 +481,13 @@ def search(
     """
     known = {} if known is None else known
     trials: dict[Candidate, Trial] = {}
-    best = base
+    best, folds = base, len(problems[0].folds())
+    later = folds * sum(len(values) - 1 for values in options.values())  # the best is tried again
     for key, values in (("", [None]), *options.items()):
         tried = [replace(best, **{key: value}) if key else best for value in values]
-        for candidate, trial in _judged(problems, tried, ridges, executor, progress, known):
+        later -= folds * (len(values) - 1)
+        tell = _counted(progress, folds * len(trials), later)
+        for candidate, trial in _judged(problems, tried, ridges, executor, tell, known):
             trials.setdefault(candidate, trial)
         best = min(trials, key=lambda each: float(trials[each].means.min()))
     means = trials[best].means
@@ -498,6 +501,13 @@ def search(
     wanted += [each[1:] for each in sorted(every, key=lambda each: each[0])]
     still = (each for each in wanted if problems[each[0].alignment].radius(*each) < 1.0)
     return Choice(*next(still, wanted[0]), tuple(trials.items()))
+
+
+def _counted(progress: Progress | None, before: int, after: int) -> Progress | None:
+    """Progress of a part, counted among what was done before it and what comes after."""
+    if progress is None:
+        return None
+    return lambda done, total, what: progress(before + done, before + total + after, what)
 
 
 def _judged(
@@ -785,7 +795,8 @@ def select(
     ]
     trials = dict(found.trials)
     untried = [each for each in without if each not in trials]
-    trials |= dict(_judged(problems, untried, ridges, executor, progress, known))
+    tell = _counted(progress, len(trials) * len(problems[0].folds()), 0)
+    trials |= dict(_judged(problems, untried, ridges, executor, tell, known))
     found = replace(found, trials=tuple(trials.items()))
     best = trials[taken]
     score = float(best.means[best.levels.index(found.level)])
@@ -811,6 +822,8 @@ def select(
         f"; without {named(chosen[number])} {trials[less].means.min():.3f}"
         for number, less in zip(taken.observables, without, strict=True)
     )
+    lengths = {"lead", "input_delays", "state_delays", "alignment"} & {*vary}
+    note += "; over instants that all of these can forecast" * bool(lengths)
     groups = problems[0].groups
     if folds == "sea_state" or len(set(groups)) < len(groups):
         note += f"; {_words_of_groups(groups, folds == 'sea_state')}"

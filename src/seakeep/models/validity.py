@@ -37,7 +37,8 @@ class Waves:
     period : float
         Period of the band that holds most of its energy, s.
     trained : (float, float)
-        Shortest and longest period of the bands that were trained, s.
+        Shortest and longest period of the bands that were trained, s; where `period` lies in a
+        gap between them, those on either side of it.
     outside : float
         Fraction of its energy in bands that were not trained, 0 to 1.
     is_gap : bool
@@ -73,11 +74,12 @@ class Waves:
         if not self.is_untrained:
             return ""
         low, high = self.trained
-        where = "in a gap of" if self.is_gap else "outside"
+        where, word = ("between", "and") if self.is_gap else ("outside", "to")
+        nothing = ", with none between" * self.is_gap
         return (
             f"{self.channel}: the dominant period of {self.period:.3g} s lies {where} the periods "
-            f"that trained the model ({low:.3g} to {high:.3g} s); {100 * self.outside:.0f} % of "
-            "the energy is at periods it has not seen"
+            f"that trained the model ({low:.3g} {word} {high:.3g} s{nothing}); "
+            f"{100 * self.outside:.0f} % of the energy is at periods it has not seen"
         )
 
     def reasons(self, duration: float) -> tuple[str, str, str]:
@@ -165,13 +167,15 @@ class Coverage:
             known = _with_neighbours(is_trained)
             peak = int(np.argmax(found[column]))
             inside = np.flatnonzero(is_trained)
+            is_gap = bool(inside[0] < peak < inside[-1] and not known[peak])
+            edge = [inside[inside < peak][-1], inside[inside > peak][0]] if is_gap else inside
             out.append(
                 Waves(
                     channel=channel,
                     period=float(periods[peak]),
-                    trained=(float(periods[inside[-1]]), float(periods[inside[0]])),
+                    trained=(float(periods[edge[-1]]), float(periods[edge[0]])),
                     outside=float(found[column][~known].sum()),
-                    is_gap=bool(inside[0] < peak < inside[-1] and not known[peak]),
+                    is_gap=is_gap,
                     height=float(heights[column]),
                     highest=float(self.heights[column]),
                     steepness=float(steep[column]) if channel.startswith("eta") else np.nan,

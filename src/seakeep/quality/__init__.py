@@ -26,10 +26,10 @@ __all__ = [
 
 CHECKS: list[Callable[[Record], Iterable[Finding]]] = [
     samples.constant,
+    samples.noise,
     samples.flagged,
     samples.levels,
     sensors.redundant,
-    sensors.held,
     sensors.positions,
     clocks.clocks,
     clocks.others,

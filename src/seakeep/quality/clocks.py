@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from seakeep.arrays import FloatArray
+from seakeep.quality.faults import noise_share
 from seakeep.quality.findings import Finding, Kind
-from seakeep.quality.record import Record, channels_of, step_of
+from seakeep.quality.record import Record, channels_of, sound, step_of
 from seakeep.quality.samples import is_elevation
 from seakeep.signals.filters import PASSBAND
-from seakeep.signals.quality import energy_above, noise_level
 from seakeep.signals.synchronisation import ASSUMED
+from seakeep.signals.waves import energy_above
 
 __all__ = ["ClocksKind", "clocks", "others", "periods", "rates", "records", "steps"]
 
@@ -189,18 +189,12 @@ def steps(record: Record) -> Iterator[Finding]:
             cuts = [(ClocksKind.COARSE_STEP, edge)] if own[logger] < dt else []
             if (passed := record.whole[name].attrs.get("low_pass")) is not None:
                 cuts.append((ClocksKind.LOW_PASS, float(np.mean(passed))))
-            x = channel.to_numpy()
+            x = sound(group, name)
             for kind, cut in cuts:
                 share, period = energy_above(x, own[logger], cut)
-                if share > LOST_ENERGY and not is_noise(x):
+                if share > LOST_ENERGY and noise_share(x) < 0.5:
                     details = {"share": 100 * share, "period": period, "fate": fate}
                     yield Finding(kind, record.run, name, 1 / dt, cut, "Hz", details=details)
-
-
-def is_noise(series: FloatArray) -> bool:
-    """Whether most of a channel's variance has no memory from one sample to the next."""
-    series = series[np.isfinite(series)]
-    return series.size > 2 and bool(noise_level(series) > np.sqrt(0.5) * float(series.std()) > 0)
 
 
 def periods(record: Record) -> Iterator[Finding]:

@@ -104,17 +104,9 @@ def as_json(findings: Iterable[Finding]) -> str:
     """Findings as a text that an attribute of a prepared run can hold."""
     return json.dumps(
         [
-            {
-                "kind": each.kind.name,
-                "run": each.run,
-                "channel": each.channel,
-                "value": _or_none(each.value),
-                "limit": _or_none(each.limit),
-                "unit": each.unit,
-                "place": _or_none(each.place),
-                "details": dict(each.details),
-                "text": each.text,
-            }
+            vars(each)
+            | {"kind": each.kind.name, "details": dict(each.details), "text": each.text}
+            | {key: _or_none(getattr(each, key)) for key in ("value", "limit", "place")}
             for each in findings
         ],
         ensure_ascii=False,

@@ -9,7 +9,9 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
+from seakeep.quality.faults import OUTLIER, STUCK
 from seakeep.signals import Clock
+from seakeep.signals.time_axis import over_gaps
 
 __all__ = ["Rate", "Record", "Redundant", "filled", "step_of"]
 
@@ -102,10 +104,11 @@ def channels_of(data: xr.Dataset) -> dict[str, xr.Variable]:
 
 def filled(channel: xr.DataArray | xr.Variable) -> FloatArray:
     """Values of a channel, straight lines across gaps."""
-    x = channel.to_numpy()
-    there = np.isfinite(x)
-    if there.all() or not there.any():
-        return np.where(there, x, 0.0)
-    at = np.arange(x.size)
-    values: FloatArray = np.interp(at, at[there], x[there])
-    return values
+    return over_gaps(channel.to_numpy())
+
+
+def sound(data: xr.Dataset, name: str) -> FloatArray:
+    """Values of a channel, straight lines across gaps and what is flagged as wrong or stuck."""
+    x, flags = data.variables[name].to_numpy(), data.variables.get(f"{name}_flags")
+    right = True if flags is None else (flags.to_numpy() & (OUTLIER | STUCK)) == 0
+    return over_gaps(x, np.isfinite(x) & right)

@@ -5,24 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import scipy
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.quality.findings import Finding, Kind
-from seakeep.quality.record import Record, channels_of, filled, step_of
-from seakeep.signals.quality import (
+from seakeep.quality.faults import (
     BRIDGED,
     MISSING,
     OUTLIER,
     REPLACED,
     SATURATED,
     STUCK,
-    dominant_period,
-    level_drift,
+    noise_share,
 )
+from seakeep.quality.findings import Finding, Kind
+from seakeep.quality.record import Record, channels_of, sound, step_of
 from seakeep.signals.time_axis import stretches
+from seakeep.signals.waves import dominant_period
 
-__all__ = ["SamplesKind", "constant", "flagged", "impossible", "levels", "units"]
+__all__ = ["SamplesKind", "constant", "flagged", "impossible", "levels", "noise", "units"]
 
 NO_SLOW_MOTION = ("heave", "roll", "pitch")
 """Besides wave elevations, channels whose level has no reason to change within a run."""
@@ -43,6 +44,7 @@ class SamplesKind(Kind):
     SATURATED = "saturated" + _COUNTED
     STUCK = "stuck" + _COUNTED
     CONSTANT = "constant at {value:.6g}"
+    NOISE = "is noise: {share:.0f} % of its variance has no memory from one sample to the next"
     DRIFT = "level drifts by {value:+.3g} over the record"
     IMPOSSIBLE = "reaches {value:.3g}, more than {limit:.3g}", _UNIT
     OUT_OF_WATER = "leaves its mean by {value:.3g} in water of {limit:g}", _UNIT
@@ -112,13 +114,23 @@ def constant(record: Record) -> Iterator[Finding]:
                 yield Finding(SamplesKind.CONSTANT, record.run, name, value, unit=unit)
 
 
+def noise(record: Record) -> Iterator[Finding]:
+    """Channels most of whose variance has no memory, such as a record of random readings."""
+    for group in record.groups.values():
+        for name, channel in channels_of(group).items():
+            share = noise_share(sound(group, name))
+            if "derived_from" not in channel.attrs and share > 0.5:
+                details = {"share": 100 * share}
+                yield Finding(SamplesKind.NOISE, record.run, name, details=details)
+
+
 def levels(record: Record) -> Iterator[Finding]:
     """Levels that drift, of channels that have no slow motion of their own."""
     dt = step_of(record.whole)
     for name, channel in channels_of(record.whole).items():
         if not (is_elevation(name, channel) or name in NO_SLOW_MOTION):
             continue
-        x = filled(channel)
+        x = sound(record.whole, name)
         if x.size < 16 or not np.ptp(x):
             continue
         change, sure = level_drift(x, dt, dominant_period(x, dt))
@@ -165,3 +177,39 @@ def units(record: Record) -> Iterator[Finding]:
         if name in record.whole:
             stated = "a number without a unit" if unit == "-" else unit
             yield Finding(SamplesKind.UNIT, record.run, name, details={"stated": stated})
+
+
+def level_drift(x: FloatArray, dt: float, period: float) -> tuple[float, float]:
+    """Change of a sensor's level over a record, and how sure it is.
+
+    Parameters
+    ----------
+    x : ndarray, shape (time,)
+        Uniformly sampled, without gaps, of a quantity that has no slow motion of its own.
+    dt : float
+        Time step, s.
+    period : float
+        Period of the waves, s.
+
+    Returns
+    -------
+    (float, float)
+        End minus start of the straight line through the means of windows of four periods, and
+        that change in standard errors of the line.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(0, 200, 0.1)
+    >>> change, sure = level_drift(np.sin(4 * t) + 0.005 * t, 0.1, 1.57)
+    >>> round(change, 1), bool(sure > 10)
+    (1.0, True)
+    """
+    length = max(2, round(4 * period / dt))
+    windows = x.size // length
+    if windows < 4:
+        return 0.0, 0.0
+    means = x[: windows * length].reshape(windows, length).mean(axis=1)
+    line = scipy.stats.linregress(np.arange(windows), means)
+    sure = abs(line.slope) / line.stderr if line.stderr > 0 else 0.0
+    return float(line.slope * x.size / length), float(sure)

@@ -7,23 +7,22 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 import xarray as xr
 
-from seakeep.quality.findings import Finding, Kind
-from seakeep.quality.record import Record, Redundant, channels_of, filled, step_of
-from seakeep.signals import misplaced_probes
-from seakeep.signals.quality import (
+from seakeep.quality.agreement import (
     FEWEST_STEPS,
     LARGEST_GAIN,
     LARGEST_NRMSE,
     LATE,
     LEAST_CORRELATION,
     RUN_AWAY,
-    STUCK,
     Agreement,
     compare_sensors,
-    find_stuck,
 )
+from seakeep.quality.faults import STUCK, find_held
+from seakeep.quality.findings import Finding, Kind
+from seakeep.quality.record import Record, Redundant, channels_of, filled, step_of
+from seakeep.signals import misplaced_probes
 
-__all__ = ["SensorsKind", "compared", "held", "positions", "redundant"]
+__all__ = ["SensorsKind", "compared", "positions", "redundant"]
 
 
 class SensorsKind(Kind):
@@ -86,9 +85,10 @@ def compared(run: xr.Dataset, pairs: Iterable[Redundant]) -> dict[tuple[str, str
 
 
 def redundant(record: Record) -> Iterator[Finding]:
-    """Redundant sensors that disagree by more than a model may err."""
-    for (name, other), found in compared(record.whole, record.redundant).items():
-        unit = str(record.whole[name].attrs["units"])
+    """Redundant sensors that disagree by more than a model may err, or hold still alone."""
+    run = record.whole
+    for (name, other), found in compared(run, record.redundant).items():
+        unit = str(run[name].attrs["units"])
         for kind, value, limit, its_unit in _faults(found, unit):
             details = {
                 "other": other,
@@ -98,6 +98,14 @@ def redundant(record: Record) -> Iterator[Finding]:
                 "so": f"so that the NRMSE between the two is {found.nrmse:.2f}",
             }
             yield Finding(kind, record.run, name, value, limit, its_unit, details=details)
+        x, dt = filled(run[name]), step_of(run)
+        stuck = find_held(x, dt, filled(run[other]))
+        if stuck.any() and np.isfinite(found.period):
+            start, length = float(run["time"][int(np.argmax(stuck))]), float(stuck.sum()) * dt
+            yield Finding(
+                SensorsKind.HELD, record.run, name, length, found.period, "s", start,
+                {"other": other},
+            )  # fmt: skip
 
 
 def _faults(found: Agreement, unit: str) -> Iterator[tuple[SensorsKind, float, float, str]]:
@@ -121,23 +129,6 @@ def _faults(found: Agreement, unit: str) -> Iterator[tuple[SensorsKind, float, f
             yield SensorsKind.LAG, found.lag, late, "s"
         elif not scaled:
             yield SensorsKind.DIFFERENCE, found.nrmse, LARGEST_NRMSE, "1"
-
-
-def held(record: Record) -> Iterator[Finding]:
-    """Sensors that hold still while the one beside them moves."""
-    run = record.whole
-    for (name, other), found in compared(run, record.redundant).items():
-        x = filled(run[name])
-        if not np.isfinite(found.period) or not np.ptp(x):
-            continue
-        stuck = find_stuck(x, step_of(run), found.period, filled(run[other]))
-        if stuck.any():
-            start = float(run["time"][int(np.argmax(stuck))])
-            length = float(stuck.sum()) * step_of(run)
-            yield Finding(
-                SensorsKind.HELD, record.run, name, length, found.period, "s", start,
-                {"other": other},
-            )  # fmt: skip
 
 
 def positions(record: Record) -> Iterator[Finding]:

@@ -16,10 +16,14 @@ from seakeep.report.figures import checks
 from seakeep.report.page import write_page
 from seakeep.report.section import Drawing, Section
 from seakeep.report.style import shown_unit
-from seakeep.report.tables import Table, number, probability
+from seakeep.report.tables import Table, number, probability, text
 from seakeep.report.worth import worth_section
 
 __all__ = ["CHECK_SECTIONS", "check_sections", "write_check"]
+
+
+OVERSHOOT = 1.1
+"""Largest swing over the offset that a free decay may show; the rest is for the noise of a fit."""
 
 
 def response_section(checked: Checked) -> Section | None:
@@ -34,7 +38,8 @@ def response_section(checked: Checked) -> Section | None:
     counted = f"a wave that passes all probes, counted from {reference}" if wave else str(reference)
     read = [str(s) for s in found["state"].values if found["amplitude"].sel(state=s).isnull().all()]
     words = [
-        f"Response per amplitude of {counted}, from the matrices of the model: its answer to small "
+        f"The response amplitude operator (RAO): the response per amplitude of {counted}, from the "
+        "matrices of the model: its answer to small "
         "waves. Bars are expanded uncertainties at 95 %.",
     ]
     if read:
@@ -48,15 +53,17 @@ def response_section(checked: Checked) -> Section | None:
         )
     drawing = Drawing(
         "response",
-        "Amplitude and phase of the response (phase positive where the vessel is early). Grey: "
-        "the training input holds no energy there.",
+        "Amplitude (RAO) and phase of the response (phase positive where the vessel is early). "
+        "Grey: the training input holds no energy there.",
         partial(checks.response, found, measured),
     )
     regular = measured is not None and (measured["kind"] == "regular").any()
     tables = [_points_table(measured, found)] if measured is not None and regular else []
     if "validation" in checked.found:
         tables.append(_validation_table(checked.found["validation"]))
-    return Section("response", "Response", tuple(words), figures=(drawing,), tables=tuple(tables))
+    return Section(
+        "response", "Response (RAO)", tuple(words), figures=(drawing,), tables=tuple(tables)
+    )
 
 
 def _points_table(measured: xr.Dataset, found: xr.Dataset) -> Table:
@@ -75,8 +82,8 @@ def _points_table(measured: xr.Dataset, found: xr.Dataset) -> Table:
                     number(float(one["frequency"])),
                     number(float(one["wave_amplitude"]), 4),
                     f"{state} [{shown_unit(shown)}]",
-                    _with_sure(factor * own["amplitude"], factor * own["amplitude_uncertainty"]),
-                    _with_sure(own["phase"], own["phase_uncertainty"], 3),
+                    _sure(own, "amplitude", factor),
+                    _sure(own, "phase"),
                 )
             )
     columns = ("run", "frequency [Hz]", "wave amplitude [m]", "state", "amplitude", "phase [°]")
@@ -92,13 +99,9 @@ def _points_table(measured: xr.Dataset, found: xr.Dataset) -> Table:
     )
 
 
-def _with_sure(value: xr.DataArray, sure: xr.DataArray, most: int = 6) -> str:
-    """Value ± uncertainty, the latter with two digits."""
-    x, u = float(value), float(sure)
-    if not (np.isfinite(x) and np.isfinite(u)):
-        return number(np.nan)
-    digits = min(most, max(0, 1 - int(np.floor(np.log10(u))))) if u > 0 else most
-    return f"{x:.{digits}f} ± {u:.{digits}f}"
+def _sure(own: xr.Dataset, key: str, factor: float = 1.0) -> str:
+    """Value ± expanded uncertainty."""
+    return text(factor * float(own[key]), [factor * float(own[f"{key}_uncertainty"])])
 
 
 def _validation_table(found: xr.Dataset) -> Table:
@@ -120,14 +123,14 @@ def _validation_table(found: xr.Dataset) -> Table:
                     kind,
                     str(known.sum()),
                     str(int(at["within"].values[known].sum())),
-                    number(factor * float(np.sqrt(np.mean(error**2))), 4),
+                    text(factor * float(np.sqrt(np.mean(error**2))), digits=None),
                     number(float(at["frequency"].values[known][worst])),
-                    f"{number(factor * error[worst], 4)} against {number(factor * sure[worst], 4)}",
+                    text(factor * error[worst], [factor * sure[worst]]),
                 )
             )
     columns = (
         *("state", "waves", "points", "|E| < U_val", "RMS of E", "worst at [Hz]"),
-        "E against U_val there",
+        "E ± U_val there",
     )
     return Table(
         "validation",
@@ -166,11 +169,11 @@ def possible_section(checked: Checked) -> Section | None:
             continue
         model, linear = float(own["nrmse"]), float(own["linear_bound"])
         more = float(own.get("observables_bound", np.nan))
-        text = f"{state}: model {model:.2g}, linear bound {linear:.2g}"
+        beside = f"{state}: model {model:.2g}, linear bound {linear:.2g}"
         if np.isfinite(more):
-            text += f", with the observables {more:.2g}"
-        advice.setdefault(_advice(model, linear, more, ahead), []).append(text)
-    points = [f"{'; '.join(states)}. {text}" for text, states in advice.items()]
+            beside += f", with the observables {more:.2g}"
+        advice.setdefault(_advice(model, linear, more, ahead), []).append(beside)
+    points = [f"{'; '.join(states)}. {words}" for words, states in advice.items()]
     points += [f"{', '.join(of)}: cannot be judged: {why}." for why, of in unjudged.items()]
     if "worth" in checked.found and (state := checked.found["worth"].attrs["conditional_on"]):
         points.append(
@@ -216,8 +219,7 @@ def _bounds_row(own: xr.Dataset) -> tuple[str, ...]:
     cells = []
     for key in ("linear_bound", "observables_bound"):
         at = [float(own.get(f"{key}{end}", np.nan)) for end in ("", "_lower", "_upper")]
-        known = np.isfinite(at).all()
-        cells += [number(at[0]), f"{at[1]:.3f} to {at[2]:.3f}" if known else number(np.nan)]
+        cells += [number(at[0]), text(np.nan, at[1:])]
     return (str(own["state"].values), own.attrs["of"], number(float(own["nrmse"])), *cells)
 
 
@@ -243,7 +245,7 @@ def _advice(model: float, linear: float, more: float, ahead: bool) -> str:
 
 def decay_section(checked: Checked) -> Section | None:
     """Return free decay, beside measured ones, and the modes."""
-    figures, tables, words = [], [], []
+    figures, tables, words, points = [], [], [], []
     if (found := checked.found.get("decay")) is not None:
         rows: list[tuple[str, ...]] = [
             (
@@ -267,6 +269,7 @@ def decay_section(checked: Checked) -> Section | None:
         tables.append(Table("decay", "Free decay", columns, tuple(rows), note, (1, 2, 3, 4)))
         caption = "What is left of an offset of one training SD after its release in still water."
         figures.append(Drawing("decay", caption, partial(checks.decay, found)))
+        points = _ringing(found)
         words.append(
             "The model holds an offset for the length of its history, and is released. A motion "
             "with fewer than three extremes has neither period nor damping: it creeps back, or its "
@@ -280,7 +283,23 @@ def decay_section(checked: Checked) -> Section | None:
     if not figures:
         return None
     title = "Free decay and modes"
-    return Section("decay", title, tuple(words), figures=tuple(figures), tables=tuple(tables))
+    return Section(
+        *("decay", title, tuple(words), tuple(points)),
+        figures=tuple(figures),
+        tables=tuple(tables),
+    )
+
+
+def _ringing(found: xr.Dataset) -> list[str]:
+    """Motions that swing farther than they were moved, which none does in still water."""
+    most = np.abs(found["displacement"].values).max(axis=1)
+    return [
+        f"{motion}: after its release the model swings to {reach:.2g} times the offset, "
+        "where a vessel in still water swings back by less than it was moved. Read no period and "
+        "no damping off it: the state of this model follows the waves, or its delays fit noise."
+        for motion, reach in zip(found["motion"].values, most, strict=True)
+        if reach > OVERSHOOT
+    ]
 
 
 def _decay_row(own: xr.Dataset) -> tuple[str, ...]:
@@ -393,8 +412,8 @@ def statistics_section(checked: Checked) -> Section | None:
         factor, shown = displayed(str(unit))
         for kind in found["kind"].values:
             own = found.sel(state=state, kind=kind)
-            low, high = (factor * float(own[f"extreme_{each}"]) for each in ("lower", "upper"))
-            known = np.isfinite(low)
+            bounds = [factor * float(own[f"extreme_{each}"]) for each in ("lower", "upper")]
+            extreme = factor * float(own["extreme"]) if np.isfinite(bounds[0]) else np.nan
             rows.append(
                 (
                     f"{state} [{shown_unit(shown)}]",
@@ -403,8 +422,8 @@ def statistics_section(checked: Checked) -> Section | None:
                     number(float(own["zero_crossing_period"]), 3),
                     f"{int(own['peaks'])}",
                     number(float(own["weibull_shape"]), 2),
-                    f"{factor * float(own['extreme']):.4g}" if known else number(np.nan),
-                    f"{low:.4g} to {high:.4g}" if known else number(np.nan),
+                    text(extreme, digits=None),
+                    text(np.nan, bounds, digits=None),
                     number(float(own["divergence"]) if kind == "forecast" else np.nan, 4),
                 )
             )
@@ -508,7 +527,7 @@ def drift_section(checked: Checked) -> Section | None:
                     str(at["run"].values),
                     number(f),
                     number(factor * made, 4),
-                    _with_sure(factor * at["offset"], factor * at["offset_uncertainty"], 4),
+                    _sure(at, "offset", factor),
                 )
             )
     columns = ("state", "run", "frequency [Hz]", "model", "measured")
@@ -532,7 +551,7 @@ def drift_section(checked: Checked) -> Section | None:
 
 CHECK_SECTIONS: list[tuple[str, tuple[str, ...], Callable[[Checked], Section | None]]] = [
     ("What the model is worth", ("worth",), worth_section),
-    ("Response", ("response", "measured_response", "validation"), response_section),
+    ("Response (RAO)", ("response", "measured_response", "validation"), response_section),
     ("What is possible", ("coherence",), possible_section),
     ("Free decay and modes", ("decay", "measured_decay", "modes"), decay_section),
     ("Residuals", ("residuals",), residuals_section),

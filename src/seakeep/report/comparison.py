@@ -14,7 +14,8 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.files import MARK, replacing, write_netcdf
-from seakeep.report.tables import MISSING, Table, plain_cell
+from seakeep.report.tables import MISSING, Table, change, plain_cell
+from seakeep.report.tables import text as text_of
 from seakeep.study.judge import verdict
 
 __all__ = [
@@ -106,8 +107,7 @@ def _intervals(at: xr.Dataset, run: str) -> Table:
 
 
 def _bounds(at: xr.Dataset, key: str) -> str:
-    low, high = (_text(at[f"{key}_{bound}"], "{:.3f}") for bound in ("lower", "upper"))
-    return MISSING if MISSING in (low, high) else f"{low}–{high}"
+    return text_of(np.nan, [float(at[f"{key}_{bound}"]) for bound in ("lower", "upper")])
 
 
 def _extremes(at: xr.Dataset, run: str) -> Table:
@@ -183,8 +183,8 @@ def model_blocks(
         ]
         note = "; ".join(told)
         yield Table(f"models_{run}", title, heads, tuple(rows), note, tuple(range(1, len(heads))))
-        if references:
-            yield _skill(of_run, references, str(run))
+        if skill := _skill(of_run, references, str(run)):
+            yield skill
         channels = [
             (str(name), *(_text(at["nrmse"].sel(channel=name), "{:.3f}") for at in of_run.values()))
             for name in first["channel"].values
@@ -198,16 +198,20 @@ def model_blocks(
 
 def _skill(
     of_run: Mapping[str, xr.Dataset], references: Mapping[str, Sequence[str]], run: str
-) -> Table:
-    """By how much the ANRMSE of each model lies below the best of some references."""
+) -> Table | None:
+    """Change of the ANRMSE to each model from the best of some references, which have no row."""
     errors = {name: float(at["anrmse"]) for name, at in of_run.items()}
     best = [min((errors[each] for each in names), default=np.nan) for names in references.values()]
+    known = {each for names in references.values() for each in names}
     rows = [
-        (name, *(_text(100 * (1 - error / each), "{:+z.0f} %") for each in best))
+        (name, *(change(error / each) for each in best))
         for name, error in errors.items()
+        if name not in known
     ]
-    heads = ("model", *(f"below {each}" for each in references))
-    title = f"{run}: ANRMSE against the baselines'"
+    if not (rows and references):
+        return None
+    heads = ("model", *(f"from {each}" for each in references))
+    title = f"{run}: change of ANRMSE from the baselines'"
     return Table(f"skill_{run}", title, heads, tuple(rows), "", tuple(range(1, len(heads))))
 
 
@@ -231,16 +235,14 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
         yield Table("by_run", title, heads, tuple(rows), "", numeric, averages=last)
     changes = []
     for k, name in enumerate(models):
-        value, low, high = (
-            100.0 * float(table[f"all_{key}"][k]) for key in ("change", "lower", "upper")
-        )
+        value, low, high = (float(table[f"all_{key}"][k]) for key in ("change", "lower", "upper"))
         known = k > 0 and bool(np.isfinite([low, high]).all())
         changes.append(
             (
                 name,
                 _text(table["all_anrmse"][k], "{:.3f}"),
-                _text(value, "{:+z.0f} %") if k else "",
-                f"{low:+z.0f} to {high:+z.0f} %" if known else "",
+                change(1 + value) if k else "",
+                change(1 + low, 1 + high) if known else "",
                 verdict(low, high) if known else "",
             )
         )

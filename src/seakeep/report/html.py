@@ -36,6 +36,7 @@ def _environment() -> Environment:
     )
     made.globals["source"] = _source
     made.filters["shade"] = shade
+    made.filters["breakable"] = lambda text: escape(text).replace("_", Markup("_<wbr>"))
     made.filters["minus"] = lambda text: re.sub(r"(?<![\w)])-(?=\d)", "−", text)
     return made
 

@@ -12,7 +12,7 @@ import xarray as xr
 from seakeep.files import replacing
 from seakeep.report.comparison import plain_cells
 from seakeep.report.figures.common import FURTHER, grid_of_axes, short_label
-from seakeep.report.style import figure_style, new_figure
+from seakeep.report.style import PALETTE, figure_style, new_figure
 from seakeep.report.tables import Table, number
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ __all__ = ["HEADER", "nowcast_blocks", "nowcast_figure", "write_nowcasts"]
 
 HEADER = "model,run,channel,lead,error,claimed,coverage,lead_time"
 """First line of the CSV file."""
-COLOURS = ("#0072B2", *FURTHER)
+COLOURS = (PALETTE["blue"], *FURTHER)
 STYLES = ("-", "--", "-.", ":")
 
 

@@ -14,6 +14,7 @@ from seakeep.errors import DataError
 from seakeep.report.style import (
     COLOURS,
     LINES,
+    PALETTE,
     THIN,
     axis_label,
     figure_style,
@@ -40,14 +41,14 @@ LABEL = 8
 """Points of a label: the longest line of one fits beside its panel."""
 
 SHADES: tuple[tuple[str, Any], ...] = (
-    ("#56606B", "-"),
-    ("#56B4E9", (0, (3, 1))),
-    ("#CC79A7", (0, (5, 1.5, 1, 1.5))),
-    ("#E69F00", (0, (1, 1))),
-    ("#000000", (0, (8, 1.5))),
-    ("#009E73", (0, (5, 1.5, 1, 1.5, 1, 1.5))),
-    ("#D55E00", (0, (1, 2.5))),
-    ("#0072B2", (0, (2, 2, 6, 2))),
+    (PALETTE["slate"], "-"),
+    (PALETTE["sky"], (0, (3, 1))),
+    (PALETTE["pink"], (0, (5, 1.5, 1, 1.5))),
+    (PALETTE["amber"], (0, (1, 1))),
+    (PALETTE["black"], (0, (8, 1.5))),
+    (PALETTE["green"], (0, (5, 1.5, 1, 1.5, 1, 1.5))),
+    (PALETTE["vermilion"], (0, (1, 2.5))),
+    (PALETTE["blue"], (0, (2, 2, 6, 2))),
 )
 """Colour and dash of each of several inputs: dashes distinguish them in grey print."""
 ACROSS = 84
@@ -58,11 +59,16 @@ BAND: dict[str, Any] = {"color": COLOURS["ensemble"], "alpha": 0.35, "linewidth"
 SEVERAL: tuple[dict[str, Any], ...] = (
     {**LINES["forecast"], "marker": "o"},
     {**LINES["ensemble"], "marker": "s"},
-    {"color": "#009E73", "linewidth": 1.2, "linestyle": (0, (1, 1)), "marker": "^"},
-    {"color": "#CC79A7", "linewidth": 1.2, "linestyle": (0, (8, 2)), "marker": "D"},
-    {"color": "#E69F00", "linewidth": 1.2, "linestyle": (0, (3, 1, 1, 1, 1, 1)), "marker": "v"},
-    {"color": "#56B4E9", "linewidth": 1.2, "linestyle": (0, (6, 1, 1, 1)), "marker": "P"},
-    {"color": "#56606B", "linewidth": 1.2, "linestyle": (0, (2, 2)), "marker": "X"},
+    {"color": PALETTE["green"], "linewidth": 1.2, "linestyle": (0, (1, 1)), "marker": "^"},
+    {"color": PALETTE["pink"], "linewidth": 1.2, "linestyle": (0, (8, 2)), "marker": "D"},
+    {
+        "color": PALETTE["amber"],
+        "linewidth": 1.2,
+        "linestyle": (0, (3, 1, 1, 1, 1, 1)),
+        "marker": "v",
+    },
+    {"color": PALETTE["sky"], "linewidth": 1.2, "linestyle": (0, (6, 1, 1, 1)), "marker": "P"},
+    {"color": PALETTE["slate"], "linewidth": 1.2, "linestyle": (0, (2, 2)), "marker": "X"},
 )
 """Colour, dash and marker of each of several models."""
 
@@ -331,7 +337,7 @@ def _draw_envelopes(
 ) -> None:
     styles = _styles(compared)
     edges, low, high = _envelope(styles[0][0].measured[name], period)
-    measured = {"color": "#BDBDBD", "linewidth": 0}
+    measured = {"color": PALETTE["pale"], "linewidth": 0}
     axes.stairs(high, edges, baseline=low, fill=True, label="measured, envelope", **measured)
     for each, _, style in styles:
         if (band := _band_of(each, name)) is not None:

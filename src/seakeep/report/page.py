@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from seakeep.arrays import Progress
 from seakeep.files import MARK, check_output, replacing
 from seakeep.report.html import inline_svg, rendered
 from seakeep.report.section import Drawing, Section
@@ -33,9 +34,6 @@ UNFINISHED = f"""<!DOCTYPE html>
 <meta name="generator" content="{MARK}: report">
 <p>This report was not finished. Run its command again.</p>
 """
-
-
-Progress = Callable[[int, int, str], None]
 
 
 def write_report(

@@ -16,10 +16,12 @@ from seakeep.campaign.settings import CampaignSettings, long_name_of
 from seakeep.conventions import displayed
 from seakeep.files import MARK, replacing
 from seakeep.quality import compared, findings_of
+from seakeep.quality.agreement import LATE, Agreement
+from seakeep.quality.faults import FLAGS
 from seakeep.report.html import inline_picture, rendered
-from seakeep.report.style import COLOURS, axis_label, figure_style, new_figure, shown_unit
-from seakeep.signals.quality import FLAGS, LATE, Agreement
+from seakeep.report.style import COLOURS, PALETTE, axis_label, figure_style, new_figure, shown_unit
 from seakeep.signals.synchronisation import ASSUMED, Clock
+from seakeep.signals.time_axis import over_gaps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,15 +42,15 @@ DRAWN = 50
 """Channels that a picture shows at most, each in a row of its own; the table lists all."""
 
 _MARKS = {
-    "missing": ("#D55E00", "x"),
-    "bridged": ("#E69F00", "+"),
-    "outlier": ("#CC79A7", "o"),
-    "saturated": ("#0072B2", "^"),
-    "stuck": ("#009E73", "s"),
-    "replaced": ("#56B4E9", "d"),
+    "missing": (PALETTE["vermilion"], "x"),
+    "bridged": (PALETTE["amber"], "+"),
+    "outlier": (PALETTE["pink"], "o"),
+    "saturated": (PALETTE["blue"], "^"),
+    "stuck": (PALETTE["green"], "s"),
+    "replaced": (PALETTE["sky"], "d"),
 }
 """Colour and shape of each flag: shapes distinguish them in grey print."""
-FOUND = "#FDEEE4"
+FOUND = PALETTE["blush"]
 """Ground of a panel in which something was found; the style sheet has the same for rows."""
 
 
@@ -149,7 +151,7 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
         for at, name in zip(axes[len(names) :], lagging, strict=True):
             each = agreements[name]
             limit = LATE * each.period
-            at.axhspan(-limit, limit, color="#009E73", alpha=0.12)
+            at.axhspan(-limit, limit, color=PALETTE["green"], alpha=0.12)
             instants = each.centre + time[0]
             at.plot(*_broken(instants, each.lags), "o-", color=COLOURS["ensemble"], markersize=3)
             reach = max(1.5 * limit, 1.1 * float(np.nanmax(np.abs(each.lags), initial=0.0)))
@@ -184,9 +186,7 @@ def _broken(instants: Any, lags: Any) -> tuple[Any, Any]:
 
 def _mark(at: Any, time: Any, x: Any, flags: Any) -> None:
     seen = False
-    there = np.isfinite(x)
-    # A sample that is not there stands between its neighbours.
-    filled = np.interp(time, time[there], x[there]) if there.any() else np.zeros_like(time)
+    filled = over_gaps(x)  # a sample that is not there stands between its neighbours
     for word, bit in FLAGS.items():
         hit = (flags & bit) > 0
         if hit.any():

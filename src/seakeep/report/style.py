@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "COLOURS",
     "LINES",
+    "PALETTE",
     "THIN",
     "axis_label",
     "figure_style",
@@ -31,14 +32,32 @@ __all__ = [
     "shown_unit",
 ]
 
-COLOURS = {
-    "measured": "#000000",
-    "forecast": "#D55E00",
-    "ensemble": "#0072B2",
-    "input": "#56606B",
-    "start": "#009E73",
+PALETTE = {
+    "black": "#000000",
+    "vermilion": "#D55E00",
+    "blue": "#0072B2",
+    "green": "#009E73",
+    "pink": "#CC79A7",
+    "amber": "#E69F00",
+    "sky": "#56B4E9",
+    "slate": "#56606B",
+    "brown": "#8C564B",
+    "violet": "#9467BD",
+    "grey": "#999999",
+    "pale": "#BBBBBB",
+    "light": "#D9D9D9",
+    "blush": "#FDEEE4",
 }
-"""From the palette of Okabe and Ito; their greys differ too."""
+"""From the palette of Okabe and Ito, their greys differ too; then two more colours, and tints."""
+
+COLOURS = {
+    "measured": PALETTE["black"],
+    "forecast": PALETTE["vermilion"],
+    "ensemble": PALETTE["blue"],
+    "input": PALETTE["slate"],
+    "start": PALETTE["green"],
+}
+"""By what a line shows."""
 
 LINES: dict[str, dict[str, Any]] = {
     "measured": {"color": COLOURS["measured"], "linewidth": 1.6, "linestyle": "-"},
@@ -68,7 +87,7 @@ _RC: Any = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
-    "grid.color": "#D9D9D9",
+    "grid.color": PALETTE["light"],
     "grid.linewidth": 0.5,
     "legend.frameon": False,
     "figure.dpi": 110,  # of layout and picture alike: what is measured for one serves the other

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "MISSING",
     "Table",
+    "change",
     "latex_text",
     "number",
     "plain_cell",
@@ -29,6 +30,7 @@ __all__ = [
     "shade",
     "signed",
     "small_number",
+    "text",
     "write_csv",
     "write_latex",
 ]
@@ -129,6 +131,56 @@ def signed(value: float, digits: int) -> str:
     if text == MISSING or float(text) == 0.0:
         return text.removeprefix("-")
     return text if value < 0 else f"+{text}"
+
+
+def text(value: float, bounds: Sequence[float] | None = None, digits: int | None = 3) -> str:
+    """Text of a value with its interval, or with its uncertainty, where that is known.
+
+    An uncertainty is shown with two digits, and the value to the same place.
+
+    Parameters
+    ----------
+    value : float
+        The value; NaN for an interval alone.
+    bounds : sequence of float, optional
+        Lower and upper bound, or one expanded uncertainty.
+    digits : int, optional
+        Decimals; None for four significant digits.
+
+    Examples
+    --------
+    >>> text(0.481, (0.421, 0.549)), text(float("nan"), (0.421, 0.549)), text(0.481)
+    ('0.481 (0.421 to 0.549)', '0.421 to 0.549', '0.481')
+    >>> text(2255.3387, (1159.329,)), text(0.01234, (0.00056,)), text(2255.3387, digits=None)
+    ('2300 ± 1200', '0.01234 ± 0.00056', '2255')
+    """
+    known = bounds is not None and bool(np.isfinite(bounds).all())
+    if bounds is not None and len(bounds) == 1:
+        if not (known and np.isfinite(value)):
+            return MISSING
+        places = 1 - int(np.floor(np.log10(bounds[0]))) if bounds[0] > 0 else 6
+        both = (round(each, places) for each in (value, bounds[0]))
+        return " ± ".join(number(each, max(places, 0)) for each in both)
+    shown = [f"{each:.4g}" if digits is None else number(each, digits) for each in bounds or ()]
+    whole = f"{value:.4g}" if digits is None and np.isfinite(value) else number(value, digits or 0)
+    if not known:
+        return whole
+    return f"{whole} ({' to '.join(shown)})" if np.isfinite(value) else " to ".join(shown)
+
+
+def change(*ratios: float) -> str:
+    """Text of one error over another, or of an interval: in percent, or how many times from 2 on.
+
+    Examples
+    --------
+    >>> change(0.4), change(1.1), change(14.57), change(2.1, 3.05), change(float("nan"))
+    ('−60 %', '+10 %', '14.6 times', '2.1 to 3.05 times', '–')
+    """
+    if not np.isfinite(ratios).all():
+        return MISSING
+    if round(max(ratios), 2) >= 2:
+        return " to ".join(f"{each:.3g}" for each in ratios) + " times"
+    return " to ".join(signed(100 * (each - 1), 0) for each in ratios).replace("-", "−") + " %"
 
 
 def probability(value: float) -> str:

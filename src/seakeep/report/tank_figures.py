@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from seakeep.report.style import COLOURS, axis_label, figure_style, new_figure
+from seakeep.report.style import COLOURS, PALETTE, axis_label, figure_style, new_figure
 from seakeep.signals import wave_spectrum
 from seakeep.tank.dynamics import Rig
 from seakeep.tank.hydrodynamics import excitation_at, kernel_coefficients, response
@@ -32,8 +32,8 @@ SYMBOLS = {
 }
 KINDS = {"pierson_moskowitz": "Pierson–Moskowitz", "jonswap": "JONSWAP", "table": "as given"}
 SHADES = {
-    "surge": "#0072B2", "heave": "#D55E00", "pitch": "#009E73",
-    "piston": "#CC79A7", "slosh": "#56606B",
+    "surge": PALETTE["blue"], "heave": PALETTE["vermilion"], "pitch": PALETTE["green"],
+    "piston": PALETTE["pink"], "slosh": PALETTE["slate"],
 }  # fmt: skip
 
 
@@ -109,7 +109,7 @@ def spectrum_figure(settings: TankSettings, realised: Sequence[Realised]) -> Fig
                 label=f"nominal ({KINDS[spectrum.kind]})",
             )  # fmt: skip
             for edge in spectrum.band:
-                axes.axvline(edge, color="#999999", linewidth=0.8, linestyle=":")
+                axes.axvline(edge, color=PALETTE["grey"], linewidth=0.8, linestyle=":")
         if seas:
             rough = [paper_peak(r.elevation, r.dt)[1:] for r in seas]
             fine = [wave_spectrum(r.elevation, r.dt) for r in seas]
@@ -144,7 +144,7 @@ def run_figure(data: xr.Dataset, channels: Sequence[str] | None = None) -> Figur
             axes.set_ylabel(label, rotation=0, ha="right", va="center", fontsize=7)
             startup = float(data.attrs.get("startup", 0.0))
             if startup > 0:
-                axes.axvspan(time[0], startup, color="#E6E6E6", zorder=0)
+                axes.axvspan(time[0], startup, color=PALETTE["light"], zorder=0)
             axes.locator_params(axis="y", nbins=3)
         stack[-1].set(xlabel="time [s]", xlim=(time[0], time[-1]))
         figure.align_ylabels(list(stack))

@@ -9,7 +9,7 @@ import xarray as xr
 
 from seakeep.check import Checked
 from seakeep.report.section import Section
-from seakeep.report.tables import MISSING, Table, number, signed
+from seakeep.report.tables import MISSING, Table, change, number, text
 
 __all__ = ["worth_section"]
 
@@ -37,8 +37,8 @@ def worth_section(checked: Checked) -> Section | None:
             if why
         ]
     words = (
-        "Free runs from one measured start to the end of each of the "
-        f"{found.sizes['run']} {found.attrs['of']}; errors in measured SDs of the run. A verdict "
+        f"Free runs from one measured start to the end of each {_one(found)} "
+        f"({found.sizes['run']}); errors in measured SDs of the run. A verdict "
         "reads the upper bound of the 95 % interval of the error: below 0.1 (99 % of the variance "
         "is forecast), 0.3 (91 %), 0.7 (51 %). Better than a baseline: the paired 95 % interval of "
         "the change of the error lies below zero. Intervals hold for these runs.",
@@ -52,6 +52,11 @@ def worth_section(checked: Checked) -> Section | None:
     )
 
 
+def _one(found: xr.Dataset) -> str:
+    """What a run is: a test, or training."""
+    return str(found.attrs["of"]).removesuffix("s")
+
+
 def _verdicts(found: xr.Dataset, repeats: Mapping[str, str]) -> Iterator[str]:
     """One sentence on all states in each kind of waves, and one per group of alike states."""
     if found.attrs["of"] == "training":
@@ -62,16 +67,17 @@ def _verdicts(found: xr.Dataset, repeats: Mapping[str, str]) -> Iterator[str]:
         count, known = len(names), [run for run in names if run in repeats]
         memory = f" (memory, not skill: {', '.join(known)} repeat training input)" * bool(known)
         tests = "training" if found.attrs["of"] == "training" else f"test{'s' * (count > 1)}"
+        every = own.sel(state="all", model="model")
+        error = every["nrmse"]
         yield (
             f"{count} {tests} in {kind} waves: ANRMSE "
-            f"{_with_bounds(own.sel(state='all', model='model'))}{_beside(own)}."
+            f"{text(float(error), _bounds(every, 'nrmse'))}{_beside(own)}."
         )
         groups: dict[tuple[float, str], list[str]] = {}
         for state in found["state"].values[1:]:
-            limit, text = _verdict(own.sel(state=state))
-            groups.setdefault((limit, text), []).append(str(state))
-        for (_, text), alike in sorted(groups.items(), key=lambda each: (not each[0][0], each[0])):
-            yield f"{kind.capitalize()} waves, {', '.join(alike)}: {text}{memory}."
+            groups.setdefault(_verdict(own.sel(state=state)), []).append(str(state))
+        for (_, use), alike in sorted(groups.items(), key=lambda each: (not each[0][0], each[0])):
+            yield f"{kind.capitalize()} waves, {', '.join(alike)}: {use}{memory}."
 
 
 def _verdict(one: xr.Dataset) -> tuple[float, str]:
@@ -84,23 +90,18 @@ def _verdict(one: xr.Dataset) -> tuple[float, str]:
             else "its forecast is lost"
         )
         return limit, f"cannot be judged: {why}"
-    text, rival = USES[limit], str(one["rival"].values)
+    use, rival = USES[limit], str(one["rival"].values)
     if not rival or bool(one["better"]):
-        return limit, text
+        return limit, use
     at = one.sel(model=rival)
-    low, high = _change(at)
-    how = "worse" if low > 0 else "not shown to be better"
-    beside = f" ({_percent(low, high)})" if np.isfinite([low, high]).all() else ""
-    return limit, f"{text}; {how} than the baseline {rival}{beside}"
+    how = "worse" if float(at["change_lower"]) > 0 else "not shown to be better"
+    beside = f" ({_change(at)})".replace(f" ({MISSING})", "")
+    return limit, f"{use}; {how} than the baseline {rival}{beside}"
 
 
-def _change(at: xr.Dataset) -> tuple[float, float]:
-    """Bounds of the change from a baseline, %."""
-    return 100 * float(at["change_lower"]), 100 * float(at["change_upper"])
-
-
-def _percent(low: float, high: float) -> str:
-    return f"{signed(low, 0)} to {signed(high, 0)} %".replace("-", "−")
+def _change(at: xr.Dataset) -> str:
+    """Interval of the change from a baseline."""
+    return change(*(1 + float(at[f"change_{each}"]) for each in ("lower", "upper")))
 
 
 def _beside(own: xr.Dataset) -> str:
@@ -109,11 +110,8 @@ def _beside(own: xr.Dataset) -> str:
     if not (best := str(one["best"].values)):
         return ""
     at = one.sel(model=best)
-    low, high = _change(at)
-    text = f"; of the best baseline, {best}, {number(float(at['nrmse']))}"
-    if np.isfinite([low, high]).all():
-        text += f" (from there {_percent(low, high)})"
-    return text
+    beside = f" (from there {_change(at)})".replace(f" (from there {MISSING})", "")
+    return f"; of the best baseline, {best}, {number(float(at['nrmse']))}{beside}"
 
 
 def _conditions(found: xr.Dataset) -> Iterator[str]:
@@ -130,12 +128,6 @@ def _conditions(found: xr.Dataset) -> Iterator[str]:
         yield f"All errors are conditional on measured {state}, which is read after the start."
 
 
-def _with_bounds(at: xr.Dataset, key: str = "nrmse") -> str:
-    low, high = (float(at[f"{key}_{each}"]) for each in ("lower", "upper"))
-    text = number(float(at[key]))
-    return f"{text} ({low:.3f} to {high:.3f})" if np.isfinite([low, high]).all() else text
-
-
 def _by_run(found: xr.Dataset) -> Table:
     """ANRMSE of each test, of the model with its interval and of the baselines."""
     rows, averages, models = [], [], found["model"].values
@@ -148,7 +140,7 @@ def _by_run(found: xr.Dataset) -> Table:
     return Table(
         "worth",
         "ANRMSE of the model and of baselines",
-        (found.attrs["of"].removesuffix("s"), "model", "95 %", *map(str, models[1:])),
+        (_one(found), "model", "95 %", *map(str, models[1:])),
         tuple(rows),
         "Baselines are fitted to the training runs with their recommended settings, and read no "
         "wave after the instant that they forecast and no measured state after the start."
@@ -161,11 +153,12 @@ def _by_run(found: xr.Dataset) -> Table:
 
 
 def _cells(at: xr.Dataset, key: str) -> tuple[str, ...]:
-    own = at.sel(model="model")
-    low, high = (float(own[f"{key}_{each}"]) for each in ("lower", "upper"))
-    bounds = f"{low:.3f} to {high:.3f}" if np.isfinite([low, high]).all() else MISSING
     first, *others = (number(float(x)) for x in at[key].values)
-    return (first, bounds, *others)
+    return (first, text(np.nan, _bounds(at.sel(model="model"), key)), *others)
+
+
+def _bounds(at: xr.Dataset, key: str) -> list[float]:
+    return [float(at[f"{key}_{each}"]) for each in ("lower", "upper")]
 
 
 def _by_state(found: xr.Dataset) -> Table:
@@ -178,10 +171,7 @@ def _by_state(found: xr.Dataset) -> Table:
             beside = (MISSING, MISSING, MISSING)
             if best:
                 at = one.sel(model=best)
-                low, high = _change(at)
-                known = np.isfinite([low, high]).all()
-                change = f"{signed(low, 0)} to {signed(high, 0)} %" if known else MISSING
-                beside = (best, number(float(at["nrmse"])), change)
+                beside = (best, number(float(at["nrmse"])), _change(at))
             use = USES.get(float(one["limit"]), "not judged").partition(" (")[0]
             rows.append((str(state), str(kind), *cells[:2], *beside, use))
     columns = ("state", "waves", "NRMSE", "95 %", "best baseline", "its NRMSE", "change", "verdict")

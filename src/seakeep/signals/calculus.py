@@ -146,6 +146,14 @@ def _check_slowest(frequency: float, dt: float, samples: int, name: str) -> None
         )
 
 
+def _extended(array: FloatArray, frequency: float) -> tuple[FloatArray, int]:
+    """Series continued at either end, and by how many samples; the frequency is per sample."""
+    # Eight periods outlast the ringing of a flank there; a prediction needs to look back one and
+    # a half of them to separate the slowest wave from a trend.
+    padding, order = int(np.ceil(8.0 / frequency)), min(int(np.ceil(1.6 / frequency)), 2000)
+    return predicted_extension(array, padding, fitted=padding, order=order), padding
+
+
 def _integrated(
     series: npt.ArrayLike, dt: float, band: tuple[float, float], times: int
 ) -> FloatArray:
@@ -154,11 +162,7 @@ def _integrated(
     # Averaged column by column, so that a channel has the same bits alone and beside others.
     columns = np.ascontiguousarray(array.reshape(array.shape[0], -1).T)
     array = (columns - columns.mean(axis=1, keepdims=True)).T.reshape(array.shape)
-    # Eight periods of the lower edge outlast the ringing of its flank; a prediction needs to
-    # look back one and a half of them to separate the slowest wave from a trend.
-    padding = int(np.ceil(8.0 / (low * dt)))
-    order = min(int(np.ceil(1.6 / (low * dt))), 2000)
-    extended = predicted_extension(array, padding, fitted=padding, order=order)
+    extended, padding = _extended(array, low * dt)
     frequency = fft.rfftfreq(extended.shape[0], dt)
     gain = band_gain(frequency, edges)
     omega = 2 * np.pi * np.where(gain > 0, frequency, 1.0)
@@ -398,11 +402,9 @@ def complementary_filter(
             f"frequency); received {crossover:g} Hz. Set it below the slowest wave."
         )
     _check_slowest(crossover, dt, x.size, "the crossover")
-    padding = int(np.ceil(8.0 / (crossover * dt)))
-    order = min(int(np.ceil(1.6 / (crossover * dt))), 2000)
     mean, trend = _line(x)
     both = np.column_stack([x - trend, a - a.mean()])
-    long = predicted_extension(both, padding, fitted=padding, order=order)
+    long, padding = _extended(both, crossover * dt)
     frequency = fft.rfftfreq(long.shape[0], dt)
     spectrum = fft.rfft(long, axis=0)
     weight = 0.5 + 0.5 * np.cos(np.pi * np.clip((frequency / crossover - 0.75) / 0.5, 0.0, 1.0))

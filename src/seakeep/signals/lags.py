@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,14 +36,11 @@ class Lags:
         s, positive where the series is late; NaN where a window holds no motion.
     correlation : ndarray, shape (window,)
         Correlation coefficient at the peak; NaN where there is no motion.
-    at_zero : ndarray, shape (window,)
-        Correlation coefficient without a lag.
     """
 
     centre: FloatArray
     lag: FloatArray
     correlation: FloatArray
-    at_zero: FloatArray
 
 
 def windowed_lags(
@@ -51,9 +49,8 @@ def windowed_lags(
     dt: float,
     window: float,
     largest_lag: float,
-    overlap: float = 0.5,
 ) -> Lags:
-    """Lag of a series behind a reference in windows, by bounded cross-correlation.
+    """Lag of a series behind a reference in windows that share a half, by cross-correlation.
 
     The coefficient is that of the two stretches compared, each less its mean, so that the ends
     of a window do not pull the peak towards zero lag; a parabola places the peak between samples.
@@ -68,8 +65,6 @@ def windowed_lags(
         Length of a window, s.
     largest_lag : float
         Lags searched on either side, s.
-    overlap : float, optional
-        Fraction of a window that the next one shares.
 
     Returns
     -------
@@ -98,30 +93,22 @@ def windowed_lags(
         )
     for value, name in ((window, "window"), (largest_lag, "largest_lag")):
         positive(value, name, "s")
-    if not 0 <= overlap < 1:
-        raise RequestError(f"overlap must be at least 0 and less than 1; received {overlap!r}.")
-    if max(largest_lag, window) > a.size * dt:
-        raise RequestError(
-            f"the record lasts {a.size * dt:g} s, less than the window of {window:g} s or the "
-            f"largest lag of {largest_lag:g} s. Shorten them, in seconds."
-        )
-    reach = int(np.ceil(largest_lag / dt))
-    length = round(window / dt)
+    length, reach = round(window / dt), math.ceil(largest_lag / dt)
     if length < 4 or a.size < length + 2 * reach:
         raise RequestError(
-            f"{a.size} samples are too few for windows of {length} and lags of ±{reach} samples. "
-            "Shorten the window or the largest lag, or sample at a higher rate."
+            f"the record lasts {a.size * dt:g} s ({a.size} samples), too short for windows of "
+            f"{window:g} s and lags of ±{largest_lag:g} s. Shorten them, in seconds, or sample at "
+            "a higher rate."
         )
-    hop = max(1, round(length * (1.0 - overlap)))
-    starts = np.arange(reach, a.size - length - reach + 1, hop)
+    starts = np.arange(reach, a.size - length - reach + 1, round(0.5 * length))
     rows = [_peak(a[s - reach : s + length + reach], b[s : s + length], reach) for s in starts]
-    lag, peak, zero = np.array(rows, dtype=float).T
-    centre = (starts + 0.5 * (length - 1)) * float(dt)
-    return Lags(centre.astype(float), lag * float(dt), peak, zero)
+    lag, peak = np.array(rows, dtype=float).T
+    centre = (float(dt) * (starts + 0.5 * (length - 1))).astype(float)
+    return Lags(centre, lag * float(dt), peak)
 
 
-def _peak(stretch: FloatArray, reference: FloatArray, reach: int) -> tuple[float, float, float]:
-    """Lag in samples, correlation there and correlation at zero."""
+def _peak(stretch: FloatArray, reference: FloatArray, reach: int) -> tuple[float, float]:
+    """Lag in samples, and correlation there."""
     length = reference.size
     views = np.lib.stride_tricks.sliding_window_view(stretch, length)
     centred = reference - reference.mean()
@@ -131,13 +118,13 @@ def _peak(stretch: FloatArray, reference: FloatArray, reach: int) -> tuple[float
     with np.errstate(divide="ignore", invalid="ignore"):
         coefficient = np.where(moving, (views @ centred) / (spread * scale), np.nan)
     if not np.isfinite(coefficient).any():
-        return (np.nan, np.nan, np.nan)
+        return np.nan, np.nan
     best = int(np.nanargmax(coefficient))
     shift, peak = float(best), float(coefficient[best])
     if 0 < best < coefficient.size - 1:
         part, peak = parabola_peak(*coefficient[best - 1 : best + 2])
         shift += part
-    return shift - reach, min(peak, 1.0), float(coefficient[reach])
+    return shift - reach, min(peak, 1.0)
 
 
 def correlation_peak(
@@ -265,8 +252,6 @@ class MotionAgreement:
     ----------
     correlation : float
         Greatest correlation, at `lag`.
-    correlation_at_zero : float
-        Correlation with no lag.
     lag : float
         s by which the first record is late behind the second; sub-sample.
     rms : float
@@ -289,7 +274,6 @@ class MotionAgreement:
     """
 
     correlation: float
-    correlation_at_zero: float
     lag: float
     rms: float
     offset: float
@@ -393,7 +377,6 @@ def compare_motion(
     difference = y1 - spline(t1 - lag)
     return MotionAgreement(
         correlation=correlation(lag),
-        correlation_at_zero=correlation(0.0),
         lag=lag,
         rms=float(np.std(difference)),
         offset=float(np.mean(difference)),

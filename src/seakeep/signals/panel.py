@@ -57,7 +57,7 @@ class TrackingSettings:
         those of the centre of gravity.
     downstream : {"right", "left"}
         Side of the picture to which the waves run.
-    level : float
+    camera_pitch : float
         Pitch that the picture shows of a vessel that is level, rad: the camera's own roll.
     origin : (float, float) or None
         Pixel of the panel's centre while the vessel is at rest; None makes the means of surge
@@ -91,7 +91,7 @@ class TrackingSettings:
     panel: tuple[float, float] = (0.30, 0.10)
     panel_place: tuple[float, float] = (0.0, 0.25)
     downstream: Literal["right", "left"] = "right"
-    level: float = 0.0
+    camera_pitch: float = 0.0
     origin: tuple[float, float] | None = None
     rest: float = 1.0
     lower: tuple[int, int, int] = (150, 150, 150)
@@ -113,7 +113,7 @@ class TrackingSettings:
         for name, unit in (("metres_per_pixel", "m"), ("passband", "Hz"), ("stopband", "Hz")):
             if getattr(self, name) is not None:
                 positive(getattr(self, name), name, unit)
-        for name in ("panel", "panel_place", "level", "origin", "lamp"):
+        for name in ("panel", "panel_place", "camera_pitch", "origin", "lamp"):
             value = getattr(self, name)
             if value is not None and not np.all(np.isfinite(value)):
                 raise RequestError(f"{name} must be finite; received {value!r}.")

@@ -21,6 +21,7 @@ __all__ = [
     "inspect_times",
     "instant_text",
     "onto_uniform",
+    "over_gaps",
     "span_text",
     "stretches",
     "uniform_step",
@@ -187,7 +188,7 @@ class TimeReport:
         Instants of the grid that are not.
     gaps : tuple of (float, float)
         Last instant before each gap and its length, s.
-    jitter_rms, jitter_max : float
+    jitter_rms : float
         Distance of the instants from the grid, s.
     jittered : bool
         Whether that is more than a hundredth of a step and than the decimals explain.
@@ -203,7 +204,6 @@ class TimeReport:
     missing: int
     gaps: tuple[tuple[float, float], ...]
     jitter_rms: float
-    jitter_max: float
     jittered: bool
 
     @property
@@ -243,7 +243,6 @@ def inspect_times(time: npt.ArrayLike, name: str = "the run") -> TimeReport:
         missing=int(place[-1]) + 1 - t.size,
         gaps=tuple((float(t[i]), float(round(t[i + 1] - t[i], 9))) for i in at),
         jitter_rms=float(np.sqrt(np.mean(away**2))),
-        jitter_max=worst,
         jittered=worst > max(0.01 * step, printed_tolerance(t, step)),
     )
 
@@ -344,6 +343,24 @@ def stretches(
         bounds = [begin, *breaks.tolist(), end]
         parts += list(itertools.pairwise(bounds))
     return parts
+
+
+def over_gaps(series: FloatArray, there: BoolArray | None = None) -> FloatArray:
+    """Series with straight lines across its gaps, and its first and last value before and after.
+
+    Gaps are samples that are not finite, or not `there`; a series without any value gets zeros.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> over_gaps(np.array([0.0, 1.0, np.nan, 3.0]))
+    array([0., 1., 2., 3.])
+    """
+    there = np.isfinite(series) if there is None else there
+    at = np.flatnonzero(there)
+    if at.size in (0, series.size):
+        return np.where(there, series, 0.0)
+    return np.interp(np.arange(series.size), at, series[at])
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ downstream to the left it stands on the other side of the tank.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray
+from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.files import existing_file
 from seakeep.signals.filters import low_pass
@@ -33,7 +33,6 @@ from seakeep.signals.time_axis import stretches
 __all__ = ["FLAGS", "LABELS", "Track", "TrackingSettings", "contact_sheet", "track_video"]
 
 Seen = Mapping[str, FloatArray]
-Progress = Callable[[int, int, str], None]
 
 FLAGS = {
     "good": 0,
@@ -461,7 +460,7 @@ def _motions(
 ) -> tuple[dict[str, FloatArray], BoolArray]:
     """Surge, heave and pitch of the centre of gravity, filtered, and what was bridged."""
     side = 1.0 if how.downstream == "right" else -1.0
-    pitch = side * seen["angle"] - how.level
+    pitch = side * seen["angle"] - how.camera_pitch
     (along, up), scale = how.panel_place, usual["scale"]
     # Where the panel's centre would be if the vessel had turned about its centre of gravity alone.
     x = side * scale * seen["x"] - along * np.cos(pitch) - up * np.sin(pitch)

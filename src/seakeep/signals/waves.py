@@ -14,11 +14,15 @@ import scipy
 from seakeep.arrays import FloatArray, IntArray, as_series, number, time_step, whole_number
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import parabola_peak
+from seakeep.signals.time_axis import over_gaps
 
 __all__ = [
     "WaveStatistics",
+    "dominant_period",
     "encounter_period",
+    "energy_above",
     "energy_period",
+    "noise_floor",
     "paper_welch",
     "peak_period",
     "repeated_waves",
@@ -177,6 +181,26 @@ def _are_alike(
     one, other = one[begin:end], other[begin - lag : end - lag]
     small, large = sorted((float(one.std()), float(other.std())))
     return 0 < small >= ALIKE * large and bool(np.corrcoef(one, other)[0, 1] >= ALIKE)
+
+
+def dominant_period(series: npt.ArrayLike, dt: float) -> float:
+    """Period at the peak of a series' spectrum, s (Hann window, three bins smoothed).
+
+    NaN for fewer than eight samples, and for a constant.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> round(dominant_period(np.sin(np.arange(0, 100, 0.05) * 2 * np.pi / 1.6), 0.05), 1)
+    1.6
+    """
+    x = as_series(series)
+    if x.size < 8 or not np.ptp(x):
+        return float("nan")
+    power = tapered_power(x)
+    power = np.convolve(power, [0.25, 0.5, 0.25], mode="same")
+    power[:3] = 0.0
+    return float(1.0 / np.fft.rfftfreq(x.size, dt)[int(np.argmax(power))])
 
 
 def tapered_power(x: FloatArray) -> FloatArray:
@@ -563,3 +587,78 @@ def wave_statistics(series: npt.ArrayLike, dt: float) -> WaveStatistics:
         zero_crossing_period=encounter_period(series, dt),
         moment_period=float(np.sqrt(moments[0] / moments[1])),
     )
+
+
+NOISE_BAND = (0.5, 0.75)
+"""Part of the Nyquist frequency where the level of the spectrum is that of the noise: above the
+waves and their harmonics, below the edge of an anti-alias filter."""
+
+WAVES = (0.3, 3.0)
+"""Frequencies that count as those of waves, in parts of their peak's: drift lies below, and of a
+Pierson-Moskowitz spectrum, whose tail is the highest of the usual ones, 1.5 % of the energy above:
+:math:`1 - \\exp(-1.25 / 3^4)`."""
+
+
+def energy_above(series: npt.ArrayLike, dt: float, edge: float) -> tuple[float, float]:
+    """Fraction of the energy of waves that lies above a frequency.
+
+    Noise and ringing above three times the peak's frequency do not count: to lose them does no
+    harm.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(0, 100, 0.05)
+    >>> share, period = energy_above(np.sin(2 * np.pi * t) + 0.5 * np.sin(4 * np.pi * t), 0.05, 1.5)
+    >>> round(share, 2), round(period, 2)
+    (0.2, 1.0)
+    """
+    x = as_series(series)
+    time_step(dt)
+    period = dominant_period(x, dt)
+    if not np.isfinite(period):
+        return float("nan"), float("nan")
+    power = tapered_power(x)
+    lines = np.fft.rfftfreq(x.size, dt)
+    waves = (lines >= WAVES[0] / period) & (lines <= WAVES[1] / period)
+    return float(power[waves & (lines > edge)].sum() / power[waves].sum()), period
+
+
+def noise_floor(series: npt.ArrayLike) -> float:
+    r"""Standard deviation of the noise of a record that is sampled well above its waves.
+
+    The level of the spectrum between one half and three quarters of the Nyquist frequency, taken
+    for that of white noise: the median over the lines, which neither a harmonic nor a spur moves,
+    over ln 2, since the lines of noise are exponentially distributed.
+
+    Parameters
+    ----------
+    series : array_like, shape (time,)
+        Uniformly sampled; gaps (NaN) are interpolated. A mean and a trend are removed.
+
+    Returns
+    -------
+    float
+        In the unit of the series; 0 of fewer than 64 samples, in which waves leak too far.
+
+    Notes
+    -----
+    Pulses, as of a slack line that dips into the water, are noise by this measure. What an
+    integrated channel has of noise below the band is not seen.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t, rng = np.arange(2000) / 20, np.random.default_rng(0)
+    >>> waves = np.sin(2 * np.pi * 0.6 * t)
+    >>> round(noise_floor(waves + 0.05 * rng.standard_normal(2000)), 2)
+    0.05
+    """
+    x = np.asarray(series, dtype=float)
+    if np.isfinite(x).sum() < 64:
+        return 0.0
+    x = scipy.signal.detrend(over_gaps(x))
+    taper = np.hanning(x.size)
+    power = np.abs(np.fft.rfft(x * taper)) ** 2 / np.sum(taper**2)
+    low, high = (round(edge * (power.size - 1)) for edge in NOISE_BAND)
+    return float(np.sqrt(np.median(power[low:high]) / np.log(2.0)))

@@ -14,6 +14,7 @@ from seakeep.campaign import Campaign
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError
 from seakeep.signals import significant_height, wave_spectrum
+from seakeep.signals.waves import paper_welch
 from seakeep.study.fit import find_repeat
 from seakeep.study.judge import wave_frequency
 from seakeep.study.plan import Plan, between, training_samples, whole_span
@@ -34,10 +35,6 @@ POSITIVE = {
 SLACK = 1e-3
 """A load below this part of its largest value counts as slack."""
 WELCH = ("paper", "recommended")
-LONGEST_SEGMENT = 60.0
-"""s, of the recommended Welch segments; half of them overlaps."""
-PAPER_SEGMENT, PAPER_OVERLAP, PAPER_PADDED = 2**12 / 500, 2**7 / 500, 2**16 / 500
-"""s, of the paper's Welch settings, which it states in samples at 500 Hz."""
 
 
 def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset]:
@@ -245,7 +242,8 @@ def _spectra(plan: Plan, runs: Runs) -> xr.Dataset | None:
         heights.append(significant_height(x))
         for k, kind in enumerate(WELCH):
             with suppress(RequestError):  # a record shorter than one segment
-                curves[r, k] = wave_spectrum(x, plan.dt, *_welch(kind, x.size, plan.dt))
+                welch = paper_welch(plan.dt) if kind == "paper" else ()
+                curves[r, k] = wave_spectrum(x, plan.dt, *welch)
     bins = max((len(density) for _, density in curves.values()), default=0)
     values = np.full((2, len(runs), len(WELCH), bins), np.nan)
     for (r, k), curve in curves.items():
@@ -259,11 +257,3 @@ def _spectra(plan: Plan, runs: Runs) -> xr.Dataset | None:
         coords={"run": list(runs), "kind": list(WELCH)},
         attrs={"channel": waves[0]},
     )
-
-
-def _welch(kind: str, samples: int, dt: float) -> tuple[int, int, int | None]:
-    if kind == "paper":
-        segment = round(PAPER_SEGMENT / dt)
-        return segment, round(PAPER_OVERLAP / dt), round(PAPER_PADDED / dt)
-    segment = min(samples, round(LONGEST_SEGMENT / dt))
-    return segment, segment // 2, None

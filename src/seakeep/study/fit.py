@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -14,7 +14,9 @@ from seakeep.campaign.prepare import Progress
 from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, outside_training
+from seakeep.models.settings import Select
 from seakeep.models.slow import warn_of_slow_motions
+from seakeep.models.specs import left_open
 from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, find_leakage
 from seakeep.study.plan import between
@@ -171,6 +173,9 @@ def read_training(
     period = campaign.encounter_period() if counts_in_periods(settings) else None
     aligned = can_align(campaign.settings, settings.inputs)
     spec = build_spec(settings, period, dt, aligned=aligned)
+    if period is not None and (open_spec := left_open(spec)):
+        chosen = open_spec.select or Select()
+        spec = replace(open_spec, select=replace(chosen, period=chosen.period or period))
     stop = settings.stop
     if isinstance(stop, Length):
         stop = None if period is None else stop.at(period)
@@ -225,7 +230,11 @@ def fit_baselines(
         try:
             found[kind] = spec.fit(runs, states, inputs)
         except SeakeepError as error:
-            warn(f"baseline '{kind}' is left out: {error}")
+            warn(
+                f"baseline '{kind}' is left out: with its recommended settings, {error} To compare "
+                f"with one of other settings, state them in [models.{kind}], fit it with --model "
+                f"{kind}, and name its file beside the model's."
+            )
     return found
 
 

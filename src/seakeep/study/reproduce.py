@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ from seakeep.campaign import read_campaign, write_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, check_report, is_there, replacing
-from seakeep.models.executor import as_finished, on_this_machine
+from seakeep.models.executor import on_this_machine, submitting
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
 from seakeep.study.store import StudyResult, read_result, storing, versions
@@ -191,7 +190,7 @@ def reproduce(
             campaigns[1].parent.mkdir(exist_ok=True)
         text = campaigns[0].read_text(encoding="utf-8")
         _write(campaigns[1], detrended_text(text), CAMPAIGN_FILE)
-    _prepare_all(campaigns, executor, progress)
+    prepare_campaigns(campaigns, executor, progress)
     found = {}
     for act in acts:
         path = out / act.name / "study.toml"
@@ -276,7 +275,7 @@ def _play(folder: Path, seed: int, progress: Progress | None) -> xr.Dataset:
     )
 
 
-def _prepare_all(
+def prepare_campaigns(
     campaigns: Sequence[Path], executor: Executor | None, progress: Progress | None
 ) -> None:
     """Write the prepared runs of campaigns, which lie side by side where workers are near."""
@@ -285,10 +284,12 @@ def _prepare_all(
         for path in campaigns:
             write_prepared(read_campaign(path), progress=_named(progress, "preparing "))
         return
-    tell = progress or (lambda done, total, what: None)
-    tell(0, len(campaigns), "preparing campaigns")
-    for done, _ in enumerate(as_finished(_prepare, None, deque(campaigns), near), 1):
-        tell(done, len(campaigns), "campaigns prepared")
+    first, *others = campaigns
+    with submitting(_prepare, None, near) as submit:
+        pending = [submit([path]) for path in others]
+        write_prepared(read_campaign(first), progress=_named(progress, "preparing "))
+        for each in pending:
+            each.result()
 
 
 def _prepare(_: None, path: Path) -> None:

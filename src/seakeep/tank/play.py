@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import MARK, check_output, is_there, make_folder
@@ -32,7 +33,6 @@ from seakeep.tank.video import SIDE_VIEW, check_video, render_side_view
 
 __all__ = ["check_settings", "generator", "noisy_truth", "play", "play_run", "truth"]
 
-Progress = Callable[[int, int, str], None]
 
 CAMPAIGN_FILE = "campaign.toml"
 LOGGERS = ("wave_probes", "mru", "loads", "video", "all")

@@ -16,6 +16,7 @@ from seakeep.signals import (
     wave_heights,
     wave_spectrum,
 )
+from seakeep.signals.time_axis import over_gaps
 from seakeep.tank.instruments import Played, record_run
 from seakeep.tank.play import generator
 from seakeep.tank.settings import TankSettings
@@ -100,9 +101,7 @@ def realise(played: Played, name: str) -> Realised:
     probe = _forward_probe(settings)
     record = record_run(played, generator(settings, name, "instruments"))[0]
     dt = 1.0 / settings.instruments.clocks["wave_probes"].rate
-    values = 1e-3 * record.columns[probe].values
-    good = np.isfinite(values)
-    values = np.interp(record.time, record.time[good], values[good])
+    values = over_gaps(1e-3 * record.columns[probe].values)
     edges = (10.0, 10.75) if dt < 1 / 22 else (0.4 / dt, 0.45 / dt)
     eta = low_pass(values, dt, *edges)[record.time >= run.startup]
     time = played.rig.step * np.arange(int(played.length / played.rig.step) + 1, dtype=float)

@@ -34,7 +34,7 @@ static const double {{ name }}[{{ size }}] = {
 {{ array(kind ~ "_mean", scale.mean) -}}
 {{ array(kind ~ "_std", scale.std) -}}
 {{ array(kind ~ "_centre", scale.centre) -}}
-{{ array(kind ~ "_reach", scale.reach) }}
+{{ array(kind ~ "_reach", scale.bound) }}
 {% endfor %}
 {% for each in kernels %}
 {{ array("kernel_%d" % loop.index0, each) }}
@@ -84,7 +84,7 @@ static void push({{ name }}_model *m, const double *u)
         direct[i] = (direct[i] - direct_mean[i]) / direct_std[i];
 }
 
-/* Remember how far inputs go beyond those of training. */
+/* Remember how far inputs go beyond those of training; each step forgets a little of it. */
 static void widen({{ name }}_model *m, int delays)
 {
     const double *v = m->regressors + EXTENDED, *direct = v + DELAYED * (DELAYS + 1);
@@ -136,6 +136,7 @@ int {{ name }}_step({{ name }}_model *m, const double *u)
     if (!all_finite(u, Q))
         return 1;
     push(m, u);
+    m->excess = 1.0 + {{ fade | hex }} * (m->excess - 1.0);
     widen(m, 0);
     for (int row = 0; row < ROWS; row++) {
         const double *weights = coefficients + row * COLUMNS;

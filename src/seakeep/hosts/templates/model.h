@@ -46,7 +46,7 @@ int {{ name }}_start({{ name }}_model *m, const double *x_history, const double 
 
 /* Make one step with one row of inputs. Returns 0; 1 if an input is not finite, and the model is
  * as it was; 2 if the run is lost: a state is ten times as far from its mean as it ever was in
- * training, in proportion to the waves. All states are NaN from then on. */
+ * training, in proportion to the waves of late. All states are NaN from then on. */
 int {{ name }}_step({{ name }}_model *m, const double *u);
 
 #ifdef __cplusplus

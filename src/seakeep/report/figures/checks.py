@@ -11,7 +11,7 @@ import xarray as xr
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError
 from seakeep.report.figures.common import grid_of_axes, short_label
-from seakeep.report.style import COLOURS, LINES, figure_style, new_figure, shown_unit
+from seakeep.report.style import COLOURS, LINES, PALETTE, figure_style, new_figure, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +31,7 @@ __all__ = [
 
 NARROWEST = 7.5
 """Inches: a page stretches figures to its width, and a legend needs room."""
-UNTRAINED: dict[str, Any] = {"color": "#DDDDDD", "alpha": 0.6, "linewidth": 0}
+UNTRAINED: dict[str, Any] = {"color": PALETTE["light"], "alpha": 0.6, "linewidth": 0}
 MARKS: dict[str, dict[str, Any]] = {
     "regular": {"color": COLOURS["measured"], "marker": "o", "markersize": 5, "zorder": 4},
     "irregular": {
@@ -58,26 +58,12 @@ def panels(
         return figure, grid_of_axes(figure, count, most)
     several = isinstance(axes, Sequence | np.ndarray)
     given: list[Any] = list(np.ravel(np.array(axes, dtype=object))) if several else [axes]
-    if strange := [each for each in given if not hasattr(each, "get_figure")]:
-        raise RequestError(
-            f"axes must be Axes of matplotlib, or a list of them; received a "
-            f"{type(strange[0]).__name__}. Make them with matplotlib.pyplot.subplots()."
-        )
     if len(given) != count:
         raise RequestError(
             f"axes holds {len(given)} Axes and the figure draws {count} panels. Give as many, or "
             "none."
         )
     return given[0].figure, given
-
-
-def check_result(found: xr.Dataset, variable: str, source: str) -> None:
-    """Refuse a Dataset that is none of the results that a figure draws."""
-    if variable not in found:
-        raise RequestError(
-            f"a result of {source} is drawn; received a Dataset of "
-            f"{', '.join(map(str, found.data_vars)) or 'nothing'}."
-        )
 
 
 def _chosen(found: xr.Dataset, states: Sequence[str] | None) -> list[str]:
@@ -112,9 +98,6 @@ def response(
     -------
     Figure
     """
-    check_result(found, "trained", "seakeep.check.response")
-    if measured is not None:
-        check_result(measured, "kind", "seakeep.check.measured_response")
     known = [
         str(s) for s in found["state"].values if found["amplitude"].sel(state=s).notnull().any()
     ]
@@ -213,7 +196,6 @@ def coherence(
     -------
     Figure
     """
-    check_result(found, "spectrum", "seakeep.check.coherence")
     chosen = _chosen(found, states)
     frequency = found["frequency"].values
     with figure_style():
@@ -224,7 +206,7 @@ def coherence(
             own = found.sel(state=name)
             power = own["spectrum"].values
             place.fill_between(
-                frequency, power / max(power.max(), 1e-300), color="#DDDDDD", linewidth=0,
+                frequency, power / max(power.max(), 1e-300), color=PALETTE["light"], linewidth=0,
                 label="spectrum of the state",
             )  # fmt: skip
             for each in own["input"].values:
@@ -261,7 +243,6 @@ def modes(
     -------
     Figure
     """
-    check_result(found, "participation", "seakeep.check.modes")
     at = found.isel(mode=slice(0, most))
     states = [str(name) for name in at["state"].values]
     with figure_style():
@@ -305,7 +286,6 @@ def decay(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Fi
     -------
     Figure
     """
-    check_result(found, "displacement", "seakeep.check.decay")
     motions = [str(name) for name in found["motion"].values]
     with figure_style():
         figure, places = panels(axes, len(motions), 3, (3.0, 1.8))
@@ -342,9 +322,8 @@ def residuals(
     -------
     Figure
     """
-    check_result(found, "autocorrelation", "seakeep.check.residuals")
     chosen = _chosen(found, states)
-    grey = {"color": "#BBBBBB", "linewidth": 0.8}
+    grey = {"color": PALETTE["pale"], "linewidth": 0.8}
     with figure_style():
         figure, places = panels(axes, 4 * len(chosen), 4, (2.6, 1.75))
         for number, name in enumerate(chosen):
@@ -428,7 +407,6 @@ def exceedance(
     -------
     Figure
     """
-    check_result(found, "exceedance", "seakeep.check.statistics")
     return by_state(found, states, axes, 2.0, _exceedance)
 
 
@@ -465,7 +443,6 @@ def density(
     axes: Sequence[Axes] | Axes | None = None,
 ) -> Figure:
     """Draw the densities of states, measured and forecast; arguments as :func:`exceedance`."""
-    check_result(found, "density", "seakeep.check.statistics")
     return by_state(found, states, axes, 1.9, _density)
 
 
@@ -492,14 +469,13 @@ def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) ->
     -------
     Figure
     """
-    check_result(found, "steepness", "seakeep.check.validity")
     maps = [("period", "mean zero-crossing period [s]", "height", "wave height [m]")]
     if (found["drift"].notnull() & found["steepness"].notnull()).any():
         maps.append(("drift", "mean surge [m]", "steepness", "wave steepness [1]"))
     outside = found["outside"].values != ""
     train, test = (found.sel(part=each) for each in ("train", "test"))
     kinds = (
-        (train, "trained", {"marker": "o", "markersize": 11, "color": "#BBBBBB"}),
+        (train, "trained", {"marker": "o", "markersize": 11, "color": PALETTE["pale"]}),
         (test.isel(run=~outside), "test, inside", {"marker": "s", "color": COLOURS["ensemble"]}),
         (test.isel(run=outside), "test, outside", {"marker": "X", "color": COLOURS["forecast"]}),
     )
@@ -543,7 +519,6 @@ def drift(
     -------
     Figure
     """
-    check_result(found, "slow_response", "seakeep.check.drift")
     known = found["state"].values[found["slow_response"].notnull().any(["difference", "frequency"])]
     chosen = _chosen(found, [str(name) for name in known] if states is None else states)
     with figure_style():

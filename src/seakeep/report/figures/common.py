@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from seakeep.conventions import canonical_channel
-from seakeep.report.style import COLOURS, LINES
+from seakeep.report.style import COLOURS, LINES, PALETTE
 from seakeep.study import StudyResult
 
 __all__ = [
@@ -20,7 +20,9 @@ __all__ = [
 ]
 
 
-FURTHER = ("#CC79A7", "#E69F00", "#009E73", "#56B4E9", "#8C564B", "#56606B", "#9467BD")
+FURTHER = tuple(
+    PALETTE[name] for name in ("pink", "amber", "green", "sky", "brown", "slate", "violet")
+)
 HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
 """Names of the paper for the averages of the two measures over the channels."""
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from seakeep.report.figures.common import judged_models, model_colour, model_words
-from seakeep.report.style import figure_style, new_figure
+from seakeep.report.style import PALETTE, figure_style, new_figure
 from seakeep.study import StudyResult
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
         figure = new_figure(8.5, 3.0)
         plane, decay = figure.subplots(1, 2)
         circle = np.exp(1j * np.linspace(0, np.pi, 400))
-        plane.plot(circle.real, circle.imag, color="#56606B", linewidth=0.8)
+        plane.plot(circle.real, circle.imag, color=PALETTE["slate"], linewidth=0.8)
         order = sorted(judged_models(result), key=lambda model: not result.is_ensemble(model))
         for model in order:
             data = result.groups[f"eigenvalues/{model}"]
@@ -37,7 +37,7 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
         plane.set_ylim(0, 1.05)
         plane.set_xticks([-1.0, -0.5, 0.0, 0.5, 1.0])
         plane.set(xlabel="real part", ylabel="imaginary part")
-        decay.axhline(1.0, color="#56606B", linewidth=0.8)
+        decay.axhline(1.0, color=PALETTE["slate"], linewidth=0.8)
         decay.set(xlabel="frequency [Hz]", ylabel="modulus")
         decay.set_xlim(0, 3 / float(result.attrs["encounter_period"]))
         decay.set_ylim(LOWEST, 1.01)

@@ -11,7 +11,7 @@ import xarray as xr
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError
 from seakeep.models import summarize
-from seakeep.report.figures.checks import check_result, legend_outside, panels
+from seakeep.report.figures.checks import legend_outside, panels
 from seakeep.report.figures.common import FURTHER, short_label
 from seakeep.report.style import COLOURS, LINES, THIN, axis_label, figure_style
 
@@ -156,7 +156,6 @@ def errors(table: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> F
     -------
     Figure
     """
-    check_result(table, "nrmse", "seakeep.study.comparison_table")
     channels = [str(name) for name in table["channel"].values]
     runs = [str(run) for run in table["run"].values]
     width = 0.6 / max(len(runs), 1)

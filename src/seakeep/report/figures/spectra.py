@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.report.style import figure_style, new_figure, plain_text
+from seakeep.report.style import PALETTE, figure_style, new_figure, plain_text
 from seakeep.study import StudyResult
 
 if TYPE_CHECKING:
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 __all__ = ["spectrum_figure"]
 
 KINDS: dict[str, tuple[str, str, Any]] = {
-    "paper": ("measured, segments of 8.2 s (paper)", "#D55E00", (0, (4, 1.5))),
-    "recommended": ("measured, segments of 60 s", "#0072B2", "-"),
+    "paper": ("measured, segments of 8.2 s (paper)", PALETTE["vermilion"], (0, (4, 1.5))),
+    "recommended": ("measured, segments of 60 s", PALETTE["blue"], "-"),
 }
 
 
@@ -78,4 +78,4 @@ def _mark_regular(axes: Any, frequencies: npt.NDArray[np.float64]) -> None:
     known = sorted({round(float(f), 3) for f in frequencies[np.isfinite(frequencies)]})
     for number, frequency in enumerate(known):
         label = "regular waves" if number == 0 else None
-        axes.axvline(frequency, color="#009E73", linewidth=0.9, linestyle="--", label=label)
+        axes.axvline(frequency, color=PALETTE["green"], linewidth=0.9, linestyle="--", label=label)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seakeep.signals.quality import reading_step
+from seakeep.quality.faults import reading_step
 
 T = np.arange(0, 100, 0.005)
 RNG = np.random.default_rng(3)

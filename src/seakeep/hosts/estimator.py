@@ -1,0 +1,54 @@
+"""C99 sources of an estimator: what ``model.live()`` computes, without Python."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from seakeep.errors import RequestError
+from seakeep.hosts.c import content_of, identifier, rendered, sources, write_sources
+from seakeep.hosts.program import program_of
+from seakeep.models import Model
+from seakeep.signals.prediction import MEMORY
+
+__all__ = ["write_estimator"]
+
+
+def write_estimator(
+    model: Model, folder: str | Path, name: str = "rom", noise: Mapping[str, float] | None = None
+) -> list[Path]:
+    """Write a model and its estimator as C99: the files of ``write_c``, and ``NAME_estimator.…``.
+
+    Parameters
+    ----------
+    model : Model
+        As for :func:`seakeep.hosts.write_c`, without look-ahead, observables and carried waves.
+    folder, name
+        As for :func:`seakeep.hosts.write_c`.
+    noise : mapping of str to float, optional
+        As for ``model.live``.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    RequestError
+        If the model cannot be exported, or a file is there that seakeep did not write.
+    """
+    program = program_of(model)
+    fitted, signature = program.model, program.model.signature
+    if program.lead or program.observed is not None or program.is_aligned:
+        raise RequestError(
+            "an estimator in C takes models whose steps read waves as they are measured, and this "
+            "one has a look-ahead, observables or carried waves. Run model.live() in Python, or "
+            "fit it without them."
+        )
+    name = identifier(name)
+    content = content_of(program, name) | fitted.live(noise=noise).equations
+    content |= {"begins": signature.history_samples, "memory": MEMORY}
+    files = ("estimator.h", "estimator.c")
+    more = {f"{name}_{file}": rendered(file, **content) for file in files}
+    return write_sources(sources(program, name) | more, folder)

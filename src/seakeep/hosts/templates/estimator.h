@@ -1,0 +1,66 @@
+/* {{ mark }} C header of an estimator
+ *
+ * Follows a vessel sample by sample, beside {{ name }}.c: a Kalman filter on the delayed states
+ * fills what was not measured, and lost inputs are predicted from their own record. Plain C99, no
+ * memory but the struct below. Set it to zero before the first sample:
+ *
+ *     static {{ name }}_estimator e;
+ *     for (;;) {
+ *         ... NAN for what is missing ...
+ *         status = {{ name }}_estimate(&e, u, y); ... {{ name }}_estimated(&e)[0] ...
+ *         status = {{ name }}_forecast(&e, n, NULL, x); ... x[i * {{ upper }}_STATES] ...
+ *     }
+ */
+#ifndef {{ upper }}_ESTIMATOR_H
+#define {{ upper }}_ESTIMATOR_H
+
+#include "{{ name }}.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum {
+    {{ upper }}_EXTENDED = {{ N * (s + 1) }},
+    {{ upper }}_RECORD = {{ record }},
+    {{ upper }}_ORDER = {{ record // 3 }}
+};
+
+/* All that an estimator remembers. To save and restore it, copy it as it is. */
+typedef struct {
+    double x[{{ upper }}_EXTENDED]; /* estimates, oldest row first; the last one is of this instant */
+    double covariance[{{ upper }}_EXTENDED * {{ upper }}_EXTENDED]; /* of their errors */
+    double innovation[{{ upper }}_STATES]; /* measurement less prediction, NaN without one */
+    double inputs[{{ [record * Q, 1] | max }}]; /* a ring */
+    int newest, filled, taken, since, partly, complete;
+    /* What lies below is work space. */
+    double gain[{{ upper }}_EXTENDED * {{ upper }}_STATES];
+    double cross[{{ upper }}_EXTENDED * {{ upper }}_STATES];
+    double forward[{{ upper }}_RECORD], backward[{{ upper }}_RECORD];
+    double filter[{{ [Q, 1] | max }}][{{ upper }}_ORDER + 1], past[{{ [Q, 1] | max }}][{{ upper }}_ORDER];
+    double mean[{{ [Q, 1] | max }}];
+    int order[{{ [Q, 1] | max }}];
+    double u_history[{{ [history * Q, 1] | max }}];
+    {{ name }}_model model;
+} {{ name }}_estimator;
+
+/* Take one sample: {{ upper }}_INPUTS inputs and {{ upper }}_STATES states, NaN for what is missing.
+ * Returns 0, or 1 if a value is infinite, or an input is missing before the fifth sample; the
+ * estimator is as it was then. */
+int {{ name }}_estimate({{ name }}_estimator *e, const double *u, const double *y);
+
+/* Estimates of the states at the last sample. */
+const double *{{ name }}_estimated(const {{ name }}_estimator *e);
+
+/* Standard deviation of the error of one of them. */
+double {{ name }}_deviation(const {{ name }}_estimator *e, int state);
+
+/* Forecast n instants after the last sample into x, a row for each. `future` holds the inputs of
+ * the n - 1 instants after it, or is NULL: they are predicted from their own records then.
+ * Returns 0; 1 if there are fewer than {{ begins }} samples; 2 if the run is lost, as a step is. */
+int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,120 @@
+"""Stand-in of rclpy: nodes under an executor whose clock is that of a bag, with real messages."""
+
+import sys
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_typestore
+
+STORE = get_typestore(Stores.ROS2_HUMBLE)
+SECOND = 1_000_000_000  # ns
+
+
+def message(kind):
+    """Class of a message as ROS generates it: fields by keyword, with defaults."""
+    zeros = {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}
+
+    def filled(field, given):
+        node, content = field
+        if node.name == "NAME":
+            return message(content)() if given is None else given
+        if node.name == "BASE":
+            return zeros.get(content[0], 0) if given is None else given
+        is_float = content[0][1][0] == "float64"
+        return np.array(given or [], dtype=float) if is_float else list(given or [])
+
+    def made(**given):
+        fields = STORE.fielddefs[kind][1]
+        return STORE.types[kind](**{name: filled(each, given.get(name)) for name, each in fields})
+
+    return made
+
+
+def instant(kind):
+    """Class of a Time or Duration of rclpy."""
+
+    def of(seconds):
+        sec, nanosec = divmod(round(seconds * SECOND), SECOND)
+        return SimpleNamespace(to_msg=lambda: message(kind)(sec=sec, nanosec=nanosec))
+
+    return of
+
+
+class Node:
+    """Node with simulated time, whose parameters are set before it is made."""
+
+    given: dict = {}  # noqa: RUF012
+
+    def __init__(self, name):
+        self.parameters, self.subscriptions, self.timers = {}, [], []
+        self.published, self.warnings, self.clock = {}, [], 0
+
+    def declare_parameter(self, name, default):
+        self.parameters[name] = self.given.get(name, default)
+
+    def get_parameter(self, name):
+        return SimpleNamespace(value=self.parameters[name])
+
+    def create_subscription(self, kind, topic, callback, qos):
+        self.subscriptions.append((topic, kind, callback))
+
+    def create_publisher(self, kind, topic, depth):
+        def publish(each):
+            name = each.__msgtype__
+            sent = STORE.deserialize_cdr(STORE.serialize_cdr(each, name), name)
+            self.published.setdefault(topic, []).append(sent)
+
+        return SimpleNamespace(publish=publish)
+
+    def create_timer(self, period, callback):
+        self.timers.append([None, round(period * SECOND), callback])
+
+    def get_clock(self):
+        return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=self.clock))
+
+    def get_logger(self):
+        return SimpleNamespace(warning=self.warnings.append)
+
+    def play(self, bag):
+        """Run timers and callbacks at the instants at which a bag's messages were received."""
+        with Reader(bag) as reader:
+            for connection, received, data in reader.messages():
+                self._run_timers(received)
+                for topic, kind, callback in self.subscriptions:
+                    if topic == connection.topic:
+                        assert kind == connection.msgtype
+                        callback(STORE.deserialize_cdr(data, kind))
+
+    def _run_timers(self, until):
+        for timer in self.timers:
+            timer[0] = timer[0] or until + timer[1]
+        while (timer := min(self.timers, key=lambda each: each[0]))[0] <= until:
+            self.clock = timer[0]
+            timer[0] += timer[1]
+            timer[2]()
+        self.clock = until
+
+
+def install(monkeypatch):
+    """Put the stand-in where `import rclpy` looks."""
+    modules = {
+        "rclpy": {},
+        "rclpy.duration": {"Duration": instant("builtin_interfaces/msg/Duration")},
+        "rclpy.node": {"Node": Node},
+        "rclpy.qos": {"qos_profile_sensor_data": None},
+        "rclpy.time": {"Time": instant("builtin_interfaces/msg/Time")},
+        "rosidl_runtime_py": {},
+        "rosidl_runtime_py.utilities": {"get_message": lambda kind: kind},
+        "sensor_msgs": {},
+        "sensor_msgs.msg": {"JointState": message("sensor_msgs/msg/JointState")},
+        "trajectory_msgs": {},
+        "trajectory_msgs.msg": {
+            name: message(f"trajectory_msgs/msg/{name}")
+            for name in ("JointTrajectory", "JointTrajectoryPoint")
+        },
+    }
+    for name, content in modules.items():
+        module = ModuleType(name)
+        vars(module).update(content)
+        monkeypatch.setitem(sys.modules, name, module)

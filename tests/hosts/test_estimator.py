@@ -1,0 +1,198 @@
+"""The estimator in C is the live model of Python, sample by sample."""
+
+import ctypes
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from seakeep import HankelDMDc, ReadOut, RequestError, SlowSquares
+from seakeep.hosts import write_estimator
+
+STATES, INPUTS = ["heave", "pitch"], ["eta_fwd", "eta_cog"]
+COUNT = 700
+FLAGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared"]
+NOISES = {"exact": {}, "noisy": {"heave": 0.02}}
+
+
+@pytest.fixture(scope="module")
+def model(make_run):
+    return HankelDMDc(6, 9, 1.0).fit([make_run(1200, seed) for seed in (1, 2)], STATES, INPUTS)
+
+
+@pytest.fixture(scope="module")
+def sources(model, tmp_path_factory):
+    if shutil.which("cc") is None:
+        pytest.skip("there is no C compiler")
+    folder = tmp_path_factory.mktemp("estimators")
+    for name, noise in NOISES.items():
+        write_estimator(model, folder, name, noise)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def library(sources):
+    files = sorted(path.name for path in sources.glob("*.c"))
+    subprocess.run(["cc", *FLAGS, "-o", "all.so", *files, "-lm"], cwd=sources, check=True)
+    return ctypes.CDLL(str(sources / "all.so"))
+
+
+def pointer(values):
+    return np.ascontiguousarray(values, dtype=float).ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+
+
+class Estimator:
+    """The functions of an estimator, on memory of its own."""
+
+    def __init__(self, library, name):
+        self.memory = (ctypes.c_double * 20_000)()  # more than the struct
+        self.calls = {
+            verb: getattr(library, f"{name}_{verb}")
+            for verb in ("estimate", "estimated", "deviation", "forecast")
+        }
+        self.calls["estimated"].restype = ctypes.POINTER(ctypes.c_double)
+        self.calls["deviation"].restype = ctypes.c_double
+
+    def step(self, u, y):
+        return self.calls["estimate"](self.memory, pointer(u), pointer(y))
+
+    @property
+    def state(self):
+        return np.array(self.calls["estimated"](self.memory)[:2])
+
+    @property
+    def deviations(self):
+        return np.array([self.calls["deviation"](self.memory, each) for each in (0, 1)])
+
+    def forecast(self, steps, future=None):
+        out = np.empty((steps, 2))
+        known = None if future is None else pointer(future)
+        return self.calls["forecast"](self.memory, steps, known, pointer(out)), out
+
+
+def samples(make_run, lost_inputs):
+    """Inputs and states of a run, of which some are lost: at random, one, all, and for long."""
+    run, rng = make_run(COUNT, 5), np.random.default_rng(3)
+    u, y = (np.stack([run[name].values for name in of], axis=1) for of in (INPUTS, STATES))
+    lost = rng.uniform(size=y.shape) < 0.1
+    lost[280:300] = False  # what follows is blind
+    y[lost] = np.nan
+    y[:8], y[200:260, 0], y[300:380] = np.nan, np.nan, np.nan
+    if lost_inputs:
+        u[[30, 400, 401, 402], 1], u[450] = np.nan, np.nan
+    return u, y
+
+
+@pytest.mark.parametrize("name", NOISES)
+@pytest.mark.parametrize("lost_inputs", [False, True])
+def test_each_estimate_and_forecast_is_that_of_the_live_model(
+    library, model, make_run, name, lost_inputs
+):
+    live, found = model.live(noise=NOISES[name]), Estimator(library, name)
+    u, y = samples(make_run, lost_inputs)
+    # The same sums in another order.
+    close = {"rtol": 0, "atol": 1e-12}
+    for at in range(COUNT - 30):
+        assert found.step(u[at], y[at]) == 0
+        np.testing.assert_allclose(found.state, live.step(u[at], y[at]), **close)
+        if at > 20:
+            expected = np.sqrt(np.maximum(np.diagonal(live.covariance), 0.0))
+            np.testing.assert_allclose(found.deviations, expected, rtol=1e-9, atol=1e-12)
+        if at in (5, 250, 350, 420, 640):
+            status, forecast = found.forecast(30, u[at + 1 : at + 30])
+            assert status == (1 if at == 5 else 0)
+            if status == 0:
+                steps = live.forecast(30, u[at + 1 : at + 30]).sel(statistic="mean")
+                expected = np.stack([steps[each] for each in STATES], axis=1)
+                np.testing.assert_allclose(forecast, expected, **close)
+    expected = live.forecast(30).sel(statistic="mean")
+    status, forecast = found.forecast(30)
+    assert status == 0
+    expected = np.stack([expected[each] for each in STATES], axis=1)
+    np.testing.assert_allclose(forecast, expected, **close)
+
+
+def test_a_probe_that_stands_still_is_predicted_to(library, model):
+    live, found = model.live(), Estimator(library, "exact")
+    for at in range(12):
+        u = np.full(2, 0.25 if at < 8 else np.nan)  # no rounding hides 0/0
+        assert found.step(u, np.full(2, 0.1 * at)) == 0
+        live.step(u, np.full(2, 0.1 * at))
+    found.step(np.zeros(2), np.full(2, np.nan))  # reads the inputs that were predicted
+    np.testing.assert_allclose(found.state, live.step(np.zeros(2)), rtol=0, atol=1e-12)
+
+
+def test_a_bad_sample_leaves_the_estimator_as_it_was(library):
+    found = Estimator(library, "exact")
+    for _ in range(3):
+        found.step([0.1, 0.2], [0.3, 0.4])
+    before = bytes(found.memory)
+    for u, y in (
+        ([0.1, np.inf], [0.3, 0.4]),
+        ([0.1, 0.2], [-np.inf, 0.4]),
+        ([np.nan, 0.2], [0, 0]),
+    ):
+        assert found.step(u, np.array(y, dtype=float)) == 1
+    assert bytes(found.memory) == before
+
+
+def test_it_runs_clean_under_sanitizers_without_a_heap(sources, model, make_run):
+    try_out = ["cc", "-fsanitize=address,undefined", "-xc", "-o", "/dev/null", "-"]
+    if subprocess.run(try_out, input=b"int main(void){return 0;}", capture_output=True).returncode:
+        pytest.skip("the compiler has no sanitizers")
+    program = """
+    #include "exact_estimator.h"
+    #include <math.h>
+    #include <stdio.h>
+    int main(void)
+    {
+        static exact_estimator e;
+        static double x[40 * 2];
+        double row[4];
+        while (fread(row, sizeof row, 1, stdin) == 1)
+            if (exact_estimate(&e, row, row + 2))
+                return 3;
+        if (exact_forecast(&e, 40, NULL, x))
+            return 4;
+        printf("%.12g", x[0]);
+        return 0;
+    }
+    """
+    (sources / "main.c").write_text(program)
+    u, y = samples(make_run, True)
+    clean = ["-std=c99", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    files = ["main.c", "exact.c", "exact_estimator.c"]
+    subprocess.run(["cc", *clean, "-o", "main", *files, "-lm"], cwd=sources, check=True)
+    (sources / "main.c").unlink()
+    done = subprocess.run([sources / "main"], input=np.hstack([u, y]).tobytes(), check=True,
+                          capture_output=True)  # fmt: skip
+    assert np.isfinite(float(done.stdout))
+    assert "alloc" not in (sources / "exact_estimator.c").read_text()
+
+
+def test_read_outs_are_those_of_the_forecast(make_run, tmp_path):
+    runs = [make_run(1200, seed) for seed in (1, 2)]
+    for run in runs:
+        run["pitch"] = np.maximum(0.1, run["heave"] - 0.2).assign_attrs(run["pitch"].attrs)
+    hinge = [ReadOut("pitch", of=("heave",), kind="hinge")]
+    model = HankelDMDc(4, 6, 1.0, readouts=hinge).fit(runs, STATES, INPUTS)
+    write_estimator(model, tmp_path, "rom")
+    subprocess.run(
+        ["cc", *FLAGS, "-o", "rom.so", "rom.c", "rom_estimator.c", "-lm"], cwd=tmp_path, check=True
+    )
+    found, live = Estimator(ctypes.CDLL(str(tmp_path / "rom.so")), "rom"), model.live()
+    u, y = samples(make_run, False)
+    for at in range(100):
+        found.step(u[at], y[at])
+        live.step(u[at], y[at])
+    expected = live.forecast(20, u[100:119])["pitch"].sel(statistic="mean")
+    np.testing.assert_allclose(found.forecast(20, u[100:119])[1][:, 1], expected, atol=1e-12)
+
+
+def test_a_model_that_looks_ahead_stays_in_python(make_run, tmp_path):
+    squares = SlowSquares("eta_fwd", orders=(0,), lags=(0, 1), period=1.0)
+    for more in ({"lead": 2}, {"observables": [squares]}):
+        model = HankelDMDc(2, 2, 1.0, **more).fit(make_run(), STATES, INPUTS)
+        with pytest.raises(RequestError, match=r"Run model.live\(\) in Python"):
+            write_estimator(model, tmp_path)

@@ -1,0 +1,182 @@
+"""Faults of samples of every length are found, and sound series are left alone."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep.campaign import read_campaign
+from seakeep.campaign.pipeline import flag_samples
+from seakeep.quality import Record, findings_of
+from seakeep.quality.faults import find_held, find_outliers, noise_share, saturated
+from seakeep.quality.samples import constant, flagged, level_drift, noise
+
+TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
+DT = 0.04
+T = DT * np.arange(3000)
+PERIOD = 1.6
+
+
+def waves(shift=0.0):
+    frequency = np.linspace(0.4, 0.9, 20)
+    phase = np.random.default_rng(0).uniform(0, 6.28, 20)
+    return np.cos(2 * np.pi * np.outer(T - shift, frequency) + phase).sum(axis=1)
+
+
+@pytest.fixture
+def noisy():
+    x = waves()
+    return x + 0.02 * x.std() * np.random.default_rng(1).standard_normal(x.size)
+
+
+def reported(x):
+    """Kinds of findings about samples."""
+    group = xr.Dataset({"x": ("time", x, {"units": "m"})}, {"time": T})
+    record = Record("r", group, {"": flag_samples(group, replaced=False)})
+    return {found.kind.name for check in (flagged, constant, noise) for found in check(record)}
+
+
+def faulty(x, kind, length, place):
+    """A series with a fault; one that is held repeats the reading before it."""
+    at = slice(start := round(place * (x.size - length)), start + length)
+    x = np.round(x, 3)
+    random = np.random.default_rng(length).uniform(40, 200, length) * (-1) ** np.arange(length)
+    x[at] = {"held": x[max(start - 1, 0)], "zero": 0.0, "-99.9": -99.9, "spiked": random}[kind]
+    return x
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 4, 5, 7, 10, 15, 40, 100, 300, 1000, 1600, 2900, 3000])
+@pytest.mark.parametrize("kind", ["held", "zero", "-99.9", "spiked"])
+def test_a_fault_of_any_length_is_reported(kind, length):
+    """Shorter runs of plausible readings occur by chance: 4 equal ones do not in 3000 samples."""
+    if kind in ("-99.9", "spiked") or length > 3:
+        for place in (0.2, 0.37, 0.5, 0.9):
+            assert reported(faulty(waves() + 0.2, kind, length, place)), place
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 300])
+def test_flags_spoil_no_sample_beside_them(noisy, length):
+    noisy[1000 : 1000 + length] = -999.0
+    hit = find_outliers(noisy) | find_held(noisy, DT)
+    assert np.flatnonzero(hit).tolist() == list(range(1000, 1000 + length))
+
+
+def test_a_sound_series_is_left_alone(noisy):
+    assert reported(noisy) == set()
+    change, certain = level_drift(noisy, DT, PERIOD)
+    assert abs(change) < 0.5 * noisy.std() or certain < 5
+
+
+def test_noise_has_no_outliers_and_no_memory():
+    noise = np.random.default_rng(0).standard_normal(100_000)
+    assert not find_outliers(noise).any()
+    # The share of n samples of white noise scatters by 1/√n.
+    assert noise_share(noise) == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.3, 0.6])
+def test_quantised_noise_holds_no_reading(share):
+    """Readings that repeat by chance, up to 60 % of them: their longest run is expected."""
+    random = np.random.default_rng(1)
+    repeats = random.random(100_000) < share
+    fresh = np.where(repeats, 0, np.arange(100_000))
+    x = random.standard_normal(100_000)[np.maximum.accumulate(fresh)]
+    assert not find_held(x, DT).any()
+
+
+@pytest.mark.parametrize("size", [1.5, 3.0, -40.0])
+def test_spikes_of_harmful_size(noisy, size):
+    at = [100, 700, 1500, 2980]
+    noisy[at] += size * noisy.std()
+    assert np.flatnonzero(find_outliers(noisy)).tolist() == at
+
+
+def test_a_resolved_impact_is_no_outlier(noisy):
+    """A pulse of seven samples, three times the spread: it grows and falls."""
+    noisy[1500:1507] += 3 * noisy.std() * np.hanning(9)[1:-1]
+    assert not find_outliers(noisy).any()
+
+
+def test_a_line_that_sticks_and_slips_has_no_outliers():
+    random = np.random.default_rng(0)
+    load = np.repeat(np.cumsum(random.normal(0, 1, 150)), 20) + random.normal(0, 1e-3, T.size)
+    assert not find_outliers(load).any()
+    load[1007] += 30.0
+    assert np.flatnonzero(find_outliers(load)).tolist() == [1007]
+
+
+def test_still_before_the_waves_is_not_held(noisy):
+    noisy[:600] = noisy[600]
+    witness = waves() * (np.arange(3000) >= 600)
+    assert not find_held(noisy, DT).any()
+    assert not find_held(noisy, DT, witness).any()
+    assert find_held(noisy, DT, waves()).sum() == 601  # a witness that moved
+
+
+def test_at_rest_after_the_waves_is_not_held():
+    decay = np.exp(-0.1 * np.clip(T - 80, 0, None) * 2 * np.pi / PERIOD)
+    x = np.round(waves() * decay, 1)
+    assert not find_held(x, DT).any()
+
+
+def test_a_signal_that_freezes_for_its_last_second():
+    x = waves()
+    x[-25:] = x[-25]
+    assert np.flatnonzero(find_held(x, DT)).tolist() == list(range(2975, 3000))
+
+
+@pytest.mark.parametrize("steps", [3, 5, 10, 100])
+def test_a_coarse_sensor_stays_at_crests_and_holds_nothing(steps):
+    step = 2 * np.sqrt(2) * waves().std() / steps
+    x = step * np.round(waves() / step)
+    assert not find_held(x, DT).any()
+    assert not find_held(x[: 3000 - np.argmax(np.diff(x[::-1]) != 0)], DT).any()  # ends at a crest
+
+
+def test_a_camera_that_repeats_frames_holds_none():
+    x = np.repeat(waves()[::10], 10)
+    assert not find_held(x, DT).any()
+    between = np.interp(np.arange(3000), np.arange(0, 3000, 10), waves()[::10])
+    between[1000:1020] = between[1000]  # one frame is dropped
+    assert not find_held(between, DT).any()
+
+
+def test_saturation_recurs_at_the_end_of_the_range():
+    x = np.clip(waves(), -4.0, 4.0)
+    edges = np.abs(x) == 4.0
+    found = saturated(x, find_held(x, DT))
+    assert found.sum() > 0.9 * edges.sum()  # crests that are cut for three samples are left out
+    assert not found[~edges].any()
+    x = waves()
+    top = int(np.argmax(x))
+    x[top : top + 12] = x[top]  # once, at its highest
+    assert not saturated(x, find_held(x, DT)).any()
+    assert reported(x) == {"STUCK"}
+
+
+@pytest.mark.filterwarnings("ignore:first. heave leaves its mean")
+@pytest.mark.parametrize(
+    ("length", "values", "kind"),
+    [
+        (3, [-999.0], "OUTLIERS"),
+        (3, [-99.9], "OUTLIERS"),
+        (10, [900.0, -700.0, 500.0, -300.0, 800.0], "OUTLIERS"),
+        (300, None, "STUCK"),
+        (2200, [900.0, -700.0, 500.0, -300.0, 800.0], "NOISE"),
+    ],
+)
+def test_findings_of_the_tutorial_s_heave(tmp_path, length, values, kind):
+    """In the file's unit; 300 samples are 12 s."""
+    shutil.copytree(TUTORIAL, tmp_path / "t")
+    path = tmp_path / "t" / "run1.csv"
+    header, *lines = path.read_text(encoding="utf-8").splitlines()
+    table = [line.split(";") for line in lines]
+    for row in range(600, 600 + length):
+        table[row][3] = table[599][3] if values is None else str(values[row % len(values)])
+    path.write_text("\n".join([header, *map(";".join, table)]), encoding="utf-8")
+    run = read_campaign(tmp_path / "t" / "campaign.toml").prepare(["first"])["first"]
+    found = {(each.channel, each.kind.name) for each in findings_of(run)}
+    assert ("heave", kind) in found
+    assert {channel for channel, _ in found} == {"heave"}
