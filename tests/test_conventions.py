@@ -6,7 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seakeep.conventions import canonical_channel, canonical_names, conversion, si_unit
+from seakeep.conventions import (
+    canonical_channel,
+    canonical_names,
+    conversion,
+    is_elevation,
+    si_unit,
+)
 from seakeep.errors import RequestError
 
 
@@ -72,7 +78,26 @@ def test_every_canonical_unit_is_si(name):
 def test_families_of_channels():
     assert canonical_channel("eta_fwd").long_name == "wave elevation fwd"
     assert canonical_channel("mooring_port").units == "N"
+    assert canonical_channel("mooring_bow_rate").units == "N/s"
+    assert canonical_channel("mooring_aft_port_acceleration").units == "N/s^2"
+    assert canonical_channel("eta_rate").symbol == r"\dot{\eta}"
     assert canonical_channel("Eta") is None
+
+
+@pytest.mark.parametrize(
+    ("name", "elevation", "rate"),
+    [
+        ("eta", True, False),
+        ("eta_fwd", True, False),
+        ("eta_fwd_rate", False, True),
+        ("eta_rate", False, True),
+        ("etalon", False, False),
+        ("heave", False, False),
+    ],
+)
+def test_elevations_and_their_rates_are_known_by_name(name, elevation, rate):
+    assert is_elevation(name) == elevation
+    assert is_elevation(name, rates=True) == (elevation or rate)
 
 
 @given(st.sampled_from(["mm", "cm", "m", "ft"]), st.sampled_from(["mm", "m", "km", "in"]))
@@ -111,7 +136,7 @@ def test_units_of_shafts_and_cranes_are_known():
 
 @pytest.mark.parametrize(
     ("name", "units"),
-    [("eta_fwd_rate", "m/s"), ("eta_us_bow_acceleration", "m/s^2"), ("eta_rate", "m")],
+    [("eta_fwd_rate", "m/s"), ("eta_us_bow_acceleration", "m/s^2"), ("eta_rate", "m/s")],
 )
 def test_rates_of_elevations_are_no_elevations(name, units):
     assert canonical_channel(name).units == units

@@ -433,6 +433,24 @@ def test_bounds_take_the_place_of_the_value():
         metrics.error_over_time(**pair, interval=0.9)
     with pytest.raises(RequestError, match="interval must lie between 0 and 1"):
         metrics.nrmse(**pair, interval=95)
+    with pytest.raises(RequestError, match="is_slack says yes or no, and has no interval"):
+        metrics.is_slack(**pair, interval=0.9)
+
+
+def test_a_forecast_that_ends_in_nan_has_no_interval():
+    measured = np.random.default_rng(0).standard_normal((400, 2))
+    predicted = 0.9 * measured
+    predicted[-1, 1] = np.nan
+    pair = both(predicted, measured)
+    np.testing.assert_array_equal(
+        np.isnan(metrics.nrmse(**pair, interval=0.9)), [[False, True], [False, True]]
+    )
+    assert np.isnan(metrics.anrmse(**pair, interval=0.9)).all()
+    sets = [[labelled(0.9 * measured)], [labelled(predicted)]]
+    found = metrics.anrmse_differences(sets, [labelled(measured)])
+    for key in ("lower", "upper", "anrmse_lower", "all_upper"):
+        assert np.isnan(found[key].values.ravel()[1])
+        assert np.isfinite(found[key].values.ravel()[0])
 
 
 def test_errors_that_models_share_cancel_in_their_difference():
@@ -475,3 +493,12 @@ def test_the_interval_of_the_mean_over_runs_holds_it_as_often_as_it_says():
         held += bool(found["all_lower"] <= truth <= found["all_upper"])
     # 150 repetitions know a coverage of 95 % to 1.8 % (one SD); 500 gave 92.6 %.
     assert 0.91 <= held / len(draws) <= 0.99
+
+
+def test_a_channel_is_judged_where_less_than_half_of_its_variance_is_noise():
+    measured = np.tile([[1.0, 1.0], [-1.0, -1.0]], (50, 1))
+    spread = measured.std(axis=0, ddof=1)
+    for part, slack in ((0.49, False), (0.51, True)):
+        pair = both(measured, measured)
+        found = metrics.is_slack(**pair, noise_std=np.sqrt(part) * spread)
+        np.testing.assert_array_equal(found, [slack, slack])

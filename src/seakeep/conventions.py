@@ -20,12 +20,14 @@ if TYPE_CHECKING:
     import pint
 
 __all__ = [
+    "MOTIONS",
     "Channel",
     "base_powers",
     "canonical_channel",
     "canonical_names",
     "conversion",
     "displayed",
+    "is_elevation",
     "si_unit",
 ]
 
@@ -60,6 +62,8 @@ _MOTIONS = {
     "pitch": ("rad", r"\theta"),
     "yaw": ("rad", r"\psi"),
 }
+MOTIONS = tuple(_MOTIONS)
+"""Motions of a rigid body, in the order of its six degrees of freedom."""
 _FIXED = {
     "mooring_bow": ("N", "bow mooring load", r"M_\mathrm{bow}"),
     "mooring_stern": ("N", "stern mooring load", r"M_\mathrm{stern}"),
@@ -69,8 +73,8 @@ _DERIVATIVES = {
     "rate": ("/s", r"\dot{{{}}}"),
     "acceleration": ("/s^2", r"\ddot{{{}}}"),
 }
-_ELEVATION = re.compile(r"eta_([a-z0-9_]+)\Z")
-_MOORING = re.compile(r"mooring_([a-z0-9_]+)\Z")
+_QUANTITIES = {"eta": ("m", "wave elevation", r"\eta"), "mooring": ("N", "mooring load", "M")}
+_PLACED = re.compile(r"(eta|mooring)(?:_([a-z0-9_]+?))??(?:_(rate|acceleration))?\Z")
 
 
 @lru_cache(maxsize=1)
@@ -92,9 +96,9 @@ def canonical_names() -> list[str]:
     Returns
     -------
     list of str
-        Motions, their rates and accelerations, and the mooring loads. Besides these, any
-        ``eta_…`` is a wave elevation in metres (``eta_…_rate`` in m/s) and any ``mooring_…`` a
-        load in newtons.
+        Motions, their rates and accelerations, and the mooring loads. Besides these, ``eta`` and
+        any ``eta_…`` is a wave elevation in metres (``eta_…_rate`` in m/s), and any ``mooring_…``
+        a load in newtons (``mooring_…_rate`` in N/s).
     """
     return list(_table())
 
@@ -124,18 +128,39 @@ def canonical_channel(name: str) -> Channel | None:
     known = _table().get(name)
     if known is not None:
         return known
-    if match := _ELEVATION.match(name):
-        place, _, suffix = match[1].rpartition("_")
-        if not place or suffix not in _DERIVATIVES:
-            place, suffix = match[1], ""
-        per, accent = _DERIVATIVES[suffix]
-        place = place.replace("_", " ")
-        symbol = accent.format(r"\eta") + rf"_\mathrm{{{place}}}"
-        return Channel(name, f"m{per}", f"wave elevation {place} {suffix}".rstrip(), symbol)
-    if match := _MOORING.match(name):
-        place = match[1].replace("_", " ")
-        return Channel(name, "N", f"mooring load {place}", rf"M_\mathrm{{{place}}}")
-    return None
+    if (match := _PLACED.match(name)) is None:
+        return None
+    kind, place, suffix = (part or "" for part in match.groups())
+    unit, words, letter = _QUANTITIES[kind]
+    per, accent = _DERIVATIVES[suffix]
+    place = place.replace("_", " ")
+    symbol = accent.format(letter) + (rf"_\mathrm{{{place}}}" if place else "")
+    return Channel(name, unit + per, " ".join(filter(None, (words, place, suffix))), symbol)
+
+
+def is_elevation(name: str, rates: bool = False) -> bool:
+    """Whether a channel is named as wave elevations are.
+
+    Parameters
+    ----------
+    name : str
+        Name of a channel.
+    rates : bool, optional
+        Whether the rates and accelerations of elevations count too.
+
+    Returns
+    -------
+    bool
+        True for ``eta`` and ``eta_…``.
+
+    Examples
+    --------
+    >>> is_elevation("eta_fwd"), is_elevation("eta_fwd_rate"), is_elevation("etalon")
+    (True, False, False)
+    """
+    known = canonical_channel(name)
+    called = name == "eta" or name.startswith("eta_")
+    return called and (rates or known is None or known.units == "m")
 
 
 def displayed(units: str) -> tuple[float, str]:

@@ -186,13 +186,16 @@ def _valued(
     level: float | None,
 ) -> Any:
     """A measure, or its bounds over redrawn blocks of instants, shape (2, …)."""
+    value = np.asarray(measure(**arrays, **known))
     if level is None:
-        return measure(**arrays, **known)
+        return value
+    if value.dtype == bool:
+        raise RequestError(f"{measure.__name__} says yes or no, and has no interval.")
     p, m, _, _ = core.paired(arrays["predicted"], arrays["measured"], None)
     tails = fraction(level, "interval")
     block = _block(p, m)
     axis = max(p.ndim, m.ndim) - 2  # of the draws, behind members and windows
-    redrawn, value = _redrawn(measure, p, m, known, block), measure(**arrays, **known)
+    redrawn = _redrawn(measure, p, m, known, block)
     return np.stack(student_interval(value, redrawn, m.shape[-2] / block, tails, axis))
 
 
@@ -334,7 +337,9 @@ def _anrmse_of_run(
     redrawn = [
         _redrawn(core.anrmse, p, m, k, block, seed) for (p, m), k in zip(arrays, known, strict=True)
     ]
-    return np.array(own, dtype=float), np.stack(redrawn), arrays[0][1].shape[-2] / block
+    values = np.array(own, dtype=float)
+    draws = np.where(np.isnan(values)[:, None], np.nan, np.stack(redrawn))
+    return values, draws, arrays[0][1].shape[-2] / block
 
 
 is_slack: Measure[xr.Dataset, BoolArray] = labelled(core.is_slack, "channel", label="slackness")

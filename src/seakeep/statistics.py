@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -96,33 +96,6 @@ def _labelled(**sides: object) -> bool:
     return all(kinds)
 
 
-@overload
-def moving_block_bootstrap(
-    series: xr.Dataset,
-    n_series: int,
-    block_length: int,
-    rng: np.random.Generator,
-    *,
-    segments: Sequence[int] | None = None,
-) -> xr.Dataset: ...
-@overload
-def moving_block_bootstrap(
-    series: xr.DataArray,
-    n_series: int,
-    block_length: int,
-    rng: np.random.Generator,
-    *,
-    segments: Sequence[int] | None = None,
-) -> xr.DataArray: ...
-@overload
-def moving_block_bootstrap(
-    series: npt.ArrayLike,
-    n_series: int,
-    block_length: int,
-    rng: np.random.Generator,
-    *,
-    segments: Sequence[int] | None = None,
-) -> FloatArray: ...
 @functools.wraps(_bootstrap.moving_block_bootstrap)
 def moving_block_bootstrap(
     series: Any,
@@ -188,30 +161,6 @@ def _divergence_of(
         raise DataError(f"channel '{name}': {error}") from error
 
 
-@overload
-def jsd_interval(
-    predicted: xr.Dataset,
-    measured: xr.Dataset,
-    *,
-    block_length: int | BlockRule,
-    rng: np.random.Generator,
-    n_series: int = 100,
-    bandwidth: Bandwidth = "paper",
-    grid: npt.ArrayLike | None = None,
-    segments: Sequence[int] | None = None,
-) -> xr.Dataset: ...
-@overload
-def jsd_interval(
-    predicted: npt.ArrayLike,
-    measured: npt.ArrayLike,
-    *,
-    block_length: int | BlockRule,
-    rng: np.random.Generator,
-    n_series: int = 100,
-    bandwidth: Bandwidth = "paper",
-    grid: npt.ArrayLike | None = None,
-    segments: Sequence[int] | None = None,
-) -> JsdInterval: ...
 @functools.wraps(_divergence.jsd_interval)
 def jsd_interval(
     predicted: Any,
@@ -270,12 +219,6 @@ def jsd_interval(
     )
 
 
-@overload
-def coverage(lower: xr.Dataset, upper: xr.Dataset, measured: xr.Dataset) -> xr.Dataset: ...
-@overload
-def coverage(
-    lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
-) -> BandCoverage: ...
 @functools.wraps(_coverage.coverage)
 def coverage(lower: Any, upper: Any, measured: Any) -> Any:
     """Take Datasets too; the docstring shown is that of the array function."""
@@ -307,22 +250,6 @@ def _channels(names: Sequence[str], measured: xr.Dataset) -> dict[str, Any]:
     return {"channel": list(names), "unit": ("channel", units)}
 
 
-@overload
-def coverage_table(
-    lower: xr.Dataset,
-    upper: xr.Dataset,
-    measured: xr.Dataset,
-    level: float = 0.95,
-    waves: xr.DataArray | None = None,
-) -> xr.Dataset: ...
-@overload
-def coverage_table(
-    lower: npt.ArrayLike,
-    upper: npt.ArrayLike,
-    measured: npt.ArrayLike,
-    level: float = 0.95,
-    waves: npt.ArrayLike | None = None,
-) -> CoverageTable: ...
 @functools.wraps(_coverage.coverage_table)
 def coverage_table(
     lower: Any, upper: Any, measured: Any, level: float = 0.95, waves: Any = None

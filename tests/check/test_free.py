@@ -114,3 +114,33 @@ def test_free_runs_of_an_ensemble_are_the_mean_of_its_members():
     made = free_windows(ensemble, run, starts, 20)
     each = [ensemble.forecast(run, start, 20)["heave"].mean("member").values for start in starts]
     np.testing.assert_allclose(made[..., 0], each, rtol=1e-12)
+
+
+def test_strong_damping_is_no_small_angle():
+    """δ = 2πζ/√(1 − ζ²): with ζ = 0.3 a division by 2π alone is 5 % too large."""
+    time = DT * np.arange(900)
+    damped = FREQUENCY * np.sqrt(1 - 0.3**2)
+    heave = np.exp(-0.3 * FREQUENCY * time) * np.cos(damped * time)
+    # Extremes by a parabola, (ωΔt)²/12 of their height.
+    assert free_decay(heave, DT).damping_ratio == pytest.approx(0.3, rel=0.01)
+
+
+def test_the_damping_of_a_model_is_no_small_angle_either():
+    A = np.array([[0, 1], [-(FREQUENCY**2), -2 * 0.3 * FREQUENCY]])
+    step = scipy.linalg.expm(A * DT)
+    rng, state = np.random.default_rng(0), np.zeros((2000, 2))
+    for k in range(1999):
+        state[k + 1] = step @ state[k] + rng.standard_normal() * np.array([0.0, DT])
+    run = xr.Dataset(
+        {
+            "heave": ("time", state[:, 0], {"units": "m"}),
+            "heave_rate": ("time", state[:, 1], {"units": "m/s"}),
+            "eta": ("time", rng.standard_normal(2000), {"units": "m"}),
+        },
+        coords={"time": DT * np.arange(2000)},
+        attrs={"encounter_period": 3.0},
+    )
+    model = HankelDMDc(0, 0, 1e-9).fit(run, ["heave", "heave_rate"], ["eta"])
+    rates = np.log(np.linalg.eigvals(model.A).astype(complex)) / DT
+    ratio = -rates[0].real / abs(rates[0])
+    assert float(check.decay(model).damping_ratio[0]) == pytest.approx(ratio, rel=0.01)

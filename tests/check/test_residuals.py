@@ -76,6 +76,17 @@ def test_ljung_box_is_that_of_statsmodels():
     assert ours[1][0] == pytest.approx(known["lb_pvalue"].item(), rel=1e-8)
 
 
+def test_records_shorter_than_the_lags_add_what_they_have():
+    long = np.array([1.0, -1.0, 2.0, -2.0])[:, None]
+    short = np.array([3.0, -3.0])[:, None]
+    # Products at lags 0 to 3: 10, -7, 4, -2 of the long record and 18, -9 of the short one.
+    expected = np.array([28.0, -16.0, 4.0, -2.0]) / 28
+    for pieces in ([long, short], [short, long]):
+        np.testing.assert_allclose(autocorrelation(pieces, 9)[:, 0], expected, atol=1e-15)
+        found, _ = input_correlation([(each, each) for each in pieces], 9)
+        np.testing.assert_allclose(found[:, 0, 0], expected, atol=1e-15)  # rounding of an FFT
+
+
 def test_limits_of_the_correlation_with_inputs_cover_as_they_say():
     rng = np.random.default_rng(2)
     wave = scipy.signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal((2000, 1)), axis=0)
@@ -93,3 +104,16 @@ def test_a_short_test_says_so(run):
     shorter = run.isel(time=slice(0, 2)).assign_attrs(test_span=(0.0, 0.1))
     with pytest.raises(DataError, match=r"no run can be forecast\. short: "):
         check.residuals(fitted(run, 3), {"short": shorter})
+
+
+def test_limits_and_past_inputs_are_those_of_the_errors_by_hand(run):
+    model = fitted(run, 0)
+    found = check.residuals(model, {"run": run})
+    assert float(found.limit) == pytest.approx(1.96 / np.sqrt(1499), rel=1e-12)
+    first, last = 1500, 2999  # the last measured state before each step of the test part
+    error = one_step(model, run, first, last)[:, 0] - run.heave.values[first + 1 : last + 1]
+    inputs = run.eta.values[first + 1 : last + 1]
+    e, u = error - error.mean(), inputs - inputs.mean()
+    for lag in (0, 1, 2):
+        expected = e[lag:] @ u[: len(u) - lag] / np.sqrt((e @ e) * (u @ u))
+        assert float(found.input_correlation[0, 0, lag]) == pytest.approx(expected, abs=1e-10)

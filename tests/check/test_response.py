@@ -6,6 +6,7 @@ import xarray as xr
 from moored import moored_run
 
 from seakeep import HankelDMDc, check
+from seakeep.check.parts import reference_probe
 from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
 from seakeep.errors import DataError, RequestError
 from seakeep.waves import wavenumber
@@ -109,6 +110,14 @@ def test_points_of_irregular_waves_hold_the_truth_up_to_the_edges_of_the_spectru
     assert 0.9 < np.mean(np.concatenate(inside)) < 0.99
 
 
+def test_a_rate_of_an_elevation_is_no_reference(sea):
+    rate = np.gradient(sea["eta_cog"].values, DT)
+    given = sea.assign(eta_cog_rate=("time", rate, {"units": "m/s", "x_position": 1.0}))
+    names = ["eta_fwd", "eta_cog", "eta_cog_rate"]
+    model = HankelDMDc(4, 8, 1.0, delay_rows="exact").fit(given, ["heave"], names)
+    assert model.inputs[reference_probe(model, {"sea": given})] == "eta_cog"
+
+
 def test_measured_points_hold_the_truth_in_their_intervals(sea, model):
     runs = {"sea": sea} | {
         f"at {f}": vessel_run([f], 7, 1200, 1e-3, run=f"at {f}", waves="regular")
@@ -174,3 +183,10 @@ def test_what_cannot_be_judged_says_why(sea, model):
         check.measured_response(model, {"dead": dead})
     with pytest.raises(DataError, match="it has no frequency"):
         dominant_frequency(np.ones(100), 0.1)
+
+
+def test_type_a_uncertainty_is_that_of_the_mean_of_few_windows():
+    ratios = np.array([1.0, 1.2, 1.1])[:, None].astype(complex)
+    found = estimate(ratios, np.zeros(1))
+    # Student's t of two degrees of freedom times 0.1/√3.
+    assert found.amplitude[0] == pytest.approx(4.302653 * 0.1 / np.sqrt(3), rel=1e-6)

@@ -398,3 +398,11 @@ def test_offsets_that_cannot_be_estimated(runs, models):
         estimate_probe_offset(models["dispersion"], runs[0], (0.0, 60.0), bounds=(1.0, 0.0))
     with pytest.warns(UserWarning, match="lies at the end of the distances tried, 0.2 to 0.3 m"):
         estimate_probe_offset(models["dispersion"], runs[0], (0.0, 60.0), bounds=(0.2, 0.3))
+
+
+def test_the_spread_of_celerities_is_that_between_the_runs():
+    given = {f"run{c}": drifting_run(seed).assign_attrs(celerity=c)
+             for seed, c in enumerate((2.0, 2.2, 2.7))}  # fmt: skip
+    alignment = ProbeAlignment(mode="effective", surge="none")
+    model = HankelDMDc(2, 4, 1.0, alignment=alignment).fit(given, ["heave"], INPUTS)
+    assert model.alignment.celerity_spread == pytest.approx(np.std([2.0, 2.2, 2.7], ddof=1))

@@ -21,6 +21,7 @@ from seakeep.models import (
     load_model,
     outside_training,
 )
+from seakeep.models.draws import Draw
 from seakeep.models.engine import group_series, read_groups
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.observables import OBSERVABLES, Bound
@@ -135,6 +136,11 @@ class TestLead:
         )
         back = load_model(fitted.save(tmp_path / "e.nc"))
         xr.testing.assert_identical(back.forecast(run, start=20.0, steps=30), members)
+
+    @pytest.mark.parametrize("lead", [2.0, -1, True, "-1 T", "2 /T", "inf T"])
+    def test_a_number_is_samples_and_a_text_periods(self, lead):
+        with pytest.raises(RequestError, match=r"lead must be zero or more, a whole number of sam"):
+            ensemble(lead=lead)
 
 
 @dataclass(frozen=True)
@@ -402,3 +408,10 @@ class TestUnitsAndNumbers:
         spec = HankelDMDc(1, 4, 1.0, observables=[seakeep.Powers(("eta",), (3,))])
         with pytest.raises(DataError, match=r"has a standard deviation that is not finite"):
             spec.fit(run, ["heave"], ["eta"])
+
+
+def test_a_history_inside_the_window_is_not_counted_twice():
+    draw = Draw(1.0, 0.2, 0.5, 1.0, window=50, state_delays=4, input_delays=12, run=None, last=None,
+                redrawn=0)  # fmt: skip
+    assert (draw.needed(True), draw.needed(False)) == (50, 62)
+    assert draw.needed(True, history=60) == 62  # a pair after the longest history

@@ -11,6 +11,7 @@ from drifting import STATES as DRIFTING
 from drifting import drifting_run
 
 from seakeep import (
+    DataError,
     HankelDMDc,
     Powers,
     ProbeAlignment,
@@ -19,6 +20,7 @@ from seakeep import (
     load_model,
     metrics,
 )
+from seakeep.models.labelled import mean_period
 from seakeep.models.selection import RIDGES, WORST, select
 
 DT, PERIOD = 0.1, 10  # s, samples
@@ -87,6 +89,49 @@ def test_scores_are_those_of_plain_fits_and_forecasts():
     assert found.settings.ridge == max(near)
     chosen = [row["ridge"] for row in found.rows if row["chosen"]]
     assert chosen == [found.settings.ridge]
+
+
+def test_a_run_in_which_nothing_moves_weighs_nothing():
+    given = runs(4)
+    calm = given["run3"]
+    for name in STATES:
+        calm[name].values[:] *= 1e-6
+    found = select(SPEC, given, STATES, INPUTS, horizon=(15.0,), ridges=(1e-3,))
+    (row,) = found.rows
+    errors = []
+    for held in ("run0", "run1", "run2"):
+        others = [run for name, run in given.items() if name != held]
+        model = replace(SPEC, ridge=1e-3).fit(others, STATES, INPUTS)
+        for start in range(12, 700 - 150, 150):
+            forecast = model.forecast(given[held], start=start * DT, steps=150)
+            measured = given[held].isel(time=slice(start + 1, start + 151))
+            each = [metrics.nrmse(predicted=forecast[n], measured=measured[n]) for n in STATES]
+            errors.append(np.mean(np.minimum(each, 1.0)))  # as many windows in each run
+    # Sums in another order, and an eigendecomposition of them.
+    assert row["score"] == pytest.approx(np.mean(errors), abs=1e-10)
+
+
+def test_periods_are_counted_in_the_first_elevation():
+    t = np.arange(600) * DT
+    waves = {
+        "wind": (4.0 + np.sin(2 * np.pi * t / 5), "m/s"),
+        "eta_fwd_rate": (np.sin(2 * np.pi * t / 3), "m/s"),
+        "gauge": (np.sin(2 * np.pi * t / 2.5), "m"),
+        "eta_fwd": (np.sin(2 * np.pi * t / 2), "m"),
+    }
+    run = xr.Dataset(
+        {name: ("time", x, {"units": units}) for name, (x, units) in waves.items()},
+        coords={"time": t},
+    )
+    still = run.assign(eta_fwd=0 * run["eta_fwd"])
+    # Crossings of a sine between samples are linear to a thousandth of a step.
+    assert mean_period({"a": run}, list(waves)) == pytest.approx(2 / DT, rel=1e-3)
+    assert mean_period({"still": still, "a": run}, list(waves)) == pytest.approx(2 / DT, rel=1e-3)
+    assert mean_period({"a": run}, ["wind", "gauge"]) == pytest.approx(2.5 / DT, rel=1e-3)
+    stated = run.assign_attrs(encounter_period=1.5)
+    assert mean_period({"still": still, "b": stated}, list(waves)) == pytest.approx(15)
+    with pytest.raises(DataError, match=r"no input \(wind\) is a wave elevation, eta_…\. Set run"):
+        mean_period({"a": run}, ["wind"])
 
 
 def test_a_model_chooses_its_ridge_and_says_how(tmp_path):

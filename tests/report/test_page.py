@@ -146,7 +146,7 @@ def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page, result)
     average = table.sel(channel="average")
     expected = [average["calibrated_inside"], average["calibrated_relative_width"]]
     assert rows[-1] == ["average", *(f"{float(value):.2f}" for value in expected)]
-    windows = result.groups["calibration/bayesian"]["windows"].values
+    windows = result.groups["calibration"]["windows"].sel(ensemble="bayesian").values
     assert f"A training set had {windows.min()}" in page.read_text("utf-8")
 
 
@@ -193,7 +193,7 @@ def test_a_history_shows_the_calibrated_band_around_that_of_the_members(result):
     ((test, training, window), *_) = shown_cells(result)
     figure = history_figure(result, test, training, window)
     cell = result.tests[test].isel(training=training, window=window)
-    kept = result.groups["calibration/bayesian"].isel(training=training)
+    kept = result.groups["calibration"].sel(ensemble="bayesian").isel(training=training)
     for axes, name in zip(figure.axes, result.channels, strict=True):
         one = cell.sel(channel=name, model="bayesian", ensemble="bayesian")
         (lower,) = (line for line in axes.lines if line.get_label() == "calibrated")
@@ -204,7 +204,7 @@ def test_a_history_shows_the_calibrated_band_around_that_of_the_members(result):
         np.testing.assert_allclose(lower.get_ydata(), (wider - mean) / spread, rtol=1e-10)
     (legend,) = figure.legends
     assert "calibrated" in [text.get_text() for text in legend.get_texts()]
-    without = {n: g for n, g in result.groups.items() if not n.startswith("calibration/")}
+    without = {n: g for n, g in result.groups.items() if n != "calibration"}
     plain = history_figure(replace(result, groups=without), test, training, window)
     assert "calibrated" not in [text.get_text() for text in plain.legends[0].get_texts()]
 
@@ -407,6 +407,7 @@ def test_panels_fill_their_rows(channels, rows):
 
 
 def test_letters_that_latex_reads_otherwise():
+    assert latex_text("τ̂ and T̂, not τ") == r"$\hat\tau$ and $\hat T$, not $\tau$"
     assert latex_text("50 % of a_b & λ") == r"50 \% of a\_b \& $\lambda$"
 
 

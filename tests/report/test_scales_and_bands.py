@@ -49,7 +49,7 @@ def result():
         ),
         "tests/t": test,
         "statistics/boxes": box_table(test).expand_dims(test=["t"]),
-        "statistics/bands": band_parts(test, {}, 0.95).expand_dims(test=["t"]),
+        "statistics/bands": band_parts(test, None, 0.95).expand_dims(test=["t"]),
     }
     models = {"m": {"ensemble": True}}
     attrs = {"settings": json.dumps(settings), "models": json.dumps(models)}
@@ -88,10 +88,10 @@ def test_choices_stand_with_the_look_ahead(result):
     group = xr.Dataset(
         {"words": ("training", [tried, ""]), "look_ahead": ("training", [1.5, 0.0])},
         coords={"training": ["a", "b"]},
-    )
-    known = StudyResult(None, result.attrs, {**result.groups, "chosen/m": group})
+    ).expand_dims(model=["m"])
+    known = StudyResult(None, result.attrs, {**result.groups, "chosen": group})
     (table,) = chosen(known).tables
     words = "ridge 0.001: the best; 0.3 ridge 0.001, observables none"
     assert table.rows == (("m", "a", "1.50", words),)
-    nothing = {**result.groups, "chosen/m": group.isel(training=[1])}
+    nothing = {**result.groups, "chosen": group.isel(training=[1])}
     assert chosen(StudyResult(None, result.attrs, nothing)) is None

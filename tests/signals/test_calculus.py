@@ -6,7 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seakeep.errors import DataError, RequestError
-from seakeep.signals import band_pass, differentiate, envelope_squared, integrate
+from seakeep.signals import (
+    band_pass,
+    complementary_filter,
+    differentiate,
+    envelope_squared,
+    integrate,
+)
 
 DT = 0.01
 T = np.arange(0, 80, DT)
@@ -103,3 +109,12 @@ def test_channels_side_by_side():
         for i in range(2):
             # Rounding of the mean, which the prediction of a pure sine magnifies at the ends.
             np.testing.assert_allclose(together[:, i], function(both[:, i]), atol=1e-6)
+
+
+def test_a_complementary_rate_keeps_the_steady_drift():
+    dt, t = 0.05, 0.05 * np.arange(2000)
+    position = 0.3 * t + np.sin(2 * np.pi * 0.6 * t)
+    acceleration = -((2 * np.pi * 0.6) ** 2) * np.sin(2 * np.pi * 0.6 * t)
+    rate = complementary_filter(position, acceleration, dt, 0.1, times=1)
+    # Ends are extended by prediction; the middle holds the drift to a thousandth.
+    assert rate[200:-200].mean() == pytest.approx(0.3, abs=5e-3)

@@ -11,6 +11,7 @@ from seakeep.signals import (
     clock_from_shared,
     pool_drift,
 )
+from seakeep.signals.lags import _correlation
 from seakeep.signals.synchronisation import find_pulses, without_doubtful_drift
 
 
@@ -218,3 +219,10 @@ def test_without_its_drift_a_clock_reads_the_same_in_the_middle():
     assert kept.reading(found.centre) == pytest.approx(
         float(found.reading(found.centre)), abs=1e-12
     )
+
+
+def test_the_correlation_at_a_lag_is_that_of_the_samples_in_common():
+    a, b = np.random.default_rng(0).standard_normal((2, 40)) + 5.0
+    found = _correlation(a, b, np.array([-25, 0, 25]))
+    expected = [np.corrcoef(x, y)[0, 1] for x, y in ((a[25:], b[:15]), (a, b), (a[:15], b[25:]))]
+    np.testing.assert_allclose(found, expected, atol=1e-12)  # rounding of an FFT

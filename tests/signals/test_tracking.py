@@ -480,6 +480,7 @@ def test_a_varying_frame_rate(plain, monkeypatch):
         ({"metres_per_pixel": -1.0}, r"metres_per_pixel must be positive \(m\); received -1"),
         ({"opening": -1}, "opening and closing are sides in pixels"),
         ({"region": (0, 0, 0, 10)}, r"region is \(left, top, width, height\) in pixels"),
+        ({"region": (1, 2)}, r"region is \(left, top, width, height\) in pixels"),
         ({"bridge": -0.1}, "bridge is a time in s, 0 for none; received -0.1"),
         ({"tolerance": float("nan")}, "tolerance must be a number"),
         ({"camera_pitch": float("nan")}, "camera_pitch must be finite; received nan"),

@@ -10,6 +10,7 @@ from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.statistics import (
     block_length,
     choose_block_length,
+    jsd_interval,
     lag_one_correlation,
     moving_block_bootstrap,
 )
@@ -238,6 +239,11 @@ def test_blocks_out_of_range(length, message):
 def test_blocks_longer_than_a_segment():
     with pytest.raises(RequestError, match="does not fit into the shortest segment of 30"):
         moving_block_bootstrap(NOISE, 3, 40, np.random.default_rng(0), segments=[70, 30])
+
+
+def test_a_rule_that_counts_in_periods_says_where_they_are_stated():
+    with pytest.raises(RequestError, match=r"State both to block_length\(\), or a block length in"):
+        jsd_interval(NOISE, NOISE, block_length="encounter_periods", rng=np.random.default_rng(0))
 
 
 def test_gaps_are_not_redrawn():

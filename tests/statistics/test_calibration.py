@@ -231,3 +231,11 @@ def test_what_scores_refuse():
         band_scores(np.zeros((3, 1)), np.ones((3, 1)), np.zeros((4, 1)))
     with pytest.raises(DataError, match=r"1 value\(s\) that are NaN or infinite"):
         band_scores(np.zeros((2, 1)), np.ones((2, 1)), [[0.0], [np.nan]])
+
+
+def test_the_block_is_the_integrated_correlation_time():
+    """Exceedances of a score that is held for k samples: 1 + 2 Σ (1 − j/k) = k."""
+    rng = np.random.default_rng(0)
+    scores = np.stack([np.repeat(rng.standard_normal(500), 8) for _ in range(20)])[..., None]
+    found = conformal_margin(scores, 0.9).block_length[0]
+    assert found == pytest.approx(8, rel=0.1)  # the first correlations beyond 8 are noise of 1 %

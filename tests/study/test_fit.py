@@ -112,6 +112,8 @@ def test_start_and_steps_of_the_user_are_taken(halves):
     (judged,) = compare(fit_campaign(whole), whole, ["all"], start=150.0, steps=20)
     assert judged.forecast.sizes["time"] == 20
     assert float(judged.forecast.time[0]) == pytest.approx(150.1)
+    with pytest.raises(RequestError, match=r"steps must be a whole number of .* received 4\.7"):
+        compare(fit_campaign(whole), whole, ["all"], start=150.0, steps=4.7)
 
 
 def test_steps_one_past_the_record_are_judged_where_there_is_a_measurement(halves):
@@ -230,6 +232,9 @@ def test_distributions_of_scipy_are_named_in_the_table():
             "'norm' with these 'parameters' has no median; correct them",
         ),
         ("-1", "state_delays must be an integer of at least 0; received -1"),
+        ('"1 /T"', "state_delays must be a length that is not negative, .* received '1 /T'"),
+        ('"-1 T"', "state_delays must be a length that is not negative, .* received '-1 T'"),
+        ("1\nridge = '1 T'", "ridge must be a number, zero or positive, or the word rollout"),
         ('"1 Q"', "state_delays: a text in place of a number counts in encounter periods"),
         ("1\nriddge = 2", "has no key 'riddge'. Did you mean 'ridge'"),
         (

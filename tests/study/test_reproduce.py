@@ -22,6 +22,7 @@ from seakeep.study import read_study
 from seakeep.study.plan import make_plan
 from seakeep.study.reproduce import (
     ACTS,
+    HIGH_PASS,
     SLOW,
     Size,
     prepare_campaigns,
@@ -33,6 +34,7 @@ from seakeep.study.reproduce import (
 pytest.importorskip("seakeep.tank.play", reason="the virtual tank needs its libraries")
 from seakeep.tank.delivery import campaign_text, write_record
 from seakeep.tank.instruments import Column, Record
+from seakeep.tank.settings import default_settings
 
 SMALL = Size(training=2, tests=2, members=2, series=4)
 RATE = 50.0
@@ -260,3 +262,9 @@ def test_runs_that_are_prepared_beside_others_are_counted_one_by_one(tmp_path):
     assert counted == [(n, 3, f"preparing {run}") for n, run in enumerate(RUNS, 1)]
     for campaign in campaigns:
         assert {each.stem for each in (campaign.parent / "prepared").glob("*.nc")} == set(RUNS)
+
+
+def test_the_edge_of_the_drift_lies_between_drift_and_waves():
+    slowest = default_settings().runs["irregular_1"].spectrum.band[0]
+    # A filter of 60 s bends within some tenths of its edge; the drift is at 0.03 Hz.
+    assert 4 * 0.03 < HIGH_PASS < slowest / 1.5

@@ -420,3 +420,18 @@ def test_missing_numba_names_the_extra(monkeypatch, rig, calm):
     monkeypatch.delattr(seakeep.tank, "_loop", raising=False)
     with pytest.raises(RequestError, match=r"needs numba .* pip install 'seakeep\[tank\]'"):
         simulate(rig, calm, 1.0)
+
+
+def test_wave_drift_damping_is_aranhas(rig):
+    """The force at a slow drift U is D(ω − ω²U/g)(1 − 4ωU/g), by which the frequency is met."""
+    sea = small_sea(np.array([3.0, 4.0, 5.0]), 0.01)
+    losses, w, drift = sea_losses(rig, sea), sea.omega, 1e-3
+    force, damping = drift_coefficient(rig, sea)
+    met = [
+        mean_drift(rig, w - sign * w**2 * drift / 9.80665, losses)
+        * (1 - sign * 4 * w * drift / 9.80665)
+        for sign in (1, -1)
+    ]
+    # Differences of a curve whose slope changes within a few tenths of rad/s.
+    np.testing.assert_allclose(damping, (met[1] - met[0]) / (2 * drift), rtol=0.05)
+    np.testing.assert_allclose(force, mean_drift(rig, w, losses), rtol=1e-12)

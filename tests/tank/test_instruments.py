@@ -3,6 +3,7 @@ import pytest
 
 from seakeep.signals import low_pass
 from seakeep.tank.instruments import (
+    _immersed,
     clock_instants,
     record_run,
     record_together,
@@ -228,3 +229,29 @@ def test_instruments_interpolate_the_motion_exactly_at_its_steps(played):
     assert q == pytest.approx(played.motion.position[:, 500:600], abs=1e-13)
     assert v == pytest.approx(played.motion.velocity[:, 500:600], abs=1e-12)
     assert a == pytest.approx(played.motion.acceleration[:, 500:600], abs=1e-11)
+
+
+@pytest.mark.parametrize("line", [0, 1])
+def test_a_pitch_that_lifts_the_bow_lifts_the_eye_of_its_line(played, line):
+    """A line's middle under still water: eye and pole at the waterline, the vessel pitched."""
+    eye = played.settings.moorings[played.rig.line_names[line]].eye
+    time = np.arange(0.0, 5.0, 0.5)
+
+    class Still:
+        settings, rig = played.settings, played.rig
+
+        def __init__(self, pitch):
+            self.pitch = pitch
+
+        def states(self, instants):
+            q = np.zeros((5, len(instants)))
+            q[2] = self.pitch
+            return q, q, q
+
+        def elevation(self, x, instants):
+            pole = played.settings.moorings[played.rig.line_names[line]].pole
+            return np.full(len(instants), 0.5 * (eye[1] + pole[1]))
+
+    lifted = -np.sign(eye[0]) * 0.1  # the bow points against x
+    assert not _immersed(Still(lifted), time, line).any()
+    assert _immersed(Still(-lifted), time, line).all()

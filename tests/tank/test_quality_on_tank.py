@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from seakeep.signals.quality import noise_floor
 
 import quality
 from quality import FAULTS
+from seakeep.core.metrics import slack_share
+from seakeep.tank.play import play_run, truth
 
 pytest.importorskip("numba", reason="needs the extra tank")
 
@@ -25,6 +28,15 @@ def test_faults_are_found_and_what_is_below_a_limit_is_not(heaves, fault):
     put, kind, size, _ = FAULTS[fault]
     found = kind in quality.kinds(put(measured, dt, np.random.default_rng(1), size), trusted, dt)
     assert found is not ("below" in fault or "finer" in fault)
+
+
+@pytest.mark.parametrize("name", ["irregular_1", "regular_1_5", "regular_2"])
+def test_the_share_of_a_slack_line_is_that_of_the_truth(settings, rig, name):
+    load = truth(play_run(settings, name, rig), name, 0.05)["mooring_stern"].values
+    noise = settings.instruments.load_noise * np.random.default_rng(0).normal(size=load.size)
+    found = slack_share(load + noise, noise_floor(load + noise))
+    # Pulses are noise to the noise floor, and loads below it count as slack.
+    assert found == pytest.approx(np.mean(load <= 0), abs=0.07)
 
 
 def test_noise_makes_no_lag(heaves):

@@ -13,7 +13,6 @@ import tomlkit
 from seakeep.campaign.datasets import data_folder
 from seakeep.campaign.guesses import (
     HYSTERESIS,
-    MOTIONS,
     SHORT_GAP,
     File,
     Guess,
@@ -27,7 +26,7 @@ from seakeep.campaign.guesses import (
 )
 from seakeep.campaign.readers import time_column, time_step_of, time_unit_of
 from seakeep.campaign.settings import FileSettings
-from seakeep.conventions import canonical_channel
+from seakeep.conventions import MOTIONS, canonical_channel, is_elevation
 from seakeep.errors import RequestError
 from seakeep.files import MARK, expanded
 from seakeep.formats import Columns, read_columns
@@ -210,7 +209,7 @@ def _instruments(files: Sequence[File], guesses: Sequence[Guess]) -> Iterator[st
     """A table per logger; clocks by the trigger, where all loggers have one."""
     loggers = list({file.logger: file for file in reversed(files)}.values())[::-1]
     triggers = {file.logger: next(filter(is_trigger, file.table.values), None) for file in loggers}
-    waves = [g.logger for g in guesses if (g.channel or "").startswith("eta_")]
+    waves = [g.logger for g in guesses if is_elevation(g.channel or "")]
     reference = (waves or [file.logger for file in loggers])[0]
     yield from ("", "[instruments]")
     yield f"reference = {_value(reference)} # guessed: its clock is the time of all"
@@ -369,7 +368,7 @@ def _preparation(
 
 def _inputs(guesses: Sequence[Guess]) -> list[Guess]:
     """Wave probes that drive a model: none behind the vessel, without gaps where there are such."""
-    waves = [guess for guess in guesses if (guess.channel or "").startswith("eta_")]
+    waves = [guess for guess in guesses if is_elevation(guess.channel or "")]
     before = [guess for guess in waves if not guess.behind] or waves
     for gaps in ("", "short"):
         if whole := [guess for guess in before if guess.gaps == gaps]:
@@ -383,7 +382,7 @@ def _model(guesses: Sequence[Guess]) -> Iterator[str]:
     kinds = [MOTIONS, [f"{m}_rate" for m in MOTIONS], [f"{m}_acceleration" for m in MOTIONS]]
     usable = [n for n, g in mapped.items() if g.gaps != "long" and not g.at_rest]
     moved = [[name for name in usable if name in kind] for kind in kinds]
-    rest = [name for name in usable if not name.startswith("eta_")]
+    rest = [name for name in usable if not is_elevation(name, rates=True)]
     states = [*moved[0], *moved[1]] or moved[2] or rest or list(mapped)[:1]
     inputs = [str(guess.channel) for guess in _inputs(guesses) if guess.channel not in states]
     motions = [name for name in mapped if any(name in kind for kind in kinds)]
@@ -400,7 +399,7 @@ def _model(guesses: Sequence[Guess]) -> Iterator[str]:
         yield "# motions where a line goes slack and that is better. Judge their extremes."
     yield f"inputs = {_value(inputs)} # guessed: the waves that drive it"
     yield "# kind = 'bayesian_hankel_dmdc' # an ensemble: its forecasts have a band"
-    probes = [name for name in mapped if name.startswith("eta_") and name not in inputs]
+    probes = [name for name in mapped if is_elevation(name) and name not in inputs]
     if behind := [name for name in probes if mapped[name].behind]:
         yield f"# {', '.join(behind)} left out: behind the vessel, by name, where its own waves are"
     else:

@@ -13,7 +13,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.campaign.readers import time_step_of, time_unit_of
-from seakeep.conventions import canonical_channel, conversion, si_unit
+from seakeep.conventions import MOTIONS, canonical_channel, conversion, si_unit
 from seakeep.errors import DataError
 from seakeep.formats import Columns
 from seakeep.formats.columns import is_unit, named_unit
@@ -22,7 +22,6 @@ from seakeep.signals.time_axis import over_gaps
 from seakeep.signals.waves import energy_period, tapered_power
 
 __all__ = [
-    "MOTIONS",
     "File",
     "Guess",
     "Sea",
@@ -39,7 +38,6 @@ __all__ = [
 # What a column may be called: whole words, lower case.
 _WORDS = {"surge": {"surge", "x"}, "sway": {"sway", "y"}, "heave": {"heave", "z"},
           "roll": {"roll", "phi"}, "pitch": {"pitch", "theta"}, "yaw": {"yaw", "psi"}}  # fmt: skip
-MOTIONS = tuple(_WORDS)
 """The six motions, by their canonical names."""
 _TURNS = {name: _WORDS[name] | {axis} for name, axis in zip(MOTIONS[3:], "xyz", strict=True)}
 _ACCELERATION = {"acc", "accel", "acceleration", "a", "dd"}

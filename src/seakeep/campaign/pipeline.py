@@ -28,7 +28,7 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray
 from seakeep.campaign.derivation import derive
-from seakeep.campaign.guesses import MOTIONS, is_wave
+from seakeep.campaign.guesses import is_wave
 from seakeep.campaign.readers import (
     counts_samples,
     find_column,
@@ -48,7 +48,7 @@ from seakeep.campaign.settings import (
     long_name_of,
 )
 from seakeep.campaign.validation import derivation_order, needed_channels, sources_of
-from seakeep.conventions import canonical_channel, conversion, si_unit
+from seakeep.conventions import MOTIONS, canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
 from seakeep.formats import Columns, Options
 from seakeep.formats.columns import is_unit, meant_column, same_unit

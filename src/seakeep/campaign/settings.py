@@ -19,7 +19,7 @@ from pydantic import (
     model_validator,
 )
 
-from seakeep.conventions import canonical_channel
+from seakeep.conventions import canonical_channel, is_elevation
 from seakeep.errors import RequestError
 from seakeep.formats import Options
 from seakeep.toml import (
@@ -654,12 +654,6 @@ class CampaignSettings(Table):
         """Models by the key of their table: ``model`` and ``models.NAME``."""
         unnamed = {} if self.model is None else {"model": self.model}
         return {**unnamed, **{f"models.{name}": each for name, each in self.models.items()}}
-
-
-def is_elevation(name: str) -> bool:
-    """Whether a channel is called as wave elevations are; their rates are none."""
-    known = canonical_channel(name)
-    return name.startswith("eta_") and known is not None and known.units == "m"
 
 
 def long_name_of(name: str, stated: str | None) -> str:

@@ -13,7 +13,6 @@ from seakeep.check.parts import (
     FreeRun,
     Known,
     beside,
-    encounter_period_of,
     free_runs,
     irregular,
     judged,
@@ -24,6 +23,7 @@ from seakeep.core.harmonics import dominant_frequency
 from seakeep.core.spectra import Spectra, cross_spectra, segment_length
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Model
+from seakeep.models.labelled import mean_period
 
 __all__ = ["coherence"]
 
@@ -106,7 +106,7 @@ def coherence(
         x = part.states[whole][at]
         left = [x, *(x - each[name].forecast[to] for each in references)]
         pieces.append((columns[whole][at], np.concatenate(left, axis=1)))
-    period = encounter_period_of(model, waves) / model.dt
+    period = mean_period(waves, model.inputs)
     samples = sum(len(columns) for columns, _ in pieces)
     segment = segment_length(samples, AVERAGES * (len(model.inputs) + 1), period, LONGEST)
     further = cross_spectra(pieces, model.dt, segment)

@@ -10,16 +10,15 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.check.parts import single_model
-from seakeep.conventions import canonical_channel
+from seakeep.conventions import MOTIONS, canonical_channel
 from seakeep.core.decay import free_decay
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Model
 from seakeep.models.labelled import channel_matrix
 from seakeep.models.linear import modes as modes_of
 
-__all__ = ["MOTIONS", "decay", "measured_decay", "modes"]
+__all__ = ["decay", "measured_decay", "modes"]
 
-MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 LONGEST, SHORTEST = 20000, 200
 """Samples of a decay."""
 

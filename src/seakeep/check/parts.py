@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray
+from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, SlowSquares, is_ensemble
 from seakeep.models.engine import Windows
@@ -19,7 +20,6 @@ from seakeep.models.inputs import Chain, Lead, Measured
 from seakeep.models.interface import Span
 from seakeep.models.labelled import channel_matrix, check_step
 from seakeep.models.observables import HALF_WIDTH, Observed
-from seakeep.signals import encounter_period
 from seakeep.signals.time_axis import stretches
 from seakeep.waves import wavenumber
 
@@ -28,7 +28,6 @@ __all__ = [
     "Known",
     "Part",
     "beside",
-    "encounter_period_of",
     "free_runs",
     "free_windows",
     "irregular",
@@ -299,20 +298,6 @@ def _span(run: xr.Dataset) -> tuple[float, float]:
     return float(min(each[0] for each in spans)), float(max(each[1] for each in spans))
 
 
-def encounter_period_of(model: Model, runs: Mapping[str, xr.Dataset]) -> float:
-    """Encounter period that runs state, s, or that of the first input."""
-    for run in runs.values():
-        if "encounter_period" in run.attrs:
-            return float(run.attrs["encounter_period"])
-    for part in used_parts(model, runs).values():
-        if part.inputs.shape[1]:
-            return encounter_period(part.inputs[:, 0], model.dt)
-    raise RequestError(
-        "the encounter period is not known: the runs state none, and the model has no input. Set "
-        "run.attrs['encounter_period'] (s)."
-    )
-
-
 def regressors(model: Model, part: Part) -> FloatArray:
     """Columns that drive a model over a part: inputs, then observables, each at the instant itself.
 
@@ -388,7 +373,7 @@ def reference_probe(model: Model, runs: Mapping[str, xr.Dataset]) -> int:
 
 def elevations(model: Model) -> BoolArray:
     """Which inputs are wave elevations."""
-    return np.array([name.startswith("eta") for name in model.inputs], dtype=bool)
+    return np.array([is_elevation(name) for name in model.inputs], dtype=bool)
 
 
 def positions(model: Model, runs: Mapping[str, xr.Dataset]) -> FloatArray | None:

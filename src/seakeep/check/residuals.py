@@ -11,7 +11,6 @@ from seakeep.arrays import FloatArray
 from seakeep.check.parts import (
     FreeRun,
     Known,
-    encounter_period_of,
     free_runs,
     free_windows,
     judged,
@@ -22,7 +21,7 @@ from seakeep.core.spectra import cross_spectra
 from seakeep.core.whiteness import autocorrelation, input_correlation, ljung_box
 from seakeep.errors import DataError, SeakeepError, warn
 from seakeep.models import Model
-from seakeep.models.labelled import channel_matrix
+from seakeep.models.labelled import channel_matrix, mean_period
 
 __all__ = ["residuals"]
 
@@ -72,7 +71,7 @@ def residuals(
     """
     runs, of = judged(runs)
     known = free_runs(model, runs, free)
-    period = encounter_period_of(model, runs)
+    period = mean_period(runs, model.inputs) * model.dt
     lags = round(period / model.dt)
     steps, ages, reasons = [], [], []
     for name in known:

@@ -13,7 +13,6 @@ from seakeep.arrays import ComplexArray, FloatArray, as_real
 from seakeep.check.parts import (
     Part,
     elevations,
-    encounter_period_of,
     is_regular,
     reference_probe,
     units_of,
@@ -28,6 +27,7 @@ from seakeep.models import HankelDMDcModel, HankelEnsemble, Model
 from seakeep.models.engine import Dynamics
 from seakeep.models.following import Following
 from seakeep.models.inputs import Chain, Lead
+from seakeep.models.labelled import mean_period
 
 __all__ = ["measured_response", "response", "transfer", "validation"]
 
@@ -268,7 +268,7 @@ def measured_response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Datase
     pieces = [part for part in parts.values() if not is_regular(part.run)]
     if pieces:
         try:
-            period = encounter_period_of(model, runs)
+            period = mean_period(runs, model.inputs) * model.dt
             points.append(_irregular_points(model, pieces, reference, period))
         except SeakeepError as error:
             reasons.append(f"irregular waves: {error}")

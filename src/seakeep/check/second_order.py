@@ -9,7 +9,6 @@ import xarray as xr
 
 from seakeep.arrays import ComplexArray, FloatArray, IntArray
 from seakeep.check.parts import (
-    encounter_period_of,
     is_regular,
     reference_probe,
     single_model,
@@ -21,6 +20,7 @@ from seakeep.errors import DataError, RequestError
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.inputs import Chain, Measured
 from seakeep.models.interface import Span
+from seakeep.models.labelled import mean_period
 
 __all__ = ["drift"]
 
@@ -70,7 +70,7 @@ def drift(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
             "waves. Fit one with observables = [seakeep.SlowSquares(…)] for drift."
         )
     reference = reference_probe(model, runs)
-    period = encounter_period_of(model, runs)
+    period = mean_period(runs, model.inputs) * model.dt
     samples = round(PERIODS * period / model.dt)
     step = 1.0 / (samples * model.dt)
     bins = _probed(single, step)

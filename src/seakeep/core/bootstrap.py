@@ -207,7 +207,8 @@ def choose_block_length(
         if periods is None or not periods > 0 or not samples_per_period > 0:
             raise RequestError(
                 "rule 'encounter_periods' needs how many of them make a block, and the samples of "
-                f"one; received periods={periods} and samples_per_period={samples_per_period}."
+                f"one; received periods={periods} and samples_per_period={samples_per_period}. "
+                "State both to block_length(), or a block length in samples."
             )
         optimum = float(periods * samples_per_period)
     samples = int(np.clip(round(min(optimum, 1e18)), 1, cap))

@@ -20,6 +20,7 @@ __all__ = [
     "nammae",
     "normalised_extremes_error",
     "nrmse",
+    "slack_share",
 ]
 
 
@@ -119,6 +120,27 @@ def is_slack(
     array([False,  True])
     """
     return ~paired(predicted, measured, training_std, noise_std)[3]
+
+
+def slack_share(load: FloatArray, noise_std: float) -> float:
+    """Part of the samples at which a line is slack: its load is not above the SD of its noise.
+
+    A sixth of the noise lies above it, and waves that just leave the line slack count as slack: the
+    two about cancel, to 5 % of the samples in the virtual tank.
+
+    Parameters
+    ----------
+    load : ndarray, shape (time,)
+        Load of a line, which only pulls.
+    noise_std : float
+        Standard deviation of its noise, as :func:`seakeep.signals.noise_floor` estimates it.
+
+    Returns
+    -------
+    float
+        From 0 to 1.
+    """
+    return float(np.mean(load <= noise_std))
 
 
 def nrmse(

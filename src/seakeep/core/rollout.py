@@ -85,10 +85,8 @@ def rollout(
         Extended inputs :math:`\hat u_0 … \hat u_{steps-1}`, newest block first; or the samples
         themselves, oldest first. A model without input takes shape (window, steps, 0).
     n_states : int, optional
-        N. By default it is taken from `histories` with three axes, or from an `A` with N rows. For
-        extended states and a square `A` it is the smallest N for which the rows of the delayed
-        states are a symmetric matrix but for their last N columns, as an exact shift and
-        regressed rows are; without one, the whole state is returned.
+        N. By default it is taken from `histories` with three axes, or from an `A` with N rows;
+        for extended states and a square `A` the whole state is returned.
     direct : array_like, shape (window, steps, D), optional
         Further inputs, without delays, of the last D columns of `B`.
 
@@ -230,26 +228,13 @@ def _count_states(a: FloatArray, start: FloatArray, given: int | None) -> int:
     elif start.ndim == 3:
         count = start.shape[2]
     else:
-        count = rows if rows < size else _delayed_states(a)
+        count = rows
     if count < 1 or size % count or rows not in (count, size):
         raise RequestError(
             f"A of shape {a.shape} does not belong to {count} states: its columns must be a "
             "multiple of N, and its rows N or all of them."
         )
     return count
-
-
-def _delayed_states(a: FloatArray) -> int:
-    """N of a square Â whose lower rows shift or regress the delayed states; else all of it."""
-    size = len(a)
-    for count in (n for n in range(1, size) if size % n == 0):
-        block = a[count:, : size - count]
-        tolerance = SYMMETRIC * np.abs(block).max()
-        # One number is always symmetric; a smoother of states onto themselves is not negative.
-        told = len(block) > 1 or block[0, 0] == 1.0
-        if told and np.trace(block) > 0 and np.all(np.abs(block - block.T) <= tolerance):
-            return count
-    return size
 
 
 def _steps(b: FloatArray, inputs: FloatArray) -> int:

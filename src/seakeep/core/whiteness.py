@@ -24,13 +24,15 @@ def autocorrelation(pieces: Sequence[FloatArray], lags: int) -> FloatArray:
     pieces : sequence of ndarray, each (time, channel)
         Records; the mean of each is removed, and products do not cross a joint.
     lags : int
-        Largest lag, samples.
+        Largest lag, samples; at most that of the longest record, to which shorter ones add nothing
+        beyond their own ends.
 
     Returns
     -------
     ndarray
         One at lag 0; NaN of a channel without variance.
     """
+    lags = min(lags, max(map(len, pieces)) - 1)
     sums = sum(_products(x - x.mean(axis=0), x - x.mean(axis=0), lags) for x in pieces)
     total = np.asarray(sums)
     out = np.full(total.shape, np.nan)
@@ -80,6 +82,7 @@ def input_correlation(
         one, its value for white residuals.
     """
     samples = sum(len(e) for e, _ in pieces)
+    lags = min(lags, max(len(e) for e, _ in pieces) - 1)
     size = pieces[0][1].shape[1]
     e, u = (autocorrelation([pair[side] for pair in pieces], lags) for side in (0, 1))
     both = e[:, :, None] * u[:, None]
@@ -103,8 +106,8 @@ def input_correlation(
 def _products(x: FloatArray, past: FloatArray, lags: int) -> FloatArray:
     """Sums of x at an instant times `past` lag samples before, shape (lags + 1, channel)."""
     size = len(x)
-    lags = min(lags, size - 1)
-    found = [signal.correlate(a, b, method="fft")[size - 1 : size + lags]
-             for a, b in zip(x.T, past.T, strict=True)]  # fmt: skip
-    result: FloatArray = np.stack(found, axis=1)
-    return result
+    out = np.zeros((lags + 1, x.shape[1]))
+    for column, (a, b) in enumerate(zip(x.T, past.T, strict=True)):
+        found = signal.correlate(a, b, method="fft")[size - 1 : size + lags]
+        out[: len(found), column] = found
+    return out

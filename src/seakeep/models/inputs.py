@@ -25,6 +25,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
+from seakeep.conventions import is_elevation
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice, of_json, settings_of
@@ -345,7 +346,7 @@ class ProbeAlignment:
         placed = self.channels or [each for each in inputs if _position(first, each) is not None]
         if not placed and self.surge != "none":
             return f"{name} states no position of a wave probe"
-        if not placed and not any(each.startswith("eta") for each in inputs):
+        if not placed and not any(is_elevation(each, rates=True) for each in inputs):
             return "no input is a wave elevation"
         if self.mode == "dispersion" and _common_depth(runs) is None:
             return "the runs state no water depth"
@@ -739,7 +740,7 @@ def _elevations(
     else:
         chosen = tuple(_position(run, channel) is not None for channel in inputs)
         if not any(chosen):
-            chosen = tuple(channel.startswith("eta") for channel in inputs)
+            chosen = tuple(is_elevation(channel, rates=True) for channel in inputs)
     if not any(chosen):
         raise RequestError(
             f"alignment: none of the inputs ({', '.join(inputs) or 'none'}) is known as a wave "

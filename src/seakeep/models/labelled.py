@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
+from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.signals import uniform_step
 from seakeep.signals.time_axis import instant_text, span_text
@@ -339,27 +340,35 @@ def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "sta
     return min(max(round((instant - float(time[0])) / step), 0), time.size - 1)
 
 
-def mean_period(runs: Mapping[str, xr.Dataset], elevations: Sequence[str]) -> float:
-    """Mean encounter period of some runs, samples: as they state it, or counted in a probe.
+def mean_period(runs: Mapping[str, xr.Dataset], inputs: Sequence[str]) -> float:
+    """Mean encounter period of some runs, samples: as they state it, or counted.
+
+    It is counted in the first input that is a wave elevation, or, where none is named as one, in
+    the first that has no unit or metres; runs without waves do not count.
 
     Raises
     ------
     DataError
-        If a run states none and none can be counted.
+        If no run states a period and none can be counted.
     """
-    found = []
+    steps = {name: run_step(run, name) for name, run in runs.items()}
+    key = "encounter_period"
+    found = [float(run.attrs[key]) / steps[name] for name, run in runs.items() if key in run.attrs]
+    if found:
+        return float(np.mean(found))
+    reason = f"no input ({', '.join(inputs) or 'none'}) is a wave elevation, eta_…."
     for name, run in runs.items():
-        dt = run_step(run, name)
-        if (stated := run.attrs.get("encounter_period")) is not None:
-            found.append(float(stated) / dt)
-            continue
-        wave = channel_matrix(run, elevations[:1], name)[:, 0] if elevations else np.empty(0)
-        try:
-            found.append(encounter_period(wave[np.isfinite(wave)], dt) / dt)
-        except (DataError, RequestError) as error:
-            raise DataError(
-                f"{name}: observables, a predicted surge, read-outs and ridge = 'rollout' count "
-                f"in encounter periods, and there is none to be counted: {error} Set "
-                "run.attrs['encounter_period'] (s)."
-            ) from None
+        lengths = [each for each in inputs if run[each].attrs.get("units", "") in ("", "m")]
+        for wave in [*filter(is_elevation, inputs), *lengths][:1]:
+            series = channel_matrix(run, [wave], name)[:, 0]
+            try:
+                counted = encounter_period(series[np.isfinite(series)], steps[name])
+                found.append(counted / steps[name])
+            except (DataError, RequestError) as error:
+                reason = f"{name}, channel '{wave}': {error}"
+    if not found:
+        raise DataError(
+            f"the encounter period is not known: no run states it, and {reason} Set "
+            "run.attrs['encounter_period'] (s)."
+        )
     return float(np.mean(found))

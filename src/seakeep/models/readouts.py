@@ -9,6 +9,7 @@ from typing import Any, Literal, Self, get_args
 import numpy as np
 
 from seakeep.arrays import FloatArray
+from seakeep.conventions import MOTIONS
 from seakeep.core.readouts import LinearHinges
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models.checks import check_choice, check_keys
@@ -27,7 +28,6 @@ __all__ = [
 
 ReadOutKind = Literal["none", "hinge", "stacked"]
 Asked = Literal["hinge", "stacked", "auto"]
-MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray, IntArray
+from seakeep.conventions import is_elevation
 from seakeep.core import metrics
 from seakeep.core.path import Moments, free_runs, lagged, ridge_path, truncated_path
 from seakeep.errors import DataError, RequestError, did_you_mean
@@ -125,7 +126,7 @@ class Trial:
     scores : ndarray, shape (level, window)
         NRMSE averaged over the channels, by window of all folds and horizons.
     weights : ndarray, shape (window,)
-        They sum to one; folds and horizons count alike.
+        They sum to one; folds count alike, and the horizons of a fold.
     """
 
     levels: tuple[float, ...]
@@ -548,10 +549,10 @@ def _judged(
             horizons = [each for each in found if each.shape[1]]  # in others nothing moves
             scores += horizons
             weights += [
-                np.full(each.shape[1], 1.0 / (len(folds) * len(horizons) * each.shape[1]))
-                for each in horizons
+                np.full(each.shape[1], 1.0 / (len(horizons) * each.shape[1])) for each in horizons
             ]
-        kept = np.concatenate(scores, axis=1), np.concatenate(weights)
+        joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
+        kept = np.concatenate(scores, axis=1), joined / joined.sum()
         yield candidate, Trial(levels(candidate), *kept)
 
 
@@ -958,7 +959,7 @@ def default_observables(
     probes away from the vessel see the waves before it. A model that does not look ahead takes
     those of all elevations: the ones up-wave tell what comes.
     """
-    elevations = tuple(name for name in inputs if name.startswith("eta"))
+    elevations = tuple(name for name in inputs if is_elevation(name))
     if not elevations:
         return ()
     at_vessel = tuple(name for name in elevations if name == "eta_cog") or elevations

@@ -11,6 +11,7 @@ import xarray as xr
 from scipy import fft
 
 from seakeep.arrays import BoolArray, FloatArray
+from seakeep.conventions import is_elevation
 from seakeep.core.wave_bands import PER_OCTAVE, band_edges, band_energy
 from seakeep.models import labelled, store
 from seakeep.models.interface import Model, Signature
@@ -178,7 +179,7 @@ class Coverage:
                     is_gap=is_gap,
                     height=float(heights[column]),
                     highest=float(self.heights[column]),
-                    steepness=float(steep[column]) if channel.startswith("eta") else np.nan,
+                    steepness=float(steep[column]) if is_elevation(channel) else np.nan,
                     steepest=float(self.steepnesses[column]),
                 )
             )

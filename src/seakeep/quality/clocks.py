@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from seakeep.conventions import MOTIONS, is_elevation
 from seakeep.quality.faults import noise_share
 from seakeep.quality.findings import Finding, Kind
 from seakeep.quality.record import Record, channels_of, sound, step_of
-from seakeep.quality.samples import is_elevation
 from seakeep.signals.filters import PASSBAND
 from seakeep.signals.synchronisation import ASSUMED
 from seakeep.signals.waves import energy_above
@@ -37,7 +37,6 @@ FINER = 2.0
 """Times finer than the fastest logger that a step may be: one of 32 to a period is so where the
 loggers take 16, the fewest that show a wave's shape."""
 
-MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 _FILE = (
     "Check whether its file is whole; if it is, state span = [start, end] in [runs.{run}] to say "
     "which part is meant."
@@ -183,7 +182,7 @@ def steps(record: Record) -> Iterator[Finding]:
     fate = "is damped or lost" if record.anti_alias else "is folded into slower waves"
     for logger, group in record.groups.items():
         for name, channel in channels_of(group).items():
-            wanted = is_elevation(name, channel) or name in MOTIONS
+            wanted = is_elevation(name) or name in MOTIONS
             if not wanted or "derived_from" in channel.attrs:
                 continue
             cuts = [(ClocksKind.COARSE_STEP, edge)] if own[logger] < dt else []

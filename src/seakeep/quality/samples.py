@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 import scipy
-import xarray as xr
 
 from seakeep.arrays import FloatArray
+from seakeep.conventions import is_elevation
 from seakeep.quality.faults import (
     BRIDGED,
     MISSING,
@@ -128,7 +128,7 @@ def levels(record: Record) -> Iterator[Finding]:
     """Levels that drift, of channels that have no slow motion of their own."""
     dt = step_of(record.whole)
     for name, channel in channels_of(record.whole).items():
-        if not (is_elevation(name, channel) or name in NO_SLOW_MOTION):
+        if not (is_elevation(name) or name in NO_SLOW_MOTION):
             continue
         x = sound(record.whole, name)
         if x.size < 16 or not np.ptp(x):
@@ -139,11 +139,6 @@ def levels(record: Record) -> Iterator[Finding]:
         if abs(change) > limit and sure > 5:
             unit = str(channel.attrs["units"])
             yield Finding(SamplesKind.DRIFT, record.run, name, change, limit, unit)
-
-
-def is_elevation(name: str, channel: xr.Variable) -> bool:
-    """Whether a channel is a wave elevation: ``eta_…`` in metres."""
-    return name.startswith("eta_") and channel.attrs.get("units") == "m"
 
 
 def impossible(record: Record) -> Iterator[Finding]:
@@ -158,7 +153,7 @@ def impossible(record: Record) -> Iterator[Finding]:
         x = x[np.isfinite(x)]
         if not x.size:
             continue
-        vertical = depth is not None and (name == "heave" or is_elevation(name, channel))
+        vertical = depth is not None and (name == "heave" or is_elevation(name))
         if name in ("roll", "pitch") and (far := _reached(x)) > np.pi / 2:
             yield Finding(SamplesKind.IMPOSSIBLE, record.run, name, far, np.pi / 2, "rad")
         elif vertical and depth is not None and (far := _reached(x - x.mean())) > depth:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.settings import long_name_of
+from seakeep.conventions import is_elevation
 from seakeep.errors import DataError
 from seakeep.report.style import (
     COLOURS,
@@ -173,7 +174,7 @@ def _input_label(inputs: xr.Dataset) -> str:
     names = [str(name) for name in inputs.data_vars]
     if len(names) == 1:
         return _label(inputs[names[0]])
-    waves = all(name.startswith("eta") for name in names)
+    waves = all(is_elevation(name) for name in names)
     units = shown_unit(_units(inputs[names[0]])) or "?"
     return f"{'wave elevations' if waves else 'inputs'}\n[{units}]"
 
@@ -261,7 +262,7 @@ def _title(comparisons: Sequence[Comparison]) -> str:
 
 def _counted(comparison: Comparison) -> xr.DataArray:
     """Series whose periods are counted: a wave elevation, for a state may be a slow motion."""
-    waves = [name for name in comparison.inputs.data_vars if str(name).startswith("eta")]
+    waves = [name for name in comparison.inputs.data_vars if is_elevation(str(name))]
     if waves:
         return comparison.inputs[waves[0]]
     return comparison.measured[next(iter(comparison.measured.data_vars))]

@@ -269,6 +269,7 @@ _LATEX = {
     "·": r"$\cdot$", "³": r"$^3$", "φ": r"$\varphi$", "θ": r"$\theta$", "ω": r"$\omega$",
     "<": r"$<$", ">": r"$>$", "T̂": r"$\hat T$", "τ̂": r"$\hat\tau$",
 }  # fmt: skip
+_KNOWN = re.compile("|".join(re.escape(each) for each in sorted(_LATEX, key=len, reverse=True)))
 NAME = 20
 """Characters of a word, such as the name of a channel, that a terminal does not break."""
 WIDE = 24
@@ -286,9 +287,11 @@ def latex_text(text: str) -> str:
     --------
     >>> latex_text("50 % of λ_max")
     '50 \\% of $\\lambda$\\_max'
+    >>> latex_text("τ̂ of τ")
+    '$\\hat\\tau$ of $\\tau$'
     """
-    text = re.sub(r"(?<![\w)])-(?=\d)", "−", text.replace("T̂", "\0"))
-    return "".join(_LATEX.get(each, each) for each in text).replace("\0", r"$\hat T$")
+    text = re.sub(r"(?<![\w)])-(?=\d)", "−", text)
+    return _KNOWN.sub(lambda found: _LATEX[found[0]], text)
 
 
 def write_latex(table: Table, path: Path) -> Path:

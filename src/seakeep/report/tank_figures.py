@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.report.style import COLOURS, PALETTE, axis_label, figure_style, new_figure
 from seakeep.signals import wave_spectrum
 from seakeep.tank.dynamics import Rig
@@ -114,11 +115,11 @@ def spectrum_figure(settings: TankSettings, realised: Sequence[Realised]) -> Fig
             rough = [paper_peak(r.elevation, r.dt)[1:] for r in seas]
             fine = [wave_spectrum(r.elevation, r.dt) for r in seas]
             axes.plot(
-                fine[0][0], 1e4 * np.mean([d for _, d in fine], axis=0), color=COLOURS["ensemble"],
+                fine[0][0], 1e4 * _mean(fine), color=COLOURS["ensemble"],
                 linewidth=0.9, label="measured, segments of 60 s",
             )  # fmt: skip
             axes.plot(
-                rough[0][0], 1e4 * np.mean([d for _, d in rough], axis=0),
+                rough[0][0], 1e4 * _mean(rough),
                 color=COLOURS["forecast"], linewidth=1.4, linestyle=(0, (4, 1.5)),
                 label="measured, paper's Welch settings",
             )  # fmt: skip
@@ -128,6 +129,12 @@ def spectrum_figure(settings: TankSettings, realised: Sequence[Realised]) -> Fig
         axes.set_ylim(bottom=0.0)
         axes.legend()
     return figure
+
+
+def _mean(spectra: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    """Mean of spectra at the frequencies of the first: records differ in length."""
+    mean: FloatArray = np.mean([np.interp(spectra[0][0], *each) for each in spectra], axis=0)
+    return mean
 
 
 def run_figure(data: xr.Dataset, channels: Sequence[str] | None = None) -> Figure:

@@ -141,7 +141,8 @@ class TrackingSettings:
                 f"{self.opening} and {self.closing}",
             ),
             (
-                self.region is not None and (min(self.region) < 0 or min(self.region[2:]) < 1),
+                self.region is not None
+                and (len(self.region) != 4 or min(self.region) < 0 or min(self.region[2:]) < 1),
                 "region is (left, top, width, height) in pixels",
                 self.region,
             ),

@@ -15,7 +15,7 @@ from seakeep import metrics, statistics
 from seakeep.arrays import whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
-from seakeep.conventions import displayed
+from seakeep.conventions import displayed, is_elevation
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
@@ -544,7 +544,7 @@ def difference_table(found: Mapping[str, Sequence[Comparison]]) -> xr.Dataset:
 
 def _wave_period(inputs: xr.Dataset) -> float:
     """Mean period of the first wave elevation among the inputs, s; NaN where there is none."""
-    waves = [each for name, each in inputs.data_vars.items() if str(name).startswith("eta")]
+    waves = [each for name, each in inputs.data_vars.items() if is_elevation(str(name))]
     if not waves or waves[0].size < 3:
         return np.nan
     try:
@@ -689,7 +689,7 @@ def samples_of(
 ) -> int:
     """Number of samples; a length in encounter periods is rounded to the nearest one."""
     try:
-        count = int(stated)
+        count = int(stated) if isinstance(stated, str) else stated
     except ValueError:
         length = _count(str(stated), name, "a whole number such as 400")
         return round(length * _period(campaign, runs) / dt)

@@ -11,7 +11,8 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign import Campaign
-from seakeep.conventions import canonical_channel
+from seakeep.conventions import canonical_channel, is_elevation
+from seakeep.core.metrics import slack_share
 from seakeep.errors import RequestError
 from seakeep.signals import significant_height, wave_spectrum
 from seakeep.signals.waves import paper_welch
@@ -32,8 +33,6 @@ POSITIVE = {
     "pitch": "bow up (the bow points against the waves)",
     "yaw": "right-handed about z",
 }
-SLACK = 1e-3
-"""A load below this part of its largest value counts as slack."""
 WELCH = ("paper", "recommended")
 
 
@@ -134,7 +133,7 @@ def _positive(name: str) -> str:
     for motion, words in POSITIVE.items():
         if name == motion or name.startswith(motion + "_"):
             return words
-    if name.startswith("eta_"):
+    if is_elevation(name, rates=True):
         return "above still water"
     return "tension" if name.startswith("mooring_") else "as measured"
 
@@ -183,7 +182,8 @@ def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
             x = run[name].values
             # A sample equal to both neighbours: a frozen sensor, or a limit that clips.
             same = (np.diff(x)[1:] == 0) & (np.diff(x)[:-1] == 0)
-            slack = np.mean(x <= SLACK * np.max(x)) if name.startswith("mooring") else np.nan
+            noise = run[name].attrs.get("noise_std", 0.0)
+            slack = slack_share(x, noise) if name.startswith("mooring") else np.nan
             spread = x.std(ddof=1)
             values[:, r, c] = x.mean(), spread, x.min(), x.max(), same.mean(), slack
     words: dict[str, Any] = {
@@ -223,7 +223,7 @@ def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
 
 def _frequency(plan: Plan, run: xr.Dataset) -> float:
     """Return the frequency of a run's regular waves, Hz; NaN for others."""
-    waves = [name for name in plan.inputs if name.startswith("eta_")]
+    waves = [name for name in plan.inputs if is_elevation(name)]
     if run.attrs.get("waves") != "regular" or not waves:
         return float("nan")
     return wave_frequency(between(run, whole_span(run))[waves[0]].values, plan.dt)
@@ -231,7 +231,7 @@ def _frequency(plan: Plan, run: xr.Dataset) -> float:
 
 def _spectra(plan: Plan, runs: Runs) -> xr.Dataset | None:
     """Spectra of the first wave elevation in all runs, as the paper and as recommended."""
-    waves = [name for name in plan.inputs if name.startswith("eta_")]
+    waves = [name for name in plan.inputs if is_elevation(name)]
     if not waves:
         return None
     curves, heights = {}, []

@@ -14,11 +14,12 @@ from seakeep.campaign.prepare import Progress
 from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, outside_training
+from seakeep.models.labelled import mean_period
 from seakeep.models.settings import Select
 from seakeep.models.slow import warn_of_slow_motions
 from seakeep.models.specs import left_open
 from seakeep.quality import warn_of_runs
-from seakeep.signals import encounter_period, find_leakage
+from seakeep.signals import find_leakage
 from seakeep.study.plan import between
 from seakeep.study.resolve import Spec, build_spec, can_align, counts_in_periods, mistakes_of
 from seakeep.toml import Length, refusal
@@ -270,15 +271,12 @@ def _warn_of_slow_model(model: Model, runs: Mapping[str, xr.Dataset]) -> None:
     """Warn of slow motions that the training windows of a model hold fewer than five periods of."""
     spans = model.training_spans
     first = runs[next(iter(spans))]
-    period = first.attrs.get("encounter_period")
-    if period is None and not model.inputs:
+    if "encounter_period" not in first.attrs and not model.inputs:
         return
-    if period is None:
-        wave = first[model.inputs[0]].values
-        period = encounter_period(wave[np.isfinite(wave)], model.dt)
+    period = mean_period({str(first.attrs.get("run", "the run")): first}, model.inputs) * model.dt
     parts = {name: runs[name].sel(time=slice(None, end + 1e-6)) for name, (_, end) in spans.items()}
     trained = sum(last - first for first, last in spans.values())
-    warn_of_slow_motions(parts, model.states, trained, float(period))
+    warn_of_slow_motions(parts, model.states, trained, period)
 
 
 def repeats_of(

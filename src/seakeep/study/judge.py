@@ -85,11 +85,9 @@ def judge(
         found["differences"][name] = changes = difference_table(test, groups["training"], rng)
         found["skill"][name] = skill_table(boxes, changes, kinds)
         if test.sizes["ensemble"]:
-            ensembles = test["ensemble"].values
-            known = [model for model in ensembles if f"calibration/{model}" in groups]
-            calibrations = {model: groups[f"calibration/{model}"] for model in known}
-            found["coverage"][name] = coverage_table(test, calibrations)
-            found["bands"][name] = band_parts(test, calibrations, level)
+            calibration = groups.get("calibration")
+            found["coverage"][name] = coverage_table(test, calibration)
+            found["bands"][name] = band_parts(test, calibration, level)
         found["trend"][name] = trend_table(test, random_stream(seed, f"trend.{name}"))
         if is_regular(groups, name):
             found["response"][name] = regular_response(groups, name)
@@ -309,24 +307,22 @@ def average_of(cells: FloatArray) -> FloatArray:
     return out
 
 
-def coverage_table(
-    test: xr.Dataset, calibrations: Mapping[str, xr.Dataset] | None = None
-) -> xr.Dataset:
+def coverage_table(test: xr.Dataset, calibration: xr.Dataset | None = None) -> xr.Dataset:
     """Fraction of the instants at which the band holds the measurement, and the truth where known.
 
-    Over (model, against, channel), averages over all cells. With calibrations of a study, the same
-    of the calibrated band: ``calibrated_inside`` and so on.
+    Over (model, against, channel), averages over all cells. With a calibration, the same of the
+    calibrated band: ``calibrated_inside`` and so on.
     """
     sides = ["measured", *(["truth"] if "truth" in test else [])]
     numbers = ("inside", "below", "above", "relative_width")
     names = ["average", *map(str, test["channel"].values)]
     judged, ensembles = test["judged"].values, test["ensemble"].values
     variables: dict[str, Any] = {}
-    for prefix in ("", "calibrated_") if calibrations else ("",):
+    bands = {"": None} if calibration is None else {"": None, "calibrated_": calibration}
+    for prefix, band in bands.items():
         values = np.full((len(numbers), len(ensembles), len(sides), len(names)), np.nan)
         for m, model in enumerate(ensembles):
-            found = calibrations[model] if calibrations and prefix else None
-            lower, upper = (bound[judged] for bound in band_of(test, model, found))
+            lower, upper = (bound[judged] for bound in band_of(test, model, band))
             for s, side in enumerate(sides):
                 values[:, m, s] = _coverage_row(test, side, lower, upper, numbers)
         variables |= {
@@ -335,9 +331,7 @@ def coverage_table(
     return xr.Dataset(variables, coords={"model": ensembles, "against": sides, "channel": names})
 
 
-def band_parts(
-    test: xr.Dataset, calibrations: Mapping[str, xr.Dataset], level: float
-) -> xr.Dataset | None:
+def band_parts(test: xr.Dataset, calibration: xr.Dataset | None, level: float) -> xr.Dataset | None:
     """Coverage, width, Winkler score and CRPS of bands over (model, band, part, channel).
 
     Parts are all instants, thirds by wave height, and thirds of the horizon; None where no band
@@ -350,10 +344,10 @@ def band_parts(
     if "wave_height" in test and np.isfinite(test["wave_height"]).all():
         waves = np.broadcast_to(test["wave_height"].values, shape[:-1])[judged]
     numbers = ("inside", "width", "relative_width", "winkler", "crps")
-    bands = ("members", "calibrated") if calibrations else ("members",)
+    bands = ("members",) if calibration is None else ("members", "calibrated")
     tables: dict[tuple[int, int], CoverageTable] = {}
     for m, model in enumerate(ensembles):
-        for b, found in enumerate((None, calibrations.get(model))[: len(bands)]):
+        for b, found in enumerate((None, calibration)[: len(bands)]):
             lower, upper = (bound[judged] for bound in band_of(test, model, found))
             if np.isnan(lower).any(axis=(1, 2)).all():
                 continue  # lost everywhere, or nothing to calibrate on
@@ -386,6 +380,7 @@ def band_of(
     if calibration is None:
         return lower, upper
     mean, std = test["mean"].sel(model=model).values, test["std"].values
+    calibration = calibration.sel(ensemble=model)
     margin = calibration["margin"].values[:, None, None, :]
     scale = None
     if "law" in calibration:

@@ -264,7 +264,7 @@ class StudyResult:
         Settings (JSON), digest, seed, versions, and what figures and tables need to know.
     groups : dict of str to Dataset
         ``channels``, ``training``, ``runs``, ``prepared/RUN``, ``spectra``, ``tests/NAME``,
-        ``draws/MODEL``, ``calibration/MODEL``, ``eigenvalues/MODEL``, and ``statistics/…``.
+        ``draws/MODEL``, ``eigenvalues/MODEL``, ``chosen``, ``calibration``, and ``statistics/…``.
     """
 
     folder: Path
@@ -317,7 +317,7 @@ class StudyResult:
     @property
     def is_calibrated(self) -> bool:
         """Whether bands of ensembles are calibrated."""
-        return any(name.startswith("calibration/") for name in self.groups)
+        return "calibration" in self.groups
 
     def is_ensemble(self, model: str) -> bool:
         """Whether a model is an ensemble."""

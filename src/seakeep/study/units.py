@@ -17,6 +17,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray
+from seakeep.conventions import is_elevation
 from seakeep.core import metrics
 from seakeep.core.bands import band_error_over_time
 from seakeep.errors import DataError, SeakeepError
@@ -356,14 +357,15 @@ def collect(study: Study, plan: Plan, runs: Runs, read: Read) -> dict[str, xr.Da
     units = units_of(plan)
     found = {unit: read(unit) for unit in units}
     groups = {f"tests/{test}": _collect_test(study, plan, runs, found, test) for test in plan.tests}
+    groups["chosen"] = _collect_chosen(plan, found)
+    calibrations = []
     for model, each in plan.models.items():
         mine = {unit.training: arrays for unit, arrays in found.items() if unit.model == model}
-        groups[f"chosen/{model}"] = _collect_chosen(plan, mine)
         if each.is_ensemble:
             origin = json.loads(str(mine[min(mine)]["origin"]))
             groups[f"draws/{model}"] = draws_of(plan, runs, model, origin)
             if plan.calibrated_on:
-                groups[f"calibration/{model}"] = _collect_calibration(plan, mine)
+                calibrations.append(_collect_calibration(plan, mine))
         first = units[0].training
         if "nowcast/error" in mine.get(first, {}):
             groups[f"nowcast/{model}"] = _collect_nowcast(plan, mine[first])
@@ -375,6 +377,8 @@ def collect(study: Study, plan: Plan, runs: Runs, read: Read) -> dict[str, xr.Da
                 },
                 attrs={"training": plan.training[first].name, "dt": plan.dt},
             )
+    if calibrations:
+        groups["calibration"] = xr.concat(calibrations, xr.Variable("ensemble", plan.ensembles))
     return groups
 
 
@@ -439,7 +443,7 @@ def _noise(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray:
 
 def wave_heights(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray | None:
     """Twice the envelope of the first elevation in windows, (window, time), or None."""
-    name = next((name for name in plan.inputs if name.startswith("eta_")), None)
+    name = next((name for name in plan.inputs if is_elevation(name)), None)
     if name is None:
         return None
     out = []
@@ -549,22 +553,21 @@ def true_channels(study: Study, plan: Plan, runs: Runs, test: str) -> FloatArray
     return np.stack(out)
 
 
-def _collect_chosen(plan: Plan, found: Mapping[int, Arrays]) -> xr.Dataset:
-    """How a model's settings were chosen on each training set, and how far it looks ahead."""
-    rows = [found[k] for k in sorted(found)]
+def _collect_chosen(plan: Plan, found: Mapping[Unit, Arrays]) -> xr.Dataset:
+    """How settings were chosen on each training set, and how far each model looks ahead."""
+    sets = sorted({unit.training for unit in found})
+    words, ahead = (
+        [[found[Unit(model, k)][f"chosen/{key}"].item() for k in sets] for model in plan.models]
+        for key in ("words", "look_ahead")
+    )
+    long_name = "waves read after the instant that is forecast"
+    dims = ("model", "training")
     return xr.Dataset(
         {
-            "words": (
-                "training",
-                np.array([str(row["chosen/words"]) for row in rows], dtype=object),
-            ),
-            "look_ahead": (
-                "training",
-                np.array([float(row["chosen/look_ahead"]) for row in rows]),
-                {"units": "s", "long_name": "waves read after the instant that is forecast"},
-            ),
+            "words": (dims, words),
+            "look_ahead": (dims, ahead, {"units": "s", "long_name": long_name}),
         },
-        coords={"training": [plan.training[k].name for k in sorted(found)]},
+        coords={"model": list(plan.models), "training": [plan.training[k].name for k in sets]},
     )
 
 

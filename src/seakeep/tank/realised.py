@@ -165,7 +165,8 @@ def matrix_rows(settings: TankSettings, realised: list[Realised]) -> list[dict[s
         run = settings.runs[each.run]
         if run.spectrum is not None:
             high = run.nominal_height or run.spectrum.height
-            label = f"{high:.2f}|{run.spectrum.kind.replace('_', '–').title()}"
+            stated = "" if high is None else f"{high:.2f}"
+            label = f"{stated}|{run.spectrum.kind.replace('_', '–').title()}"
             seas.setdefault(label, []).append(each)
     for label, runs in seas.items():
         nominal, kind = label.split("|")

@@ -49,11 +49,10 @@ def history_figure(
         figure = new_figure(7.5, 0.9 + (0.95 if len(names) > 1 else 1.4) * len(names))
         axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
         alone = result.tests[test].isel(training=[training], window=[window])
-        bands = {
-            model: band_of(alone, model, found.isel(training=[training]))
-            for model in result.models
-            if (found := result.groups.get(f"calibration/{model}")) is not None
-        }
+        bands = {}
+        if result.is_calibrated:
+            found = result.groups["calibration"].isel(training=[training])
+            bands = {model: band_of(alone, model, found) for model in found["ensemble"].values}
         for each, name in zip(axes, names, strict=True):
             k = result.channels.index(name)
             edges = {model: [edge[0, 0, :, k] for edge in band] for model, band in bands.items()}

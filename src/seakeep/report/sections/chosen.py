@@ -14,7 +14,7 @@ def chosen(result: StudyResult) -> Section | None:
     """Return how settings were chosen; None where all are stated and no model looks ahead."""
     rows = []
     for model in result.models:
-        data = result.groups[f"chosen/{model}"]
+        data = result.groups["chosen"].sel(model=model)
         for name, text, ahead in zip(
             data["training"].values, data["words"].values, data["look_ahead"].values, strict=True
         ):

@@ -221,7 +221,7 @@ def _quality_table(result: StudyResult, name: str) -> Table:
          "found, and done about it"),
         tuple(rows),
         "After preparation; no value that the study uses is missing, or it would have refused the "
-        "run. Frozen: samples equal to both neighbours. Slack: a load below 0.1 % of its largest. "
+        "run. Frozen: samples equal to both neighbours. Slack: a load within the SD of its noise. "
         "Flagged: fraction of the samples.",
         (3, 4, 5, 6, 7, 8),
         folded=True,

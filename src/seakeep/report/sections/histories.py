@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.conventions import displayed
+from seakeep.conventions import displayed, is_elevation
 from seakeep.files import replacing
 from seakeep.report.figures.common import judged_models, line_of, model_words
 from seakeep.report.figures.histories import history_figure, shown_cells
@@ -115,7 +115,7 @@ def _elevations(result: StudyResult) -> list[str]:
     """Inputs that are wave elevations."""
     channels = result.groups["channels"]
     names = [str(name) for name in channels["name"].values]
-    return [name for name in names if name.startswith("eta_")]
+    return [name for name in names if is_elevation(name)]
 
 
 def _words(result: StudyResult, name: str) -> dict[str, str]:

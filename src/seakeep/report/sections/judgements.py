@@ -105,7 +105,7 @@ def coverage(result: StudyResult) -> Section | None:
         coverage_table(result, model, calibrated)
         for model in _ensembles(result)
         for calibrated in (False, True)
-        if not calibrated or f"calibration/{model}" in result.groups
+        if not calibrated or result.is_calibrated
     )
     return Section("coverage", "Coverage of the band", tables=tables) if tables else None
 
@@ -136,7 +136,7 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
         "the members), and its mean width in measured SD; means over all cells."
     )
     if calibrated:
-        found = result.groups[f"calibration/{model}"]
+        found = result.groups["calibration"].sel(ensemble=model)
         made = "these quantiles, moved outwards by a margin found"
         if "floor" in found:
             scale = "a scale learnt from spread, horizon and waves" * ("law" in found)

@@ -75,6 +75,6 @@ def _slack_words(result: StudyResult, tests: list[str]) -> str:
     if not listed:
         return ""
     return (
-        f"Slack line (a load below 0.1 % of the largest): {', '.join(listed)}. A slack line does "
+        f"Slack line (a load within the SD of its noise): {', '.join(listed)}. A slack line does "
         "not respond linearly; where it is slack throughout, only noise is left to be forecast."
     )
