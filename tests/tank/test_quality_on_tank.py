@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from seakeep.signals.quality import noise_floor
+from seakeep.signals.waves import noise_floor
 
 import quality
 from quality import FAULTS

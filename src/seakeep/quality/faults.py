@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from seakeep.arrays import BoolArray, FloatArray, as_series, time_step
 from seakeep.errors import RequestError
@@ -145,20 +146,35 @@ def _noise(x: FloatArray) -> float:
     return 1.4826 * float(np.median(np.abs(np.diff(x, 2)))) / float(np.sqrt(6.0))
 
 
-def noise_share(series: FloatArray) -> float:
-    r"""Part of a series' variance that has no memory from one sample to the next.
+MEMORY = 4
+"""Samples before one from which it is told what has memory; a wave needs two of them."""
 
-    Half of von Neumann's ratio, :math:`\overline{(x_{i+1}-x_i)^2} / 2\sigma^2`: one for white
-    noise and for random readings of whatever size, 2 % for a wave of 32 samples.
+
+def noise_share(series: FloatArray) -> float:
+    """Part of a series' variance that the samples before do not predict.
+
+    The residual of the best linear prediction from the last four samples: one for white noise and
+    for random readings of whatever size, and little for a wave. Readings that alternate, as those
+    of a wave of three samples or fewer would, have no memory either.
 
     Examples
     --------
     >>> import numpy as np
-    >>> round(noise_share(np.sin(2 * np.pi * np.arange(320) / 32)), 2)
-    0.02
+    >>> round(noise_share(np.sin(2 * np.pi * np.arange(320) / 5)), 2)
+    0.01
+    >>> round(noise_share(np.random.default_rng(0).normal(size=4000)), 1)
+    1.0
     """
-    variance = float(np.var(series))
-    return float(np.mean(np.diff(series) ** 2)) / (2 * variance) if variance > 0 else 0.0
+    x = series - series.mean()
+    n = x.size
+    power = np.array([x[lag:] @ x[: n - lag] for lag in range(min(MEMORY, n - 1) + 1)])
+    if power[0] <= 0 or power.size < 2:
+        return 0.0
+    if power[1] < -0.5 * power[0]:
+        return 1.0
+    power[0] *= 1 + 1e-9  # the matrix of a noiseless wave is singular
+    weights = scipy.linalg.solve_toeplitz(power[:-1], power[1:])
+    return float(np.clip(1.0 - weights @ power[1:] / power[0], 0.0, 1.0))
 
 
 def find_held(series: npt.ArrayLike, dt: float, witness: npt.ArrayLike | None = None) -> BoolArray:
