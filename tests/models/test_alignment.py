@@ -184,7 +184,7 @@ def test_a_file_whose_alignment_lacks_what_its_mode_needs_is_refused(models, key
 def test_a_file_whose_alignment_is_of_other_channels_is_refused(models, key, tmp_path):
     kept = models["predicted"].to_dataset()
     signature = json.loads(kept.attrs["signature"])
-    signature["input_map"]["maps"][0]["alignment"][key][0] = "x"
+    signature["input_map"]["maps"][0]["alignment"][key][1] = "x"
     kept.attrs["signature"] = json.dumps(signature)
     store.write(kept, tmp_path / "rom.nc", "hankel_dmdc")
     with pytest.raises(

@@ -17,7 +17,6 @@ SETTINGS = {
     "ridge rows": {"delay_rows": "ridge"},
     "lead": {"lead": 6},
     "observables": {"lead": 6, "observables": (SQUARES, seakeep.Powers("eta_fwd"))},
-    "rest": {"alignment": ProbeAlignment(mode="dispersion", surge="none", offset=-0.3)},
     "aligned": {
         "lead": 6,
         "alignment": ProbeAlignment(mode="dispersion", surge="predicted"),

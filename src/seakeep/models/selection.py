@@ -951,7 +951,7 @@ def default_observables(
     if not looks_ahead:
         slow = SlowSquares(elevations, lead=0.0, period=period)
     elif unseen and len(at_vessel) > 1:
-        slow = replace(slow, orders=(0,), lead=0.0)
+        slow = replace(slow, orders=(0,), cutoff=1 / 3, lead=0.0)
     return slow, Powers(elevations)
 
 
