@@ -362,7 +362,7 @@ def test_what_cannot_be_is_refused(models, ensemble, runs, run):
     model = models["plain"]
     aligned = spec(alignment=ProbeAlignment(mode="dispersion", surge="measured"))
     without = aligned.fit(runs, [name for name in STATES if name != "surge"], INPUTS)
-    with pytest.raises(RequestError, match="carries waves to the measured 'surge', which a live"):
+    with pytest.raises(RequestError, match="carried over whole records, which are not"):
         without.live()
     with pytest.raises(RequestError, match=r"it is a member .* Use ensemble.hold\(\).live\(\)"):
         ensemble.member(1).live()
