@@ -4,8 +4,8 @@ The three irregular runs are played, delivered as raw files of four loggers, and
 tank's campaign file (32 samples a mean encounter period); what is used begins after the start-up.
 Each run in turn is forecast, in windows of 15 periods that do not overlap, by models that were
 identified from the two others. The alignments see the same windows, so that their errors are
-compared in pairs. Another table counts the passes in which a predicted surge is followed, and what
-they cost.
+compared in pairs. A predicted surge takes exact delay rows and dispersion, so that it stands in the
+table of `recommended` alone.
 
     python benchmarks/alignment_on_tank.py [--preset paper|recommended] [--out FILE.md]
 """
@@ -20,7 +20,6 @@ from pathlib import Path
 
 import numpy as np
 from chain_on_tank import deliver, used
-from timing import interleave, machine
 
 import seakeep
 from seakeep.models.settings import periods_to_samples
@@ -35,13 +34,10 @@ PERIODS = 15
 BEFORE, AHEAD = 12, 3
 """Periods at either end of a run that hold the history and the look-ahead of all models."""
 ALIGNMENTS = {
-    f"{surge}, {mode}": seakeep.ProbeAlignment(mode=mode, surge=surge)
-    for surge in ("measured", "predicted")
-    for mode in ("dispersion", "effective")
+    f"measured, {mode}": seakeep.ProbeAlignment(mode=mode) for mode in ("dispersion", "effective")
 }
+ALIGNMENTS["predicted, dispersion"] = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
 ALIGNMENTS["none"] = None
-PASSES = (1, 2, 3, 4)
-ROUNDS, WINDOWS = 15, 40
 
 
 def irregular_runs():
@@ -85,6 +81,7 @@ def table(preset, period, runs):
     errors = {
         name: window_errors(runs, period, preset, alignment)
         for name, alignment in ALIGNMENTS.items()
+        if preset == "recommended" or not name.startswith("predicted")
     }
     none = errors["none"].mean(axis=1)
     lines = [
@@ -108,72 +105,6 @@ def table(preset, period, runs):
     return "\n".join([*lines, "", "¹ conditional on measured surge", ""])
 
 
-def passes_table(period, runs):
-    """Text of the table of passes: errors of `recommended`, and what a forecast takes."""
-    aligned = {
-        f"predicted, {count} pass{'es' * (count > 1)}": seakeep.ProbeAlignment(
-            mode="dispersion", surge="predicted", passes=count
-        )
-        for count in PASSES
-    }
-    errors = {
-        name: window_errors(runs, period, "recommended", each).mean(axis=1)
-        for name, each in aligned.items()
-    }
-    twice = list(errors.values())[1]
-    dt = next(iter(runs.values())).attrs["dt"]
-    run, *others = runs.values()
-    steps, before, ahead = (periods_to_samples(n, period, dt) for n in (PERIODS, BEFORE, AHEAD))
-    instants = run["time"].values
-    starts = np.linspace(instants[before], instants[-1 - steps - ahead], WINDOWS)
-    # One choice of settings for all: the time of a forecast depends on its columns.
-    spec = seakeep.HankelDMDc.recommended(period, dt).settled(others, STATES, INPUTS).settings
-    open_loop = {
-        "not aligned": None,
-        "measured surge ¹": seakeep.ProbeAlignment(mode="dispersion", surge="measured"),
-    }
-    models = {
-        name: replace(spec, alignment=each).fit(others, STATES, INPUTS)
-        for name, each in (aligned | open_loop).items()
-    }
-    taken = {
-        windows: interleave(
-            {
-                name: lambda model=model, windows=windows: model.forecast_windows(
-                    run, starts[:windows], steps
-                )
-                for name, model in models.items()
-            },
-            ROUNDS,
-            memory=False,
-        )
-        for windows in (1, WINDOWS)
-    }
-    lines = [
-        "## Passes of a predicted surge",
-        "",
-        f"Preset recommended, dispersion; errors as above, {twice.size} windows. Times of "
-        f"forecasts of {PERIODS} periods from one start and from {WINDOWS}, all of one choice of "
-        f"settings: medians of {ROUNDS} rounds in turns, on one of {machine()['cores']} cores of "
-        f"an {machine()['processor']}, and medians of their ratios to one pass. One pass is the "
-        "open loop: the surge is held at its mean over the last period before the start.",
-        "",
-        "| surge | ANRMSE | less two passes, 95 % interval | one start [ms] | ratio "
-        f"| {WINDOWS} starts [ms] | ratio |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for row, name in enumerate(models):
-        cells = ["", ""]
-        if name in errors:
-            middle, low, high = paired(errors[name], twice, np.random.default_rng(0))
-            cells[0] = f"{np.median(errors[name]):.3f}"
-            cells[1] = "" if errors[name] is twice else f"{middle:+.3f} [{low:+.3f}, {high:+.3f}]"
-        for timings in taken.values():
-            cells += [f"{timings[row].milliseconds:.1f}", f"{timings[row].ratio:.2f}"]
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return "\n".join([*lines, "", "¹ conditional on measured surge", ""])
-
-
 def main(arguments=None):
     """Print the tables, and write them."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -189,8 +120,6 @@ def main(arguments=None):
         "alignment_on_tank.py` from the tank's raw files: medians over the same windows.\n"
     )
     tables = [table(preset, period, runs) for preset in presets]
-    if "recommended" in presets:
-        tables.append(passes_table(period, runs))
     text = "\n".join([head, *tables])
     print(text)
     options.out.write_text(text, encoding="utf-8")

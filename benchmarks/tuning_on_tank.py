@@ -45,7 +45,7 @@ def start_of_search(period, dt):
         ridge="rollout",
         delay_rows="exact",
         lead=round(0.75 * samples),
-        alignment=seakeep.ProbeAlignment(mode="dispersion", surge="predicted", passes=2),
+        alignment=seakeep.ProbeAlignment(mode="dispersion", surge="predicted"),
     )
 
 

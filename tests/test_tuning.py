@@ -73,8 +73,10 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words):
                 counted = [min(float(errors[state]), WORST) for state in STATES]
                 scores.append(np.mean(counted))
             found.append(np.mean(scores))
-        # The house rule for results: sums in another order, and an eigendecomposition of them.
-        assert float(row["score"]) == pytest.approx(np.mean(found), abs=1e-10)
+        # The house rule for results; but powers are bounded by the spread of all runs there, and
+        # by that of those that train here.
+        tolerance = 1e-4 if chosen else 1e-10
+        assert float(row["score"]) == pytest.approx(np.mean(found), abs=tolerance)
 
 
 def test_the_result_is_the_same_for_any_number_of_workers():
@@ -264,14 +266,13 @@ celerity = 2.0
 
 [next]
 """
-    aligned = seakeep.ProbeAlignment(mode="dispersion", surge="predicted", passes=3)
+    aligned = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
     spec = replace(SPEC, ridge=0.0, rank=64, alignment=aligned)
     result = seakeep.TuneResult(spec, xr.Dataset(), "")
     read = tomllib.loads(_tuned(before, None, result, ["rank", "alignment"], "recommended", 20.0))
     assert read["model"]["alignment"] == {
         "mode": "dispersion",
         "surge": "predicted",
-        "passes": 3,
     }
     assert (read["model"]["rank"], read["model"]["ridge"]) == (64, 0.0)
     assert "next" in read

@@ -2,6 +2,7 @@
 
     python docs/figures/make_figures.py indices     # docs/figures/indices.svg and .png
     python docs/figures/make_figures.py instants    # docs/figures/instants.svg
+    python docs/figures/make_figures.py recursion   # docs/figures/recursion.svg
     python docs/figures/make_figures.py in_service  # docs/figures/in_service.png
     python docs/figures/make_figures.py tutorial    # docs/figures/unseen.png and band.png
     python docs/figures/make_figures.py study       # the tutorial's study report; needs Chromium
@@ -222,6 +223,37 @@ def instants():
         figure.savefig(HERE / "instants.svg", metadata={"Date": None})
 
 
+def recursion():
+    """What one step of a model that follows its own surge reads."""
+    with mpl.rc_context(
+        {"svg.fonttype": "path", "svg.hashsalt": "seakeep", "hatch.linewidth": 0.7}
+    ):
+        figure = Figure(figsize=(10.0, 10.0 * 7.6 / 25.4))
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        panel(axes, "the step from j to j+1, with a look-ahead of 3 samples", 7.6)
+        rows = {"probes": 5.2, "waves carried": 4.0, "surge": 2.4, "states": 1.2}
+        for text, row in rows.items():
+            label(axes, row, text)
+        for at in range(13):
+            axes.text(at, 5.95, index_name("j", at - 8), ha="center", fontsize=9)
+            cell(axes, at, rows["probes"], READ if at < 12 else IDLE)
+            cell(axes, at, rows["waves carried"], AHEAD if 2 <= at <= 8 else IDLE)
+            cell(axes, at, rows["surge"], WINDOW if 4 <= at <= 8 else IDLE)
+            cell(axes, at, rows["states"], WRITTEN if at == 9 else READ if 5 <= at <= 8 else IDLE)
+        for at in range(12):
+            axes.plot([at, 8], [rows["probes"] - 0.4, 4.45], color="#888888", lw=0.6)
+        axes.annotate("", (8, 3.55), (8, 2.85), arrowprops={"arrowstyle": "->", "lw": 1.2})
+        words = {
+            "probes": "filters of all probes,\nfor places on a grid",
+            "waves carried": "read between the two places\nbeside the vessel",
+            "surge": "the place: a sum\nof the last surges",
+            "states": "the next states; then\nall moves on by one",
+        }
+        for row, text in words.items():
+            axes.text(13.2, rows[row], text, fontsize=9.5, va="center")
+        figure.savefig(HERE / "recursion.svg", metadata={"Date": None})
+
+
 def in_service():
     """A minute without a sensor, as the example plays it."""
     campaign = ROOT / "docs" / "tutorial" / "campaign.toml"
@@ -380,7 +412,19 @@ def draw_checks(model, runs):
 
 DRAWINGS = {
     each.__name__: each
-    for each in (indices, instants, in_service, tutorial, study, ntnu, sjtu, tank, check, chain)
+    for each in (
+        indices,
+        instants,
+        recursion,
+        in_service,
+        tutorial,
+        study,
+        ntnu,
+        sjtu,
+        tank,
+        check,
+        chain,
+    )
 }
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ import pytest
 import scipy
 import xarray as xr
 
-from seakeep import HankelDMDc, Powers, check
+from seakeep import Expression, HankelDMDc, check
 from seakeep.check import Checked
 from seakeep.core.spectra import cross_spectra
 from seakeep.errors import DataError
@@ -61,7 +61,7 @@ def test_a_state_too_slow_for_the_segments_is_not_judged(run):
 
 
 def test_observables_lower_the_bound(run):
-    found = check.coherence(fitted(run, (Powers("eta", (2,)),)), {"run": run})
+    found = check.coherence(fitted(run, (Expression("square", "eta**2"),)), {"run": run})
     assert float(found.linear_bound[0]) == pytest.approx(0.5, abs=0.03)
     assert float(found.observables_bound[0]) < 0.15  # a lag of a sample in segments of 160
     assert float(found.nrmse[0]) < 0.01

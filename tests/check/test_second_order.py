@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep import HankelDMDc, Powers, SlowSquares, check
+from seakeep import Expression, HankelDMDc, SlowSquares, check
 from seakeep.core.observables import slow_kernel
 from seakeep.errors import RequestError
 
@@ -33,7 +33,7 @@ def drifting_run(seed=0, samples=2000, waves=None, **attrs):
 
 @pytest.fixture(scope="module")
 def model():
-    spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=(Powers("eta", (2,)),))
+    spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=(Expression("square", "eta**2"),))
     return spec.fit(drifting_run(), ["surge"], ["eta"])
 
 
@@ -51,7 +51,7 @@ def test_drift_of_a_square_is_its_own(model):
 
 
 def test_slow_squares_answer_by_their_filter():
-    observable = SlowSquares("eta", orders=(0,), lags=(0,), lead=1.5)
+    observable = SlowSquares("eta", orders=(0,), cutoff=1 / 3, lags=(0,), lead=1.5)
     spec = HankelDMDc(0, 0, 1e-6, delay_rows="exact", observables=(observable,))
     model = spec.fit(drifting_run(), ["surge"], ["eta"])
     found = check.drift(model, {"sea": drifting_run()}).sel(state="surge")

@@ -1,10 +1,8 @@
 """Many ridge regressions from one Gram matrix: folds, columns and λ."""
 
 import numpy as np
-import pytest
 
-from seakeep.core.path import Moments, free_runs, lagged, ridge_path
-from seakeep.core.rollout import rollout
+from seakeep.core.path import Moments, lagged, ridge_path
 
 
 def pairs(seed: int, count: int = 60, p: int = 7, n: int = 2) -> tuple[np.ndarray, np.ndarray]:
@@ -41,25 +39,3 @@ def test_the_path_gives_the_ridge_solution_at_every_lambda():
 def test_lagged_rows_stand_newest_first():
     series = np.arange(10.0)[:, None] * [1.0, 10.0]
     np.testing.assert_array_equal(lagged(series, 3, 2, 2)[1], [4, 40, 3, 30, 2, 20])
-
-
-def test_free_runs_of_several_models_are_those_of_one_after_the_other():
-    rng = np.random.default_rng(4)
-    N, s, q, windows, steps = 2, 3, 3, 4, 25
-    tops = 0.2 * rng.normal(size=(3, N, N * (s + 1)))
-    b = rng.normal(size=(3, N, q))
-    histories = rng.normal(size=(windows, N * (s + 1)))
-    inputs = rng.normal(size=(windows, steps, q))
-    forcing = np.einsum("wtq,mnq->mwtn", inputs, b)
-    found = free_runs(tops, histories, forcing)
-    for model in range(3):
-        expected = rollout(tops[model], b[model], histories, inputs)
-        # Twenty-five steps of products in another order.
-        np.testing.assert_allclose(found[model], expected, rtol=1e-10, atol=1e-12)
-
-
-def test_a_free_run_that_grows_beyond_all_numbers_stays_alone():
-    tops = np.array([[[1e200]], [[0.5]]])
-    out = free_runs(tops, np.ones((1, 1)), np.zeros((2, 1, 5, 1)))
-    assert not np.isfinite(out[0, 0, -1, 0])
-    assert out[1, 0, -1, 0] == pytest.approx(0.5**5)

@@ -21,7 +21,6 @@ SETTINGS = {
     "ridge rows": {"delay_rows": "ridge"},
     "lead": {"lead": 6},
     "observables": {"lead": 6, "observables": (SQUARES, seakeep.Powers("eta_fwd"))},
-    "rest": {"alignment": ProbeAlignment(mode="dispersion", surge="none", offset=-0.3)},
     "aligned": {
         "lead": 6,
         "alignment": ProbeAlignment(mode="dispersion", surge="predicted"),
@@ -429,7 +428,7 @@ def test_what_cannot_be_is_refused(models, ensemble, runs, run):
     model = models["plain"]
     aligned = spec(alignment=ProbeAlignment(mode="dispersion", surge="measured"))
     without = aligned.fit(runs, [name for name in STATES if name != "surge"], INPUTS)
-    with pytest.raises(RequestError, match="carries waves to the measured 'surge', which a live"):
+    with pytest.raises(RequestError, match="carried over whole records, which are not"):
         without.live()
     with pytest.raises(RequestError, match=r"it is a member .* Use ensemble.hold\(\).live\(\)"):
         ensemble.member(1).live()

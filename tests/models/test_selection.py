@@ -21,7 +21,7 @@ from seakeep import (
     metrics,
 )
 from seakeep.models.labelled import mean_period
-from seakeep.models.selection import RIDGES, WORST, select
+from seakeep.models.selection import RIDGES, WORST, default_observables, select
 
 DT, PERIOD = 0.1, 10  # s, samples
 STATES, INPUTS = ["heave", "drift"], ["eta"]
@@ -196,9 +196,9 @@ def test_unseen_seas_are_offered_the_envelopes_of_several_probes_alone():
         )
         for folds in ("run", "sea_state")
     }  # fmt: skip
-    squares = {folds: each.settings.observables[0] for folds, each in found.items()}
-    assert (squares["run"].orders, squares["run"].lead) == ((0, 1, 2), 0.75)
-    assert (squares["sea_state"].orders, squares["sea_state"].lead) == ((0,), 0.0)
+    seen, unseen = (default_observables(["eta", "eta_2"], 1.0, each)[0] for each in (False, True))
+    assert (seen.orders, seen.lead) == ((0, 1, 2), 0.75)
+    assert (unseen.orders, unseen.lead) == ((0,), 0.0)
     # Each run is a sea state of its own here, so that both judge alike: by the lowest error, or by
     # the largest λ that is as good.
     for folds, each in found.items():

@@ -51,6 +51,8 @@ state_delays = 6
 input_delays = 20
 ridge = 1e-2
 alignment = { mode = "dispersion", surge = "predicted" }
+delay_rows = "exact"
+lead = "0.75 T"
 [models.bayesian]
 kind = "bayesian_hankel_dmdc"
 n_members = 3
@@ -59,6 +61,8 @@ state_delays = { uniform = ["0.3 T", "0.6 T"] }
 input_delays = { uniform = ["1 T", "2 T"] }
 ridge = 1e-2
 alignment = { mode = "dispersion", surge = "predicted" }
+delay_rows = "exact"
+lead = "0.75 T"
 [tests.later]
 runs = ["sea"]
 windows = 2

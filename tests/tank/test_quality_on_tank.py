@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from seakeep.signals.waves import noise_floor
 
 import quality
 from quality import FAULTS
 from seakeep.core.metrics import slack_share
+from seakeep.signals.waves import noise_floor
 from seakeep.tank.play import play_run, truth
 
 pytest.importorskip("numba", reason="needs the extra tank")

@@ -16,7 +16,7 @@ from scipy import linalg
 
 from seakeep.arrays import FloatArray, IntArray
 
-__all__ = ["Moments", "free_runs", "lagged", "ridge_path", "truncated_path"]
+__all__ = ["Moments", "lagged", "ridge_path", "truncated_path"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,35 +176,3 @@ def lagged(series: FloatArray, first: int, count: int, lags: int) -> FloatArray:
     """
     blocks = [series[first - lag : first - lag + count] for lag in range(lags + 1)]
     return np.concatenate(blocks, axis=1)
-
-
-def free_runs(top: FloatArray, histories: FloatArray, forcing: FloatArray) -> FloatArray:
-    """Free runs of several models over several windows, side by side.
-
-    Parameters
-    ----------
-    top : ndarray, shape (model, N, N(s+1))
-        Rows of Â for the newest block; the delayed states shift exactly.
-    histories : ndarray, shape (window, N(s+1))
-        Extended states at the starts, newest block first.
-    forcing : ndarray, shape (model, window, steps, N)
-        What the inputs add at each step.
-
-    Returns
-    -------
-    ndarray, shape (model, window, steps, N)
-        States after the starts; not finite from where a run is lost.
-    """
-    models, windows, steps, count = forcing.shape
-    size = histories.shape[1]
-    # Newest first, so that the extended state of each step is a block of one buffer.
-    line = np.empty((models, windows, steps * count + size))
-    line[..., steps * count :] = histories
-    turned = np.ascontiguousarray(top.transpose(0, 2, 1))
-    with np.errstate(over="ignore", invalid="ignore"):
-        for step in range(steps):
-            at = (steps - step) * count
-            state = line[..., at : at + size]
-            line[..., at - count : at] = state @ turned + forcing[:, :, step]
-    out = line[..., : steps * count].reshape(models, windows, steps, count)
-    return out[:, :, ::-1]

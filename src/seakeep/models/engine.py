@@ -41,10 +41,10 @@ __all__ = [
     "cut_lost",
     "driven",
     "first_lost",
-    "followed_runs",
     "group_series",
     "linear_runs",
     "member_series",
+    "model_runs",
     "read_groups",
     "read_windows",
     "run_members",
@@ -480,11 +480,11 @@ def linear_runs(
 def _runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
     if all(windows.table is None for windows in groups):
         return _open_runs(member, groups)
-    return [followed_runs(member, member.coefficients[None], windows)[0] for windows in groups]
+    return [model_runs(member, member.coefficients[None], windows)[0] for windows in groups]
 
 
-def followed_runs(scales: Dynamics, coefficients: FloatArray, windows: Windows) -> FloatArray:
-    """Free runs of models that follow their own surge, (model, window, steps, N), physical units.
+def model_runs(scales: Dynamics, coefficients: FloatArray, windows: Windows) -> FloatArray:
+    """Free runs of models of the same delays and moments, side by side.
 
     Parameters
     ----------
@@ -493,9 +493,16 @@ def followed_runs(scales: Dynamics, coefficients: FloatArray, windows: Windows) 
     coefficients : ndarray, shape (model, N, N(s+1) + n(z+1) + m)
         [Â B̂] of each.
     windows : Windows
-        With a table.
+        What they read.
+
+    Returns
+    -------
+    ndarray, shape (model, window, steps, N)
+        Physical units; NaN from where a run is lost.
     """
-    assert windows.table is not None
+    if windows.table is None:
+        members = (replace(scales, coefficients=each) for each in coefficients)
+        return np.stack([_open_runs(member, [windows])[0] for member in members])
     assert windows.starts is not None
     follows, z, s = scales.follows, scales.input_delays, scales.state_delays
     assert follows is not None

@@ -503,6 +503,10 @@ class FittedAlignment:
                 out[column] += reference - float(here)
         return out
 
+    def carries_in(self, run: xr.Dataset) -> bool:
+        """Whether waves are carried at all in a run."""
+        return self.settings.carries or bool(np.any(self.offsets(run)))
+
     def positions_in(self, run: xr.Dataset) -> tuple[float | None, ...]:
         """Position of each input's probe in a run, m; that in training where it states none."""
         found = [_position(run, channel) for channel in self.inputs]

@@ -51,11 +51,9 @@ STATE = "live state"
 PAIRS = 8
 """Pairs of futures of the waves that are drawn where they are not known."""
 RECORD = 16
-"""Record that is kept, in longest delays: what waves are predicted from, and carried by."""
+"""Record that is kept, in longest delays: what waves are predicted from."""
 LEAST_RECORD = 512
 """Samples of record that are kept at least."""
-BLOCK = 16
-"""Samples whose waves an alignment carries together: that costs as much for one as for many."""
 CONSISTENCY = 256
 """Samples over which the consistency is averaged, as a time constant; twice as many as a free run
 lasts, at least, where it is that of free runs."""
@@ -134,16 +132,14 @@ class Live:
         self._noise = _noise(signature, noise)
         chain = Chain.of(signature.input_map)
         self._follows = signature.input_map.follows
-        # What carries waves by the measured record, of which a model that follows has no need.
-        self._alignment = chain.alignment if self._follows is None else None
-        if (aligned := self._alignment) is not None and aligned.settings.surge == "measured":
-            channel = aligned.settings.surge_channel
-            if channel not in signature.states:
-                raise RequestError(
-                    f"the model carries waves to the measured '{channel}', which a live model "
-                    f"takes from its states, and these are {', '.join(signature.states)}. Fit it "
-                    f"with '{channel}' among them, or with surge = 'predicted' or 'none'."
-                )
+        rig = _dataset(signature, self._rig)
+        aligned = chain.alignment
+        if aligned is not None and self._follows is None and aligned.carries_in(rig):
+            raise RequestError(
+                "the model is driven by waves that are carried over whole records, which are not "
+                "there in service. Fit it with alignment mode = 'dispersion', surge = 'predicted', "
+                "which carries them in each step, or without alignment."
+            )
         self._places, self._depth = _places(signature, chain.alignment, self._rig)
         self._offset, self._a, self._b, self._d = _mean_predictor(members, signature)
         count, s = len(signature.states), signature.state_delays
@@ -154,26 +150,23 @@ class Live:
         self._deviation_known = np.sqrt(np.diagonal(process) + variances)
         # Samples after an instant whose input is needed before its estimate is final.
         self._time = math.nan
-        none = self._run(0, np.zeros((0, len(signature.inputs))))
-        ahead = signature.input_map.look_ahead(none, signature.dt)
-        self._ahead = math.ceil(ahead / signature.dt - 1e-6)
+        self._ahead = signature.lead_samples
         # Of a model that follows its own surge: the map with its carriers in this rig, and filters
         # that predict the probes from one another; rows at all places of the samples to come.
         self._following = next((each for each in chain.maps if isinstance(each, Following)), None)
         self._table = (0, np.empty(0))
         if self._following is not None:
-            self._banks = self._following.banks(none)
-            self._foresight = self._following.foresight(none, max(self._ahead, 1))
-        self._block = 1 if self._alignment is None else BLOCK
+            self._banks = self._following.banks(rig)
+            self._foresight = self._following.foresight(rig, max(self._ahead, 1))
         longest = max(s, signature.input_delays) + 1
-        needed = 2 * (signature.history_samples + self._ahead + self._block)
+        needed = 2 * (signature.history_samples + self._ahead + 1)
         self._record = max(LEAST_RECORD, needed, RECORD * longest)
         delayed, direct = signature.input_scale.mean.size, signature.direct_scale.mean.size
         widths = {"u": len(signature.inputs), "x": count, "y": count}
         widths |= {"delayed": delayed, "direct": direct}
         room = 2 * self._record
         self._kept = {name: np.full((room, width), np.nan) for name, width in widths.items()}
-        slots = self._ahead + self._block + 1
+        slots = self._ahead + 2
         self._gains = np.zeros((slots, size, count))
         self._whitenings = np.zeros((slots, count, count))
         self._deviations = np.zeros((slots, count))
@@ -443,7 +436,7 @@ class Live:
             place["final"] = at
             return
         final = at - max(self._ahead - 1, 0)
-        if final - place["final"] >= self._block:
+        if final > place["final"]:
             self._find_rows(final, self._known_inputs())
             place["rows"] = final
             self._advance(self._history, place["final"] + 1, final, is_final=True)
@@ -535,54 +528,22 @@ class Live:
         if stop <= first:
             return
         begin = self._at["filled"] - min(self._at["filled"], self._record)
-        measured = Measured(known, begin)
-        # Direct regressors are wanted from the first prediction on.
-        spans = [Span(first, max(first, self._at["begins"] - 1), stop)]
-        run = None
         if self._following is not None and self._follows is not None:
             surge = self._x[begin : self._at["filled"], self._follows.column]
             drive = Followed(self._following, Measured(known, begin, surge), self._banks)
+            places = drive.places(first, stop)
             self._table = (first, drive.table(first, stop))
             self._kept["delayed"][first:stop] = read_table(
-                self._follows.place,
-                self._table[1],
-                np.arange(stop - first),
-                drive.places(first, stop),
+                self._follows.place, self._table[1], np.arange(stop - first), places
             )
             self._kept["direct"][first:stop, :-1] = drive.direct(first, stop)
             return
-        if self._alignment is not None:
-            spans.append(Span(first, stop - 1, stop))
-            run = self._run(begin, known)
-            # Samples count from the start of the run there.
-            measured = Measured(known)
-            spans = [Span(*(each - begin for each in span)) for span in spans]
-        wrapped = signature.input_map.wrap(measured, run, spans)
-        found: Regressors = wrapped.rows(spans[0].first, spans[0].stop)
+        # Direct regressors are wanted from the first prediction on.
+        span = Span(first, max(first, self._at["begins"] - 1), stop)
+        wrapped = signature.input_map.wrap(Measured(known, begin), None, [span])
+        found: Regressors = wrapped.rows(first, stop)
         self._kept["delayed"][first:stop] = found.delayed
         self._kept["direct"][first:stop] = found.direct
-
-    def _run(self, begin: int, inputs: FloatArray) -> xr.Dataset:
-        """Dataset of the record from a place on; states to come are held at their last mean."""
-        signature, size = self.signature, len(inputs)
-        states, time = np.empty((size, len(signature.states))), np.arange(size) * signature.dt
-        if size:
-            known = self._x[begin : self._at["filled"]]
-            states[: len(known)] = known
-            states[len(known) :] = known[-1 - signature.state_delays :].mean(axis=0)
-            time += self._time - (len(known) - 1) * signature.dt
-        variables = {
-            label.name: ("time", column, {"units": label.units})
-            for labels, table in (
-                (signature.state_labels, states),
-                (signature.input_labels, inputs),
-            )
-            for label, column in zip(labels, table.T, strict=True)
-        }
-        run = xr.Dataset(variables, coords={"time": time}, attrs=self._rig["run"])
-        for name, position in self._rig["positions"].items():
-            run[name].attrs["x_position"] = position
-        return run
 
     @one_blas_thread()
     def forecast(
@@ -706,11 +667,6 @@ class Live:
     def _windows(self, steps: int, futures: Sequence[FloatArray]) -> Windows:
         """What a forecast reads, for each future."""
         signature, filled = self.signature, self._at["filled"]
-        if self._alignment is not None:
-            begin = filled - min(filled, self._record)
-            runs = {str(number): self._run(begin, each) for number, each in enumerate(futures)}
-            places = [(name, self._time) for name in runs]
-            return engine.read_windows(signature, runs, places, steps)
         history = self._x[filled - signature.state_samples : filled]
         back = signature.input_map.history(signature.input_delays) + 1
         size = min(filled, self._record)
@@ -718,7 +674,7 @@ class Live:
         if not signature.inputs:
             inputs = np.zeros((1, signature.input_delays + steps, 0))
         histories = np.broadcast_to(history, (len(inputs), *history.shape))
-        rig = None if self._follows is None else self._run(0, inputs[0, :0])
+        rig = None if self._follows is None else _dataset(signature, self._rig)
         return engine.array_windows(signature, histories, inputs, steps, rig)
 
     def _error_variances(self, steps: int) -> FloatArray:
@@ -763,10 +719,10 @@ class Live:
         """Views of what samples and forecasts to come read, but for the covariance."""
         place, signature = self._at, self.signature
         filled, slots = place["filled"], len(self._plain)
-        longest = max(signature.state_delays, signature.input_delays)
+        taps = 0 if self._follows is None else self._follows[0].taps.size
+        longest = max(signature.state_delays, signature.input_delays, taps)
         record, tail = (max(filled - each, 0) for each in (self._record, slots + longest + 2))
-        first = {"u": record, "x": tail if self._alignment is None else record}
-        kept = [each[first.get(name, tail) : filled] for name, each in self._kept.items()]
+        kept = [each[record if name == "u" else tail : filled] for name, each in self._kept.items()]
         pending = (place["taken"] - np.arange(filled - 1 - place["final"])) % slots
         used = [slot for slot in pending if not self._plain[slot]]
         of_slots = (self._gains, self._whitenings, self._deviations)
@@ -899,6 +855,14 @@ def _rig(signature: Signature, like: xr.Dataset | None) -> dict[str, dict[str, f
     }
     found = {key: float(like.attrs[key]) for key in RIG if key in like.attrs}
     return {"run": found, "positions": positions}
+
+
+def _dataset(signature: Signature, rig: Mapping[str, Mapping[str, float]]) -> xr.Dataset:
+    """Attributes of a rig as those of a run without samples."""
+    run = xr.Dataset({each: ("time", np.zeros(0)) for each in signature.inputs}, attrs=rig["run"])
+    for name, position in rig["positions"].items():
+        run[name].attrs["x_position"] = position
+    return run
 
 
 def _places(

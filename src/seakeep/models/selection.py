@@ -21,10 +21,10 @@ import xarray as xr
 from seakeep.arrays import BoolArray, FloatArray, IntArray
 from seakeep.conventions import is_elevation
 from seakeep.core import metrics
-from seakeep.core.path import Moments, free_runs, lagged, ridge_path, truncated_path
+from seakeep.core.path import Moments, lagged, ridge_path, truncated_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
-from seakeep.models.engine import Dynamics, Windows, followed_runs
+from seakeep.models.engine import Dynamics, Windows, model_runs
 from seakeep.models.executor import Progress, in_order
 from seakeep.models.following import LEAD, Followed
 from seakeep.models.inputs import FittedAlignment, Measured, Mode, ProbeAlignment, Surge
@@ -314,65 +314,33 @@ class Problem:
 
         They are in the standardised deviations of `data`.
         """
-        if self.data.input_map.follows is not None:
-            return self._followed(candidate, held, steps)
-        data, s, z = self.data, candidate.state_delays, candidate.input_delays
-        fold, (x, u, w), weights = held.fold, held.scales, held.weights
-        kept, direct = self._delayed(candidate), self._direct(candidate)
-        size = len(x[0]) * (s + 1)
-        top, rest = weights[..., :size], weights[..., size:]
-        starts = self._starts(fold, steps)
-        histories = np.concatenate(
-            [lagged((data.states[fold] - x[0]) / x[1], at, 1, s) for at in starts]
-        )
-        ahead = self._ahead(candidate)
-        delayed = ((data.delayed[fold] - u[0]) / u[1])[:, kept]
-        straight = ((data.direct[fold] - w[0]) / w[1])[:, direct]
-        driving = np.stack(
-            [
-                np.concatenate(
-                    [lagged(delayed, at - ahead, steps, z), straight[at : at + steps]], axis=1
-                )
-                for at in starts
-            ]
-        )
-        forcing = np.einsum("wtp,lnp->lwtn", driving, rest, optimize=True)
-        return free_runs(top, histories, forcing) * x[1] + x[0]
-
-    def _followed(self, candidate: Candidate, held: _Regression, steps: int) -> FloatArray:
-        """As :meth:`_forecast`, of models that follow their own surge."""
         data, fold, follows = self.data, held.fold, self.data.input_map.follows
-        assert follows is not None
+        s, z, ahead = candidate.state_delays, candidate.input_delays, self._ahead(candidate)
         kept, direct = self._delayed(candidate), self._direct(candidate)
-        x, u, w = (
-            _scale(own, moments, part)
-            for own, moments, part in zip(
-                (data.state_scale, data.input_scale, data.direct_scale),
-                held.scales,
-                (slice(None), kept, direct),
-                strict=True,
-            )
-        )
-        drive, offset = self.drives[fold], self.offsets[fold]
-        starts = self._starts(fold, steps)
-        known, rows = starts + offset, max(candidate.state_delays + 1, follows.place.taps.size)
+        own = (data.state_scale, data.input_scale, data.direct_scale)
+        parts = (slice(None), kept, direct)
+        x, u, w = (_scale(*each) for each in zip(own, held.scales, parts, strict=True))
+        starts, rows, read = self._starts(fold, steps), s + 1, steps
+        if follows is not None:
+            rows, read = max(rows, follows.place.taps.size), 0
         states = data.state_scale.physical(data.states[fold])
         delayed = data.input_scale.physical(data.delayed[fold])[:, kept]
-        every = data.direct_scale.physical(data.direct[fold])[:, direct][:, :-1]
+        straight = data.direct_scale.physical(data.direct[fold])[:, direct]
         windows = Windows(
             places=(("a run held out", 0.0),) * len(starts),
             steps=steps,
             time=(),
             histories=np.stack([states[at + 1 - rows : at + 1] for at in starts]),
-            delayed=np.stack([delayed[at - candidate.input_delays : at] for at in starts]),
-            direct=np.stack([every[at : at + steps] for at in starts]),
-            table=drive.table(int(known[0]), int(known[-1]) + steps)[:, :, kept],
-            starts=known - known[0],
+            delayed=np.stack([delayed[at - ahead - z : at - ahead + read] for at in starts]),
+            direct=np.stack([straight[at : at + steps] for at in starts]),
         )
-        scales = Dynamics(
-            held.weights[0], candidate.state_delays, candidate.input_delays, x, u, w, follows
-        )
-        found = followed_runs(scales, held.weights, windows)
+        if follows is not None:
+            first, last = starts[[0, -1]] + self.offsets[fold]
+            table = self.drives[fold].table(int(first), int(last) + steps)[:, :, kept]
+            squares = windows.direct[..., :-1]
+            windows = replace(windows, direct=squares, table=table, starts=starts - starts[0])
+        scales = Dynamics(held.weights[0], s, z, x, u, w, follows)
+        found = model_runs(scales, held.weights, windows)
         return data.state_scale.deviations(np.nan_to_num(found, nan=np.inf))
 
     def _system(
@@ -967,7 +935,7 @@ def default_observables(
     if not looks_ahead:
         slow = SlowSquares(elevations, lead=0.0, period=period)
     elif unseen and len(at_vessel) > 1:
-        slow = replace(slow, orders=(0,), lead=0.0)
+        slow = replace(slow, orders=(0,), cutoff=1 / 3, lead=0.0)
     return slow, Powers(elevations)
 
 
@@ -1039,9 +1007,7 @@ def _defaults(
 ) -> list[tuple[Observable, ...]]:
     """Observables to choose among, and fewer of them for runs that are too short."""
     elevations = [
-        label.name
-        for label in labelled.common_labels(runs, inputs)
-        if label.units in ("", "m")  # not their rates
+        label.name for label in labelled.common_labels(runs, inputs) if is_elevation(label.name)
     ]
     follows = settings.alignment is not None and settings.alignment.surge == "predicted"
     looks_ahead = settings.lead > 0 or not follows
