@@ -82,7 +82,7 @@ def test_lengths_in_periods(text, value, unit):
     assert parse_length(text) == Length(value, unit)
 
 
-@pytest.mark.parametrize("text", ["T", "1", "1 s", "1 t", "1 T/2", "one T", "", "1,5 T", "1 T T"])
+@pytest.mark.parametrize("text", ["T", "1", "1 t", "1 T/2", "one T", "", "1,5 T", "1 T T"])
 def test_what_is_no_length(text):
     with pytest.raises(RequestError, match=r"counts in encounter periods, such as '1\.5 T'"):
         parse_length(text)

@@ -282,12 +282,12 @@ def anrmse_differences(
         values.append(own)
         draws.append(redrawn)
         blocks += held
-        bounds.append(student_interval(_change(own), _change(redrawn), held, level, -1))
+        bounds.append(student_interval(_ratio(own), _ratio(redrawn), held, level, -1))
         own_bounds.append(student_interval(own, redrawn, held, level, -1))
     anrmses, pooled = np.stack(values, axis=-1), np.mean(draws, axis=0)
     means = anrmses.mean(axis=-1)
     lower, upper = np.stack(bounds, axis=-1)
-    all_lower, all_upper = student_interval(_change(means), _change(pooled), blocks, level, -1)
+    all_lower, all_upper = student_interval(_ratio(means), _ratio(pooled), blocks, level, -1)
     own_lower, own_upper = np.stack(own_bounds, axis=-1)
     all_own = student_interval(means, pooled, blocks, level, -1)
     grid, single = ("model", "run"), ("model",)
@@ -296,24 +296,24 @@ def anrmse_differences(
             "anrmse": (grid, anrmses),
             "anrmse_lower": (grid, own_lower),
             "anrmse_upper": (grid, own_upper),
-            "change": (grid, _change(anrmses)),
-            "lower": (grid, lower),
-            "upper": (grid, upper),
+            "change": (grid, _ratio(anrmses) - 1.0),
+            "lower": (grid, lower - 1.0),
+            "upper": (grid, upper - 1.0),
             "all_anrmse": (single, means),
             "all_anrmse_lower": (single, all_own[0]),
             "all_anrmse_upper": (single, all_own[1]),
-            "all_change": (single, _change(means)),
-            "all_lower": (single, all_lower),
-            "all_upper": (single, all_upper),
+            "all_change": (single, _ratio(means) - 1.0),
+            "all_lower": (single, all_lower - 1.0),
+            "all_upper": (single, all_upper - 1.0),
         },
         attrs={"level": level},
     )
 
 
-def _change(values: FloatArray) -> FloatArray:
-    """Change from the first entry, relative to it; zero for the first itself."""
+def _ratio(values: FloatArray) -> FloatArray:
+    """Ratio to the first entry; one for the first itself."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        out: FloatArray = values / values[0] - 1.0
+        out: FloatArray = values / values[0]
     return out
 
 

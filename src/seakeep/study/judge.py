@@ -161,20 +161,18 @@ def difference_table(
     cells = np.concatenate([average_of(cells)[..., None], cells], axis=-1)
     cells = np.where(judged[..., None, None, None], cells, np.nan)
 
-    def change(drawn: FloatArray) -> FloatArray:
+    def ratio(drawn: FloatArray) -> FloatArray:
         middle = median_of(drawn.reshape(len(drawn), -1, *drawn.shape[3:]))
         with np.errstate(divide="ignore", invalid="ignore"):
-            out: FloatArray = middle[:, :, None] / middle[:, None] - 1.0
+            out: FloatArray = middle[:, :, None] / middle[:, None]
         return out
 
-    found = change(cells[None])[0]
-    bounds = statistics.two_way_interval(
-        change, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES
-    )
+    found = ratio(cells[None])[0]
+    bounds = statistics.two_way_interval(ratio, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES)
     dims = ("model", "other", "measure", "channel")
     return xr.Dataset(
         {
-            key: (dims, values)
+            key: (dims, values - 1.0)
             for key, values in zip(("change", "lower", "upper"), (found, *bounds), strict=True)
         },
         coords={
