@@ -1,6 +1,7 @@
 """What a model in service costs, and what it gives up: steps, bands, and the chain of raw samples.
 
 python benchmarks/live.py steps [COUNT]                  # time and memory of COUNT steps
+python benchmarks/live.py service CAMPAIGN.toml                   # what `recommended` costs
 python benchmarks/live.py bands CAMPAIGN.toml [KIND [STARTS]]     # errors and bands; KIND of SPECS
 python benchmarks/live.py lost CAMPAIGN.toml                      # filling of lost samples of waves
 python benchmarks/live.py chain MODEL.nc CAMPAIGN.toml RUN    # live chain against the offline one
@@ -61,6 +62,47 @@ def steps(count=1_000_000):
             print(
                 f"{number + 1} steps: {spent:.0f} µs of CPU per step, {memory() - before:+.1f} MiB"
             )
+
+
+def service(campaign):
+    """Time of the recommended model of two runs, served in the third: medians, ms of CPU."""
+    read = seakeep.read_campaign(campaign)
+    names, channels = read.training_runs, read.model()
+    runs = load_prepared(read, names=names)
+    run, dt = runs[names[-1]], float(runs[names[0]].attrs["dt"])
+    begun = time.process_time()
+    spec = seakeep.HankelDMDc.recommended(read.seconds("1 T"), dt)
+    others = [runs[each] for each in names]
+    spec.fit(others, list(channels.states), list(channels.inputs))
+    print(f"choice and fit, {len(others)} runs: {time.process_time() - begun:.1f} s")
+    model = spec.fit(others[:-1], list(channels.states), list(channels.inputs))
+    u = np.stack([run[each].values for each in model.inputs], axis=1)
+    y = np.stack([run[each].values for each in model.states], axis=1)
+    live, at = model.live(like=run), 1500
+    for number in range(at):
+        live.step(u[number], y[number])
+    dead = y.copy()
+    dead[:, 0] = np.nan
+
+    def step(inputs, states):
+        nonlocal at
+        at += 1
+        return live.step(inputs[at] if inputs is not None else None, states[at])
+
+    calls = {
+        "forecast of 15 T": lambda: model.forecast(run, float(run.time[at]), 15 * 32),
+        "blind forecast of 10 s with band": lambda: live.forecast(round(10 / dt)),
+        "complete step": lambda: step(u, y),
+        "step with a dead sensor": lambda: step(u, dead),
+        "lost sample": lambda: step(None, np.full_like(y, np.nan)),
+    }
+    for words, call in calls.items():
+        spent = []
+        for _ in range(20):
+            begun = time.process_time()
+            call()
+            spent.append(1e3 * (time.process_time() - begun))
+        print(f"{words}: {np.median(spent):.2f} ms")
 
 
 def bands(campaign, kind="plain", starts=60):
@@ -186,4 +228,6 @@ def chain(model, campaign, name, until=120.0):
 
 
 if __name__ == "__main__":
-    {"steps": steps, "bands": bands, "lost": lost, "chain": chain}[sys.argv[1]](*sys.argv[2:])
+    {"steps": steps, "service": service, "bands": bands, "lost": lost, "chain": chain}[sys.argv[1]](
+        *sys.argv[2:]
+    )

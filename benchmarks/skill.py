@@ -102,6 +102,34 @@ runs = ["{name}"]
 length = 5
 placement = "apart"
 """
+HIGHER_STUDY = """
+[study]
+campaign = "campaign.toml"
+preset = "recommended"
+
+[training]
+scheme = "pooled"
+runs = ["irregular_1", "irregular_2"]
+
+[models.paper]
+preset = "paper"
+alignment = { mode = "effective", surge = "measured" }
+
+[models.recommended]
+
+[tests.higher]
+runs = ["irregular_3"]
+length = 15
+windows = 40
+placement = "apart"
+
+[statistics]
+n_series = 10
+
+[output]
+shown_windows = 1
+eigenvalues = false
+"""
 SEA_STATES = """
 [study]
 campaign = "ship_section.toml"
@@ -142,6 +170,8 @@ eigenvalues = false
 LEFT_OUT = {"waves": "20 to 50 s", "ends": "last 30 s"}
 """Where windows of 15 T̂ lie in runs of a sea state that is left out."""
 ROLE, SPANS = re.compile('role = "(train|test)"'), "train = [0.0, 54.9]\ntest = [20.0, 50.0]"
+HIGHER, RISE = "irregular, 67 % higher than trained, 15 T̂", 1 / 0.6
+"""Seas of two runs that train are lower, by which the third one's are higher."""
 WINDOWS = "irregular, 15 T̂"
 GOALS = {
     (WINDOWS, "ANRMSE"): (0.18, 0.14),
@@ -198,7 +228,7 @@ def studies_of(work: Path, seed: int, law: str) -> Results:
     )
     (folder / "whole.toml").write_text(whole, encoding="utf-8")
     baselines = "".join(f'[models.{kind}]\nkind = "{kind}"\n\n' for kind in BASELINES)
-    found: dict[str, StudyResult] = {}
+    found: dict[str, StudyResult] = {"higher": higher_seas(work, seed, law, progress)}
     for name, of, scheme, tests in (
         ("irregular", "campaign", "leave_out", IRREGULAR),
         ("regular", "whole", "pooled", "".join(IN_REGULAR.format(name=name) for name in REGULAR)),
@@ -207,6 +237,21 @@ def studies_of(work: Path, seed: int, law: str) -> Results:
         result = result_of(folder, name, text, progress)
         found |= dict.fromkeys(result.tests, result)
     return found
+
+
+def higher_seas(work: Path, seed: int, law: str, progress: Progress) -> StudyResult:
+    """Models of two runs in low seas, judged in a higher one."""
+    folder = work / f"seed_{seed}_{law}_higher"
+    if not (folder / "campaign.toml").exists():
+        settings = with_waves(default_settings(), seed, "jittered")
+        runs = {name: run for name, run in settings.runs.items() if run.spectrum is not None}
+        for name in list(runs)[:2]:
+            low = {"height": runs[name].spectrum.height / RISE}
+            spectrum = runs[name].spectrum.model_copy(update=low)
+            runs[name] = runs[name].model_copy(update={"spectrum": spectrum})
+        drift = settings.drift.model_copy(update={"law": law})
+        play(settings.model_copy(update={"runs": runs, "drift": drift}), folder, progress=progress)
+    return result_of(folder, "higher", HIGHER_STUDY, progress)
 
 
 def result_of(folder: Path, name: str, text: str, progress: Progress) -> StudyResult:
@@ -262,6 +307,23 @@ def goals(found: Mapping[str, Results]) -> list[str]:
         "measured surge, errs less.",
         "",
         *markdown(("test", "error", "good", "stretch", *found, "reached"), rows),
+    ]
+
+
+def in_higher_seas(found: Mapping[str, Results]) -> list[str]:
+    """Errors in seas that are higher than those of training."""
+    rows = [
+        [HIGHER, short, f"`{model}`"]
+        + [f"{median(each, 'higher', model, channel):.3f}" for each in found.values()]
+        for channel, short in WORDS.items()
+        for model in ("paper", "recommended")
+    ]
+    return [
+        "## Higher seas than those of training",
+        "",
+        "Trained on two runs in seas of six tenths of the height, judged in the third.",
+        "",
+        *markdown(("test", "error", "model", *found), rows),
     ]
 
 
@@ -431,7 +493,7 @@ def main() -> None:
         work = options.work or Path(temporary)
         found = {f"seed {seed}": studies_of(work, seed, "newman") for seed in options.seeds}
         found |= {f"seed {seed}, QTF": studies_of(work, seed, "qtf") for seed in options.qtf}
-        lines = [*goals(found), *coverage(found), *side_by_side(found)]
+        lines = [*goals(found), *in_higher_seas(found), *coverage(found), *side_by_side(found)]
         if os.environ.get("SEAKEEP_DATA_DIR"):
             lines += measured(work, told("measured"))
     facts = machine()

@@ -23,7 +23,7 @@ def test_sources_take_the_name_of_the_model_and_the_instants_are_told(run, tmp_p
     status, said = run("--c", "library")
     assert status == 0
     assert {path.name for path in (tmp_path / "library").iterdir()} == {"my_model.c", "my_model.h"}
-    lead = "A step of 0.1 s takes the inputs 6 samples (0.6 s) after the instant that it starts"
+    lead = "A step of 0.1 s takes the inputs 16 samples (1.6 s) after the instant that it starts"
     assert lead in said
 
 

@@ -14,7 +14,10 @@ from seakeep.models.inputs import Chain, Measured
 from seakeep.models.interface import Span
 
 FOLLOWED = ProbeAlignment(mode="dispersion", surge="predicted")
-OBSERVABLES = (SlowSquares("eta_cog", lags=(0, 1)), Powers(("eta_fwd", "eta_cog")))
+OBSERVABLES = (
+    SlowSquares("eta_cog", cutoff=1.0, lead=0.75, lags=(0, 1)),
+    Powers(("eta_fwd", "eta_cog")),
+)
 SPEC = HankelDMDc(
     10, 40, 1e-3, delay_rows="exact", alignment=FOLLOWED, lead=12, observables=OBSERVABLES
 )
@@ -119,6 +122,11 @@ def test_a_step_is_the_equation(models):
     expected = signature.state_scale.physical(model.coefficients @ regressors)
     found = model.forecast(run, start=start * DT, steps=1)
     np.testing.assert_allclose([found[each].values[0] for each in STATES], expected, atol=1e-12)
+
+
+def test_a_ridge_weighs_a_hundred_times_on_powers(models):
+    scale = models["ahead"].signature.input_scale
+    np.testing.assert_allclose(scale.std / scale.spread, [1, 1, 10, 10, 10, 10])  # √100
 
 
 def test_training_is_the_recursion_on_the_measured_surge(models):

@@ -19,7 +19,7 @@ import math
 import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self, cast
 
 import numpy as np
 import xarray as xr
@@ -655,8 +655,12 @@ class Chain:
 
     @property
     def stretch(self) -> tuple[FloatArray, FloatArray] | None:
-        """Factors of the standard deviations that the columns are divided by; None for ones."""
-        return next((each.stretch for each in self.maps if hasattr(each, "stretch")), None)
+        """Factors of the standard deviations that the columns are divided by; None for ones.
+
+        λ of a model that follows its own surge is small, and weighs more on powers.
+        """
+        found = (cast("Any", each).stretch for each in self.maps if each.follows)
+        return next(found, None)
 
     def regressors(
         self, inputs: tuple[ChannelLabel, ...]

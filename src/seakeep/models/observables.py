@@ -44,8 +44,8 @@ __all__ = [
 HALF_WIDTH = 0.5
 """Half of the length of the low-pass filter of :class:`SlowSquares`, in periods of its cutoff.
 
-With a cutoff of one per encounter period the filter lasts one encounter period in all: twice the
-wave's frequency, at which a square swings, is damped to a thousandth."""
+With a cutoff of 1/3 per encounter period that is 1.5 encounter periods: a wave of half the
+encounter period's frequency is damped to a fifth, one at the encounter frequency to a hundredth."""
 BOUND = 36.0
 """Squared standard deviations of an input at which its powers begin to grow like the input."""
 STIFF = 100.0
@@ -234,8 +234,8 @@ class SlowSquares:
 
     of: tuple[str, ...]
     orders: tuple[int, ...] = (0, 1, 2)
-    cutoff: float = 1.0
-    lead: float = 0.75
+    cutoff: float = 1 / 3
+    lead: float = 2.0
     lags: tuple[float, ...] = (0, 1, 2, 3, 4, 5)
     period: float | None = None
     kind: ClassVar[str] = "slow_squares"
@@ -320,8 +320,9 @@ class Powers:
     r"""Powers of inputs, and products of pairs of them, with the input delays of the model.
 
     Steep waves move a vessel at wave frequency by more than a linear map of the elevation makes.
-    Powers stay bounded by the input far out, :math:`u^q/(1 + u^2/36σ^2)^{(q-1)/2}`, and λ weighs
-    a hundred times on them, so that seas above those of training are not answered by their cubes.
+    Powers stay bounded by the input far out, :math:`u^q/(1 + u^2/36σ^2)^{(q-1)/2}`, so that seas
+    above those of training are not answered by their cubes; where a model follows its own surge, λ
+    weighs a hundred times on them.
 
     Parameters
     ----------

@@ -706,7 +706,7 @@ def select(
     variants = list(_variants(settings, runs, states, inputs, vary, samples))
     wanted = [settings.observables]
     if "observables" in vary and not settings.observables:
-        wanted = _defaults(settings, runs, inputs, samples * step, folds == "sea_state")
+        wanted = _defaults(settings, runs, states, inputs, samples * step, folds == "sea_state")
     base = Candidate(
         settings.state_delays,
         settings.input_delays,
@@ -917,25 +917,27 @@ def default_observables(
     inputs: Sequence[str],
     period: float | None = None,
     unseen: bool = False,
-    looks_ahead: bool = True,
+    follows: int | None = None,
 ) -> tuple[Observable, ...]:
     """Slow squares of the elevation at the vessel, or of all, and powers of all elevations.
 
     `period` is the encounter period, s; by default that of the training runs. Where what is chosen
     must hold in sea states that are `unseen`, several elevations give their envelopes alone,
     without a look-ahead: few training seas do not tell how a force is weighed by frequency, and
-    probes away from the vessel see the waves before it. A model that does not look ahead takes
-    those of all elevations: the ones up-wave tell what comes.
+    probes away from the vessel see the waves before it. A model that `follows` its own surge and
+    looks so many samples ahead takes a filter of one period that reads no further than its waves;
+    without a look-ahead the squares of all elevations, of which those up-wave tell what comes.
     """
     elevations = tuple(name for name in inputs if is_elevation(name))
     if not elevations:
         return ()
     at_vessel = tuple(name for name in elevations if name == "eta_cog") or elevations
     slow = SlowSquares(at_vessel, period=period)
-    if not looks_ahead:
-        slow = SlowSquares(elevations, lead=0.0, period=period)
+    if follows is not None:
+        lead, of = (0.75, at_vessel) if follows else (0.0, elevations)
+        slow = replace(slow, of=of, cutoff=1.0, lead=lead)
     elif unseen and len(at_vessel) > 1:
-        slow = replace(slow, orders=(0,), cutoff=1 / 3, lead=0.0)
+        slow = replace(slow, orders=(0,), lead=0.0)
     return slow, Powers(elevations)
 
 
@@ -1001,6 +1003,7 @@ def _alignments(
 def _defaults(
     settings: HankelSettings,
     runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
     inputs: Sequence[str],
     period: float,
     unseen: bool,
@@ -1009,9 +1012,11 @@ def _defaults(
     elevations = [
         label.name for label in labelled.common_labels(runs, inputs) if is_elevation(label.name)
     ]
-    follows = settings.alignment is not None and settings.alignment.surge == "predicted"
-    looks_ahead = settings.lead > 0 or not follows
-    defaults = default_observables(elevations, period, unseen, looks_ahead)
+    aligned, lead = settings.alignment, None
+    if aligned is not None and aligned.surge == "predicted":
+        is_left_out = aligned.optional and aligned.missing(runs, states, inputs)
+        lead = None if is_left_out else int(settings.lead)
+    defaults = default_observables(elevations, period, unseen, lead)
     return list(dict.fromkeys([defaults, defaults[1:], ()]))
 
 
