@@ -75,7 +75,7 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words):
             found.append(np.mean(scores))
         # The house rule for results; but powers are bounded by the spread of all runs there, and
         # by that of those that train here.
-        tolerance = 1e-4 if chosen else 1e-10
+        tolerance = 1e-3 if chosen else 1e-10
         assert float(row["score"]) == pytest.approx(np.mean(found), abs=tolerance)
 
 

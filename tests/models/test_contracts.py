@@ -139,7 +139,7 @@ class TestLead:
 
     @pytest.mark.parametrize("lead", [2.0, -1, True, "-1 T", "2 /T", "inf T"])
     def test_a_number_is_samples_and_a_text_periods(self, lead):
-        with pytest.raises(RequestError, match=r"lead must be zero or more, a whole number of sam"):
+        with pytest.raises(RequestError, match="lead must be"):
             ensemble(lead=lead)
 
 
@@ -411,7 +411,7 @@ class TestUnitsAndNumbers:
 
 
 def test_a_history_inside_the_window_is_not_counted_twice():
-    draw = Draw(1.0, 0.2, 0.5, 1.0, window=50, state_delays=4, input_delays=12, run=None, last=None,
+    draw = Draw((1.0, 0.2, 0.5), 1.0, 50, state_delays=4, input_delays=12, run=None, last=None,
                 redrawn=0)  # fmt: skip
     assert (draw.needed(True), draw.needed(False)) == (50, 62)
     assert draw.needed(True, history=60) == 62  # a pair after the longest history

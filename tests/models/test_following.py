@@ -1,6 +1,5 @@
 """The recursion: a model that carries waves to where its own surge takes the vessel."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -157,16 +156,11 @@ def test_a_probe_that_was_moved_and_says_so_changes_little(models):
         models["ahead"].forecast(run, start=60.0, steps=10)
 
 
-def test_a_file_holds_the_recursion_and_refuses_what_is_none(models, tmp_path):
+def test_a_file_holds_the_recursion(models, tmp_path):
     model, run = models["ahead"], drifting_run(7)
     again = load_model(model.save(tmp_path / "rom.nc"))
     forecasts = [each.forecast(run, start=60.0, steps=50) for each in (again, model)]
     xr.testing.assert_identical(*forecasts)
-    kind = Chain.of(model.signature.input_map).maps[0]
-    for key, wrong in (("power", [-1.0, 1.0]), ("band", [2.0, 1.0]), ("back", -1)):
-        content = json.loads(json.dumps(kind.to_json())) | {key: wrong}
-        with pytest.raises(ValueError, match="carriers of the inputs are not those of a vessel"):
-            type(kind).from_json(content)
 
 
 @pytest.mark.parametrize(
