@@ -228,6 +228,5 @@ def chain(model, campaign, name, until=120.0):
 
 
 if __name__ == "__main__":
-    {"steps": steps, "service": service, "bands": bands, "lost": lost, "chain": chain}[sys.argv[1]](
-        *sys.argv[2:]
-    )
+    calls = (steps, service, bands, lost, chain)
+    {each.__name__: each for each in calls}[sys.argv[1]](*sys.argv[2:])

@@ -7,8 +7,17 @@ import pytest
 import xarray as xr
 from drifting import DT, INPUTS, POSITIONS, STATES, drifting_run
 
-from seakeep import HankelDMDc, Powers, ProbeAlignment, RequestError, SlowSquares, load_model
+from seakeep import (
+    HankelDMDc,
+    Powers,
+    ProbeAlignment,
+    RequestError,
+    SeakeepWarning,
+    SlowSquares,
+    load_model,
+)
 from seakeep.core.recursion import Place, Recursion, recursion
+from seakeep.models.calibration import envelope_of
 from seakeep.models.inputs import Chain, Measured
 from seakeep.models.interface import Span
 
@@ -123,6 +132,20 @@ def test_a_step_is_the_equation(models):
     np.testing.assert_allclose([found[each].values[0] for each in STATES], expected, atol=1e-12)
 
 
+def test_bands_take_the_waves_at_the_place_of_the_start(models):
+    model, run = models["ahead"], drifting_run(7)
+    windows = model.read_windows({"a": run}, [("a", 60.0), ("a", 80.0)], 50)
+    assert windows.delayed.shape == (2, 40 + 50, 6)
+    found = envelope_of(model.signature, windows)
+    still = run.assign(surge=("time", np.full(run.sizes["time"], 0.0), run["surge"].attrs))
+    other = envelope_of(model.signature, model.read_windows({"a": still}, [("a", 60.0)], 50))
+    assert found.shape == (2, 50)
+    assert np.all((found > 0.2) & (found < 3))  # SD of the waves of training
+    assert not np.allclose(found[0], other[0], rtol=1e-3)
+    with pytest.raises(RequestError, match="where its own surge takes it, which no linear system"):
+        model.initial_state(run, 60.0)
+
+
 def test_a_ridge_weighs_a_hundred_times_on_powers(models):
     scale = models["ahead"].signature.input_scale
     np.testing.assert_allclose(scale.std / scale.spread, [1, 1, 10, 10, 10, 10])  # √100
@@ -161,6 +184,16 @@ def test_a_file_holds_the_recursion(models, tmp_path):
     again = load_model(model.save(tmp_path / "rom.nc"))
     forecasts = [each.forecast(run, start=60.0, steps=50) for each in (again, model)]
     xr.testing.assert_identical(*forecasts)
+
+
+def test_a_vessel_beyond_the_reach_of_its_carriers_is_said(models):
+    model, run = models["ahead"], drifting_run(7)
+    low, high = model.signature.input_map.follows.reach
+    assert low < -0.6
+    assert high > 0.6  # the drift of training
+    run["surge"].values[:] += high + 0.7
+    with pytest.warns(SeakeepWarning, match=r"from t = 60\.1 s on the slow surge .* lies beyond"):
+        model.forecast(run, start=60.0, steps=20)
 
 
 @pytest.mark.parametrize(

@@ -321,7 +321,7 @@ def envelope_of(signature: Signature, windows: Windows) -> FloatArray:
     """Root mean square of the waves that drive each step, (window, steps), in training SD.
 
     Over the input delays, and over the inputs as the map carries them; with a predicted surge
-    those of the first pass.
+    those at the place of the start.
     """
     count = len(signature.inputs)
     centre, spread = (

@@ -21,7 +21,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, IntArray, whole_number
-from seakeep.core.recursion import Recursion, recursion
+from seakeep.core.recursion import Recursion, read_table, recursion
 from seakeep.core.rollout import rollouts
 from seakeep.errors import RequestError
 from seakeep.models import labelled
@@ -82,8 +82,8 @@ class Windows:
     histories : ndarray, shape (window, at least s + 1, N)
         Measured states up to each start, physical units.
     delayed : ndarray, shape (window, z + steps, n)
-        Delayed regressors that drive these steps; those before the start, shape (window, z, n),
-        where the model follows its own surge.
+        Delayed regressors that drive these steps; where the model follows its own surge, from the
+        start on those at the place of the start.
     direct : ndarray, shape (window, steps, m)
         Direct regressors from the start on; then without the slow surge squared.
     look_ahead : tuple of float
@@ -257,6 +257,7 @@ def driven(
         )
     found = [drive for drive in drives if isinstance(drive, Followed)]
     pairs = list(zip(found, spans, strict=True))
+    place = signature.input_map.follows.place
     tables, starts, first = [], {}, 0
     for drive in dict.fromkeys(found):
         mine = [span for each, span in pairs if each is drive]
@@ -264,12 +265,18 @@ def driven(
         starts[drive] = first - begin
         tables.append(drive.table(begin, end))
         first += end - begin
+    table = np.concatenate(tables)
+    at = np.array([starts[drive] + span.known for drive, span in pairs])
+    here = np.array([drive.places(span.known, span.known + 1) for drive, span in pairs])
+    steps = np.arange(windows.steps)
+    held = read_table(place, table, at[:, None] + steps, here.repeat(windows.steps, axis=1))
+    before = np.stack([drive.rows(span.first, span.known).delayed for drive, span in pairs])
     return replace(
         windows,
-        delayed=np.stack([drive.rows(span.first, span.known).delayed for drive, span in pairs]),
+        delayed=np.concatenate([before, held], axis=1),
         direct=np.stack([drive.direct(span.known, span.stop) for drive, span in pairs]),
-        table=np.concatenate(tables),
-        starts=np.array([starts[drive] + span.known for drive, span in pairs]),
+        table=table,
+        starts=at,
     )
 
 
@@ -523,7 +530,8 @@ def model_runs(scales: Dynamics, coefficients: FloatArray, windows: Windows) -> 
         offset=float(x.mean[follows.column]),
         column=follows.column,
     )
-    delayed = windows.delayed[:, windows.delayed.shape[1] - z :]
+    known = windows.delayed.shape[1] - windows.steps
+    delayed = windows.delayed[:, known - z : known]
     found, used = recursion(
         models, follows.place, x.deviations(windows.histories), delayed,
         windows.table, windows.starts, forcing,

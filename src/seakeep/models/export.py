@@ -16,7 +16,7 @@ from seakeep.models.interface import Signature
 if TYPE_CHECKING:
     import control
 
-__all__ = ["initial_state", "matrices", "to_control", "to_mat"]
+__all__ = ["check_linear", "initial_state", "matrices", "to_control", "to_mat"]
 
 SYSTEM = "state-space system"
 """What a MATLAB file holds, as its head states it."""
@@ -72,12 +72,23 @@ def matrices(
     return A, B, np.eye(states, size), np.zeros((states, inputs))
 
 
+def check_linear(signature: Signature) -> None:
+    """Refuse a model that follows its own surge."""
+    if signature.input_map.follows is not None:
+        raise RequestError(
+            "the model reads the waves where its own surge takes it, which no linear system can "
+            "represent. Export C sources, an FMU or an ONNX graph, use forecast_arrays, or fit a "
+            "model with alignment surge = 'measured' or 'none'."
+        )
+
+
 def initial_state(signature: Signature, x_history: FloatArray, u_history: FloatArray) -> FloatArray:
     """State of the system of :func:`matrices` at the last row of the histories.
 
     The histories hold at least s + 1 and z + 1 rows; the input at the instant itself is not part
     of the state.
     """
+    check_linear(signature)
     states = (x_history - signature.state_scale.mean)[::-1][: signature.state_delays + 1]
     inputs = (u_history - signature.input_scale.mean)[::-1][1 : signature.input_delays + 1]
     return np.concatenate([states.ravel(), inputs.ravel()])

@@ -170,7 +170,8 @@ class Following:
     def follows(self) -> Follows:
         """Place of the vessel, and the state that it is a sum of."""
         settings = self.alignment.settings
-        return Follows(self.place, self.alignment.states.index(settings.surge_channel))
+        column = self.alignment.states.index(settings.surge_channel)
+        return Follows(self.place, column, self.reach)
 
     @property
     def lead_samples(self) -> int:
@@ -286,7 +287,7 @@ class Following:
         margin = BEYOND / (1 + 2 * BEYOND) * (self.place.count - 2)
         return slice(int(margin), self.place.count - int(margin))
 
-    @property
+    @cached_property
     def reach(self) -> tuple[float, float]:
         """Places between which every carrier errs less than ``REACH``, m."""
         errors = np.max([bank.errors for bank in self._trained], axis=0)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, as_real, whole_number
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, warn
 from seakeep.models import engine
 from seakeep.models.checks import check_choice
 from seakeep.models.engine import Windows, first_lost
@@ -206,6 +206,7 @@ class SingleModel(Forecaster):
         windows = self.read_windows(*one_run(run, [start]), steps, ahead)
         values = self.free_runs([windows])[0][0]
         signature = self.signature
+        _warn_of_reach(signature, windows, values[0])
         variables = label_channels(signature, values[0], ("time",))
         lost = first_lost(values)
         status = window_status(int(lost[0]), windows, 0, signature.dt)
@@ -259,6 +260,24 @@ class SingleModel(Forecaster):
             variables,
             coords=window_coords(windows, signature.dt),
             attrs=forecast_notes(signature, windows),
+        )
+
+
+def _warn_of_reach(signature: Signature, windows: Windows, values: FloatArray) -> None:
+    """Warn where a vessel leaves the places at which its waves are known."""
+    if (follows := signature.input_map.follows) is None:
+        return
+    low, high = follows.reach
+    known = windows.histories[0, :, follows.column]
+    surge = np.concatenate([known, values[:, follows.column]])
+    places = follows.place.of(surge)[-len(values) :]
+    beyond = np.flatnonzero((places <= low) | (places >= high))
+    if beyond.size:
+        instant = instant_text(windows.time[0].values[beyond[0]], signature.dt)
+        warn(
+            f"{windows.places[0][0]}: from t = {instant} s on the slow surge of the forecast lies "
+            f"beyond {low:.3g} to {high:.3g} m, where the carriers know the waves. Train on runs "
+            "that drift as far, read further ahead (lead), or add a probe up-wave."
         )
 
 

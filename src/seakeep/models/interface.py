@@ -120,10 +120,11 @@ class Drive(Protocol):
 
 
 class Follows(NamedTuple):
-    """Place of the vessel that a model follows, and the state whose last values it sums."""
+    """Place of the vessel, the state whose last values it sums, and how far carriers reach, m."""
 
     place: Place
     column: int
+    reach: tuple[float, float]
 
 
 class InputMap(Protocol):

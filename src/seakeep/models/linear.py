@@ -439,12 +439,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
         return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
 
     def _system(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        if self.signature.input_map.follows is not None:
-            raise RequestError(
-                "the model reads the waves where its own surge takes it, which no linear system "
-                "can represent. Export C sources, an FMU or an ONNX graph, use forecast_arrays, or "
-                "fit a model with alignment surge = 'measured' or 'none'."
-            )
+        export.check_linear(self.signature)
         if more := self.regressors[len(self.inputs) :]:
             raise RequestError(
                 f"the model is driven by observables too ({', '.join(more)}), which a state-space "

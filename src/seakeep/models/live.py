@@ -483,7 +483,7 @@ class Live:
         """One-step prediction from the sample `at`."""
         z, kept = self.signature.input_delays, self._kept
         if self._follows is not None:
-            place, column = self._follows
+            place, column, _ = self._follows
             first, table = self._table
             here = place.of(self._x[at + 1 - place.taps.size : at + 1, column])
             kept["delayed"][at] = read_table(place, table, np.array([at - first]), here)[0]

@@ -320,9 +320,9 @@ class Problem:
         own = (data.state_scale, data.input_scale, data.direct_scale)
         parts = (slice(None), kept, direct)
         x, u, w = (_scale(*each) for each in zip(own, held.scales, parts, strict=True))
-        starts, rows, read = self._starts(fold, steps), s + 1, steps
+        starts, rows = self._starts(fold, steps), s + 1
         if follows is not None:
-            rows, read = max(rows, follows.place.taps.size), 0
+            rows = max(rows, follows.place.taps.size)
         states = data.state_scale.physical(data.states[fold])
         delayed = data.input_scale.physical(data.delayed[fold])[:, kept]
         straight = data.direct_scale.physical(data.direct[fold])[:, direct]
@@ -331,7 +331,7 @@ class Problem:
             steps=steps,
             time=(),
             histories=np.stack([states[at + 1 - rows : at + 1] for at in starts]),
-            delayed=np.stack([delayed[at - ahead - z : at - ahead + read] for at in starts]),
+            delayed=np.stack([delayed[at - ahead - z : at - ahead + steps] for at in starts]),
             direct=np.stack([straight[at : at + steps] for at in starts]),
         )
         if follows is not None:
