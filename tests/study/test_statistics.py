@@ -192,6 +192,7 @@ input_delays = 0
 ridge = 1e-12
 window = 150
 delay_rows = "ridge"
+alignment = { mode = "effective", surge = "none", celerity = 2.0 }
 ridge_scale = "absolute"
 """
 

@@ -14,10 +14,10 @@ from typing import IO, TYPE_CHECKING
 
 from rich.console import Console
 
-from seakeep.arrays import Progress
 from seakeep.errors import SeakeepWarning
 
 if TYPE_CHECKING:
+    from seakeep.arrays import Progress
     from seakeep.report.tables import Table
 
 __all__ = [

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 import typer
 
-from seakeep.arrays import Progress
 from seakeep.cli.console import print_table, progress_bar, results
 from seakeep.cli.options import Scheduler, checked_count
 
 if TYPE_CHECKING:
+    from seakeep.arrays import Progress
     from seakeep.study import StudyResult
 
 __all__ = ["report", "reproduce", "study"]
