@@ -604,7 +604,7 @@ def test_models_stand_beside_the_baselines_and_lost_forecasts_are_named(result):
     judged = replace(result, groups=groups)
     table = errors(judged).tables[1]
     found = ("-20 [-35, -5]", "+10 [-5, +25] cannot tell")
-    assert table.rows == (("a & b < c", "best linear (Bayesian)", "deterministic", *found),)
+    assert table.rows == [("a & b < c", "best linear (Bayesian)", "deterministic", *found)]
     (notice,) = (text for text in summary(judged).notices if "diverged and are left out" in text)
     assert "window 1 of 'unseen' (r from 2 s)" in notice
 

@@ -81,10 +81,10 @@ def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
         ]
         means = [_text(at[mean], form) if mean else "" for _, form, mean in shown.values()]
         rows.append(("average", *means))
-        numeric = tuple(range(1, len(columns)))
+        numeric = range(1, len(columns))
         name, title = f"comparison_{run}", f"{run}: {_title(at)}"
-        last = (len(rows) - 1,)
-        yield Table(name, title, columns, tuple(rows), _note(at), numeric, averages=last)
+        last = [len(rows) - 1]
+        yield Table(name, title, columns, rows, _note(at), numeric, averages=last)
         yield _intervals(at, str(run))
         yield _extremes(at, str(run))
 
@@ -102,8 +102,8 @@ def _intervals(at: xr.Dataset, run: str) -> Table:
     rows.append(("average", _bounds(at, "anrmse"), _bounds(at, "mean_nammae")))
     columns = ("channel", "NRMSE, 95 %", "NAMMAE, 95 %")
     title = f"{run}: intervals over blocks of the forecast"
-    last = (len(rows) - 1,)
-    return Table(f"intervals_{run}", title, columns, tuple(rows), "", (1, 2), averages=last)
+    last = [len(rows) - 1]
+    return Table(f"intervals_{run}", title, columns, rows, "", (1, 2), averages=last)
 
 
 def _bounds(at: xr.Dataset, key: str) -> str:
@@ -121,8 +121,8 @@ def _extremes(at: xr.Dataset, run: str) -> Table:
         for name in at["channel"].values
     ]
     columns = ("channel", "unit", *shown.values())
-    numeric = tuple(range(2, len(columns)))
-    return Table(f"extremes_{run}", f"{run}: extremes", columns, tuple(rows), "", numeric)
+    numeric = range(2, len(columns))
+    return Table(f"extremes_{run}", f"{run}: extremes", columns, rows, "", numeric)
 
 
 def _title(at: xr.Dataset) -> str:
@@ -182,7 +182,7 @@ def model_blocks(
             if (ahead := look_ahead_words(float(at["look_ahead"])))
         ]
         note = "; ".join(told)
-        yield Table(f"models_{run}", title, heads, tuple(rows), note, tuple(range(1, len(heads))))
+        yield Table(f"models_{run}", title, heads, rows, note, range(1, len(heads)))
         if skill := _skill(of_run, references, str(run)):
             yield skill
         channels = [
@@ -190,8 +190,8 @@ def model_blocks(
             for name in first["channel"].values
         ]
         columns = ("channel", *of_run)
-        numeric = tuple(range(1, len(columns)))
-        yield Table(f"channels_{run}", f"{run}: NRMSE", columns, tuple(channels), "", numeric)
+        numeric = range(1, len(columns))
+        yield Table(f"channels_{run}", f"{run}: NRMSE", columns, channels, "", numeric)
         name, at = next(iter(of_run.items()))
         yield replace(_extremes(at, str(run)), title=f"{run}: extremes of {name}")
 
@@ -212,7 +212,7 @@ def _skill(
         return None
     heads = ("model", *(f"from {each}" for each in references))
     title = f"{run}: change of ANRMSE from the baselines'"
-    return Table(f"skill_{run}", title, heads, tuple(rows), "", tuple(range(1, len(heads))))
+    return Table(f"skill_{run}", title, heads, rows, "", range(1, len(heads)))
 
 
 def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
@@ -230,9 +230,9 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
         ]
         rows.append(("mean", "", *(_text(each, "{:.3f}") for each in table["all_anrmse"].values)))
         heads = ("run", "waves, s", *models)
-        numeric, last = tuple(range(1, len(heads))), (len(rows) - 1,)
+        numeric, last = range(1, len(heads)), [len(rows) - 1]
         title = f"{len(runs)} runs by wave period: ANRMSE"
-        yield Table("by_run", title, heads, tuple(rows), "", numeric, averages=last)
+        yield Table("by_run", title, heads, rows, "", numeric, averages=last)
     changes = []
     for k, name in enumerate(models):
         value, low, high = (float(table[f"all_{key}"][k]) for key in ("change", "lower", "upper"))
@@ -250,7 +250,7 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
     title = f"{of}: change of ANRMSE from {models[0]}"
     note = "Paired intervals over redrawn blocks of the forecast; they hold for these runs."
     heads = ("model", "ANRMSE", "change", "95 %", "verdict")
-    yield Table("differences", title, heads, tuple(changes), note, (1, 2, 3))
+    yield Table("differences", title, heads, changes, note, (1, 2, 3))
 
 
 def write_differences(table: xr.Dataset, path: Path) -> Path:

@@ -38,7 +38,7 @@ def nowcast_blocks(found: Mapping[str, xr.Dataset]) -> Iterator[Table]:
                 (
                     str(name),
                     _lead_time(float(each["lead_time"]), float(lead[-1])),
-                    *(number(float(each["error"][place])) for place in places),
+                    *(number(each["error"][place]) for place in places),
                     f"{float(each['coverage'].mean()):.0f}",
                 )
                 for name in at["channel"].values
@@ -51,8 +51,8 @@ def nowcast_blocks(found: Mapping[str, xr.Dataset]) -> Iterator[Table]:
             )
             title = f"{run}: {model} in service"
             columns = (*columns, "in band %")
-            numeric = tuple(range(1, len(columns)))
-            yield Table(f"nowcast_{model}_{run}", title, columns, tuple(rows), note, numeric)
+            numeric = range(1, len(columns))
+            yield Table(f"nowcast_{model}_{run}", title, columns, rows, note, numeric)
 
 
 def _lead_time(found: float, longest: float) -> str:

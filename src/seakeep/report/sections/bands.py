@@ -65,8 +65,8 @@ def _by_part(result: StudyResult, groups: dict[str, xr.Dataset], model: str, ban
                 (
                     result.label_of(test),
                     str(part),
-                    number(float(one["inside"].mean()), 2),
-                    f"{number(float(one['inside'].min()), 2)} ({result.words_of(str(least))})",
+                    number(one["inside"].mean(), 2),
+                    f"{number(one['inside'].min(), 2)} ({result.words_of(str(least))})",
                     number(_mean(one["relative_width"].values), 2),
                     *(number(_mean((one[key] * scale).values), 2) for key in ("winkler", "crps")),
                 )
@@ -75,7 +75,7 @@ def _by_part(result: StudyResult, groups: dict[str, xr.Dataset], model: str, ban
         f"bands_{band}_{model}",
         f"{_title(result, model, band)}, in parts",
         ("test set", "instants", "inside", "least covered", "width", "Winkler", "CRPS"),
-        tuple(rows),
+        rows,
         "Averages over the channels; width and scores in measured SD of the test set."
         + conditional(result),
         (2, 4, 5, 6),
@@ -96,8 +96,8 @@ def _by_channel(result: StudyResult, groups: dict[str, xr.Dataset], model: str, 
                 (
                     result.label_of(test),
                     f"{result.words_of(name)} [{units['units'].sel(name=name).item()}]",
-                    number(float(one["inside"]), 2),
-                    number(float(one["relative_width"]), 2),
+                    number(one["inside"], 2),
+                    number(one["relative_width"], 2),
                     *(f"{float(one[key]):.3g}" for key in ("winkler", "crps")),
                 )
             )
@@ -105,7 +105,7 @@ def _by_channel(result: StudyResult, groups: dict[str, xr.Dataset], model: str, 
         f"bands_{band}_{model}_channels",
         f"{_title(result, model, band)}, by channel",
         ("test set", "channel", "inside", "width [SD]", "Winkler", "CRPS"),
-        tuple(rows),
+        rows,
         "Scores in the unit of the channel (SI)." + conditional(result),
         (2, 3, 4, 5),
         folded=True,

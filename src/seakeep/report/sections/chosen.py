@@ -21,7 +21,7 @@ def chosen(result: StudyResult) -> Section | None:
             if text or ahead > 0:
                 note, *tried = str(text).splitlines() or ["stated"]
                 words = "; ".join([note, *map(str.strip, tried)])
-                rows.append((model_words(model), str(name), number(float(ahead), 2), words))
+                rows.append((model_words(model), str(name), number(ahead, 2), words))
     if not rows:
         return None
     words = (
@@ -34,7 +34,7 @@ def chosen(result: StudyResult) -> Section | None:
         "chosen",
         "Choices and look-ahead",
         ("model", "training set", "look-ahead [s]", "chosen"),
-        tuple(rows),
+        rows,
         numeric=(2,),
     )
     return Section("chosen", "How settings were chosen", words=(words,), tables=(table,))

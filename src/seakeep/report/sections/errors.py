@@ -68,7 +68,7 @@ def _skill_table(result: StudyResult) -> Table:
         "skill",
         "Models against the baselines",
         ("test set", "baseline", "model", *(f"{each} [%], 95 %" for each in HEADING.values())),
-        tuple(rows),
+        rows,
         "Change of the median error against the baseline's: −20 % is an error smaller by a fifth; "
         "intervals by a two-way block bootstrap over training sets and windows. "
         "Best linear: the linear baseline of least median ANRMSE in the test set.",
@@ -100,7 +100,7 @@ def error_table(result: StudyResult, test: str) -> Table:
             for model in models:
                 at = boxes.sel(model=model, measure=measure, channel=name)
                 spread = float(at["upper_quartile"] - at["lower_quartile"])
-                row.append(f"{number(float(at['median']))} [{number(spread)}]")
+                row.append(f"{number(at['median'])} [{number(spread)}]")
                 left_out += int(at["left_out"]) if measure == "nrmse" else 0
         rows.append(tuple(row))
     note = (
@@ -118,10 +118,10 @@ def error_table(result: StudyResult, test: str) -> Table:
     return Table(
         f"errors_{test}",
         f"ANRMSE and NAMMAE, {result.label_of(test)}",
-        tuple(columns),
-        tuple(rows),
+        columns,
+        rows,
         note + conditional(result),
-        tuple(range(1, len(columns))),
-        averages=(len(rows) - 1,),
+        range(1, len(columns)),
+        averages=[len(rows) - 1],
         folded=test != next(iter(result.tests)),
     )

@@ -67,17 +67,17 @@ def _trend_table(result: StudyResult) -> Table:
         for band, words in BAND_WORDS.items():
             for model in judged_models(result):
                 at = data.sel(model=model, band=band)
-                interval = ", ".join(small_number(float(at[key])) for key in ("lower", "upper"))
+                interval = ", ".join(small_number(at[key]) for key in ("lower", "upper"))
                 rows.append(
                     (
                         result.label_of(test),
                         words,
                         model_words(model),
-                        number(float(at["error_mean"].mean())),
-                        number(float(at["change"])),
-                        f"{small_number(float(at['slope']))} [{interval}]",
-                        number(float(at["kendall_tau"]), 2),
-                        probability(float(at["p_value"])),
+                        number(at["error_mean"].mean()),
+                        number(at["change"]),
+                        f"{small_number(at['slope'])} [{interval}]",
+                        number(at["kendall_tau"], 2),
+                        probability(at["p_value"]),
                     )
                 )
     period = float(result.settings["statistics"]["split_period"])
@@ -89,7 +89,7 @@ def _trend_table(result: StudyResult) -> Table:
             "test set", "band", "model", "mean ε", "change over the window",
             "slope [1/s] with 95 %", "Kendall's τ", "p",
         ),
-        tuple(rows),
+        rows,
         "Block-bootstrap Mann–Kendall test of ε(t) averaged over all cells. A p below 0.05 says "
         "that the error changes with the age of the forecast; blocks break some of the "
         "dependence, so slow series are called trends too often (10 to 15 %). The error is parted "
@@ -125,10 +125,10 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
         row = ["average" if name == "average" else result.words_of(name)]
         for data in groups.values():
             at = data.sel(channel=name)
-            first, *others = (number(float(v), 2) for v in at[f"{prefix}inside"].values)
+            first, *others = (number(v, 2) for v in at[f"{prefix}inside"].values)
             row.append(first + "".join(f" [{each}]" for each in others))
             width = at[f"{prefix}relative_width"].sel(against="measured")
-            row.append(number(float(width), 2))
+            row.append(number(width, 2))
         rows.append(tuple(row))
     level = float(result.settings["statistics"]["level"])
     note = (
@@ -159,11 +159,11 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
     return Table(
         f"coverage_{prefix}{model}",
         f"Coverage of the {words}{100 * level:g} % band, {model_words(model)}",
-        tuple(columns),
-        tuple(rows),
+        columns,
+        rows,
         note + conditional(result),
-        tuple(range(1, len(columns))),
-        averages=(len(rows) - 1,),
+        range(1, len(columns)),
+        averages=[len(rows) - 1],
     )
 
 
@@ -228,10 +228,10 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     for name in result.channels:
         one = at.sel(channel=name)
         block = float(one["block_length"])
-        row = [result.words_of(name), *(small_number(float(one[key])) for key in numbers)]
+        row = [result.words_of(name), *(small_number(one[key]) for key in numbers)]
         row.append(f"{block:.0f}" if np.isfinite(block) else MISSING)
         rows.append((*row, *(PUBLISHED.get(name, (MISSING,) * 4) if comparable else ())))
-    means = [small_number(float(at[key].mean())) for key in numbers]
+    means = [small_number(at[key].mean()) for key in numbers]
     rows.append(("average", *means, "", *(PUBLISHED["average"] if comparable else ())))
     quantiles = ("EV", "q0.025", "q0.975", "U")
     columns = ("channel", *quantiles, "noise floor", "block (samples)")
@@ -244,15 +244,15 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
         f"jsd_{model}_{variant}",
         f"Divergence of the densities, {model_words(model)}, {test}: {variant} variant",
         (*columns, *published),
-        tuple(rows),
+        rows,
         f"Nats, 0 to ln 2; {how}. The noise floor is the divergence of the measurement from "
         "itself under two independent bootstraps: what a record of this length cannot tell from "
         "none."
         + (" The paper's columns are of another vessel in another tank." if comparable else "")
         + conditional(result),
-        tuple(range(1, len(columns) + len(published))),
-        elsewhere=tuple(range(len(columns), len(columns) + len(published))),
-        averages=(len(rows) - 1,),
+        range(1, len(columns) + len(published)),
+        elsewhere=range(len(columns), len(columns) + len(published)),
+        averages=[len(rows) - 1],
         folded=not result.is_ensemble(model) and any(map(result.is_ensemble, result.models)),
     )
 

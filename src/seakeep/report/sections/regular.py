@@ -44,8 +44,8 @@ def response_table(result: StudyResult, tests: list[str]) -> Table:
                 total = float(np.sum(np.square(parts)))
                 share = 100 * parts[0] ** 2 / total if total > 0 else np.nan
                 row += [
-                    number(float(at["amplitude_ratio"]), 2),
-                    signed(float(at["phase_lead"]), 0),
+                    number(at["amplitude_ratio"], 2),
+                    signed(at["phase_lead"], 0),
                     number(parts[0], 2),
                     f"{number(share, 0)} %" if np.isfinite(share) else number(share),
                 ]
@@ -53,12 +53,12 @@ def response_table(result: StudyResult, tests: list[str]) -> Table:
     return Table(
         "response",
         "Forecast against measurement at the wave's frequency",
-        tuple(columns),
-        tuple(rows),
+        columns,
+        rows,
         "Amplitude: ratio of forecast to measurement; phase: positive where the forecast is early; "
         "offset: root mean square over the cells of the difference of means, in measured SDs; "
         "share: the offset's part of the mean square error." + conditional(result),
-        tuple(range(2, len(columns))),
+        range(2, len(columns)),
     )
 
 

@@ -29,24 +29,22 @@ def _table(result: StudyResult, test: str) -> Table:
     size = spread.where(data["judged"]).median(["training", "window"])
     rows = []
     for name in [*result.channels, "average"]:
-        part = "" if name == "average" else number(float(size.sel(channel=name)), 2)
+        part = "" if name == "average" else number(size.sel(channel=name), 2)
         cells = []
         for model in result.models:
             at = median.sel(model=model, channel=name)
-            window, training = (
-                number(float(at.sel(measure=key))) for key in ("nrmse", "training_nrmse")
-            )
+            window, training = (number(at.sel(measure=key)) for key in ("nrmse", "training_nrmse"))
             cells.append(f"{window} ({training})")
         rows.append((name if name == "average" else result.words_of(name), part, *cells))
     return Table(
         f"scales_{test}",
         f"Errors in SD of the window, and in SD of the training, {result.label_of(test)}",
         ("channel", "SD of the window [training SD]", *map(model_words, result.models)),
-        tuple(rows),
+        rows,
         "Medians over the cells of the root mean square error, in SD of the window, and in "
         "parentheses in SD of the training set. A channel that barely moves in the window is not "
         "judged in the first, and counts in the second." + conditional(result),
-        tuple(range(1, 2 + len(result.models))),
-        averages=(len(rows) - 1,),
+        range(1, 2 + len(result.models)),
+        averages=[len(rows) - 1],
         folded=test != next(iter(result.tests)),
     )

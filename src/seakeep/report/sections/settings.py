@@ -60,7 +60,7 @@ def _model_table(result: StudyResult) -> Table:
         "models",
         "Settings of the models, and where each comes from",
         ("model", "setting", "value", "from"),
-        tuple(rows),
+        rows,
         "Stated: in the study file. Preset: filled in by the model's preset, or the study's. "
         "Study: the study's seed. Default: none of them says anything.",
         folded=True,
@@ -179,7 +179,7 @@ def _windows_table(result: StudyResult) -> Table:
         "windows",
         "Training sets and test windows, the same for all models",
         ("use", "set", "instants", "left out"),
-        tuple(rows),
+        rows,
         "Of a training set: from the start of its span to its stop. A draw reads the last part, "
         f"{reads:.2f} s at most, delay history included{whole}. The delay history of a forecast is "
         "measured data just before the start; it may reach into a training span.",
@@ -298,5 +298,5 @@ def versions(result: StudyResult) -> Section:
     rows = [(words, str(result.attrs[key])) for words, key in told]
     rows.append(("finished", finished(result)))
     rows += [(name, str(each)) for name, each in json.loads(result.attrs["versions"]).items()]
-    table = Table("versions", "Versions and digest", ("what", "value"), tuple(rows))
+    table = Table("versions", "Versions and digest", ("what", "value"), rows)
     return Section("versions", "Versions and digest", tables=(table,))

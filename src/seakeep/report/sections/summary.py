@@ -96,11 +96,11 @@ def heat_table(result: StudyResult) -> Table:
         "heat",
         "Median NRMSE, channel by channel",
         ("channel", *heads),
-        tuple(rows),
+        rows,
         "The darker, the worse; average: the paper's ANRMSE." + conditional(result),
-        tuple(range(1, len(heads) + 1)),
-        averages=(len(rows) - 1,),
-        heat=tuple(range(1, len(heads) + 1)),
+        range(1, len(heads) + 1),
+        averages=[len(rows) - 1],
+        heat=range(1, len(heads) + 1),
     )
 
 
@@ -128,20 +128,20 @@ def overview_table(result: StudyResult) -> Table:
             for measure in HEADING:
                 at = boxes.sel(model=model, measure=measure)
                 spread = float(at["upper_quartile"] - at["lower_quartile"])
-                row += [number(float(at["median"])), number(spread)]
+                row += [number(at["median"]), number(spread)]
             scaled = boxes["median"].sel(model=model, measure="training_nrmse")
             count = boxes.sel(model=model, measure="nrmse")["count"]
-            rows.append((*row, number(float(scaled)), str(int(count))))
+            rows.append((*row, number(scaled), str(int(count))))
     heads = [f"{words} {k}" for words in HEADING.values() for k in ("median", "IQR")]
     return Table(
         "overview",
         "ANRMSE and NAMMAE",
         ("test set", "model", *heads, "in training SD", "cells"),
-        tuple(rows),
+        rows,
         "Medians and inter-quartile ranges over all cells (training set × test window) of the "
         "average over the channels that are judged; in measured standard deviations, and ANRMSE "
         "in those of the training set too." + conditional(result),
-        tuple(range(2, 8)),
+        range(2, 8),
     )
 
 
