@@ -92,6 +92,6 @@ def test_choices_stand_with_the_look_ahead(result):
     known = StudyResult(None, result.attrs, {**result.groups, "chosen": group})
     (table,) = chosen(known).tables
     words = "ridge 0.001: the best; 0.3 ridge 0.001, observables none"
-    assert table.rows == (("m", "a", "1.50", words),)
+    assert table.rows == [("m", "a", "1.50", words)]
     nothing = {**result.groups, "chosen": group.isel(training=[1])}
     assert chosen(StudyResult(None, result.attrs, nothing)) is None

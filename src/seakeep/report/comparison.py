@@ -173,12 +173,15 @@ def model_blocks(
         yield Table(f"models_{run}", title, heads, rows, note, range(1, len(heads)))
         if skill := _skill(of_run, references, str(run)):
             yield skill
-        errors = xr.concat([at["nrmse"] for at in of_run.values()], "model")
-        together = of_run[str(next(iter(of_run)))][["channel"]].assign(nrmse=errors)
-        yield _by_channel(
-            together, "channels", "NRMSE", [*of_run], lambda one: [*map(number, one["nrmse"])]
-        )
         name, at = next(iter(of_run.items()))
+        errors = (("model", "channel"), [each["nrmse"].values for each in of_run.values()])
+        yield _by_channel(
+            at.assign(every=errors),
+            "channels",
+            "NRMSE",
+            [*of_run],
+            lambda one: [*map(number, one["every"])],
+        )
         yield _extremes(at, f"extremes of {name}")
 
 

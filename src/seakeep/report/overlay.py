@@ -12,6 +12,7 @@ import xarray as xr
 from seakeep.campaign.settings import long_name_of
 from seakeep.conventions import is_elevation
 from seakeep.errors import DataError
+from seakeep.report.figures.common import legend_outside
 from seakeep.report.style import (
     COLOURS,
     LINES,
@@ -111,7 +112,7 @@ def error_figure(table: xr.Dataset) -> Figure:
             axes.set_ylim(bottom=0.0)
         axes.set_xlabel("run, and mean period of its waves")
         axes.set_ylabel("ANRMSE [measured SD]")
-        figure.legend(loc="outside lower center", ncols=min(len(names), 4))
+        legend_outside(figure, axes)
         return figure
 
 
@@ -150,14 +151,7 @@ def _draw(several: Mapping[str, Comparison]) -> Figure:
         axes[0, 0].set_title("whole forecast, envelopes", loc="left")
         axes[0, 1].set_xlim(end - ENLARGED * period, end)
         axes[0, 1].set_title(f"last {ENLARGED} periods", loc="left")
-    # Both panels label the band; the dictionary keeps one of equal labels.
-    keys = {
-        label: handle
-        for column in range(columns)
-        for handle, label in zip(*axes[0, column].get_legend_handles_labels(), strict=True)
-    }
-    columns = min(len(keys), 3) if len(compared) > 1 else len(keys)
-    figure.legend(keys.values(), keys.keys(), loc="outside lower center", ncols=columns)
+    legend_outside(figure, *axes[0])
     figure.suptitle(_title(list(compared.values())), x=0.01, ha="left")
     return figure
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from seakeep.report.figures.common import legend_outside
 from seakeep.report.figures.histories import draw_channel
 from seakeep.report.style import figure_style, new_figure
 from seakeep.study import StudyResult
@@ -35,7 +36,6 @@ def acts_figure(results: Mapping[str, StudyResult]) -> Figure:
                 axes.set_title(f"{act.title}: {name}", loc="left", fontsize=8)
         for axes in grid[-1]:
             axes.set_xlabel("time after the last measured state, in encounter periods")
-        handles, labels = grid[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper right", ncols=len(handles))
+        legend_outside(figure, grid[0, 0], side="upper right")
         figure.supylabel("deviation from the training mean, in training SD", fontsize=8)
         return figure

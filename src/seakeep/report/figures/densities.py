@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from seakeep.report.figures.common import grid_of_axes, model_colour, model_words, short_label
+from seakeep.report.figures.common import (
+    grid_of_axes,
+    legend_outside,
+    model_colour,
+    model_words,
+    short_label,
+)
 from seakeep.report.style import COLOURS, figure_style, new_figure
 from seakeep.study import StudyResult
 
@@ -29,8 +35,7 @@ def density_figure(result: StudyResult, model: str) -> Figure:
         )
         for each, name in zip(axes, names, strict=True):
             _draw(each, data.sel(channel=name), name, sides)
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper right", ncols=min(len(handles), 5))
+        legend_outside(figure, axes[0], side="upper right")
         return figure
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from seakeep.report.figures.common import judged_models, model_colour, model_words
+from seakeep.report.figures.common import judged_models, legend_outside, model_colour, model_words
 from seakeep.report.style import PALETTE, figure_style, new_figure
 from seakeep.study import StudyResult
 
@@ -41,12 +41,7 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
         decay.set(xlabel="frequency [Hz]", ylabel="modulus")
         decay.set_xlim(0, 3 / float(result.attrs["encounter_period"]))
         decay.set_ylim(LOWEST, 1.01)
-        legend = figure.legend(
-            *decay.get_legend_handles_labels(),
-            loc="outside upper right",
-            ncols=len(order),
-            markerscale=2,
-        )
+        legend = legend_outside(figure, decay, side="upper right", markerscale=2)
         for handle in filter(None, legend.legend_handles):
             handle.set_alpha(0.9)
         return figure

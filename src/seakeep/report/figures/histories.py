@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from seakeep.report.figures.common import judged_models, line_of, model_words, short_label
+from seakeep.report.figures.common import (
+    judged_models,
+    legend_outside,
+    line_of,
+    model_words,
+    short_label,
+)
 from seakeep.report.style import LINES, THIN, figure_style, new_figure
 from seakeep.study import StudyResult
 from seakeep.study.judge import band_of
@@ -62,8 +68,7 @@ def history_figure(
             fontsize=8,
         )
         axes[-1].set_xlabel(r"time after the last measured state, in encounter periods")
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper right", ncols=min(len(handles), 5))
+        legend_outside(figure, axes[0], side="upper right")
         run, learnt = str(cell["run"].values), str(cell["training"].values)
         left_out = str(result.groups["training"]["left_out"].values[training])
         axes[0].set_title(
