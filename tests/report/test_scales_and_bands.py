@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.report.sections.bands import bands
-from seakeep.report.sections.chosen import chosen
-from seakeep.report.sections.scales import scales
+from seakeep.report.sections.errors import bands, scales
+from seakeep.report.sections.settings import chosen
 from seakeep.study import StudyResult
 from seakeep.study.judge import MEASURES, band_parts, box_table
 

@@ -1,4 +1,4 @@
-"""Settings with where each comes from, training sets and test windows, versions."""
+"""Settings with where each comes from, how they were chosen, windows and versions."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ import numpy as np
 
 from seakeep.report.figures.common import model_words
 from seakeep.report.section import Section
-from seakeep.report.tables import Table
+from seakeep.report.tables import Table, number
 from seakeep.study import StudyResult
 from seakeep.study.plan import windows_overlap
 
 __all__ = [
+    "chosen",
     "finished",
     "settings",
     "test_overlap",
@@ -300,3 +301,33 @@ def versions(result: StudyResult) -> Section:
     rows += [(name, str(each)) for name, each in json.loads(result.attrs["versions"]).items()]
     table = Table("versions", "Versions and digest", ("what", "value"), rows)
     return Section("versions", "Versions and digest", tables=(table,))
+
+
+def chosen(result: StudyResult) -> Section | None:
+    """Return how settings were chosen; None where all are stated and no model looks ahead."""
+    rows = []
+    for model in result.models:
+        data = result.groups["chosen"].sel(model=model)
+        for name, text, ahead in zip(
+            data["training"].values, data["words"].values, data["look_ahead"].values, strict=True
+        ):
+            if text or ahead > 0:
+                note, *tried = str(text).splitlines() or ["stated"]
+                words = "; ".join([note, *map(str.strip, tried)])
+                rows.append((model_words(model), str(name), number(ahead, 2), words))
+    if not rows:
+        return None
+    words = (
+        "Settings that are not stated are chosen by free runs on training runs that are held out "
+        "in turn; test windows are never looked at. Mean error with its 95 % interval and the best "
+        "λ of each choice: what an observable is worth is the error of the choice without it. The "
+        "look-ahead is how long after the instant that is forecast the last wave that is read lies."
+    )
+    table = Table(
+        "chosen",
+        "Choices and look-ahead",
+        ("model", "training set", "look-ahead [s]", "chosen"),
+        rows,
+        numeric=(2,),
+    )
+    return Section("chosen", "How settings were chosen", words=(words,), tables=(table,))
