@@ -35,7 +35,7 @@ pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figure
 
 from seakeep.report.figures.boxes import FEWEST, draw_box_violin
 from seakeep.report.figures.common import grid_of_axes, model_colour
-from seakeep.report.figures.eigenvalues import eigenvalue_figure
+from seakeep.report.figures.errors import eigenvalue_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import write_page, write_report
 from seakeep.report.section import Drawing, Section

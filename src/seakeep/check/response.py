@@ -13,7 +13,10 @@ from seakeep.arrays import ComplexArray, FloatArray, as_real
 from seakeep.check.parts import (
     Part,
     elevations,
+    gathered,
     is_regular,
+    no_energy,
+    read_off,
     reference_probe,
     units_of,
     used_parts,
@@ -22,7 +25,7 @@ from seakeep.check.parts import (
 from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
 from seakeep.core.response import frequency_response
 from seakeep.core.spectra import Spectra, cross_spectra, segment_length
-from seakeep.errors import DataError, RequestError, SeakeepError, warn
+from seakeep.errors import DataError, RequestError
 from seakeep.models import HankelDMDcModel, HankelEnsemble, Model
 from seakeep.models.engine import Dynamics
 from seakeep.models.inputs import Chain, Lead
@@ -107,8 +110,7 @@ def response(
     if runs is not None and size > 1:
         each, reference = _with_wave(model, runs, frequency, each)
         names = names if not reference else [*names, WAVE]
-    made = [r.column for r in model.signature.readouts if r.function is not None]
-    each[:, :, made] = np.nan
+    each[:, :, read_off(model)] = np.nan
     return _labelled(model, frequency, names, each, reference)
 
 
@@ -255,25 +257,21 @@ def measured_response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Datase
     """
     reference = reference_probe(model, runs)
     parts = used_parts(model, runs)
-    points, reasons = [], []
-    for name, part in parts.items():
-        if is_regular(part.run):
-            try:
-                points.append(_regular_point(model, name, part, reference))
-            except SeakeepError as error:
-                reasons.append(f"{name}: {error}")
     pieces = [part for part in parts.values() if not is_regular(part.run)]
-    if pieces:
-        try:
-            period = mean_period(runs, model.inputs) * model.dt
-            points.append(_irregular_points(model, pieces, reference, period))
-        except SeakeepError as error:
-            reasons.append(f"irregular waves: {error}")
-    if not points:
-        raise DataError("no run gives a measured response. " + " ".join(reasons))
-    for reason in reasons:
-        warn(f"no measured response from {reason}")
-    out = xr.concat(points, dim="point", coords="minimal", join="outer")
+    names = [name for name, part in parts.items() if is_regular(part.run)]
+
+    def points(name: str) -> xr.Dataset:
+        if name in names:
+            return _regular_point(model, name, parts[name], reference)
+        return _irregular_points(model, pieces, reference, mean_period(runs, model.inputs))
+
+    found = gathered(
+        [*names, *["irregular waves"] * bool(pieces)],
+        points,
+        "no run gives a measured response.",
+        "no measured response from",
+    )
+    out = xr.concat([*found.values()], dim="point", coords="minimal", join="outer")
     out["phase"].attrs = {"units": "deg", "long_name": "phase before the wave"}
     return out.assign_attrs(reference=model.inputs[reference])
 
@@ -293,15 +291,8 @@ def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Da
     return _points(
         model,
         {"run": name, "kind": "regular", "frequency": frequency, "wave_amplitude": amplitude},
-        {
-            "amplitude": np.abs(found.ratio),
-            "phase": np.degrees(np.angle(found.ratio)),
-            "amplitude_uncertainty": found.amplitude,
-            "phase_uncertainty": np.degrees(found.phase),
-            "coherence": np.full(len(model.states), np.nan),
-            "offset": sure.ratio.real,
-            "offset_uncertainty": sure.amplitude,
-        },
+        *(found.ratio, found.amplitude, found.phase),
+        {"offset": sure.ratio.real, "offset_uncertainty": sure.amplitude},
     )
 
 
@@ -311,21 +302,16 @@ def _accuracy(run: xr.Dataset, channel: str) -> float:
 
 def _irregular_points(model: Model, parts: list[Part], reference: int, period: float) -> xr.Dataset:
     pieces = [(part.inputs[:, [reference]], part.states) for part in parts]
-    period /= model.dt
     segment = segment_length(sum(len(part.time) for part in parts), AVERAGES, period, LONGEST)
     spectra, gain, radius = _gain(pieces, model.dt, segment)
     power = spectra.input_power[:, 0]
     if not power.max() > 0:
-        raise DataError(
-            f"{model.inputs[reference]} holds no energy: it is constant. Look for a dead probe."
-        )
-    coherence = spectra.ordinary()[:, 0]
+        raise no_energy(model.inputs[reference])
     name = ", ".join(str(part.run.attrs.get("run", "run")) for part in parts)
     at = np.flatnonzero((power >= POWER * power.max()) & (spectra.frequency > 0))
     amplitude, half = np.abs(gain[at]), radius[at]
     with np.errstate(divide="ignore", invalid="ignore"):
         turn = np.where(half < amplitude, np.arcsin(np.minimum(half / amplitude, 1)), np.pi)
-    nothing = np.full_like(amplitude, np.nan)
     return _points(
         model,
         {
@@ -334,15 +320,8 @@ def _irregular_points(model: Model, parts: list[Part], reference: int, period: f
             "frequency": spectra.frequency[at],
             "wave_amplitude": [np.nan] * at.size,
         },
-        {
-            "amplitude": amplitude,
-            "phase": np.degrees(np.angle(gain[at])),
-            "amplitude_uncertainty": half,
-            "phase_uncertainty": np.degrees(turn),
-            "coherence": coherence[at],
-            "offset": nothing,
-            "offset_uncertainty": nothing,
-        },
+        *(gain[at], half, turn),
+        {"coherence": spectra.ordinary()[at, 0]},
     )
 
 
@@ -362,8 +341,23 @@ def _gain(
 
 
 def _points(
-    model: Model, of_points: Mapping[str, npt.ArrayLike], values: Mapping[str, FloatArray]
+    model: Model,
+    of_points: Mapping[str, npt.ArrayLike],
+    ratio: ComplexArray,
+    radius: FloatArray,
+    turn: FloatArray,
+    others: Mapping[str, FloatArray],
 ) -> xr.Dataset:
+    """Points from ratios with their uncertainty and that of the phase (rad); others are NaN."""
+    nothing = np.full(ratio.shape, np.nan)
+    values = {
+        "amplitude": np.abs(ratio),
+        "phase": np.degrees(np.angle(ratio)),
+        "amplitude_uncertainty": radius,
+        "phase_uncertainty": np.degrees(turn),
+        **dict.fromkeys(("coherence", "offset", "offset_uncertainty"), nothing),
+        **others,
+    }
     return xr.Dataset(
         {key: (("point", "state"), np.atleast_2d(value)) for key, value in values.items()},
         coords={"state": model.states}

@@ -9,7 +9,9 @@ import xarray as xr
 
 from seakeep.arrays import ComplexArray, FloatArray, IntArray
 from seakeep.check.parts import (
+    driven,
     is_regular,
+    read_off,
     reference_probe,
     single_model,
     units_of,
@@ -18,7 +20,7 @@ from seakeep.check.parts import (
 from seakeep.check.response import measured_response, transfer
 from seakeep.errors import DataError, RequestError
 from seakeep.models import HankelDMDcModel, Model
-from seakeep.models.inputs import Chain, Measured
+from seakeep.models.inputs import Chain
 from seakeep.models.interface import Span
 from seakeep.models.labelled import mean_period
 
@@ -94,8 +96,7 @@ def drift(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
             rows = _columns(single, np.asarray(elevation)) - still
             parts = np.fft.fft(rows, axis=0)[apart] / samples * (1 if apart == 0 else 2)
             found[apart, number] = slow[apart] @ parts / (amplitude**2 * (2 if apart else 1))
-    made = [r.column for r in model.signature.readouts if r.function is not None]
-    found[:, :, made] = np.nan
+    found[:, :, read_off(model)] = np.nan
     dims = ("state", "difference", "frequency")
     return xr.Dataset(
         {
@@ -139,8 +140,7 @@ def _columns(model: HankelDMDcModel, inputs: FloatArray) -> FloatArray:
     before, after = -(-max(-reach.first, 0) // size), -(-max(reach.stop, 1) // size)
     first = before * size
     tiled = np.tile(inputs, (before + 1 + after, 1))
-    drive = chain.wrap(Measured(tiled), None, [Span(first, first, first + size)])
-    return np.concatenate(drive.rows(first, first + size), axis=1)
+    return driven(chain, tiled, None, first, first + size)
 
 
 def _signed(found: ComplexArray) -> FloatArray:

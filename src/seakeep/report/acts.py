@@ -10,8 +10,8 @@ import numpy as np
 
 from seakeep.arrays import Progress
 from seakeep.report.claims import claims_table
-from seakeep.report.figures.acts import acts_figure
 from seakeep.report.figures.common import judged_models, model_words
+from seakeep.report.figures.histories import acts_figure
 from seakeep.report.page import write_page
 from seakeep.report.section import Drawing, Section
 from seakeep.report.sections.data import position_table, wave_table

@@ -10,9 +10,14 @@ import numpy as np
 import xarray as xr
 
 from seakeep.report.figures.common import judged_models, model_words
-from seakeep.report.figures.densities import density_figure
-from seakeep.report.figures.eigenvalues import LOWEST, eigenvalue_figure
-from seakeep.report.figures.errors import BAND_WORDS, error_over_time_figure, hyperparameter_figure
+from seakeep.report.figures.errors import (
+    BAND_WORDS,
+    LOWEST,
+    density_figure,
+    eigenvalue_figure,
+    error_over_time_figure,
+    hyperparameter_figure,
+)
 from seakeep.report.nowcast import nowcast_blocks, nowcast_figure
 from seakeep.report.section import Drawing, Section
 from seakeep.report.sections.summary import by_channel, conditional
