@@ -176,6 +176,7 @@ def _with_wave(
 def _labelled(
     model: Model, frequency: FloatArray, names: list[str], each: ComplexArray, reference: str
 ) -> xr.Dataset:
+    each = np.moveaxis(each, 1, -1)
     mean = each.mean(axis=0)
     dims = ("state", "input", "frequency")
     quantiles = {}
@@ -183,9 +184,9 @@ def _labelled(
         bounds = np.quantile(np.abs(each), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2], axis=0)
         turned = np.abs(np.angle(each * np.conj(mean)))
         quantiles = {
-            "amplitude_lower": (dims, np.moveaxis(bounds[0], 0, 2)),
-            "amplitude_upper": (dims, np.moveaxis(bounds[1], 0, 2)),
-            "phase_spread": (dims, np.degrees(np.moveaxis(np.quantile(turned, LEVEL, 0), 0, 2))),
+            "amplitude_lower": (dims, bounds[0]),
+            "amplitude_upper": (dims, bounds[1]),
+            "phase_spread": (dims, np.degrees(np.quantile(turned, LEVEL, 0))),
         }
     waves = [reference if name == WAVE else name for name in names]
     of = units_of(model, waves)
@@ -197,10 +198,10 @@ def _labelled(
         known = rows[[coverage.channels.index(name) for name in waves]]
     return xr.Dataset(
         {
-            "amplitude": (dims, np.moveaxis(np.abs(mean), 0, 2), {"long_name": "amplitude"}),
+            "amplitude": (dims, np.abs(mean), {"long_name": "amplitude"}),
             "phase": (
                 dims,
-                np.moveaxis(np.degrees(np.angle(mean)), 0, 2),
+                np.degrees(np.angle(mean)),
                 {"units": "deg", "long_name": "phase before the wave"},
             ),
             **quantiles,

@@ -129,12 +129,11 @@ def _sign_table(result: StudyResult) -> Table:
     channels = result.groups["channels"]
     rows = []
     for name in map(str, channels["name"].values):
-        at = {
-            k: str(channels[k].sel(name=name).values)
-            for k in ("use", "units", "positive", "source")
-        }
-        row = (at["use"], shown_unit(at["units"]), at["positive"], at["source"])
-        rows.append((result.words_of(name), *row))
+        use, unit, positive, source = (
+            str(channels[key].sel(name=name).values)
+            for key in ("use", "units", "positive", "source")
+        )
+        rows.append((result.words_of(name), use, shown_unit(unit), positive, source))
     frame = str(channels.attrs.get("frame", ""))
     return Table(
         "signs",
@@ -204,16 +203,8 @@ def _quality_table(result: StudyResult, name: str) -> Table:
             part = float(at["slack"])
             slack = f"{100 * part:.1f}" if np.isfinite(part) else ""
         low, high, mean, spread = (f"{value:.4g}" for value in each.numbers)
-        row = (
-            each.words,
-            "yes" if each.channel in used else "",
-            each.unit,
-            mean,
-            spread,
-            low,
-            high,
-        )
-        rows.append((*row, frozen, slack, each.flagged, "; ".join(each.found)))
+        row = (each.words, "yes" if each.channel in used else "", each.unit, mean, spread)
+        rows.append((*row, low, high, frozen, slack, each.flagged, "; ".join(each.found)))
     return Table(
         f"quality_{name}",
         f"Data quality of {name}, channel by channel (SI units)",
