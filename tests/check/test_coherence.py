@@ -56,7 +56,7 @@ def test_a_state_too_slow_for_the_segments_is_not_judged(run):
     found = check.coherence(model, {"run": both})
     assert float(found.period[0]) == pytest.approx(62.8, rel=0.05)  # a segment has 16 s
     assert np.isnan(found.linear_bound[0])
-    text = possible_section(Checked({"coherence": found}, {}, {})).points[0]
+    text = possible_section(found, Checked({}, {}, {})).points[0]
     assert text.startswith("surge: cannot be judged: its slow period of 6")
 
 

@@ -106,7 +106,11 @@ def test_a_motion_that_swings_farther_than_it_was_moved_is_named():
         },
         coords={"motion": ["heave", "pitch"], "time": np.arange(4.0)},
     )
-    decay = check_sections(Checked({"decay": found}, {}, {}))[3]
+    keys = ("period", "damping_ratio", "decay_time", "modulus")
+    slow = xr.Dataset({key: ("mode", [1.0]) for key in keys})
+    slow["participation"] = (("mode", "state"), [[1.0]])
+    slow = slow.assign_coords(state=["pitch"])
+    decay = check_sections(Checked({"decay": found, "modes": slow}, {}, {}))[3]
     (only,) = decay.points
     assert only.startswith("pitch: after its release the model swings to 3 times the offset")
 
@@ -157,7 +161,7 @@ def test_several_probes_without_positions_are_not_compared_with_the_vessel():
     model = HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, ["heave"], ["eta", "eta_aft"])
     response = check_sections(check_model(model, {"run": run}))[1]
     assert re.search(r"Cannot be judged: .* State both in \[rig\]", " ".join(response.notices))
-    assert response.tables == ()
+    assert not response.tables
     with pytest.raises(RequestError, match="run has no channel 'eta_aft'"):
         check_model(model, {"run": run.drop_vars("eta_aft")})
 

@@ -290,7 +290,7 @@ def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path)
     assert averages.columns == ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
     assert averages.rows[0][:2] == ("ours", "0.100")
     assert skill.columns == ("model", "from hold last", "from best linear")
-    assert skill.rows == (("ours", "−50 %", "2 times"),)  # errors of 0.1 against 0.2 and 0.05
+    assert skill.rows == [("ours", "−50 %", "2 times")]  # errors of 0.1 against 0.2 and 0.05
     assert channels.rows[0] == ("heave", "0.100", "0.200", "0.050", "0.300")
     path = write_comparison(tables, tmp_path / "t.csv")
     rows = list(csv.DictReader(path.read_text().splitlines()))

@@ -35,7 +35,7 @@ pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figure
 
 from seakeep.report.figures.boxes import FEWEST, draw_box_violin
 from seakeep.report.figures.common import grid_of_axes, model_colour
-from seakeep.report.figures.eigenvalues import eigenvalue_figure
+from seakeep.report.figures.errors import eigenvalue_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import write_page, write_report
 from seakeep.report.section import Drawing, Section
@@ -604,7 +604,7 @@ def test_models_stand_beside_the_baselines_and_lost_forecasts_are_named(result):
     judged = replace(result, groups=groups)
     table = errors(judged).tables[1]
     found = ("-20 [-35, -5]", "+10 [-5, +25] cannot tell")
-    assert table.rows == (("a & b < c", "best linear (Bayesian)", "deterministic", *found),)
+    assert table.rows == [("a & b < c", "best linear (Bayesian)", "deterministic", *found)]
     (notice,) = (text for text in summary(judged).notices if "diverged and are left out" in text)
     assert "window 1 of 'unseen' (r from 2 s)" in notice
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.report.sections.bands import bands
-from seakeep.report.sections.chosen import chosen
-from seakeep.report.sections.scales import scales
+from seakeep.report.sections.errors import bands, scales
+from seakeep.report.sections.settings import chosen
 from seakeep.study import StudyResult
 from seakeep.study.judge import MEASURES, band_parts, box_table
 
@@ -92,6 +91,6 @@ def test_choices_stand_with_the_look_ahead(result):
     known = StudyResult(None, result.attrs, {**result.groups, "chosen": group})
     (table,) = chosen(known).tables
     words = "ridge 0.001: the best; 0.3 ridge 0.001, observables none"
-    assert table.rows == (("m", "a", "1.50", words),)
+    assert table.rows == [("m", "a", "1.50", words)]
     nothing = {**result.groups, "chosen": group.isel(training=[1])}
     assert chosen(StudyResult(None, result.attrs, nothing)) is None

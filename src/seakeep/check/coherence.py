@@ -16,6 +16,8 @@ from seakeep.check.parts import (
     free_runs,
     irregular,
     judged,
+    ratio,
+    read_off,
     regressors,
     used_parts,
 )
@@ -95,7 +97,7 @@ def coherence(
     own = free_runs(model, waves, free)
     parts = {name: part for name, part in used_parts(model, waves).items() if name in own}
     names = [name for name in model.signature.regressors if name not in model.inputs]
-    linear = not names and all(each.function is None for each in model.signature.readouts)
+    linear = not names and not read_off(model)
     references = [*beside(baselines, waves, own, free).values(), own]
     pieces = []
     for name, part in parts.items():
@@ -187,7 +189,5 @@ def pooled_nrmse(runs: Mapping[str, FreeRun]) -> FloatArray:
     """NRMSE of each state over all free runs, deviations from the mean of each run."""
     squares = sum(((r.forecast - r.measured) ** 2).sum(axis=0) for r in runs.values())
     spread = sum(((r.measured - r.measured.mean(axis=0)) ** 2).sum(axis=0) for r in runs.values())
-    out = np.full(np.shape(spread), np.nan)
-    ratio = np.divide(squares, spread, out=out, where=np.asarray(spread) > 0)
-    result: FloatArray = np.sqrt(ratio)
+    result: FloatArray = np.sqrt(ratio(np.asarray(squares), np.asarray(spread)))
     return result

@@ -30,24 +30,15 @@ __all__ = ["CHECKS", "Checked", "check_model"]
 Check = Callable[..., xr.Dataset]
 
 
-def _response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    return response(model, None, runs)
-
-
-def _alone(check: Callable[[Model], xr.Dataset]) -> Check:
-    """A check that looks at no run."""
-    return lambda model, runs: check(model)
-
-
 CHECKS: dict[str, Check] = {
     "worth": worth,
-    "response": _response,
+    "response": lambda model, runs: response(model, None, runs),
     "measured_response": measured_response,
     "validation": validation,
     "coherence": coherence,
-    "decay": _alone(decay),
+    "decay": lambda model, _: decay(model),
     "measured_decay": measured_decay,
-    "modes": _alone(modes),
+    "modes": lambda model, _: modes(model),
     "residuals": residuals,
     "statistics": statistics,
     "validity": validity,

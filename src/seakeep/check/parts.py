@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -23,18 +23,25 @@ from seakeep.models.observables import HALF_WIDTH, Observed
 from seakeep.signals.time_axis import stretches
 from seakeep.waves import wavenumber
 
+T = TypeVar("T")
+
 __all__ = [
     "FreeRun",
     "Known",
     "Part",
     "beside",
+    "driven",
     "free_runs",
     "free_windows",
+    "gathered",
     "irregular",
     "is_regular",
     "judged",
+    "no_energy",
     "of_part",
     "one_step",
+    "ratio",
+    "read_off",
     "reference_probe",
     "regressors",
     "single_model",
@@ -166,20 +173,68 @@ def free_runs(
     DataError
         If no run can be forecast, with the reason of each.
     """
-    free = {} if free is None else free
+    known = {} if free is None else free
+
+    def played(name: str) -> FreeRun:
+        if (label, name) not in known:
+            known[label, name] = _free_run(model, runs[name], name, (like or {}).get(name))
+        return known[label, name]
+
+    names = runs if like is None else like
+    return gathered(names, played, "no run can be forecast.", "left out:")
+
+
+def gathered(
+    names: Iterable[str], make: Callable[[str], T], none: str, left_out: str
+) -> dict[str, T]:
+    """What is made of each name; one that fails warns.
+
+    Raises
+    ------
+    DataError
+        If all fail, with the reason of each.
+    """
     found, reasons = {}, []
-    for name in runs if like is None else like:
+    for name in names:
         try:
-            if (label, name) not in free:
-                free[label, name] = _free_run(model, runs[name], name, (like or {}).get(name))
-            found[name] = free[label, name]
+            found[name] = make(name)
         except SeakeepError as error:
             reasons.append(f"{name}: {error}")
     if not found:
-        raise DataError("no run can be forecast. " + " ".join(reasons))
+        raise DataError(" ".join([none, *reasons]))
     for reason in reasons:
-        warn(f"left out: {reason}")
+        warn(f"{left_out} {reason}")
     return found
+
+
+def ratio(values: FloatArray, per: FloatArray) -> FloatArray:
+    """Quotient; NaN where nothing is divided by."""
+    out: FloatArray = np.full(values.shape, np.nan)
+    np.divide(values, per, out=out, where=per > 0)
+    return out
+
+
+def no_energy(names: str) -> DataError:
+    """Error of inputs that are constant."""
+    return DataError(f"{names} holds no energy: it is constant. Look for a dead probe.")
+
+
+def read_off(model: Model) -> list[int]:
+    """Columns of states that read-outs make of other states."""
+    return [each.column for each in model.signature.readouts if each.function is not None]
+
+
+def driven(
+    chain: Chain,
+    inputs: FloatArray,
+    run: xr.Dataset | None,
+    first: int,
+    stop: int,
+    surge: FloatArray | None = None,
+) -> FloatArray:
+    """What a chain of input maps makes of inputs from `first` to before `stop`, side by side."""
+    drive = chain.wrap(Measured(inputs, 0, surge), run, [Span(first, first, stop)])
+    return np.concatenate(drive.rows(first, stop), axis=1)
 
 
 def beside(
@@ -317,8 +372,8 @@ def regressors(model: Model, part: Part) -> FloatArray:
     out = np.full((size, width), np.nan)
     if stop > first:
         values = channel_matrix(run, model.inputs, "the run")
-        drive = chain.wrap(Measured(values, 0, _surge(model, run)), run, [Span(first, first, stop)])
-        out[first:stop] = np.concatenate(drive.rows(first, stop), axis=1)
+        surge = _surge(model, run)
+        out[first:stop] = driven(chain, values, run, first, stop, surge)
     return out
 
 

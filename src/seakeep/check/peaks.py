@@ -76,13 +76,13 @@ def statistics(
             peaks[state, kind], periods = _peaks(series, model.dt)
             rows[state, kind] = _row(series, peaks[state, kind], periods, duration)
     most = max(each.size for each in peaks.values())
-    sorted_peaks = np.full((len(model.states), 2, most), np.nan)
-    exceedance = np.full_like(sorted_peaks, np.nan)
-    for number, state in enumerate(model.states):
-        for side, kind in enumerate(KINDS):
-            found = np.sort(peaks[state, kind])[::-1]
-            sorted_peaks[number, side, : found.size] = found
-            exceedance[number, side, : found.size] = np.arange(1, found.size + 1) / (found.size + 1)
+    padded = [
+        np.pad(each, (0, most - each.size), constant_values=np.nan) for each in peaks.values()
+    ]
+    sorted_peaks = -np.sort(-np.reshape(padded, (-1, len(KINDS), most)))  # NaN last
+    count = np.isfinite(sorted_peaks).sum(axis=-1, keepdims=True)
+    rank = np.arange(1, most + 1)
+    exceedance = np.where(rank <= count, rank / (count + 1), np.nan)
     deviation, density = _densities(list(known.values()), len(model.states))
     names = next(iter(rows.values()))
     units = [label.units for label in model.signature.state_labels]

@@ -13,13 +13,15 @@ from seakeep.check.parts import (
     Known,
     free_runs,
     free_windows,
+    gathered,
     judged,
     one_step,
+    ratio,
     window_of,
 )
 from seakeep.core.spectra import cross_spectra
 from seakeep.core.whiteness import autocorrelation, input_correlation, ljung_box
-from seakeep.errors import DataError, SeakeepError, warn
+from seakeep.errors import DataError
 from seakeep.models import Model
 from seakeep.models.labelled import channel_matrix, mean_period
 
@@ -73,18 +75,14 @@ def residuals(
     known = free_runs(model, runs, free)
     period = mean_period(runs, model.inputs) * model.dt
     lags = round(period / model.dt)
-    steps, ages, reasons = [], [], []
-    for name in known:
-        try:
-            steps.append(_one_step(model, runs[name], name))
-        except SeakeepError as error:
-            reasons.append(f"one-step errors of {name}: {error}")
-            continue
-        ages.append(_aged(model, runs[name], name, lags))
-    if not steps:
-        raise DataError("no run can be judged. " + " ".join(reasons))
-    for reason in reasons:
-        warn(f"left out: {reason}")
+    stepped = gathered(
+        known,
+        lambda name: _one_step(model, runs[name], name),
+        "no run can be judged. One-step errors of",
+        "left out: one-step errors of",
+    )
+    steps = list(stepped.values())
+    ages = [_aged(model, runs[name], name, lags) for name in stepped]
     errors = [(error, inputs) for error, inputs, _ in steps]
     count = sum(len(error) for error, _ in errors)
     if count <= 2 * lags:
@@ -101,7 +99,7 @@ def residuals(
         "limit": ((), 1.96 / np.sqrt(count)),
         "ljung_box": ("state", statistic),
         "probability": ("state", probability),
-        "one_step": ("state", _ratio(np.sqrt(np.mean(whole**2, axis=0)), spread)),
+        "one_step": ("state", ratio(np.sqrt(np.mean(whole**2, axis=0)), spread)),
         **_of_free_runs(model, known, period),
         **_of_ages(ages, spread),
     }
@@ -121,12 +119,6 @@ def residuals(
         },
         attrs={"instants": count, "encounter_period": period, "of": of},
     )
-
-
-def _ratio(error: FloatArray, spread: FloatArray) -> FloatArray:
-    out: FloatArray = np.full(error.shape, np.nan)
-    np.divide(error, spread, out=out, where=spread > 0)
-    return out
 
 
 def _one_step(
@@ -160,12 +152,9 @@ def _aged(model: Model, run: xr.Dataset, name: str, lags: int) -> FloatArray:
 
 def _of_ages(ages: list[FloatArray], spread: FloatArray) -> dict[str, object]:
     squares = np.concatenate(ages)
-    known = np.isfinite(squares)
-    total = np.where(known, squares, 0.0).sum(axis=0)
-    counted = known.sum(axis=0)
-    out = np.full(total.shape, np.nan)
-    mean = np.divide(total, counted, out=out, where=counted > 0)
-    return {"age_nrmse": (("state", "age"), _ratio(np.sqrt(mean), spread + 0 * mean).T)}
+    counted = np.isfinite(squares).sum(axis=0)
+    mean = ratio(np.nan_to_num(squares, nan=0.0, posinf=0.0).sum(axis=0), counted)
+    return {"age_nrmse": (("state", "age"), ratio(np.sqrt(mean), spread + 0 * mean).T)}
 
 
 def _of_free_runs(model: Model, free: Mapping[str, FreeRun], period: float) -> dict[str, object]:
@@ -186,7 +175,7 @@ def _of_free_runs(model: Model, free: Mapping[str, FreeRun], period: float) -> d
     cycles = found.frequency * period
     total = power.sum(axis=0)
     bands = [
-        np.sqrt(_ratio(error[(cycles >= low) & (cycles < high)].sum(axis=0), total))
+        np.sqrt(ratio(error[(cycles >= low) & (cycles < high)].sum(axis=0), total))
         for low, high in BANDS.values()
     ]
     return {

@@ -13,7 +13,10 @@ from seakeep.arrays import ComplexArray, FloatArray, as_real
 from seakeep.check.parts import (
     Part,
     elevations,
+    gathered,
     is_regular,
+    no_energy,
+    read_off,
     reference_probe,
     units_of,
     used_parts,
@@ -22,7 +25,7 @@ from seakeep.check.parts import (
 from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
 from seakeep.core.response import frequency_response
 from seakeep.core.spectra import Spectra, cross_spectra, segment_length
-from seakeep.errors import DataError, RequestError, SeakeepError, warn
+from seakeep.errors import DataError, RequestError
 from seakeep.models import HankelDMDcModel, HankelEnsemble, Model
 from seakeep.models.engine import Dynamics
 from seakeep.models.following import Following
@@ -108,8 +111,7 @@ def response(
     if runs is not None and size > 1:
         each, reference = _with_wave(model, runs, frequency, each)
         names = names if not reference else [*names, WAVE]
-    made = [r.column for r in model.signature.readouts if r.function is not None]
-    each[:, :, made] = np.nan
+    each[:, :, read_off(model)] = np.nan
     return _labelled(model, frequency, names, each, reference)
 
 
@@ -177,6 +179,7 @@ def _with_wave(
 def _labelled(
     model: Model, frequency: FloatArray, names: list[str], each: ComplexArray, reference: str
 ) -> xr.Dataset:
+    each = np.moveaxis(each, 1, -1)
     mean = each.mean(axis=0)
     dims = ("state", "input", "frequency")
     quantiles = {}
@@ -184,9 +187,9 @@ def _labelled(
         bounds = np.quantile(np.abs(each), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2], axis=0)
         turned = np.abs(np.angle(each * np.conj(mean)))
         quantiles = {
-            "amplitude_lower": (dims, np.moveaxis(bounds[0], 0, 2)),
-            "amplitude_upper": (dims, np.moveaxis(bounds[1], 0, 2)),
-            "phase_spread": (dims, np.degrees(np.moveaxis(np.quantile(turned, LEVEL, 0), 0, 2))),
+            "amplitude_lower": (dims, bounds[0]),
+            "amplitude_upper": (dims, bounds[1]),
+            "phase_spread": (dims, np.degrees(np.quantile(turned, LEVEL, 0))),
         }
     waves = [reference if name == WAVE else name for name in names]
     of = units_of(model, waves)
@@ -198,10 +201,10 @@ def _labelled(
         known = rows[[coverage.channels.index(name) for name in waves]]
     return xr.Dataset(
         {
-            "amplitude": (dims, np.moveaxis(np.abs(mean), 0, 2), {"long_name": "amplitude"}),
+            "amplitude": (dims, np.abs(mean), {"long_name": "amplitude"}),
             "phase": (
                 dims,
-                np.moveaxis(np.degrees(np.angle(mean)), 0, 2),
+                np.degrees(np.angle(mean)),
                 {"units": "deg", "long_name": "phase before the wave"},
             ),
             **quantiles,
@@ -258,25 +261,21 @@ def measured_response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Datase
     """
     reference = reference_probe(model, runs)
     parts = used_parts(model, runs)
-    points, reasons = [], []
-    for name, part in parts.items():
-        if is_regular(part.run):
-            try:
-                points.append(_regular_point(model, name, part, reference))
-            except SeakeepError as error:
-                reasons.append(f"{name}: {error}")
     pieces = [part for part in parts.values() if not is_regular(part.run)]
-    if pieces:
-        try:
-            period = mean_period(runs, model.inputs) * model.dt
-            points.append(_irregular_points(model, pieces, reference, period))
-        except SeakeepError as error:
-            reasons.append(f"irregular waves: {error}")
-    if not points:
-        raise DataError("no run gives a measured response. " + " ".join(reasons))
-    for reason in reasons:
-        warn(f"no measured response from {reason}")
-    out = xr.concat(points, dim="point", coords="minimal", join="outer")
+    names = [name for name, part in parts.items() if is_regular(part.run)]
+
+    def points(name: str) -> xr.Dataset:
+        if name in names:
+            return _regular_point(model, name, parts[name], reference)
+        return _irregular_points(model, pieces, reference, mean_period(runs, model.inputs))
+
+    found = gathered(
+        [*names, *["irregular waves"] * bool(pieces)],
+        points,
+        "no run gives a measured response.",
+        "no measured response from",
+    )
+    out = xr.concat([*found.values()], dim="point", coords="minimal", join="outer")
     out["phase"].attrs = {"units": "deg", "long_name": "phase before the wave"}
     return out.assign_attrs(reference=model.inputs[reference])
 
@@ -296,15 +295,8 @@ def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Da
     return _points(
         model,
         {"run": name, "kind": "regular", "frequency": frequency, "wave_amplitude": amplitude},
-        {
-            "amplitude": np.abs(found.ratio),
-            "phase": np.degrees(np.angle(found.ratio)),
-            "amplitude_uncertainty": found.amplitude,
-            "phase_uncertainty": np.degrees(found.phase),
-            "coherence": np.full(len(model.states), np.nan),
-            "offset": sure.ratio.real,
-            "offset_uncertainty": sure.amplitude,
-        },
+        *(found.ratio, found.amplitude, found.phase),
+        {"offset": sure.ratio.real, "offset_uncertainty": sure.amplitude},
     )
 
 
@@ -314,21 +306,16 @@ def _accuracy(run: xr.Dataset, channel: str) -> float:
 
 def _irregular_points(model: Model, parts: list[Part], reference: int, period: float) -> xr.Dataset:
     pieces = [(part.inputs[:, [reference]], part.states) for part in parts]
-    period /= model.dt
     segment = segment_length(sum(len(part.time) for part in parts), AVERAGES, period, LONGEST)
     spectra, gain, radius = _gain(pieces, model.dt, segment)
     power = spectra.input_power[:, 0]
     if not power.max() > 0:
-        raise DataError(
-            f"{model.inputs[reference]} holds no energy: it is constant. Look for a dead probe."
-        )
-    coherence = spectra.ordinary()[:, 0]
+        raise no_energy(model.inputs[reference])
     name = ", ".join(str(part.run.attrs.get("run", "run")) for part in parts)
     at = np.flatnonzero((power >= POWER * power.max()) & (spectra.frequency > 0))
     amplitude, half = np.abs(gain[at]), radius[at]
     with np.errstate(divide="ignore", invalid="ignore"):
         turn = np.where(half < amplitude, np.arcsin(np.minimum(half / amplitude, 1)), np.pi)
-    nothing = np.full_like(amplitude, np.nan)
     return _points(
         model,
         {
@@ -337,15 +324,8 @@ def _irregular_points(model: Model, parts: list[Part], reference: int, period: f
             "frequency": spectra.frequency[at],
             "wave_amplitude": [np.nan] * at.size,
         },
-        {
-            "amplitude": amplitude,
-            "phase": np.degrees(np.angle(gain[at])),
-            "amplitude_uncertainty": half,
-            "phase_uncertainty": np.degrees(turn),
-            "coherence": coherence[at],
-            "offset": nothing,
-            "offset_uncertainty": nothing,
-        },
+        *(gain[at], half, turn),
+        {"coherence": spectra.ordinary()[at, 0]},
     )
 
 
@@ -365,8 +345,23 @@ def _gain(
 
 
 def _points(
-    model: Model, of_points: Mapping[str, npt.ArrayLike], values: Mapping[str, FloatArray]
+    model: Model,
+    of_points: Mapping[str, npt.ArrayLike],
+    ratio: ComplexArray,
+    radius: FloatArray,
+    turn: FloatArray,
+    others: Mapping[str, FloatArray],
 ) -> xr.Dataset:
+    """Points from ratios with their uncertainty and that of the phase (rad); others are NaN."""
+    nothing = np.full(ratio.shape, np.nan)
+    values = {
+        "amplitude": np.abs(ratio),
+        "phase": np.degrees(np.angle(ratio)),
+        "amplitude_uncertainty": radius,
+        "phase_uncertainty": np.degrees(turn),
+        **dict.fromkeys(("coherence", "offset", "offset_uncertainty"), nothing),
+        **others,
+    }
     return xr.Dataset(
         {key: (("point", "state"), np.atleast_2d(value)) for key, value in values.items()},
         coords={"state": model.states}

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from seakeep.check.parts import is_regular, reference_probe, used_parts
+from seakeep.check.parts import is_regular, no_energy, reference_probe, used_parts
 from seakeep.core.harmonics import dominant_frequency
 from seakeep.errors import DataError
 from seakeep.models import Model, outside_training
@@ -68,9 +68,7 @@ def validity(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
         raise DataError("no run has all channels of the model: there are no waves to compare.")
     table = np.stack([values for _, values in rows.values()])
     if np.isnan(table[:, :, 0]).all():
-        raise DataError(
-            f"{model.inputs[reference]} holds no energy: it is constant. Look for a dead probe."
-        )
+        raise no_energy(model.inputs[reference])
     outside = [_outside(model, run, np.isfinite(values[1, 1])) for run, values in rows.values()]
     return xr.Dataset(
         {key: (("run", "part"), table[:, :, column]) for column, key in enumerate(keys)}

@@ -9,7 +9,9 @@ import xarray as xr
 
 from seakeep.arrays import ComplexArray, FloatArray, IntArray
 from seakeep.check.parts import (
+    driven,
     is_regular,
+    read_off,
     reference_probe,
     single_model,
     units_of,
@@ -18,7 +20,7 @@ from seakeep.check.parts import (
 from seakeep.check.response import measured_response, transfer
 from seakeep.errors import DataError, RequestError
 from seakeep.models import HankelDMDcModel, Model
-from seakeep.models.inputs import Chain, Measured
+from seakeep.models.inputs import Chain
 from seakeep.models.interface import Span
 from seakeep.models.labelled import mean_period
 
@@ -86,21 +88,22 @@ def drift(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     differences: FloatArray = step * np.arange(DIFFERENCES + 1, dtype=float)
     slow = transfer(model, single.dynamics, differences)
     still = _columns(single, np.zeros((samples, len(single.inputs))))
-    found = np.empty((DIFFERENCES + 1, bins.size, len(single.states)), dtype=complex)
+    found = np.empty((len(single.states), DIFFERENCES + 1, bins.size), dtype=complex)
     for number, first in enumerate(bins):
         for apart in range(DIFFERENCES + 1):
             waves = [first] if apart == 0 else [first, first + apart]
             elevation = sum(_wave(samples, each, turns[each], amplitude) for each in waves)
             rows = _columns(single, np.asarray(elevation)) - still
             parts = np.fft.fft(rows, axis=0)[apart] / samples * (1 if apart == 0 else 2)
-            found[apart, number] = slow[apart] @ parts / (amplitude**2 * (2 if apart else 1))
-    made = [r.column for r in model.signature.readouts if r.function is not None]
-    found[:, :, made] = np.nan
+            found[:, apart, number] = slow[apart] @ parts / (amplitude**2 * (2 if apart else 1))
+    found[read_off(model)] = np.nan
+    slow_response = np.abs(found)
+    slow_response[:, 0] = found[:, 0].real  # the mean has a sign
     dims = ("state", "difference", "frequency")
     return xr.Dataset(
         {
-            "slow_response": (dims, np.moveaxis(_signed(found), 2, 0)),
-            "phase": (dims, np.moveaxis(np.degrees(np.angle(found)), 2, 0), {"units": "deg"}),
+            "slow_response": (dims, slow_response),
+            "phase": (dims, np.degrees(np.angle(found)), {"units": "deg"}),
             **_offsets(single, runs, slow[0], still),
         },
         coords={
@@ -139,15 +142,7 @@ def _columns(model: HankelDMDcModel, inputs: FloatArray) -> FloatArray:
     before, after = -(-max(-reach.first, 0) // size), -(-max(reach.stop, 1) // size)
     first = before * size
     tiled = np.tile(inputs, (before + 1 + after, 1))
-    drive = chain.wrap(Measured(tiled), None, [Span(first, first, first + size)])
-    return np.concatenate(drive.rows(first, first + size), axis=1)
-
-
-def _signed(found: ComplexArray) -> FloatArray:
-    """The mean with its sign, and the modulus of the rest."""
-    out = np.abs(found)
-    out[0] = found[0].real
-    return out
+    return driven(chain, tiled, None, first, first + size)
 
 
 def _offsets(

@@ -10,8 +10,8 @@ import numpy as np
 
 from seakeep.arrays import Progress
 from seakeep.report.claims import claims_table
-from seakeep.report.figures.acts import acts_figure
 from seakeep.report.figures.common import judged_models, model_words
+from seakeep.report.figures.histories import acts_figure
 from seakeep.report.page import write_page
 from seakeep.report.section import Drawing, Section
 from seakeep.report.sections.data import position_table, wave_table
@@ -122,12 +122,12 @@ def acts_table(results: Results) -> Table:
     for test in tests:
         label = next(iter(results.values())).label_of(test).removeprefix("regular, ")
         columns += [f"{label}: waves", f"{label}: slow"]
-    numeric = tuple(range(2, len(columns)))
+    numeric = range(2, len(columns))
     return Table(
         "acts",
         "Median NRMSE of three acts and their baselines",
-        tuple(columns),
-        tuple(rows),
+        columns,
+        rows,
         "Average over channels, median over training sets and windows, in measured SDs: 1 is no "
         "better than the mean of the window. Slow: surge and both mooring loads; waves: the eight "
         "others. Mean, hold last: the training mean, and the last measured state; FIR: "
@@ -168,17 +168,17 @@ def _heat_table(results: Results, test: str) -> Table:
         cells = []
         for _, result, model in places:
             at = result.groups["statistics/boxes"]["median"].sel(test=test)
-            cells.append(number(float(at.sel(model=model, measure="nrmse", channel=name)), 2))
+            cells.append(number(at.sel(model=model, measure="nrmse", channel=name), 2))
         rows.append((name.replace("_", " "), *cells))
     heads = [f"{act.title.partition(' ')[0]} {model_words(model)}" for act, _, model in places]
-    numeric = tuple(range(1, len(heads) + 1))
+    numeric = range(1, len(heads) + 1)
     return Table(
         f"channels_{test}",
         f"Median NRMSE, {first.label_of(test)}",
         ("channel", *heads),
-        tuple(rows),
+        rows,
         "",
         numeric,
-        averages=(len(rows) - 1,),
+        averages=[len(rows) - 1],
         heat=numeric,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,7 +16,7 @@ from seakeep.report.figures import checks
 from seakeep.report.page import write_page
 from seakeep.report.section import Drawing, Section
 from seakeep.report.style import shown_unit
-from seakeep.report.tables import Table, number, probability, text
+from seakeep.report.tables import MISSING, Table, interval, number, probability, text
 from seakeep.report.worth import worth_section
 
 __all__ = ["CHECK_SECTIONS", "check_sections", "write_check"]
@@ -26,11 +26,9 @@ OVERSHOOT = 1.1
 """Largest swing over the offset that a free decay may show; the rest is for the noise of a fit."""
 
 
-def response_section(checked: Checked) -> Section | None:
+def response_section(found: xr.Dataset, checked: Checked) -> Section:
     """Return amplitude and phase against frequency, with the judgement by V&V 20."""
-    found, measured = (checked.found.get(key) for key in ("response", "measured_response"))
-    if found is None:
-        return None
+    measured = checked.found.get("measured_response")
     reference = found.attrs["reference"]
     wave = "wave" in found["input"]
     if "validation" in checked.refused:  # points beside the answer to something else
@@ -61,37 +59,30 @@ def response_section(checked: Checked) -> Section | None:
     tables = [_points_table(measured, found)] if measured is not None and regular else []
     if "validation" in checked.found:
         tables.append(_validation_table(checked.found["validation"]))
-    return Section(
-        "response", "Response (RAO)", tuple(words), figures=(drawing,), tables=tuple(tables)
-    )
+    return Section("response", "Response (RAO)", words, figures=[drawing], tables=tables)
 
 
 def _points_table(measured: xr.Dataset, found: xr.Dataset) -> Table:
     """Measured response in regular waves; irregular ones stand in the figure."""
     at = measured.isel(point=np.flatnonzero(measured["kind"].values == "regular"))
-    units = found["units"].isel(input=-1).values
-    rows = []
-    for point in range(at.sizes["point"]):
-        one = at.isel(point=point)
-        for state, unit in zip(one["state"].values, units, strict=True):
-            own = one.sel(state=state)
-            factor, shown = displayed(str(unit))
-            rows.append(
-                (
-                    str(one["run"].values),
-                    number(float(one["frequency"])),
-                    number(float(one["wave_amplitude"]), 4),
-                    f"{state} [{shown_unit(shown)}]",
-                    _sure(own, "amplitude", factor),
-                    _sure(own, "phase"),
-                )
-            )
-    columns = ("run", "frequency [Hz]", "wave amplitude [m]", "state", "amplitude", "phase [°]")
+    at = at.assign_coords(units=("state", found["units"].isel(input=-1).values))
+    rows = [
+        (
+            str(own["run"].values),
+            number(own["frequency"]),
+            number(own["wave_amplitude"], 4),
+            state,
+            _sure(own, "amplitude", factor),
+            _sure(own, "phase"),
+        )
+        for point in range(at.sizes["point"])
+        for own, factor, state in _states(at.isel(point=point))
+    ]
     return Table(
         "measured_response",
         "Measured response in regular waves",
-        columns,
-        tuple(rows),
+        ("run", "frequency [Hz]", "wave amplitude [m]", "state", "amplitude", "phase [°]"),
+        rows,
         "± expanded uncertainty at 95 % by ITTC 7.5-02-07-02.1: scatter over windows of whole "
         "periods, and the accuracy of the instruments. Without a stated accuracy: scatter only.",
         (1, 2),
@@ -99,17 +90,26 @@ def _points_table(measured: xr.Dataset, found: xr.Dataset) -> Table:
     )
 
 
+def _states(found: xr.Dataset) -> Iterator[tuple[xr.Dataset, float, str]]:
+    """Results of each state, the factor to the unit that is shown, and its name with that unit."""
+    for state, unit in zip(found["state"].values, found["units"].values, strict=True):
+        factor, shown = displayed(str(unit))
+        yield found.sel(state=state), factor, f"{state} [{shown_unit(shown)}]"
+
+
+def _numbers(own: xr.Dataset, *keys: str, digits: int = 3) -> Iterator[str]:
+    return (number(own[key], digits) for key in keys)
+
+
 def _sure(own: xr.Dataset, key: str, factor: float = 1.0) -> str:
     """Value ± expanded uncertainty."""
-    return text(factor * float(own[key]), [factor * float(own[f"{key}_uncertainty"])])
+    return text(factor * own[key], [factor * float(own[f"{key}_uncertainty"])])
 
 
 def _validation_table(found: xr.Dataset) -> Table:
     """E and u_val of each state: over the regular runs one by one, irregular points together."""
     rows = []
-    for state, unit in zip(found["state"].values, found["units"].values, strict=True):
-        factor, shown = displayed(str(unit))
-        own = found.sel(state=state)
+    for own, factor, state in _states(found):
         for kind in ("regular", "irregular"):
             at = own.isel(point=np.flatnonzero(own["kind"].values == kind))
             known = np.isfinite(at["error"].values)
@@ -119,12 +119,12 @@ def _validation_table(found: xr.Dataset) -> Table:
             worst = int(np.argmax(np.abs(error) - sure))
             rows.append(
                 (
-                    f"{state} [{shown_unit(shown)}]",
+                    state,
                     kind,
                     str(known.sum()),
                     str(int(at["within"].values[known].sum())),
-                    text(factor * float(np.sqrt(np.mean(error**2))), digits=None),
-                    number(float(at["frequency"].values[known][worst])),
+                    text(factor * np.sqrt(np.mean(error**2)), digits=None),
+                    number(at["frequency"].values[known][worst]),
                     text(factor * error[worst], [factor * sure[worst]]),
                 )
             )
@@ -136,18 +136,15 @@ def _validation_table(found: xr.Dataset) -> Table:
         "validation",
         "Judgement by ASME V&V 20: comparison error E = S − D of the amplitude",
         columns,
-        tuple(rows),
+        rows,
         "Where |E| < U_val the error cannot be told from the uncertainty of the measurement and "
         "of an ensemble's members; elsewhere the model errs by about E.",
         (2, 3, 4, 5),
     )
 
 
-def possible_section(checked: Checked) -> Section | None:
+def possible_section(found: xr.Dataset, checked: Checked) -> Section:
     """Return coherence, and the least error of a linear map beside the model's."""
-    found = checked.found.get("coherence")
-    if found is None:
-        return None
     rows, trained = [], checked.found.get("training_coherence")
     advice: dict[str, list[str]] = {}
     unjudged: dict[str, list[str]] = {}
@@ -183,34 +180,34 @@ def possible_section(checked: Checked) -> Section | None:
     return Section(
         "possible",
         "What is possible",
-        words=(
+        words=[
             "The linear bound is the least error of a linear map of the inputs, by coherence in "
             f"{found.attrs['of']} in irregular waves ({found.attrs['averages']:.0f} segments of "
             f"{found.attrs['segment']:.3g} s). It is estimated from what linear models "
             "leave, which hardly leaks between frequencies, and lies above the error of none of "
             "them: the baselines, and this model if it is linear. With observables the model "
-            "itself counts. Its error is that of free runs over the same instants.",
-        ),
-        points=tuple(points),
-        figures=(
+            "itself counts. Its error is that of free runs over the same instants."
+        ],
+        points=points,
+        figures=[
             Drawing(
                 "coherence",
                 "Coherence of each state with the inputs, over the spectrum of the state.",
                 partial(checks.coherence, found),
-            ),
-        ),
-        tables=(
+            )
+        ],
+        tables=[
             Table(
                 "possible",
                 "NRMSE of the model's free runs, and what the inputs allow",
                 ("state", "of", "model", "linear bound", "95 %", "with observables", "95 % of it"),
-                tuple(rows),
+                rows,
                 "Bounds are corrected for what as many inputs explain of noise by chance; "
                 "intervals are those of the part that is left. Training is shown as context.",
                 (2, 3, 4, 5, 6),
                 heat=(2, 3, 5),
-            ),
-        ),
+            )
+        ],
     )
 
 
@@ -218,9 +215,8 @@ def _bounds_row(own: xr.Dataset) -> tuple[str, ...]:
     """Error of a state, and its bounds with their intervals."""
     cells = []
     for key in ("linear_bound", "observables_bound"):
-        at = [float(own.get(f"{key}{end}", np.nan)) for end in ("", "_lower", "_upper")]
-        cells += [number(at[0]), text(np.nan, at[1:])]
-    return (str(own["state"].values), own.attrs["of"], number(float(own["nrmse"])), *cells)
+        cells += [number(own[key]), interval(own, key)] if key in own else [MISSING] * 2
+    return (str(own["state"].values), own.attrs["of"], number(own["nrmse"]), *cells)
 
 
 def _advice(model: float, linear: float, more: float, ahead: bool) -> str:
@@ -243,30 +239,25 @@ def _advice(model: float, linear: float, more: float, ahead: bool) -> str:
     return "As good as inputs and observables allow."
 
 
-def decay_section(checked: Checked) -> Section | None:
+def decay_section(table: xr.Dataset, checked: Checked) -> Section:
     """Return free decay, beside measured ones, and the modes."""
     figures, tables, words, points = [], [], [], []
     if (found := checked.found.get("decay")) is not None:
-        rows: list[tuple[str, ...]] = [
-            (
-                str(motion),
-                number(float(own["period"]), 3),
-                number(float(own["damping_ratio"]), 3),
-                number(float(own["p"]), 3),
-                "0",
-                "model",
-            )
+        keys = ("period", "damping_ratio", "p")
+        rows = [
+            (str(motion), *_numbers(found.sel(motion=motion), *keys), "0", "model")
             for motion in found["motion"].values
-            for own in (found.sel(motion=motion),)
         ]
         if (measured := checked.found.get("measured_decay")) is not None:
-            rows += [_decay_row(measured.sel(run=run)) for run in measured["run"].values]
+            for run in measured["run"].values:
+                own = measured.sel(run=run)
+                rows.append((str(own["motion"].values), *_numbers(own, *keys, "q"), str(run)))
         columns = ("motion", "period [s]", "damping ratio", "p", "q [1/m or 1/rad]", "of")
         note = (
             "Decrement of a cycle p + q a. A linear model's does not depend on the amplitude a. A "
             "dash: fewer than three extremes, as where a motion creeps back."
         )
-        tables.append(Table("decay", "Free decay", columns, tuple(rows), note, (1, 2, 3, 4)))
+        tables.append(Table("decay", "Free decay", columns, rows, note, (1, 2, 3, 4)))
         caption = "What is left of an offset of one training SD after its release in still water."
         figures.append(Drawing("decay", caption, partial(checks.decay, found)))
         points = _ringing(found)
@@ -275,19 +266,11 @@ def decay_section(checked: Checked) -> Section | None:
             "with fewer than three extremes has neither period nor damping: it creeps back, or its "
             "forecast leans on the waves and forgets the state."
         )
-    if (modes := checked.found.get("modes")) is not None:
+    if table.sizes["state"] > 1:
         caption = "Modes that decay slowest: states that take part in each (parts of one)."
-        if modes.sizes["state"] > 1:
-            figures.append(Drawing("modes", caption, partial(checks.modes, modes)))
-        tables.append(_modes_table(modes))
-    if not figures:
-        return None
-    title = "Free decay and modes"
-    return Section(
-        *("decay", title, tuple(words), tuple(points)),
-        figures=tuple(figures),
-        tables=tuple(tables),
-    )
+        figures.append(Drawing("modes", caption, partial(checks.modes, table)))
+    tables.append(_modes_table(table))
+    return Section("decay", "Free decay and modes", words, points, figures=figures, tables=tables)
 
 
 def _ringing(found: xr.Dataset) -> list[str]:
@@ -302,15 +285,6 @@ def _ringing(found: xr.Dataset) -> list[str]:
     ]
 
 
-def _decay_row(own: xr.Dataset) -> tuple[str, ...]:
-    keys = ("period", "damping_ratio", "p", "q")
-    return (
-        str(own["motion"].values),
-        *(number(float(own[key]), 3) for key in keys),
-        str(own["run"].values),
-    )
-
-
 def _modes_table(found: xr.Dataset) -> Table:
     rows = []
     for k in range(found.sizes["mode"]):
@@ -319,23 +293,15 @@ def _modes_table(found: xr.Dataset) -> Table:
         parts = ", ".join(
             f"{own['state'].values[at]} {float(own['participation'][at]):.2f}" for at in largest
         )
-        rows.append(
-            (
-                *(number(float(own[key]), 4) for key in ("period", "damping_ratio")),
-                *(number(float(own[key]), 4) for key in ("decay_time", "modulus")),
-                parts,
-            )
-        )
+        keys = ("period", "damping_ratio", "decay_time", "modulus")
+        rows.append((*_numbers(own, *keys, digits=4), parts))
     columns = ("period [s]", "damping ratio", "decay time [s]", "modulus", "states that take part")
     title = f"All {found.sizes['mode']} modes"
-    return Table("modes", title, columns, tuple(rows), "", (0, 1, 2, 3), folded=True)
+    return Table("modes", title, columns, rows, "", (0, 1, 2, 3), folded=True)
 
 
-def residuals_section(checked: Checked) -> Section | None:
+def residuals_section(found: xr.Dataset, checked: Checked) -> Section:
     """Return whiteness, past inputs, bands and age of the errors."""
-    found = checked.found.get("residuals")
-    if found is None:
-        return None
     lag, trained = float(found["lag"][-1]), checked.found.get("training_residuals")
     rows = [
         _residuals_row(each.sel(state=state))
@@ -344,26 +310,22 @@ def residuals_section(checked: Checked) -> Section | None:
         if each is not None
     ]
     period = float(found.attrs["encounter_period"])
+    step = float(found["lag"][1] - found["lag"][0])
     columns = (
         *("state", "of", "one step [SD]", "Ljung–Box Q", "p", "past inputs beyond limit"),
-        *(
-            "slow",
-            "wave",
-            "above",
-            "after 1 T",
-            f"after {found.sizes['age'] * _dt(found) / period:.0f} T",
-        ),
+        *("slow", "wave", "above", "after 1 T"),
+        f"after {found.sizes['age'] * step / period:.0f} T",
     )
     table = Table(
         "residuals",
         "Errors of one step, and of free runs by band and age (in measured SDs)",
         columns,
-        tuple(rows),
+        rows,
         f"Ljung–Box up to a lag of {lag:.3g} s ({found.sizes['lag'] - 1} samples) over "
         f"{found.attrs['instants']} instants; p is the probability of white noise. Of white "
         "residuals 5 % of the lags lie beyond the limit. Bands: below 0.5, to 2, and above 2 "
         f"cycles per encounter period ({period:.3g} s).",
-        tuple(range(2, len(columns))),
+        range(2, len(columns)),
         heat=(6, 7, 8, 9, 10),
     )
     caption = (
@@ -372,14 +334,14 @@ def residuals_section(checked: Checked) -> Section | None:
         "error against the age of the forecast."
     )
     drawing = Drawing("residuals", caption, partial(checks.residuals, found))
-    words = (
+    words = [
         "A model that has taken all from the data leaves one-step errors that are white and know "
         "nothing of past inputs. With long records even small errors fail this test: read it with "
         f"the size of the error. The figure is of the {found.attrs['of']}; the table also shows "
         "training, as context. Errors by age start at other instants than the free runs of the "
-        "first section, and so differ from them.",
-    )
-    return Section("residuals", "Residuals", words, figures=(drawing,), tables=(table,))
+        "first section, and so differ from them."
+    ]
+    return Section("residuals", "Residuals", words, figures=[drawing], tables=[table])
 
 
 def _residuals_row(own: xr.Dataset) -> tuple[str, ...]:
@@ -389,42 +351,34 @@ def _residuals_row(own: xr.Dataset) -> tuple[str, ...]:
     return (
         str(own["state"].values),
         own.attrs["of"],
-        number(float(own["one_step"]), 4),
+        number(own["one_step"], 4),
         f"{float(own['ljung_box']):.0f}",
-        probability(float(own["probability"])),
-        f"{beyond:.0f} %" if np.isfinite(beyond) else number(np.nan),
-        *(number(float(own["band_nrmse"].sel(band=band))) for band in own["band"].values),
-        *(number(float(own["age_nrmse"][at])) for at in (own.sizes["lag"] - 2, -1)),
+        probability(own["probability"]),
+        f"{beyond:.0f} %" if np.isfinite(beyond) else MISSING,
+        *map(number, own["band_nrmse"]),
+        *(number(own["age_nrmse"][at]) for at in (own.sizes["lag"] - 2, -1)),
     )
 
 
-def _dt(found: xr.Dataset) -> float:
-    return float(found["lag"][1] - found["lag"][0])
-
-
-def statistics_section(checked: Checked) -> Section | None:
+def statistics_section(found: xr.Dataset, checked: Checked) -> Section:
     """Return the statistics of responses that designers read."""
-    found = checked.found.get("statistics")
-    if found is None:
-        return None
     rows = []
-    for state, unit in zip(found["state"].values, found["units"].values, strict=True):
-        factor, shown = displayed(str(unit))
+    for of_state, factor, state in _states(found):
         for kind in found["kind"].values:
-            own = found.sel(state=state, kind=kind)
+            own = of_state.sel(kind=kind)
             bounds = [factor * float(own[f"extreme_{each}"]) for each in ("lower", "upper")]
-            extreme = factor * float(own["extreme"]) if np.isfinite(bounds[0]) else np.nan
+            extreme = factor * own["extreme"] if np.isfinite(bounds[0]) else np.nan
             rows.append(
                 (
-                    f"{state} [{shown_unit(shown)}]",
+                    state,
                     str(kind),
                     f"{factor * float(own['significant_double_amplitude']):.4g}",
-                    number(float(own["zero_crossing_period"]), 3),
+                    number(own["zero_crossing_period"], 3),
                     f"{int(own['peaks'])}",
-                    number(float(own["weibull_shape"]), 2),
+                    number(own["weibull_shape"], 2),
                     text(extreme, digits=None),
                     text(np.nan, bounds, digits=None),
-                    number(float(own["divergence"]) if kind == "forecast" else np.nan, 4),
+                    number(own["divergence"], 4) if kind == "forecast" else MISSING,
                 )
             )
     hours = float(found.attrs["duration"]) / 3600
@@ -436,43 +390,35 @@ def statistics_section(checked: Checked) -> Section | None:
         "statistics",
         f"Statistics of responses over the {found.attrs['of']} in irregular waves",
         columns,
-        tuple(rows),
+        rows,
         f"Extreme: most probable largest deviation from the mean in {hours:.3g} h of "
         "these records' time (3 h at full scale), by Weibull's law; its interval is what the fit "
         "does not know. Rayleigh's law has the shape 2. JSD: Jensen–Shannon divergence of the "
         "densities forecast and measured (0 to 0.69), of deviations from the mean: no offset is "
         "seen. Peaks of slow channels mix slow and wave motion.",
-        tuple(range(2, len(columns))),
+        range(2, len(columns)),
     )
     caption = (
         "How often a peak exceeds a level, measured and forecast, beside Rayleigh and Weibull."
     )
-    drawings = (
+    drawings = [
         Drawing("exceedance", caption, partial(checks.exceedance, found)),
         Drawing("density", "Densities of the states.", partial(checks.density, found)),
-    )
-    title = "Statistics of responses"
-    return Section("statistics", title, figures=drawings, tables=(table,))
+    ]
+    return Section("statistics", "Statistics of responses", figures=drawings, tables=[table])
 
 
-def validity_section(checked: Checked) -> Section | None:
+def validity_section(found: xr.Dataset, checked: Checked) -> Section:
     """Return where each test lies against the training."""
-    found = checked.found.get("validity")
-    if found is None:
-        return None
     rows = []
     for run in found["run"].values:
-        own = found.sel(run=run)
         for part in found["part"].values:
-            at = own.sel(part=part)
+            at = found.sel(run=run, part=part)
             if np.isfinite(at["height"]):
                 keys = (("height", 3), ("period", 2), ("steepness", 4), ("drift", 3))
-                cells = (number(float(at[key]), digits) for key, digits in keys)
-                waves = str(own["waves"].values)
-                rows.append((str(run), str(part), waves, *cells))
-    columns = (
-        *("run", "part", "waves", "height [m]", "period [s]", "steepness", "mean surge [m]"),
-    )
+                cells = (number(at[key], digits) for key, digits in keys)
+                rows.append((str(run), str(part), str(at["waves"].values), *cells))
+    columns = ("run", "part", "waves", "height [m]", "period [s]", "steepness", "mean surge [m]")
     note = (
         "Steepness here is height over wave length in the depth of the run. Reasons judge "
         "steepness in deep water, by spectral mean period, so that their figures differ a little."
@@ -492,85 +438,67 @@ def validity_section(checked: Checked) -> Section | None:
         "or steepness is beyond the largest of training by a tenth and the scatter of so short a "
         "record."
     )
-    return Section(
-        "validity",
-        "Validity",
-        points=(
-            *(outside or ["All tests lie inside the waves that trained the model."]),
-            *repeats,
-        ),
-        figures=(Drawing("validity", caption, partial(checks.validity, found)),),
-        tables=(Table("validity", "Waves", columns, tuple(rows), note, (3, 4, 5, 6)),),
-    )
+    points = (outside or ["All tests lie inside the waves that trained the model."]) + repeats
+    drawing = Drawing("validity", caption, partial(checks.validity, found))
+    table = Table("validity", "Waves", columns, rows, note, (3, 4, 5, 6))
+    return Section("validity", "Validity", points=points, figures=[drawing], tables=[table])
 
 
-def drift_section(checked: Checked) -> Section | None:
+def drift_section(found: xr.Dataset, checked: Checked) -> Section:
     """Return the second order: mean drift and slow response per amplitude squared."""
-    found = checked.found.get("drift")
-    if found is None:
-        return None
     rows = []
-    for state, unit in zip(found["state"].values, found["units"].values, strict=True):
-        own = found.sel(state=state)
+    for own, factor, state in _states(found):
         if "offset" not in own or not np.isfinite(own["slow_response"]).any():
             continue
-        factor, shown = displayed(str(unit))
+        mean = factor * own["slow_response"][0]
         for point in range(own.sizes["point"]):
             at = own.isel(point=point)
             f = float(at["point_frequency"])
-            mean = own["slow_response"][0]
-            inside = float(mean["frequency"][0]) <= f <= float(mean["frequency"][-1])
-            made = float(np.interp(f, mean["frequency"], mean)) if inside else np.nan
-            rows.append(
-                (
-                    f"{state} [{shown_unit(shown)}]",
-                    str(at["run"].values),
-                    number(f),
-                    number(factor * made, 4),
-                    _sure(at, "offset", factor),
-                )
-            )
+            made = np.interp(f, mean["frequency"], mean, left=np.nan, right=np.nan)
+            sure = _sure(at, "offset", factor)
+            rows.append((state, str(at["run"].values), number(f), number(made, 4), sure))
     columns = ("state", "run", "frequency [Hz]", "model", "measured")
     note = (
         "Offset from the rest in still water, as the model has it, over the wave amplitude "
         "squared; ± expanded uncertainty at 95 % of the measured mean."
     )
     title = "Mean offset in regular waves, per amplitude squared"
-    tables = (Table("drift", title, columns, tuple(rows), note, (2, 3, 4)),) if rows else ()
-    words = (
+    tables = [Table("drift", title, columns, rows, note, (2, 3, 4))] if rows else []
+    words = [
         "What the observables make of one wave (the mean) and of two whose frequencies differ (a "
         "slow response at the difference, half of it per amplitude squared, so that it tends to "
-        f"the mean), probed with an amplitude of {float(found.attrs['amplitude']):.3g} m.",
-    )
+        f"the mean), probed with an amplitude of {float(found.attrs['amplitude']):.3g} m."
+    ]
     caption = (
         "Mean and slow response per wave amplitude squared, against the frequency of the wave."
     )
     drawing = Drawing("drift", caption, partial(checks.drift, found))
-    return Section("second-order", "Second order", words, figures=(drawing,), tables=tables)
+    return Section("second-order", "Second order", words, figures=[drawing], tables=tables)
 
 
-CHECK_SECTIONS: list[tuple[str, tuple[str, ...], Callable[[Checked], Section | None]]] = [
+CHECK_SECTIONS: list[tuple[str, Sequence[str], Callable[[xr.Dataset, Checked], Section]]] = [
     ("What the model is worth", ("worth",), worth_section),
     ("Response (RAO)", ("response", "measured_response", "validation"), response_section),
     ("What is possible", ("coherence",), possible_section),
-    ("Free decay and modes", ("decay", "measured_decay", "modes"), decay_section),
+    ("Free decay and modes", ("modes", "decay", "measured_decay"), decay_section),
     ("Residuals", ("residuals",), residuals_section),
     ("Statistics of responses", ("statistics",), statistics_section),
     ("Validity", ("validity",), validity_section),
     ("Second order", ("drift",), drift_section),
 ]
-"""Title, the checks that it shows, and what makes it."""
+"""Title, the checks that it shows, and what makes it of the result of the first."""
 
 
 def check_sections(checked: Checked) -> list[Section]:
     """Sections of the page; each says what could not be judged, and why."""
     out = []
     for title, needed, make in CHECK_SECTIONS:
-        made = make(checked) or Section(needed[0], title)
+        found = checked.found.get(needed[0])
+        made = Section(needed[0], title) if found is None else make(found, checked)
         refused = [checked.refused[name] for name in needed if name in checked.refused]
         told = [f"Cannot be judged: {text}" for text in dict.fromkeys(refused)]
         told += dict.fromkeys(note for name in needed for note in checked.notes.get(name, ()))
-        out.append(replace(made, notices=made.notices + tuple(told)))
+        out.append(replace(made, notices=(*made.notices, *told)))
     return out
 
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,7 +12,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.files import MARK, replacing, write_netcdf
-from seakeep.report.tables import MISSING, Table, change, plain_cell
+from seakeep.report.tables import MISSING, Table, change, interval, number, plain_cell
 from seakeep.report.tables import text as text_of
 from seakeep.study.judge import verdict
 
@@ -33,15 +31,15 @@ __all__ = [
 ]
 
 _SHOWN = {
-    "nrmse": ("NRMSE", "{:.3f}", "anrmse"),
-    "training_nrmse": ("in training SD", "{:.3f}", "training_anrmse"),
-    "fit": ("fit %", "{:.1f}", ""),
-    "nammae": ("NAMMAE", "{:.3f}", "mean_nammae"),
-    "sd_ratio": ("SD ratio", "{:.3f}", ""),
-    "coverage": ("in band %", "{:.1f}", "mean_coverage"),
-    "relative_band_width": ("width in SD", "{:.3f}", ""),
+    "nrmse": ("NRMSE", 3, "anrmse"),
+    "training_nrmse": ("in training SD", 3, "training_anrmse"),
+    "fit": ("fit %", 1, ""),
+    "nammae": ("NAMMAE", 3, "mean_nammae"),
+    "sd_ratio": ("SD ratio", 3, ""),
+    "coverage": ("in band %", 1, "mean_coverage"),
+    "relative_band_width": ("width in SD", 3, ""),
 }
-"""Columns of a terminal: heading, format, and the average over the channels."""
+"""Columns of a terminal: heading, decimals, and the average over the channels."""
 _IN_UNITS = {
     "measured_min": "min measured",
     "predicted_min": "min predicted",
@@ -67,62 +65,65 @@ _OF_SCALE = ("scale", "scale_factor")
 
 
 def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
-    """Comparison of forecasts with measurements, two tables per run that fit a terminal."""
+    """Comparison of forecasts with measurements, tables per run that fit a terminal."""
     shown = {name: each for name, each in _SHOWN.items() if name in table}
-    columns = ("channel", *(heading for heading, _, _ in shown.values()))
     for run in table["run"].values:
         at = table.sel(run=run)
-        rows = [
-            (
-                str(name),
-                *(_text(at[key].sel(channel=name), form) for key, (_, form, _) in shown.items()),
-            )
-            for name in table["channel"].values
-        ]
-        means = [_text(at[mean], form) if mean else "" for _, form, mean in shown.values()]
-        rows.append(("average", *means))
-        numeric = tuple(range(1, len(columns)))
-        name, title = f"comparison_{run}", f"{run}: {_title(at)}"
-        last = (len(rows) - 1,)
-        yield Table(name, title, columns, tuple(rows), _note(at), numeric, averages=last)
-        yield _intervals(at, str(run))
-        yield _extremes(at, str(run))
-
-
-def _intervals(at: xr.Dataset, run: str) -> Table:
-    """Intervals of the measures: how sure they are, one run and one model given."""
-    rows = [
-        (
-            str(name),
-            _bounds(at.sel(channel=name), "nrmse"),
-            _bounds(at.sel(channel=name), "nammae"),
+        means = [number(at[mean], digits) if mean else "" for _, digits, mean in shown.values()]
+        yield _by_channel(
+            at,
+            "comparison",
+            _title(at),
+            [heading for heading, _, _ in shown.values()],
+            lambda one: [number(one[key], digits) for key, (_, digits, _) in shown.items()],
+            means,
+            _note(at),
         )
-        for name in at["channel"].values
-    ]
-    rows.append(("average", _bounds(at, "anrmse"), _bounds(at, "mean_nammae")))
-    columns = ("channel", "NRMSE, 95 %", "NAMMAE, 95 %")
-    title = f"{run}: intervals over blocks of the forecast"
-    last = (len(rows) - 1,)
-    return Table(f"intervals_{run}", title, columns, tuple(rows), "", (1, 2), averages=last)
+        yield _by_channel(
+            at,
+            "intervals",
+            "intervals over blocks of the forecast",
+            ("NRMSE, 95 %", "NAMMAE, 95 %"),
+            lambda one: [interval(one, "nrmse"), interval(one, "nammae")],
+            [interval(at, "anrmse"), interval(at, "mean_nammae")],
+        )
+        yield _extremes(at, "extremes")
 
 
-def _bounds(at: xr.Dataset, key: str) -> str:
-    return text_of(np.nan, [float(at[f"{key}_{bound}"]) for bound in ("lower", "upper")])
+def _by_channel(
+    at: xr.Dataset,
+    name: str,
+    title: str,
+    heads: Sequence[str],
+    cells: Callable[[xr.Dataset], Sequence[str]],
+    averages: Sequence[str] = (),
+    note: str = "",
+    text_columns: int = 0,
+) -> Table:
+    """A row per channel of a run, with the averages over the channels last."""
+    run = at["run"].values
+    rows = [(str(each), *cells(at.sel(channel=each))) for each in at["channel"].values]
+    last = [len(rows)] if averages else []
+    if averages:
+        rows.append(("average", *averages))
+    numeric = range(1 + text_columns, 1 + len(heads))
+    columns = ("channel", *heads)
+    return Table(f"{name}_{run}", f"{run}: {title}", columns, rows, note, numeric, averages=last)
 
 
-def _extremes(at: xr.Dataset, run: str) -> Table:
+def _extremes(at: xr.Dataset, title: str) -> Table:
     shown = {name: heading for name, heading in _IN_UNITS.items() if name in at}
-    rows = [
-        (
-            str(name),
-            str(at["channel_units"].sel(channel=name).values),
-            *(_text(at[key].sel(channel=name), "{:.4g}") for key in shown),
-        )
-        for name in at["channel"].values
-    ]
-    columns = ("channel", "unit", *shown.values())
-    numeric = tuple(range(2, len(columns)))
-    return Table(f"extremes_{run}", f"{run}: extremes", columns, tuple(rows), "", numeric)
+    return _by_channel(
+        at,
+        "extremes",
+        title,
+        ("unit", *shown.values()),
+        lambda one: [
+            str(one["channel_units"].values),
+            *(text_of(one[key], digits=None) for key in shown),
+        ],
+        text_columns=1,
+    )
 
 
 def _title(at: xr.Dataset) -> str:
@@ -152,10 +153,6 @@ def _note(at: xr.Dataset) -> str:
     return "; ".join(said)
 
 
-def _text(value: Any, form: str) -> str:
-    return form.format(float(value)) if np.isfinite(float(value)) else MISSING
-
-
 def model_blocks(
     tables: Mapping[str, xr.Dataset], references: Mapping[str, Sequence[str]]
 ) -> Iterator[Table]:
@@ -164,36 +161,28 @@ def model_blocks(
     heads = ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
     for run in first["run"].values:
         of_run = {name: table.sel(run=run) for name, table in tables.items()}
-        rows = [
-            (
-                name,
-                _text(at["anrmse"], "{:.3f}"),
-                _bounds(at, "anrmse"),
-                _text(at["training_anrmse"], "{:.3f}"),
-                _text(at["mean_nammae"], "{:.3f}"),
-            )
-            for name, at in of_run.items()
-        ]
-        title = f"{run}: models against measurement"
-        told = [f"{n}: {s}" for n, at in of_run.items() if (s := str(at["status"].values)) != "ok"]
-        told += [
-            f"{n} {ahead}"
-            for n, at in of_run.items()
-            if (ahead := look_ahead_words(float(at["look_ahead"])))
-        ]
-        note = "; ".join(told)
-        yield Table(f"models_{run}", title, heads, tuple(rows), note, tuple(range(1, len(heads))))
+        rows, told, ahead = [], [], []
+        for name, at in of_run.items():
+            others = (number(at[key]) for key in ("training_anrmse", "mean_nammae"))
+            rows.append((name, number(at["anrmse"]), interval(at, "anrmse"), *others))
+            if (status := str(at["status"].values)) != "ok":
+                told.append(f"{name}: {status}")
+            if words := look_ahead_words(float(at["look_ahead"])):
+                ahead.append(f"{name} {words}")
+        title, note = f"{run}: models against measurement", "; ".join(told + ahead)
+        yield Table(f"models_{run}", title, heads, rows, note, range(1, len(heads)))
         if skill := _skill(of_run, references, str(run)):
             yield skill
-        channels = [
-            (str(name), *(_text(at["nrmse"].sel(channel=name), "{:.3f}") for at in of_run.values()))
-            for name in first["channel"].values
-        ]
-        columns = ("channel", *of_run)
-        numeric = tuple(range(1, len(columns)))
-        yield Table(f"channels_{run}", f"{run}: NRMSE", columns, tuple(channels), "", numeric)
         name, at = next(iter(of_run.items()))
-        yield replace(_extremes(at, str(run)), title=f"{run}: extremes of {name}")
+        errors = (("model", "channel"), [each["nrmse"].values for each in of_run.values()])
+        yield _by_channel(
+            at.assign(every=errors),
+            "channels",
+            "NRMSE",
+            [*of_run],
+            lambda one: [*map(number, one["every"])],
+        )
+        yield _extremes(at, f"extremes of {name}")
 
 
 def _skill(
@@ -212,27 +201,26 @@ def _skill(
         return None
     heads = ("model", *(f"from {each}" for each in references))
     title = f"{run}: change of ANRMSE from the baselines'"
-    return Table(f"skill_{run}", title, heads, tuple(rows), "", tuple(range(1, len(heads))))
+    return Table(f"skill_{run}", title, heads, rows, "", range(1, len(heads)))
 
 
 def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
     """Errors of several models run by run, and over all runs their change from the first one."""
     models, runs = ([str(each) for each in table[key].values] for key in ("model", "run"))
     if len(runs) > 1:
-        order = np.argsort(table["wave_period"].values, kind="stable")
         rows = [
             (
                 runs[k],
-                _text(table["wave_period"][k], "{:.3g}"),
-                *(_text(each, "{:.3f}") for each in table["anrmse"].values[:, k]),
+                f"{period:.3g}" if np.isfinite(period) else MISSING,
+                *map(number, table["anrmse"].values[:, k]),
             )
-            for k in order
+            for k in np.argsort(table["wave_period"].values, kind="stable")
+            for period in [table["wave_period"].values[k]]
         ]
-        rows.append(("mean", "", *(_text(each, "{:.3f}") for each in table["all_anrmse"].values)))
-        heads = ("run", "waves, s", *models)
-        numeric, last = tuple(range(1, len(heads))), (len(rows) - 1,)
-        title = f"{len(runs)} runs by wave period: ANRMSE"
-        yield Table("by_run", title, heads, tuple(rows), "", numeric, averages=last)
+        rows.append(("mean", "", *map(number, table["all_anrmse"].values)))
+        heads, last = ("run", "waves, s", *models), [len(runs)]
+        title, numeric = f"{len(runs)} runs by wave period: ANRMSE", range(1, len(heads))
+        yield Table("by_run", title, heads, rows, "", numeric, averages=last)
     changes = []
     for k, name in enumerate(models):
         value, low, high = (float(table[f"all_{key}"][k]) for key in ("change", "lower", "upper"))
@@ -240,17 +228,16 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
         changes.append(
             (
                 name,
-                _text(table["all_anrmse"][k], "{:.3f}"),
+                number(table["all_anrmse"][k]),
                 change(1 + value) if k else "",
-                change(1 + low, 1 + high) if known else "",
-                verdict(low, high) if known else "",
+                *((change(1 + low, 1 + high), verdict(low, high)) if known else ("", "")),
             )
         )
     of = f"{len(runs)} runs" if len(runs) > 1 else runs[0]
     title = f"{of}: change of ANRMSE from {models[0]}"
     note = "Paired intervals over redrawn blocks of the forecast; they hold for these runs."
     heads = ("model", "ANRMSE", "change", "95 %", "verdict")
-    yield Table("differences", title, heads, tuple(changes), note, (1, 2, 3))
+    yield Table("differences", title, heads, changes, note, (1, 2, 3))
 
 
 def write_differences(table: xr.Dataset, path: Path) -> Path:
@@ -260,10 +247,14 @@ def write_differences(table: xr.Dataset, path: Path) -> Path:
     every = table[[name for name in table.data_vars if str(name).startswith("all_")]]
     of_all = every.to_dataframe().rename(columns=lambda name: name.removeprefix("all_"))
     whole = pd.concat([each.reset_index(), of_all.reset_index().assign(run="")])
-    front = ["run", "wave_period", "model"]
-    whole = whole[front + [name for name in whole.columns if name not in front]]
+    return _write(whole, ["run", "wave_period", "model"], path)
+
+
+def _write(table: pd.DataFrame, front: Sequence[str], path: Path) -> Path:
+    """Write a table as CSV, some of its columns first."""
+    table = table[[*front, *(name for name in table.columns if name not in front)]]
     with replacing(path) as temporary:
-        plain_cells(whole).to_csv(temporary, index=False)
+        plain_cells(table).to_csv(temporary, index=False)
     return path
 
 
@@ -312,10 +303,7 @@ def write_comparison(tables: Mapping[str, xr.Dataset], path: Path) -> Path:
         frames.append(frame.assign(model=model) if len(tables) > 1 else frame)
     whole = pd.concat(frames, ignore_index=True)
     front = ["run", "channel", "channel_units", *["model"] * (len(tables) > 1)]
-    whole = whole[front + [name for name in whole.columns if name not in front]]
-    with replacing(path) as temporary:
-        plain_cells(whole).to_csv(temporary, index=False)
-    return path
+    return _write(whole, front, path)
 
 
 def plain_cells(table: pd.DataFrame) -> pd.DataFrame:

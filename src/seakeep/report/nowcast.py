@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
 from seakeep.files import replacing
 from seakeep.report.comparison import plain_cells
-from seakeep.report.figures.common import FURTHER, grid_of_axes, short_label
+from seakeep.report.figures.common import FURTHER, grid_of_axes, legend_outside, short_label
 from seakeep.report.style import PALETTE, figure_style, new_figure
 from seakeep.report.tables import Table, number
 
@@ -38,7 +38,7 @@ def nowcast_blocks(found: Mapping[str, xr.Dataset]) -> Iterator[Table]:
                 (
                     str(name),
                     _lead_time(float(each["lead_time"]), float(lead[-1])),
-                    *(number(float(each["error"][place])) for place in places),
+                    *(number(each["error"][place]) for place in places),
                     f"{float(each['coverage'].mean()):.0f}",
                 )
                 for name in at["channel"].values
@@ -51,8 +51,8 @@ def nowcast_blocks(found: Mapping[str, xr.Dataset]) -> Iterator[Table]:
             )
             title = f"{run}: {model} in service"
             columns = (*columns, "in band %")
-            numeric = tuple(range(1, len(columns)))
-            yield Table(f"nowcast_{model}_{run}", title, columns, tuple(rows), note, numeric)
+            numeric = range(1, len(columns))
+            yield Table(f"nowcast_{model}_{run}", title, columns, rows, note, numeric)
 
 
 def _lead_time(found: float, longest: float) -> str:
@@ -78,22 +78,17 @@ def nowcast_figure(found: Mapping[str, xr.Dataset], run: str) -> Figure:
         names = [str(each) for each in first["channel"].values]
         figure = new_figure(8.5, 0.9 + 1.7 * -(-len(names) // 4))
         panels = grid_of_axes(figure, len(names), 4)
-        handles: list[Any] = []
         for axes, name in zip(panels, names, strict=True):
-            handles = []
             for place, (model, of_model) in enumerate(found.items()):
                 at = of_model.sel(run=run, channel=name)
                 colour, style = COLOURS[place % len(COLOURS)], STYLES[place % len(STYLES)]
                 lead = at["lead"].values
-                handles += axes.plot(
-                    lead, at["error"], style, color=colour, label=f"{model}: error"
-                )
-                handles += axes.plot(
+                axes.plot(lead, at["error"], style, color=colour, label=f"{model}: error")
+                axes.plot(
                     lead, at["claimed"], color=colour, lw=0.7, alpha=0.7, label=f"{model}: claimed"
                 )
             share = float(first.attrs["share"])
-            handles.append(axes.axhline(share, color="0.4", lw=0.8, ls=(0, (1, 2))))
-            handles[-1].set_label(f"{share:g} SD")
+            axes.axhline(share, color="0.4", lw=0.8, ls=(0, (1, 2)), label=f"{share:g} SD")
             axes.set_title(short_label(name), loc="left", fontsize=8)
             drawn = [
                 each[["error", "claimed"]].sel(run=run, channel=name) for each in found.values()
@@ -104,5 +99,5 @@ def nowcast_figure(found: Mapping[str, xr.Dataset], run: str) -> Figure:
             axes.set_xlabel("lead time [s]")
             if axes.get_subplotspec().is_first_col():
                 axes.set_ylabel("error [training SD]")
-        figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 5))
+        legend_outside(figure, panels[0], side="upper right")
         return figure

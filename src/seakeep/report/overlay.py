@@ -12,6 +12,7 @@ import xarray as xr
 from seakeep.campaign.settings import long_name_of
 from seakeep.conventions import is_elevation
 from seakeep.errors import DataError
+from seakeep.report.figures.common import legend_outside
 from seakeep.report.style import (
     COLOURS,
     LINES,
@@ -60,16 +61,16 @@ BAND: dict[str, Any] = {"color": COLOURS["ensemble"], "alpha": 0.35, "linewidth"
 SEVERAL: tuple[dict[str, Any], ...] = (
     {**LINES["forecast"], "marker": "o"},
     {**LINES["ensemble"], "marker": "s"},
-    {"color": PALETTE["green"], "linewidth": 1.2, "linestyle": (0, (1, 1)), "marker": "^"},
-    {"color": PALETTE["pink"], "linewidth": 1.2, "linestyle": (0, (8, 2)), "marker": "D"},
-    {
-        "color": PALETTE["amber"],
-        "linewidth": 1.2,
-        "linestyle": (0, (3, 1, 1, 1, 1, 1)),
-        "marker": "v",
-    },
-    {"color": PALETTE["sky"], "linewidth": 1.2, "linestyle": (0, (6, 1, 1, 1)), "marker": "P"},
-    {"color": PALETTE["slate"], "linewidth": 1.2, "linestyle": (0, (2, 2)), "marker": "X"},
+    *(
+        {"color": PALETTE[colour], "linewidth": 1.2, "linestyle": (0, dash), "marker": marker}
+        for colour, dash, marker in (
+            ("green", (1, 1), "^"),
+            ("pink", (8, 2), "D"),
+            ("amber", (3, 1, 1, 1, 1, 1), "v"),
+            ("sky", (6, 1, 1, 1), "P"),
+            ("slate", (2, 2), "X"),
+        )
+    ),
 )
 """Colour, dash and marker of each of several models."""
 
@@ -111,7 +112,7 @@ def error_figure(table: xr.Dataset) -> Figure:
             axes.set_ylim(bottom=0.0)
         axes.set_xlabel("run, and mean period of its waves")
         axes.set_ylabel("ANRMSE [measured SD]")
-        figure.legend(loc="outside lower center", ncols=min(len(names), 4))
+        legend_outside(figure, axes)
         return figure
 
 
@@ -131,14 +132,14 @@ def _draw(several: Mapping[str, Comparison]) -> Figure:
         each.margins(x=0.01)
     for row, name in enumerate(states):
         if period is not None:
-            _draw_envelopes(axes[row, 0], compared, name, period)
+            _draw_state(axes[row, 0], compared, name, period)
         _draw_state(axes[row, -1], compared, name)
         axes[row, 0].set_ylabel(_label(comparison.measured[name]), fontsize=LABEL)
         judged = _judgement([table.sel(channel=name) for table in tables])
         axes[row, 0].set_title(judged, loc="right", fontsize=8, pad=2)
     for names, (first, last) in zip(alike, axes[len(states) :, [0, -1]], strict=True):
         if period is not None:
-            _draw_input_envelopes(first, comparison.inputs, names, period)
+            _draw_inputs(first, comparison.inputs, names, period)
         _draw_inputs(last, comparison.inputs, names)
         first.set_ylabel(_input_label(comparison.inputs[names]), fontsize=LABEL)
         _legend_over(first, *last.get_legend_handles_labels())
@@ -150,14 +151,7 @@ def _draw(several: Mapping[str, Comparison]) -> Figure:
         axes[0, 0].set_title("whole forecast, envelopes", loc="left")
         axes[0, 1].set_xlim(end - ENLARGED * period, end)
         axes[0, 1].set_title(f"last {ENLARGED} periods", loc="left")
-    # Both panels label the band; the dictionary keeps one of equal labels.
-    keys = {
-        label: handle
-        for column in range(columns)
-        for handle, label in zip(*axes[0, column].get_legend_handles_labels(), strict=True)
-    }
-    columns = min(len(keys), 3) if len(compared) > 1 else len(keys)
-    figure.legend(keys.values(), keys.keys(), loc="outside lower center", ncols=columns)
+    legend_outside(figure, *axes[0])
     figure.suptitle(_title(list(compared.values())), x=0.01, ha="left")
     return figure
 
@@ -189,16 +183,11 @@ def _of_one_unit(inputs: xr.Dataset) -> list[list[str]]:
 
 def _with_prefixes(comparisons: Sequence[Comparison]) -> list[Comparison]:
     """Loads in kN or MN where they are large: one factor per state, and one for alike inputs."""
-    out = [
-        replace(
-            each,
-            forecast=each.forecast.copy(),
-            measured=each.measured.copy(),
-            inputs=each.inputs.copy(),
-            band=None if each.band is None else each.band.copy(),
-        )
-        for each in comparisons
-    ]
+    parts = ("forecast", "measured", "inputs", "band")
+    out = []
+    for each in comparisons:
+        copies = {part: getattr(each, part) for part in parts}
+        out.append(replace(each, **{p: x.copy() for p, x in copies.items() if x is not None}))
     for name in map(str, out[0].measured.data_vars):
         among = [part for each in out for part in (each.measured, each.forecast, each.band)]
         _apply_prefix([(part, name) for part in among if part is not None])
@@ -309,18 +298,44 @@ def _fill(styles: Sequence[Any], style: Mapping[str, Any]) -> dict[str, Any]:
     return BAND if len(styles) == 1 else {**BAND, "color": style["color"], "alpha": 0.2}
 
 
-def _draw_state(axes: Any, compared: Mapping[str, Comparison], name: str) -> None:
+def _draw_state(
+    axes: Any, compared: Mapping[str, Comparison], name: str, period: float | None = None
+) -> None:
+    """Bands, measurement and forecasts of a state; as envelopes where a period is given."""
     styles = _styles(compared)
     measured = styles[0][0].measured[name]
     solid = dict(LINES["measured"])
+    if period is not None:
+        edges, low, high = _envelope(measured, period)
+        pale = {"color": PALETTE["pale"], "linewidth": 0, "label": "measured, envelope"}
+        axes.stairs(high, edges, baseline=low, fill=True, **pale)
     for each, _, style in styles:
-        if (band := _band_of(each, name)) is not None:
-            solid = THIN
-            fill = _fill(styles, style)
+        if (band := _band_of(each, name)) is None:
+            continue
+        solid, fill = THIN, _fill(styles, style)
+        if period is None:
             axes.fill_between(each.forecast["time"], band[0], band[1], label=band[2], **fill)
-    axes.plot(measured["time"], measured, label="measured", **solid)
+            continue
+        lower, upper = (_envelope(edge, period) for edge in band[:2])
+        for bottom, top in zip(lower[1:], upper[1:], strict=True):
+            axes.stairs(top, lower[0], baseline=bottom, fill=True, **fill)
+    if period is None:
+        axes.plot(measured["time"], measured, label="measured", **solid)
     for each, label, style in styles:
-        axes.plot(each.forecast["time"], each.forecast[name], label=label, **style)
+        line = style if period is None else {"color": style["color"]}
+        _draw_line(axes, each.forecast[name], period, label, line)
+
+
+def _draw_line(
+    axes: Any, series: xr.DataArray, period: float | None, label: str, style: dict[str, Any]
+) -> None:
+    """A line, or the two edges of its envelope."""
+    if period is None:
+        axes.plot(series["time"], series, label=label, **style)
+        return
+    edges, *reached = _envelope(series, period)
+    for each in reached:
+        axes.stairs(each, edges, baseline=None, **{**style, "linewidth": 0.8})
 
 
 def _envelope(series: xr.DataArray, period: float) -> tuple[Any, Any, Any]:
@@ -333,37 +348,13 @@ def _envelope(series: xr.DataArray, period: float) -> tuple[Any, Any, Any]:
     return edges, low, high
 
 
-def _draw_envelopes(
-    axes: Any, compared: Mapping[str, Comparison], name: str, period: float
+def _draw_inputs(
+    axes: Any, inputs: xr.Dataset, names: list[str], period: float | None = None
 ) -> None:
-    styles = _styles(compared)
-    edges, low, high = _envelope(styles[0][0].measured[name], period)
-    measured = {"color": PALETTE["pale"], "linewidth": 0}
-    axes.stairs(high, edges, baseline=low, fill=True, label="measured, envelope", **measured)
-    for each, _, style in styles:
-        if (band := _band_of(each, name)) is not None:
-            fill = _fill(styles, style)
-            (_, low, high), (_, lifted, topmost) = (_envelope(edge, period) for edge in band[:2])
-            for bottom, top in ((low, lifted), (high, topmost)):
-                axes.stairs(top, edges, baseline=bottom, fill=True, **fill)
-        _, low, high = _envelope(each.forecast[name], period)
-        for reached in (low, high):
-            axes.stairs(reached, edges, baseline=None, color=style["color"], linewidth=0.8)
-
-
-def _draw_input_envelopes(axes: Any, inputs: xr.Dataset, names: list[str], period: float) -> None:
-    for name, style in zip(names, input_styles(len(names)), strict=True):
-        edges, low, high = _envelope(inputs[name], period)
-        for reached in (low, high):
-            axes.stairs(reached, edges, baseline=None, **{**style, "linewidth": 0.8})
-    axes.axhline(0.0, color=COLOURS["input"], linewidth=0.4)
-
-
-def _draw_inputs(axes: Any, inputs: xr.Dataset, names: list[str]) -> None:
     for name, style in zip(names, input_styles(len(names)), strict=True):
         stated = inputs[name].attrs.get("long_name")
         label = name if stated in (None, long_name_of(name, None)) else plain_text(str(stated))
-        axes.plot(inputs["time"], inputs[name], label=label, **style)
+        _draw_line(axes, inputs[name], period, label, style)
     axes.axhline(0.0, color=COLOURS["input"], linewidth=0.4)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -66,11 +66,11 @@ class Section:
 
     key: str
     title: str
-    words: tuple[str, ...] = ()
-    points: tuple[str, ...] = ()
-    links: tuple[tuple[str, str], ...] = ()
-    notices: tuple[str, ...] = ()
-    terms: tuple[tuple[str, str], ...] = ()
+    words: Sequence[str] = ()
+    points: Sequence[str] = ()
+    links: Sequence[tuple[str, str]] = ()
+    notices: Sequence[str] = ()
+    terms: Sequence[tuple[str, str]] = ()
     histories: dict[str, Any] | None = None
-    figures: tuple[Drawing, ...] = ()
-    tables: tuple[Table, ...] = ()
+    figures: Sequence[Drawing] = ()
+    tables: Sequence[Table] = ()

@@ -8,9 +8,10 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, SupportsFloat
 
 import numpy as np
+import xarray as xr
 
 from seakeep.files import replacing
 
@@ -22,6 +23,7 @@ __all__ = [
     "MISSING",
     "Table",
     "change",
+    "interval",
     "latex_text",
     "number",
     "plain_cell",
@@ -48,34 +50,34 @@ class Table:
         Name of its files.
     title : str
         Caption.
-    columns : tuple of str
+    columns : sequence of str
         Headings.
-    rows : tuple of tuple of str
+    rows : sequence of sequence of str
         Cells.
     note : str
         What a reader must know about it.
-    numeric : tuple of int
+    numeric : sequence of int
         Columns of numbers.
-    elsewhere : tuple of int
+    elsewhere : sequence of int
         Columns that come from another data set.
-    averages : tuple of int
+    averages : sequence of int
         Rows that are averages of others.
     folded : bool
         Whether a page folds it away until it is wanted.
-    heat : tuple of int
+    heat : sequence of int
         Columns of errors whose size a page shows as a shade; such a table stands before figures.
     """
 
     name: str
     title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
     note: str = ""
-    numeric: tuple[int, ...] = ()
-    elsewhere: tuple[int, ...] = ()
-    averages: tuple[int, ...] = ()
+    numeric: Sequence[int] = ()
+    elsewhere: Sequence[int] = ()
+    averages: Sequence[int] = ()
     folded: bool = False
-    heat: tuple[int, ...] = ()
+    heat: Sequence[int] = ()
 
 
 SHADES = (0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
@@ -97,15 +99,16 @@ def shade(text: str) -> int:
     return sum(value >= step for step in SHADES)
 
 
-def number(value: float, digits: int = 3) -> str:
+def number(value: SupportsFloat, digits: int = 3) -> str:
     """Text of a number; a dash for one that is not finite."""
+    value = float(value)
     if not np.isfinite(value):
         return MISSING
     text = f"{value:.{digits}f}"
     return text.removeprefix("-") if float(text) == 0 else text
 
 
-def small_number(value: float) -> str:
+def small_number(value: SupportsFloat) -> str:
     """Text of a number of four decimals, or as many more as two digits of it need.
 
     Examples
@@ -113,13 +116,14 @@ def small_number(value: float) -> str:
     >>> small_number(0.0186), small_number(0.00023), small_number(-1.4e-5), small_number(3e-9)
     ('0.0186', '0.00023', '-0.000014', '3.0e-09')
     """
+    value = float(value)
     if not np.isfinite(value) or value == 0:
         return number(value, 0)
     decimals = max(4, 1 - int(np.floor(np.log10(abs(value)))))
     return f"{value:.{decimals}f}" if decimals <= 7 else f"{value:.1e}"
 
 
-def signed(value: float, digits: int) -> str:
+def signed(value: SupportsFloat, digits: int) -> str:
     """Text of a number with its sign, where anything of it is left after rounding.
 
     Examples
@@ -130,10 +134,12 @@ def signed(value: float, digits: int) -> str:
     text = number(value, digits)
     if text == MISSING or float(text) == 0.0:
         return text.removeprefix("-")
-    return text if value < 0 else f"+{text}"
+    return text if float(value) < 0 else f"+{text}"
 
 
-def text(value: float, bounds: Sequence[float] | None = None, digits: int | None = 3) -> str:
+def text(
+    value: SupportsFloat, bounds: Sequence[float] | None = None, digits: int | None = 3
+) -> str:
     """Text of a value with its interval, or with its uncertainty, where that is known.
 
     An uncertainty is shown with two digits, and the value to the same place.
@@ -154,6 +160,7 @@ def text(value: float, bounds: Sequence[float] | None = None, digits: int | None
     >>> text(2255.3387, (1159.329,)), text(0.01234, (0.00056,)), text(2255.3387, digits=None)
     ('2300 ± 1200', '0.01234 ± 0.00056', '2255')
     """
+    value = float(value)
     known = bounds is not None and bool(np.isfinite(bounds).all())
     if bounds is not None and len(bounds) == 1:
         if not (known and np.isfinite(value)):
@@ -183,9 +190,14 @@ def change(*ratios: float) -> str:
     return " to ".join(signed(100 * (each - 1), 0) for each in ratios).replace("-", "−") + " %"
 
 
-def probability(value: float) -> str:
+def interval(at: xr.Dataset, key: str, value: SupportsFloat = np.nan) -> str:
+    """Text of the bounds ``KEY_lower`` and ``KEY_upper``, behind a value where one is given."""
+    return text(value, [float(at[f"{key}_{bound}"]) for bound in ("lower", "upper")])
+
+
+def probability(value: SupportsFloat) -> str:
     """Text of a p-value."""
-    return "< 0.001" if value < 0.001 else number(value)
+    return "< 0.001" if float(value) < 0.001 else number(value)
 
 
 def plain_cell(text: str) -> str:

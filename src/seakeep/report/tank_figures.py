@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.report.figures.spectra import mean_spectrum
 from seakeep.report.style import COLOURS, PALETTE, axis_label, figure_style, new_figure
 from seakeep.signals import wave_spectrum
 from seakeep.tank.dynamics import Rig
@@ -63,13 +63,15 @@ def hydrodynamics_figure(rig: Rig, settings: TankSettings) -> Figure:
         for i, name in enumerate(hydro.names):
             colour, symbol = SHADES[name], SYMBOLS[name]
             top: list[Axes] = list(grid[:, i])
-            top[0].plot(omega, hydro.added_mass[:, i, i], ".", color=colour, markersize=3)
-            top[0].plot(fine, added[:, i, i], color=colour, linewidth=1.0)
             top[0].set_title(f"{name} ${symbol}$")
-            top[1].plot(omega, hydro.damping[:, i, i], ".", color=colour, markersize=3)
-            top[1].plot(fine, damping[:, i, i], color=colour, linewidth=1.0)
-            top[2].plot(omega, np.abs(hydro.excitation[:, i]), ".", color=colour, markersize=3)
-            top[2].plot(fine, force[:, i], color=colour, linewidth=1.0)
+            pairs = (
+                (hydro.added_mass[:, i, i], added[:, i, i]),
+                (hydro.damping[:, i, i], damping[:, i, i]),
+                (np.abs(hydro.excitation[:, i]), force[:, i]),
+            )
+            for axes, (points, line) in zip(top, pairs, strict=False):
+                axes.plot(omega, points, ".", color=colour, markersize=3)
+                axes.plot(fine, line, color=colour, linewidth=1.0)
             top[3].plot(waves, motion[:, i] / (slope if name == "pitch" else 1.0), color=colour)
             for axes in top:
                 _mark_waves(axes, settings)
@@ -115,11 +117,11 @@ def spectrum_figure(settings: TankSettings, realised: Sequence[Realised]) -> Fig
             rough = [paper_peak(r.elevation, r.dt)[1:] for r in seas]
             fine = [wave_spectrum(r.elevation, r.dt) for r in seas]
             axes.plot(
-                fine[0][0], 1e4 * _mean(fine), color=COLOURS["ensemble"],
+                fine[0][0], 1e4 * mean_spectrum(fine), color=COLOURS["ensemble"],
                 linewidth=0.9, label="measured, segments of 60 s",
             )  # fmt: skip
             axes.plot(
-                rough[0][0], 1e4 * _mean(rough),
+                rough[0][0], 1e4 * mean_spectrum(rough),
                 color=COLOURS["forecast"], linewidth=1.4, linestyle=(0, (4, 1.5)),
                 label="measured, paper's Welch settings",
             )  # fmt: skip
@@ -129,12 +131,6 @@ def spectrum_figure(settings: TankSettings, realised: Sequence[Realised]) -> Fig
         axes.set_ylim(bottom=0.0)
         axes.legend()
     return figure
-
-
-def _mean(spectra: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
-    """Mean of spectra at the frequencies of the first: records differ in length."""
-    mean: FloatArray = np.mean([np.interp(spectra[0][0], *each) for each in spectra], axis=0)
-    return mean
 
 
 def run_figure(data: xr.Dataset, channels: Sequence[str] | None = None) -> Figure:
@@ -162,16 +158,8 @@ def run_figure(data: xr.Dataset, channels: Sequence[str] | None = None) -> Figur
 
 def _distinct(data: xr.Dataset) -> list[str]:
     """Channels without crests and without second probes at the same place."""
-    names: list[str] = []
-    places: set[float] = set()
-    for key in data.data_vars:
-        name = str(key)
-        if name.endswith("_crest"):
-            continue
-        place = data[name].attrs.get("x_position")
-        if place is not None:
-            if place in places:
-                continue
-            places.add(place)
-        names.append(name)
-    return names
+    first: dict[object, str] = {}
+    for name in map(str, data.data_vars):
+        if not name.endswith("_crest"):
+            first.setdefault(data[name].attrs.get("x_position", name), name)
+    return list(first.values())

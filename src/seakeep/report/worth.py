@@ -9,7 +9,7 @@ import xarray as xr
 
 from seakeep.check import Checked
 from seakeep.report.section import Section
-from seakeep.report.tables import MISSING, Table, change, number, text
+from seakeep.report.tables import MISSING, Table, change, interval, number
 
 __all__ = ["worth_section"]
 
@@ -22,11 +22,8 @@ USES = {
 """What the limit of the error allows."""
 
 
-def worth_section(checked: Checked) -> Section | None:
+def worth_section(found: xr.Dataset, checked: Checked) -> Section:
     """Return the error over the tests beside that of baselines, the look-ahead and the verdict."""
-    found = checked.found.get("worth")
-    if found is None:
-        return None
     points = [*_verdicts(found, checked.repeats), *_conditions(found)]
     if lost := found.attrs["lost"]:
         points.append(f"Baselines that do not count in all verdicts: {lost}.")
@@ -36,20 +33,15 @@ def worth_section(checked: Checked) -> Section | None:
             for run, why in zip(validity["run"].values, validity["outside"].values, strict=True)
             if why
         ]
-    words = (
+    words = [
         f"Free runs from one measured start to the end of each {_one(found)} "
         f"({found.sizes['run']}); errors in measured SDs of the run. A verdict "
         "reads the upper bound of the 95 % interval of the error: below 0.1 (99 % of the variance "
         "is forecast), 0.3 (91 %), 0.7 (51 %). Better than a baseline: the paired 95 % interval of "
-        "the change of the error lies below zero. Intervals hold for these runs.",
-    )
-    return Section(
-        "worth",
-        "What the model is worth",
-        words=words,
-        points=tuple(points),
-        tables=(_by_run(found), _by_state(found), _of_runs(found)),
-    )
+        "the change of the error lies below zero. Intervals hold for these runs."
+    ]
+    tables = [_by_run(found), _by_state(found), _of_runs(found)]
+    return Section("worth", "What the model is worth", words, points, tables=tables)
 
 
 def _one(found: xr.Dataset) -> str:
@@ -68,10 +60,9 @@ def _verdicts(found: xr.Dataset, repeats: Mapping[str, str]) -> Iterator[str]:
         memory = f" (memory, not skill: {', '.join(known)} repeat training input)" * bool(known)
         tests = "training" if found.attrs["of"] == "training" else f"test{'s' * (count > 1)}"
         every = own.sel(state="all", model="model")
-        error = every["nrmse"]
         yield (
             f"{count} {tests} in {kind} waves: ANRMSE "
-            f"{text(float(error), _bounds(every, 'nrmse'))}{_beside(own)}."
+            f"{interval(every, 'nrmse', every['nrmse'])}{_beside(own)}."
         )
         groups: dict[tuple[float, str], list[str]] = {}
         for state in found["state"].values[1:]:
@@ -111,7 +102,7 @@ def _beside(own: xr.Dataset) -> str:
         return ""
     at = one.sel(model=best)
     beside = f" (from there {_change(at)})".replace(f" (from there {MISSING})", "")
-    return f"; of the best baseline, {best}, {number(float(at['nrmse']))}{beside}"
+    return f"; of the best baseline, {best}, {number(at['nrmse'])}{beside}"
 
 
 def _conditions(found: xr.Dataset) -> Iterator[str]:
@@ -141,24 +132,20 @@ def _by_run(found: xr.Dataset) -> Table:
         "worth",
         "ANRMSE of the model and of baselines",
         (_one(found), "model", "95 %", *map(str, models[1:])),
-        tuple(rows),
+        rows,
         "Baselines are fitted to the training runs with their recommended settings, and read no "
         "wave after the instant that they forecast and no measured state after the start."
         if len(models) > 1
         else "",
-        tuple(range(1, 2 + len(models))),
+        range(1, 2 + len(models)),
         averages=tuple(averages),
         heat=(1, *range(3, 2 + len(models))),
     )
 
 
 def _cells(at: xr.Dataset, key: str) -> tuple[str, ...]:
-    first, *others = (number(float(x)) for x in at[key].values)
-    return (first, text(np.nan, _bounds(at.sel(model="model"), key)), *others)
-
-
-def _bounds(at: xr.Dataset, key: str) -> list[float]:
-    return [float(at[f"{key}_{each}"]) for each in ("lower", "upper")]
+    first, *others = map(number, at[key].values)
+    return (first, interval(at.sel(model="model"), key), *others)
 
 
 def _by_state(found: xr.Dataset) -> Table:
@@ -171,7 +158,7 @@ def _by_state(found: xr.Dataset) -> Table:
             beside = (MISSING, MISSING, MISSING)
             if best:
                 at = one.sel(model=best)
-                beside = (best, number(float(at["nrmse"])), _change(at))
+                beside = (best, number(at["nrmse"]), _change(at))
             use = USES.get(float(one["limit"]), "not judged").partition(" (")[0]
             rows.append((str(state), str(kind), *cells[:2], *beside, use))
     columns = ("state", "waves", "NRMSE", "95 %", "best baseline", "its NRMSE", "change", "verdict")
@@ -179,7 +166,7 @@ def _by_state(found: xr.Dataset) -> Table:
         "verdicts",
         "NRMSE of each state, mean over runs, and the verdict",
         columns,
-        tuple(rows),
+        rows,
         "Change: from the best baseline to the model, paired 95 % interval.",
         (2, 3, 5, 6),
         folded=True,
@@ -190,16 +177,6 @@ def _of_runs(found: xr.Dataset) -> Table:
     """Error of each state in each run, which no mean hides."""
     errors = found["run_nrmse"]
     runs = [str(run) for run in errors["run"].values]
-    return Table(
-        "worth_of_runs",
-        "NRMSE of each state in each run",
-        ("state", *runs),
-        tuple(
-            (str(state), *(number(float(x)) for x in errors.sel(channel=state).values))
-            for state in errors["channel"].values
-        ),
-        "",
-        tuple(range(1, 1 + len(runs))),
-        heat=tuple(range(1, 1 + len(runs))),
-        folded=True,
-    )
+    rows = [(str(row["channel"].values), *map(number, row)) for row in errors]
+    title, every = "NRMSE of each state in each run", range(1, 1 + len(runs))
+    return Table("worth_of_runs", title, ("state", *runs), rows, "", every, heat=every, folded=True)

@@ -10,12 +10,14 @@ import xarray as xr
 
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError
-from seakeep.report.figures.common import grid_of_axes, short_label
+from seakeep.report.figures.common import grid_of_axes, legend_outside, short_label
 from seakeep.report.style import COLOURS, LINES, PALETTE, figure_style, new_figure, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    Places = Sequence[Axes] | Axes | None
 
 __all__ = [
     "coherence",
@@ -46,7 +48,7 @@ MARKS: dict[str, dict[str, Any]] = {
 
 
 def panels(
-    axes: Sequence[Axes] | Axes | None, count: int, most: int, size: tuple[float, float]
+    axes: Places, count: int, most: int, size: tuple[float, float]
 ) -> tuple[Figure, list[Any]]:
     """Axes that are given, as many as needed, or those of a new figure; `size` is that of one."""
     if count == 0:
@@ -66,12 +68,41 @@ def panels(
     return given[0].figure, given
 
 
-def _chosen(found: xr.Dataset, states: Sequence[str] | None) -> list[str]:
+def by_state(
+    found: xr.Dataset,
+    states: Sequence[str] | None,
+    axes: Places,
+    size: tuple[float, float],
+    draw: Callable[..., None],
+    each: int = 1,
+    most: int = 3,
+    side: str = "lower center",
+) -> Figure:
+    """Draw panels for each state: `draw` takes the results of one, and its Axes, `each` of them."""
     known = [str(name) for name in found["state"].values]
-    for name in () if states is None else states:
+    for name in states or ():
         if name not in known:
             raise RequestError(f"there is no state '{name}'. States: {', '.join(known)}.")
-    return known if states is None else list(states)
+    chosen = known if states is None else states
+    with figure_style():
+        figure, places = panels(axes, each * len(chosen), most, size)
+        for number, name in enumerate(chosen):
+            draw(found.sel(state=name), *places[each * number :][:each])
+        if axes is None:
+            legend_outside(figure, *places[:each], side=side)
+    return figure
+
+
+def _shown(own: xr.Dataset) -> tuple[float, str, str]:
+    """Factor and unit in which a state is shown, and its short label."""
+    factor, units = displayed(str(own["units"].values))
+    return factor, shown_unit(units) or "?", short_label(str(own["state"].values))
+
+
+def _end(spectrum: xr.DataArray) -> float:
+    """Frequency above which no state holds energy."""
+    energy = spectrum.sum("state").values
+    return float(spectrum["frequency"][np.flatnonzero(energy > 1e-3 * energy.max())[-1]])
 
 
 def response(
@@ -79,7 +110,7 @@ def response(
     measured: xr.Dataset | None = None,
     *,
     states: Sequence[str] | None = None,
-    axes: Sequence[Axes] | Axes | None = None,
+    axes: Places = None,
 ) -> Figure:
     """Draw amplitude and phase of the response per wave amplitude, measured points beside.
 
@@ -98,49 +129,36 @@ def response(
     -------
     Figure
     """
-    known = [
-        str(s) for s in found["state"].values if found["amplitude"].sel(state=s).notnull().any()
-    ]
-    chosen = _chosen(found, known if states is None else states)
+    if states is None:
+        answers = found["amplitude"].notnull().any(["input", "frequency"])
+        states = [str(name) for name in found["state"].values[answers]]
     entry = "wave" if "wave" in found["input"] else str(found.attrs["reference"])
+
+    def draw(own: xr.Dataset, gain: Any, turn: Any) -> None:
+        factor, units, label = _shown(own)
+        frequency, trained = own["frequency"].values, own["trained"].values
+        for place in (gain, turn):
+            across = {"transform": place.get_xaxis_transform(), "step": "mid", **UNTRAINED}
+            words = "no energy in training"
+            place.fill_between(frequency, 0, 1, where=~trained, label=words, **across)
+            place.set(xlim=frequency[[0, -1]], xlabel="frequency [Hz]")
+        line = {**LINES["forecast"], "label": "model"}
+        gain.plot(frequency, factor * own["amplitude"], **line)
+        turn.plot(frequency, _broken(own["phase"].values), **line)
+        if "amplitude_lower" in own:
+            bounds = (factor * own[f"amplitude_{each}"] for each in ("lower", "upper"))
+            band = {"color": LINES["forecast"]["color"], "alpha": 0.25, "linewidth": 0}
+            gain.fill_between(frequency, *bounds, **band, label="95 % of the members")
+        if measured is not None:
+            _points(gain, turn, measured.sel(state=own["state"]), factor)
+        inside = own["amplitude"].values[trained]
+        gain.set_ylim(0, 1.25 * factor * inside.max() if inside.size else None)
+        gain.set_ylabel(f"{label} [{units}]")
+        turn.set(ylabel=f"phase of {label} [°]", ylim=(-190, 190), yticks=range(-180, 181, 90))
+
+    most = 2 + 2 * (len(states) % 2 == 0)
     at = found.sel(input=entry)
-    with figure_style():
-        figure, places = panels(axes, 2 * len(chosen), 2 + 2 * (len(chosen) % 2 == 0), (2.9, 1.75))
-        for name, gain, turn in zip(chosen, places[::2], places[1::2], strict=True):
-            own = at.sel(state=name)
-            factor, units = displayed(str(own["units"].values))
-            for place in (gain, turn):
-                _shade(place, at["frequency"].values, ~at["trained"].values)
-            line = {**LINES["forecast"], "label": "model"}
-            gain.plot(own["frequency"], factor * own["amplitude"], **line)
-            turn.plot(own["frequency"], _broken(own["phase"].values), **line)
-            if "amplitude_lower" in own:
-                bounds = (factor * own[f"amplitude_{each}"] for each in ("lower", "upper"))
-                band = {"color": LINES["forecast"]["color"], "alpha": 0.25, "linewidth": 0}
-                gain.fill_between(own["frequency"], *bounds, **band, label="95 % of the members")
-            if measured is not None:
-                _points(gain, turn, measured.sel(state=name), factor)
-            inside = own["amplitude"].values[at["trained"].values]
-            gain.set_ylim(0, 1.25 * factor * inside.max() if inside.size else None)
-            gain.set_ylabel(f"{short_label(name)} [{shown_unit(units) or '?'}]")
-            turn.set_ylabel(f"phase of {short_label(name)} [°]")
-            turn.set_ylim(-190, 190)
-            turn.set_yticks([-180, -90, 0, 90, 180])
-            for place in (gain, turn):
-                place.set_xlim(float(found["frequency"][0]), float(found["frequency"][-1]))
-                place.set_xlabel("frequency [Hz]")
-        if axes is None:
-            legend_outside(figure, places[0], side="upper")
-    return figure
-
-
-def _shade(place: Any, frequency: Any, untrained: Any) -> None:
-    """Grey where the training input holds no energy."""
-    transform = place.get_xaxis_transform()
-    label = "no energy in training"
-    place.fill_between(
-        frequency, 0, 1, where=untrained, transform=transform, step="mid", label=label, **UNTRAINED
-    )
+    return by_state(at, states, axes, (2.9, 1.75), draw, 2, most, "upper center")
 
 
 def _broken(phase: Any) -> Any:
@@ -164,22 +182,11 @@ def _points(gain: Any, turn: Any, measured: xr.Dataset, factor: float) -> None:
             )
 
 
-def legend_outside(figure: Any, *places: Any, side: str = "lower") -> None:
-    unique: dict[str, Any] = {}
-    for place in places:
-        handles, labels = place.get_legend_handles_labels()
-        unique |= dict(zip(labels, handles, strict=True))
-    across = max(1, int(13 * figure.get_figwidth() / (6 + max(map(len, unique)))))  # letters
-    figure.legend(
-        unique.values(), unique, loc=f"outside {side} center", ncols=min(len(unique), across)
-    )
-
-
 def coherence(
     found: xr.Dataset,
     *,
     states: Sequence[str] | None = None,
-    axes: Sequence[Axes] | Axes | None = None,
+    axes: Places = None,
 ) -> Figure:
     """Draw the coherence of each state with the inputs, over the state's own spectrum.
 
@@ -196,38 +203,26 @@ def coherence(
     -------
     Figure
     """
-    chosen = _chosen(found, states)
-    frequency = found["frequency"].values
-    with figure_style():
-        figure, places = panels(axes, len(chosen), 3, (3.0, 1.9))
-        energy = found["spectrum"].sum("state").values
-        top = frequency[np.flatnonzero(energy > 1e-3 * energy.max())[-1]]
-        for name, place in zip(chosen, places, strict=True):
-            own = found.sel(state=name)
-            power = own["spectrum"].values
-            place.fill_between(
-                frequency, power / max(power.max(), 1e-300), color=PALETTE["light"], linewidth=0,
-                label="spectrum of the state",
-            )  # fmt: skip
-            for each in own["input"].values:
-                style = {"color": COLOURS["input"], "linewidth": 0.7, "alpha": 0.8}
-                ordinary = own["ordinary"].sel(input=each)
-                place.plot(frequency, ordinary, **style, label="with one input")
-            line = {**LINES["measured"], "label": "with all inputs"}
-            place.plot(frequency, own["multiple"], **line)
-            if "multiple_observables" in own:
-                line = {**LINES["forecast"], "label": "with observables too"}
-                place.plot(frequency, own["multiple_observables"], **line)
-            place.set(xlim=(0, top), ylim=(0, 1.02), xlabel="frequency [Hz]")
-            place.set_ylabel(f"coherence, {short_label(name)} [1]")
-        if axes is None:
-            legend_outside(figure, places[0])
-    return figure
+    top = _end(found["spectrum"])
+
+    def draw(own: xr.Dataset, place: Any) -> None:
+        frequency, power = own["frequency"].values, own["spectrum"].values
+        light = {"color": PALETTE["light"], "linewidth": 0, "label": "spectrum of the state"}
+        place.fill_between(frequency, power / max(power.max(), 1e-300), **light)
+        for ordinary in own["ordinary"]:
+            style = {"color": COLOURS["input"], "linewidth": 0.7, "alpha": 0.8}
+            place.plot(frequency, ordinary, **style, label="with one input")
+        place.plot(frequency, own["multiple"], **LINES["measured"], label="with all inputs")
+        if "multiple_observables" in own:
+            line = {**LINES["forecast"], "label": "with observables too"}
+            place.plot(frequency, own["multiple_observables"], **line)
+        place.set(xlim=(0, top), ylim=(0, 1.02), xlabel="frequency [Hz]")
+        place.set_ylabel(f"coherence, {short_label(str(own['state'].values))} [1]")
+
+    return by_state(found, states, axes, (3.0, 1.9), draw)
 
 
-def modes(
-    found: xr.Dataset, *, most: int = 12, axes: Sequence[Axes] | Axes | None = None
-) -> Figure:
+def modes(found: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
     """Draw the modes that decay slowest: which states take part, with period and damping.
 
     Parameters
@@ -272,7 +267,7 @@ def _mode_words(mode: xr.Dataset) -> str:
     return f"{period:.3g} s, {ratio:.3f}"
 
 
-def decay(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Figure:
+def decay(found: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw what is left of an offset after its release, motion by motion.
 
     Parameters
@@ -286,26 +281,24 @@ def decay(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Fi
     -------
     Figure
     """
-    motions = [str(name) for name in found["motion"].values]
-    with figure_style():
-        figure, places = panels(axes, len(motions), 3, (3.0, 1.8))
-        for name, place in zip(motions, places, strict=True):
-            own = found.sel(motion=name)
-            left = own["displacement"].values
-            place.axhline(0.0, color=COLOURS["input"], linewidth=0.6)
-            place.plot(own["time"], left, **{**LINES["forecast"], "linestyle": "-"})
-            moving = np.flatnonzero(np.abs(left) > 0.01)
-            place.set_xlim(0, float(own["time"][min(moving[-1] + 2, left.size - 1)]))
-            place.set_xlabel("time after the release [s]")
-            place.set_ylabel(f"{short_label(name)} over offset [1]")
-    return figure
+
+    def draw(own: xr.Dataset, place: Any) -> None:
+        left = own["displacement"].values
+        place.axhline(0.0, color=COLOURS["input"], linewidth=0.6)
+        place.plot(own["time"], left, **{**LINES["forecast"], "linestyle": "-"})
+        moving = np.flatnonzero(np.abs(left) > 0.01)
+        place.set_xlim(0, float(own["time"][min(moving[-1] + 2, left.size - 1)]))
+        place.set_xlabel("time after the release [s]")
+        place.set_ylabel(f"{short_label(str(own['state'].values))} over offset [1]")
+
+    return by_state(found.rename(motion="state"), None, axes, (3.0, 1.8), draw)
 
 
 def residuals(
     found: xr.Dataset,
     *,
     states: Sequence[str] | None = None,
-    axes: Sequence[Axes] | Axes | None = None,
+    axes: Places = None,
 ) -> Figure:
     """Draw correlations of one-step errors, the spectrum of free runs' errors, and their age.
 
@@ -322,75 +315,48 @@ def residuals(
     -------
     Figure
     """
-    chosen = _chosen(found, states)
-    grey = {"color": PALETTE["pale"], "linewidth": 0.8}
-    with figure_style():
-        figure, places = panels(axes, 4 * len(chosen), 4, (2.6, 1.75))
-        for number, name in enumerate(chosen):
-            own, (white, past, spectrum, age) = found.sel(state=name), places[4 * number :][:4]
-            limit = float(own["limit"])
-            white.axhspan(-limit, limit, **UNTRAINED)
-            white.plot(own["lag"][1:], own["autocorrelation"][1:], **LINES["measured"])
-            white.set(xlabel="lag [s]", ylabel="autocorrelation [1]")
-            white.set_title(f"{short_label(name)}: errors of one step", loc="left", fontsize=8)
-            if "input_correlation" in own:
-                for each, line in zip(
-                    own["input"].values, ("-", (0, (4, 1.5)), ":") * 9, strict=False
-                ):
-                    wide = float(own["input_limit"].sel(input=each))
-                    past.axhspan(-wide, wide, **UNTRAINED)
-                    style = {"color": COLOURS["measured"], "linewidth": 1.0, "linestyle": line}
-                    values = own["input_correlation"].sel(input=each)
-                    past.plot(own["lag"], values, **style, label=str(each))
-            past.set(xlabel="lag of the input [s]", ylabel="correlation [1]")
-            past.set_title("with past inputs", loc="left", fontsize=8)
-            power = own["measured_spectrum"].values
-            top = power.max() if power.max() > 0 else 1.0
-            spectrum.semilogy(own["frequency"][1:], power[1:] / top, **grey, label="measured")
-            error = own["error_spectrum"].values[1:] / top
-            spectrum.semilogy(own["frequency"][1:], error, **LINES["forecast"], label="error")
-            energy = found["measured_spectrum"].sum("state").values
-            last = np.flatnonzero(energy > 1e-3 * energy.max())[-1]
-            spectrum.set_xlim(0, 1.5 * float(own["frequency"][last]))
-            spectrum.set_ylim(bottom=1e-6)
-            spectrum.set(xlabel="frequency [Hz]", ylabel="power over peak [1]")
-            spectrum.set_title("free runs", loc="left", fontsize=8)
-            age.plot(own["age"], own["age_nrmse"], **LINES["forecast"])
-            age.set_ylim(bottom=0)
-            age.set(xlabel="age of the forecast [s]", ylabel="error [SD]")
-        if axes is None:
-            legend_outside(figure, *places[1:3], side="upper")
-        else:
+    dark = {"color": COLOURS["measured"], "linewidth": 1.0}
+    end = 1.5 * _end(found["measured_spectrum"])
+
+    def draw(own: xr.Dataset, white: Any, past: Any, spectrum: Any, age: Any) -> None:
+        limit = float(own["limit"])
+        white.axhspan(-limit, limit, **UNTRAINED)
+        white.plot(own["lag"][1:], own["autocorrelation"][1:], **LINES["measured"])
+        white.set(xlabel="lag [s]", ylabel="autocorrelation [1]")
+        label = short_label(str(own["state"].values))
+        white.set_title(f"{label}: errors of one step", loc="left", fontsize=8)
+        dashes = ("-", (0, (4, 1.5)), ":") * 9
+        for each, dash in zip(own.get("input_correlation", ()), dashes, strict=False):
+            name = str(each["input"].values)
+            wide = float(own["input_limit"].sel(input=name))
+            past.axhspan(-wide, wide, **UNTRAINED)
+            past.plot(own["lag"], each, **dark, linestyle=dash, label=name)
+        past.set(xlabel="lag of the input [s]", ylabel="correlation [1]")
+        past.set_title("with past inputs", loc="left", fontsize=8)
+        frequency, power = own["frequency"][1:], own["measured_spectrum"].values
+        top = power.max() if power.max() > 0 else 1.0
+        grey = {"color": PALETTE["pale"], "linewidth": 0.8, "label": "measured"}
+        spectrum.semilogy(frequency, power[1:] / top, **grey)
+        error = own["error_spectrum"].values[1:] / top
+        spectrum.semilogy(frequency, error, **LINES["forecast"], label="error")
+        spectrum.set(xlim=(0, end), xlabel="frequency [Hz]", ylabel="power over peak [1]")
+        spectrum.set_ylim(bottom=1e-6)
+        spectrum.set_title("free runs", loc="left", fontsize=8)
+        age.plot(own["age"], own["age_nrmse"], **LINES["forecast"])
+        age.set_ylim(bottom=0)
+        age.set(xlabel="age of the forecast [s]", ylabel="error [SD]")
+        if axes is not None:
             for place in (past, spectrum):
                 place.legend(fontsize=6)
-    return figure
 
-
-def by_state(
-    found: xr.Dataset,
-    states: Sequence[str] | None,
-    axes: Sequence[Axes] | Axes | None,
-    height: float,
-    draw: Callable[[Any, xr.Dataset, float, str], None],
-) -> Figure:
-    """A panel for each state: `draw` takes Axes, the state's results, factor and unit to show."""
-    chosen = _chosen(found, states)
-    with figure_style():
-        figure, places = panels(axes, len(chosen), 3, (3.0, height))
-        for name, place in zip(chosen, places, strict=True):
-            own = found.sel(state=name)
-            factor, units = displayed(str(own["units"].values))
-            draw(place, own, factor, shown_unit(units) or "?")
-        if axes is None:
-            legend_outside(figure, places[0])
-    return figure
+    return by_state(found, states, axes, (2.6, 1.75), draw, 4, 4, "upper center")
 
 
 def exceedance(
     found: xr.Dataset,
     *,
     states: Sequence[str] | None = None,
-    axes: Sequence[Axes] | Axes | None = None,
+    axes: Places = None,
 ) -> Figure:
     """Draw how often peaks exceed a level, measured and forecast, beside Rayleigh and Weibull.
 
@@ -407,10 +373,11 @@ def exceedance(
     -------
     Figure
     """
-    return by_state(found, states, axes, 2.0, _exceedance)
+    return by_state(found, states, axes, (3.0, 2.0), _exceedance)
 
 
-def _exceedance(place: Any, own: xr.Dataset, factor: float, unit: str) -> None:
+def _exceedance(own: xr.Dataset, place: Any) -> None:
+    factor, unit, label = _shown(own)
     measured = own.sel(kind="measured")
     largest = float(np.nanmax(own["peak"], initial=0.0))
     level = np.linspace(0, 1.1 * largest or 1.0, 200)
@@ -432,7 +399,7 @@ def _exceedance(place: Any, own: xr.Dataset, factor: float, unit: str) -> None:
         place.semilogy(peak, at["exceedance"], color=colour, **style, label=kind)
     place.set_ylim(0.3 / max(int(own["peaks"].max()), 1), 1.3)
     place.set_xlim(0, factor * level[-1])
-    place.set_xlabel(f"peak of {short_label(str(own['state'].values))} [{unit}]")
+    place.set_xlabel(f"peak of {label} [{unit}]")
     place.set_ylabel("exceeded by [1]")
 
 
@@ -440,22 +407,23 @@ def density(
     found: xr.Dataset,
     *,
     states: Sequence[str] | None = None,
-    axes: Sequence[Axes] | Axes | None = None,
+    axes: Places = None,
 ) -> Figure:
     """Draw the densities of states, measured and forecast; arguments as :func:`exceedance`."""
-    return by_state(found, states, axes, 1.9, _density)
+    return by_state(found, states, axes, (3.0, 1.9), _density)
 
 
-def _density(place: Any, own: xr.Dataset, factor: float, unit: str) -> None:
+def _density(own: xr.Dataset, place: Any) -> None:
+    factor, unit, label = _shown(own)
     for kind in ("measured", "forecast"):
         height = own["density"].sel(kind=kind) / factor
         place.plot(factor * own["deviation"], height, **LINES[kind], label=kind)
     place.set_ylim(bottom=0)
-    place.set_xlabel(f"{short_label(str(own['state'].values))} from its mean [{unit}]")
+    place.set_xlabel(f"{label} from its mean [{unit}]")
     place.set_ylabel(f"density [1/{unit}]")
 
 
-def validity(found: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Figure:
+def validity(found: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw height against period of the waves, and steepness against mean surge where it is known.
 
     Parameters
@@ -502,7 +470,7 @@ def drift(
     found: xr.Dataset,
     *,
     states: Sequence[str] | None = None,
-    axes: Sequence[Axes] | Axes | None = None,
+    axes: Places = None,
 ) -> Figure:
     """Draw mean drift and slow response per amplitude squared, offsets of regular runs beside.
 
@@ -519,30 +487,25 @@ def drift(
     -------
     Figure
     """
-    known = found["state"].values[found["slow_response"].notnull().any(["difference", "frequency"])]
-    chosen = _chosen(found, [str(name) for name in known] if states is None else states)
-    with figure_style():
-        figure, places = panels(axes, len(chosen), 3, (3.0, 2.0))
-        for name, place in zip(chosen, places, strict=True):
-            own = found.sel(state=name)
-            factor, units = displayed(str(own["units"].values))
-            place.axhline(0.0, color=COLOURS["input"], linewidth=0.5)
-            line = {**LINES["forecast"], "linestyle": "-", "label": "model, mean"}
-            place.plot(own["frequency"], factor * own["slow_response"][0], **line)
-            dashes = ((0, (4, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)), (0, (8, 2)))
-            for number, dash in zip(range(1, own.sizes["difference"]), dashes, strict=False):
-                at = own.isel(difference=number)
-                style = {"color": COLOURS["ensemble"], "linewidth": 0.9, "linestyle": dash}
-                label = f"model, difference {float(at['difference']):.3g} Hz"
-                place.plot(at["frequency"], factor * at["slow_response"], **style, label=label)
-            if "offset" in own:
-                style = {**MARKS["regular"], "linestyle": "none", "elinewidth": 0.8}
-                sure = factor * own["offset_uncertainty"]
-                offset = factor * own["offset"]
-                label = "measured, regular waves"
-                place.errorbar(own["point_frequency"], offset, sure, **style, label=label)
-            place.set_xlabel("frequency [Hz]")
-            place.set_ylabel(f"{short_label(name)} [{shown_unit(units) or '?'}]")
-        if axes is None:
-            legend_outside(figure, places[0])
-    return figure
+    if states is None:
+        answers = found["slow_response"].notnull().any(["difference", "frequency"])
+        states = [str(name) for name in found["state"].values[answers]]
+
+    def draw(own: xr.Dataset, place: Any) -> None:
+        factor, unit, label = _shown(own)
+        place.axhline(0.0, color=COLOURS["input"], linewidth=0.5)
+        line = {**LINES["forecast"], "linestyle": "-", "label": "model, mean"}
+        place.plot(own["frequency"], factor * own["slow_response"][0], **line)
+        dashes = ((0, (4, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)), (0, (8, 2)))
+        for slow, dash in zip(own["slow_response"][1:], dashes, strict=False):
+            style = {"color": COLOURS["ensemble"], "linewidth": 0.9, "linestyle": dash}
+            words = f"model, difference {float(slow['difference']):.3g} Hz"
+            place.plot(own["frequency"], factor * slow, **style, label=words)
+        if "offset" in own:
+            style = {**MARKS["regular"], "linestyle": "none", "elinewidth": 0.8}
+            offsets = (factor * own[key] for key in ("offset", "offset_uncertainty"))
+            words = "measured, regular waves"
+            place.errorbar(own["point_frequency"], *offsets, **style, label=words)
+        place.set(xlabel="frequency [Hz]", ylabel=f"{label} [{unit}]")
+
+    return by_state(found, states, axes, (3.0, 2.0), draw)

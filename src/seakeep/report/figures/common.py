@@ -13,6 +13,7 @@ __all__ = [
     "HEADING",
     "grid_of_axes",
     "judged_models",
+    "legend_outside",
     "line_of",
     "model_colour",
     "model_words",
@@ -82,3 +83,17 @@ def grid_of_axes(figure: Any, count: int, most: int) -> list[Any]:
     for spare in axes[count:]:
         spare.remove()
     return list(axes[:count])
+
+
+def legend_outside(figure: Any, *places: Any, side: str = "lower center", **options: Any) -> Any:
+    """Legend beside all panels of what some of them label, in as many columns as fit."""
+    unique: dict[str, Any] = {}
+    for place in places:
+        handles, labels = place.get_legend_handles_labels()
+        unique |= dict(zip(labels, handles, strict=True))
+    if not unique:
+        return None
+    across = max(1, int(13 * figure.get_figwidth() / (6 + max(map(len, unique)))))  # letters
+    columns = min(len(unique), across)
+    loc = f"outside {side}"
+    return figure.legend(unique.values(), unique, loc=loc, ncols=columns, **options)

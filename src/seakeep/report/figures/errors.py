@@ -1,4 +1,4 @@
-"""Errors over the age of a forecast, and against the hyperparameters of the draws."""
+"""Errors over the age of a forecast and against what was drawn; densities; eigenvalues."""
 
 from __future__ import annotations
 
@@ -9,15 +9,31 @@ import numpy as np
 import scipy
 
 from seakeep.arrays import FloatArray
-from seakeep.report.figures.common import judged_models, line_of, model_colour, model_words
-from seakeep.report.style import figure_style, new_figure
+from seakeep.report.figures.common import (
+    grid_of_axes,
+    judged_models,
+    legend_outside,
+    line_of,
+    model_colour,
+    model_words,
+    short_label,
+)
+from seakeep.report.style import COLOURS, PALETTE, figure_style, new_figure
 from seakeep.study import StudyResult
 from seakeep.study.judge import average_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["BAND_WORDS", "error_over_time_figure", "hyperparameter_figure", "member_errors"]
+__all__ = [
+    "BAND_WORDS",
+    "LOWEST",
+    "density_figure",
+    "eigenvalue_figure",
+    "error_over_time_figure",
+    "hyperparameter_figure",
+    "member_errors",
+]
 
 
 BAND_WORDS = {"all": "all frequencies", "low": "low frequencies", "wave": "wave frequencies"}
@@ -29,6 +45,10 @@ HYPERPARAMETERS = {
     "input_delays": "input delay",
     "ridge": "ridge λ",
 }
+
+
+LOWEST = 0.8
+"""Modulus at which the axis ends; what lies below dies out within a few samples."""
 
 
 def error_over_time_figure(result: StudyResult) -> Figure:
@@ -111,3 +131,85 @@ def _scatter(axes: Any, drawn: FloatArray, errors: FloatArray, colour: str) -> N
     if known.sum() > 2 and np.ptp(errors[known]) > 0:
         rank = float(scipy.stats.spearmanr(drawn[known], errors[known]).statistic)
         axes.set_title(f"rank correlation {rank:+.2f}", loc="right", fontsize=7, pad=2)
+
+
+def density_figure(result: StudyResult, model: str) -> Figure:
+    """Density of each channel, measured and predicted, each with its 95 % band."""
+    with figure_style():
+        data = result.groups["statistics/densities"].sel(model=model)
+        names = result.channels
+        figure = new_figure(8.5, 0.5 + 1.75 * -(-len(names) // 4))
+        axes = grid_of_axes(figure, len(names), 4)
+        sides = (
+            ("measured", "measured", COLOURS["measured"], "-"),
+            ("predicted", model_words(model), model_colour(result, model), (0, (4, 1.5))),
+        )
+        for each, name in zip(axes, names, strict=True):
+            _draw_density(each, data.sel(channel=name), name, sides)
+        legend_outside(figure, axes[0], side="upper right")
+        return figure
+
+
+def _draw_density(axes: Any, curves: Any, name: str, sides: Any) -> None:
+    x = curves["value"].values
+    centre, spread = np.nan, np.nan
+    weight = curves["measured_mean"].values
+    if np.isfinite(x).all():
+        weight = weight / weight.sum()
+        centre = float((x * weight).sum())
+        spread = float(np.sqrt((weight * (x - centre) ** 2).sum()))
+    for key, words, colour, dash in sides:
+        z = (x - centre) / spread
+        lower, mean, upper = (
+            curves[f"{key}_{k}"].values * spread for k in ("lower", "mean", "upper")
+        )
+        axes.fill_between(z, lower, upper, color=colour, alpha=0.22, linewidth=0)
+        axes.plot(z, mean, color=colour, linestyle=dash, linewidth=1.3, label=words)
+    axes.set_title(short_label(name), loc="left", pad=2)
+    axes.set_yticks([])
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("measured SD from the mean", fontsize=7)
+    axes.tick_params(labelsize=7)
+
+
+def eigenvalue_figure(result: StudyResult) -> Figure:
+    """Eigenvalues of each model of the first training set, for an ensemble those of all members."""
+    with figure_style():
+        figure = new_figure(8.5, 3.0)
+        plane, decay = figure.subplots(1, 2)
+        circle = np.exp(1j * np.linspace(0, np.pi, 400))
+        plane.plot(circle.real, circle.imag, color=PALETTE["slate"], linewidth=0.8)
+        order = sorted(judged_models(result), key=lambda model: not result.is_ensemble(model))
+        for model in order:
+            data = result.groups[f"eigenvalues/{model}"]
+            values = (data["real"].values + 1j * data["imag"].values).ravel()
+            values = values[np.isfinite(values) & (values.imag >= 0)]
+            _draw_eigenvalues(plane, decay, values, result, model)
+        plane.set_aspect("equal")
+        plane.set_ylim(0, 1.05)
+        plane.set_xticks([-1.0, -0.5, 0.0, 0.5, 1.0])
+        plane.set(xlabel="real part", ylabel="imaginary part")
+        decay.axhline(1.0, color=PALETTE["slate"], linewidth=0.8)
+        decay.set(xlabel="frequency [Hz]", ylabel="modulus")
+        decay.set_xlim(0, 3 / float(result.attrs["encounter_period"]))
+        decay.set_ylim(LOWEST, 1.01)
+        legend = legend_outside(figure, decay, side="upper right", markerscale=2)
+        for handle in filter(None, legend.legend_handles):
+            handle.set_alpha(0.9)
+        return figure
+
+
+def _draw_eigenvalues(plane: Any, decay: Any, values: Any, result: StudyResult, model: str) -> None:
+    single = not result.is_ensemble(model)
+    members = result.groups[f"eigenvalues/{model}"].sizes["member"]
+    style = {
+        "s": 9 if single else 5,
+        "color": model_colour(result, model),
+        "alpha": 0.9 if single else float(np.clip(12 / members, 0.12, 0.6)),
+        "linewidths": 0,
+        "rasterized": True,
+        "label": model_words(model),
+    }
+    plane.scatter(values.real, values.imag, **style)
+    frequency = np.angle(values) / (2 * np.pi * float(result.attrs["dt"]))
+    decay.scatter(frequency, np.abs(values), **style)

@@ -11,13 +11,14 @@ import xarray as xr
 from seakeep.conventions import displayed
 from seakeep.errors import RequestError
 from seakeep.models import summarize
-from seakeep.report.figures.checks import legend_outside, panels
-from seakeep.report.figures.common import FURTHER, short_label
+from seakeep.report.figures.checks import panels
+from seakeep.report.figures.common import FURTHER, legend_outside, short_label
 from seakeep.report.style import COLOURS, LINES, THIN, axis_label, figure_style
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from seakeep.report.figures.checks import Places
 
 __all__ = ["band", "errors", "overlay"]
 
@@ -27,7 +28,7 @@ def overlay(
     measured: xr.Dataset,
     *,
     channels: Sequence[str] | None = None,
-    axes: Sequence[Axes] | Axes | None = None,
+    axes: Places = None,
 ) -> Figure:
     """Draw a forecast over the measurement.
 
@@ -55,7 +56,7 @@ def band(
     *,
     level: float = 0.95,
     channels: Sequence[str] | None = None,
-    axes: Sequence[Axes] | Axes | None = None,
+    axes: Places = None,
 ) -> Figure:
     """Draw the band of an ensemble and its mean over the measurement.
 
@@ -92,7 +93,7 @@ def _histories(
     bounds: xr.Dataset | None,
     measured: xr.Dataset,
     channels: Sequence[str] | None,
-    axes: Sequence[Axes] | Axes | None,
+    axes: Places,
 ) -> Figure:
     for data, what in ((forecast, "forecast"), (measured, "measured")):
         if (
@@ -142,7 +143,7 @@ def _histories(
     return figure
 
 
-def errors(table: xr.Dataset, *, axes: Sequence[Axes] | Axes | None = None) -> Figure:
+def errors(table: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw the NRMSE of each channel with its interval, run by run.
 
     Parameters

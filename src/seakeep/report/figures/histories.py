@@ -7,18 +7,29 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from seakeep.report.figures.common import judged_models, line_of, model_words, short_label
+from seakeep.report.figures.common import (
+    judged_models,
+    legend_outside,
+    line_of,
+    model_words,
+    short_label,
+)
 from seakeep.report.style import LINES, THIN, figure_style, new_figure
 from seakeep.study import StudyResult
 from seakeep.study.judge import band_of
+from seakeep.study.reproduce import ACTS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_channel", "history_figure", "shown_cells"]
+__all__ = ["acts_figure", "draw_channel", "history_figure", "shown_cells"]
 
 EDGE: dict[str, Any] = {"linewidth": 0.7, "linestyle": (0, (1, 1))}
 """Bounds of a calibrated band."""
+
+
+CHANNELS = ("heave", "surge")
+"""One that moves with the waves, and one that drifts."""
 
 
 def shown_cells(result: StudyResult) -> list[tuple[str, int, int]]:
@@ -62,8 +73,7 @@ def history_figure(
             fontsize=8,
         )
         axes[-1].set_xlabel(r"time after the last measured state, in encounter periods")
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper right", ncols=min(len(handles), 5))
+        legend_outside(figure, axes[0], side="upper right")
         run, learnt = str(cell["run"].values), str(cell["training"].values)
         left_out = str(result.groups["training"]["left_out"].values[training])
         axes[0].set_title(
@@ -109,3 +119,24 @@ def draw_channel(
         axes.plot(time, standard(cell["mean"].sel(model=model)), label=words, **style)
     axes.set_ylabel(short_label(name), rotation=0, ha="right", va="center")
     axes.margins(x=0.005)
+
+
+def acts_figure(results: Mapping[str, StudyResult]) -> Figure:
+    """Channels (columns) in the same window of irregular waves, act by act (rows)."""
+    with figure_style():
+        acts = [act for act in ACTS if act.name in results]
+        figure = new_figure(8.5, 0.7 + 1.3 * len(acts))
+        grid = figure.subplots(len(acts), len(CHANNELS), sharex=True, squeeze=False)
+        for row, act in zip(grid, acts, strict=True):
+            result = results[act.name]
+            test = result.tests["irregular"]
+            training = int(test["judged"].values[:, 0].argmax())
+            cell = test.isel(training=training, window=0)
+            for axes, name in zip(row, CHANNELS, strict=True):
+                draw_channel(axes, result, cell.sel(channel=name), name, {})
+                axes.set_title(f"{act.title}: {name}", loc="left", fontsize=8)
+        for axes in grid[-1]:
+            axes.set_xlabel("time after the last measured state, in encounter periods")
+        legend_outside(figure, grid[0, 0], side="upper right")
+        figure.supylabel("deviation from the training mean, in training SD", fontsize=8)
+        return figure

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from seakeep.arrays import FloatArray
 from seakeep.report.style import PALETTE, figure_style, new_figure, plain_text
 from seakeep.study import StudyResult
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["spectrum_figure"]
+__all__ = ["mean_spectrum", "spectrum_figure"]
 
 KINDS: dict[str, tuple[str, str, Any]] = {
     "paper": ("measured, segments of 8.2 s (paper)", PALETTE["vermilion"], (0, (4, 1.5))),
@@ -62,10 +63,13 @@ def _curve(spectra: Any, run: str, kind: str) -> Any:
 def _mean(spectra: Any, names: list[str], kind: str) -> Any:
     curves = [_curve(spectra, name, kind) for name in names]
     known = [each for each in curves if each[0].size]
-    if not known:
-        return None
-    frequency = known[0][0]
-    return frequency, np.mean([np.interp(frequency, *each) for each in known], axis=0)
+    return (known[0][0], mean_spectrum(known)) if known else None
+
+
+def mean_spectrum(spectra: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    """Mean of spectra at the frequencies of the first: records differ in length."""
+    mean: FloatArray = np.mean([np.interp(spectra[0][0], *each) for each in spectra], axis=0)
+    return mean
 
 
 def _peak(spectra: Any, name: str) -> float:
@@ -73,7 +77,7 @@ def _peak(spectra: Any, name: str) -> float:
     return float(frequency[np.argmax(density)]) if density.size else 0.0
 
 
-def _mark_regular(axes: Any, frequencies: npt.NDArray[np.float64]) -> None:
+def _mark_regular(axes: Any, frequencies: FloatArray) -> None:
     """Mark the regular waves where text and tables have them, not at a bin of the spectrum."""
     known = sorted({round(float(f), 3) for f in frequencies[np.isfinite(frequencies)]})
     for number, frequency in enumerate(known):

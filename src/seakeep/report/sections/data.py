@@ -73,7 +73,7 @@ def wave_table(result: StudyResult) -> Table:
         "waves",
         "Waves tested, as measured",
         ("run", "sea", "height [m]", "frequency [Hz]", "length [m]", "phase speed [m/s]", "used"),
-        tuple(rows),
+        rows,
         f"From {result.groups['spectra'].attrs['channel']}. Height: of regular waves 2√2, of a sea "
         "4 standard deviations of the elevation. Length and speed: linear theory at the depth of "
         "the campaign.",
@@ -101,7 +101,7 @@ def position_table(result: StudyResult) -> Table | None:
         "positions",
         "Positions of the wave probes",
         ("channel", "words", "x [m]", "used"),
-        tuple(rows),
+        rows,
         str(result.groups["channels"].attrs.get("frame", "")),
         (2,),
     )
@@ -129,18 +129,17 @@ def _sign_table(result: StudyResult) -> Table:
     channels = result.groups["channels"]
     rows = []
     for name in map(str, channels["name"].values):
-        at = {
-            k: str(channels[k].sel(name=name).values)
-            for k in ("use", "units", "positive", "source")
-        }
-        row = (at["use"], shown_unit(at["units"]), at["positive"], at["source"])
-        rows.append((result.words_of(name), *row))
+        use, unit, positive, source = (
+            str(channels[key].sel(name=name).values)
+            for key in ("use", "units", "positive", "source")
+        )
+        rows.append((result.words_of(name), use, shown_unit(unit), positive, source))
     frame = str(channels.attrs.get("frame", ""))
     return Table(
         "signs",
         "Channels and signs",
         ("channel", "use", "unit", "positive", "source"),
-        tuple(rows),
+        rows,
         f"Frame: {frame}." if frame else "",
     )
 
@@ -169,7 +168,7 @@ def _run_table(result: StudyResult) -> Table:
         "runs",
         "Data quality of the runs, as preparation found it",
         ("run", "sea state", "part used", "findings", "channel (kind)", "findings of loggers"),
-        tuple(rows),
+        rows,
         "Checks flag and report; nothing is repaired unless the campaign asks for it, and what was "
         "repaired is in the tables below. A finding concerns the whole record, the part that is "
         "cut off too.",
@@ -185,7 +184,7 @@ def _clock_table(result: StudyResult) -> Table | None:
         "clocks",
         "Clocks of the loggers against the reference",
         ("run", "logger", "offset", "drift", "from"),
-        tuple(rows),
+        rows,
         "Offset: what the logger's clock reads when the reference reads zero. n: pulses, windows "
         "or samples that it rests on. ±: one standard error.",
         folded=True,
@@ -204,22 +203,14 @@ def _quality_table(result: StudyResult, name: str) -> Table:
             part = float(at["slack"])
             slack = f"{100 * part:.1f}" if np.isfinite(part) else ""
         low, high, mean, spread = (f"{value:.4g}" for value in each.numbers)
-        row = (
-            each.words,
-            "yes" if each.channel in used else "",
-            each.unit,
-            mean,
-            spread,
-            low,
-            high,
-        )
-        rows.append((*row, frozen, slack, each.flagged, "; ".join(each.found)))
+        row = (each.words, "yes" if each.channel in used else "", each.unit, mean, spread)
+        rows.append((*row, low, high, frozen, slack, each.flagged, "; ".join(each.found)))
     return Table(
         f"quality_{name}",
         f"Data quality of {name}, channel by channel (SI units)",
         ("channel", "used", "unit", "mean", "SD", "min", "max", "frozen %", "slack %", "flagged",
          "found, and done about it"),
-        tuple(rows),
+        rows,
         "After preparation; no value that the study uses is missing, or it would have refused the "
         "run. Frozen: samples equal to both neighbours. Slack: a load within the SD of its noise. "
         "Flagged: fraction of the samples.",

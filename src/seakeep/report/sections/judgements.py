@@ -1,7 +1,8 @@
-"""Beyond one number per cell: age of a forecast, band, densities, members."""
+"""Beyond one number per cell: age of a forecast, band, densities, members, service."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -9,16 +10,30 @@ import numpy as np
 import xarray as xr
 
 from seakeep.report.figures.common import judged_models, model_words
-from seakeep.report.figures.densities import density_figure
-from seakeep.report.figures.eigenvalues import LOWEST, eigenvalue_figure
-from seakeep.report.figures.errors import BAND_WORDS, error_over_time_figure, hyperparameter_figure
+from seakeep.report.figures.errors import (
+    BAND_WORDS,
+    LOWEST,
+    density_figure,
+    eigenvalue_figure,
+    error_over_time_figure,
+    hyperparameter_figure,
+)
+from seakeep.report.nowcast import nowcast_blocks, nowcast_figure
 from seakeep.report.section import Drawing, Section
-from seakeep.report.sections.summary import conditional
+from seakeep.report.sections.summary import by_channel, conditional
 from seakeep.report.tables import MISSING, Table, number, probability, small_number
 from seakeep.study import StudyResult
 from seakeep.study.judge import VARIANTS
 
-__all__ = ["age", "coverage", "coverage_table", "densities", "divergence_table", "members"]
+__all__ = [
+    "age",
+    "coverage",
+    "coverage_table",
+    "densities",
+    "divergence_table",
+    "members",
+    "service",
+]
 
 PUBLISHED = {
     "surge": ("0.0026", "0.0010", "0.0061", "0.0052"),
@@ -67,17 +82,17 @@ def _trend_table(result: StudyResult) -> Table:
         for band, words in BAND_WORDS.items():
             for model in judged_models(result):
                 at = data.sel(model=model, band=band)
-                interval = ", ".join(small_number(float(at[key])) for key in ("lower", "upper"))
+                interval = ", ".join(small_number(at[key]) for key in ("lower", "upper"))
                 rows.append(
                     (
                         result.label_of(test),
                         words,
                         model_words(model),
-                        number(float(at["error_mean"].mean())),
-                        number(float(at["change"])),
-                        f"{small_number(float(at['slope']))} [{interval}]",
-                        number(float(at["kendall_tau"]), 2),
-                        probability(float(at["p_value"])),
+                        number(at["error_mean"].mean()),
+                        number(at["change"]),
+                        f"{small_number(at['slope'])} [{interval}]",
+                        number(at["kendall_tau"], 2),
+                        probability(at["p_value"]),
                     )
                 )
     period = float(result.settings["statistics"]["split_period"])
@@ -89,7 +104,7 @@ def _trend_table(result: StudyResult) -> Table:
             "test set", "band", "model", "mean ε", "change over the window",
             "slope [1/s] with 95 %", "Kendall's τ", "p",
         ),
-        tuple(rows),
+        rows,
         "Block-bootstrap Mann–Kendall test of ε(t) averaged over all cells. A p below 0.05 says "
         "that the error changes with the age of the forecast; blocks break some of the "
         "dependence, so slow series are called trends too often (10 to 15 %). The error is parted "
@@ -113,23 +128,22 @@ def coverage(result: StudyResult) -> Section | None:
 def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> Table:
     """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
     prefix, words = ("calibrated_", "calibrated ") if calibrated else ("", "")
-    columns = ["channel"]
     found = result.groups["statistics/coverage"].sel(model=model)
     groups = {test: found.sel(test=test) for test in result.tests}
     true = any("truth" in data["against"].values for data in groups.values())
-    for test in groups:
-        columns.append(f"{result.label_of(test)}: inside" + (" [of the truth]" if true else ""))
-        columns.append(f"{result.label_of(test)}: width [SD]")
-    rows = []
-    for name in [*result.channels, "average"]:
-        row = ["average" if name == "average" else result.words_of(name)]
+    heads = [
+        f"{result.label_of(test)}: {words}"
+        for test in groups
+        for words in ("inside" + " [of the truth]" * true, "width [SD]")
+    ]
+
+    def cells(name: str) -> Iterator[str]:
         for data in groups.values():
             at = data.sel(channel=name)
-            first, *others = (number(float(v), 2) for v in at[f"{prefix}inside"].values)
-            row.append(first + "".join(f" [{each}]" for each in others))
-            width = at[f"{prefix}relative_width"].sel(against="measured")
-            row.append(number(float(width), 2))
-        rows.append(tuple(row))
+            first, *others = (number(v, 2) for v in at[f"{prefix}inside"].values)
+            yield first + "".join(f" [{each}]" for each in others)
+            yield number(at[f"{prefix}relative_width"].sel(against="measured"), 2)
+
     level = float(result.settings["statistics"]["level"])
     note = (
         f"Fraction of the measured instants inside the band of nominally {level:g} (quantiles of "
@@ -156,15 +170,8 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
             " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
             "slap; rates are not filtered."
         )
-    return Table(
-        f"coverage_{prefix}{model}",
-        f"Coverage of the {words}{100 * level:g} % band, {model_words(model)}",
-        tuple(columns),
-        tuple(rows),
-        note + conditional(result),
-        tuple(range(1, len(columns))),
-        averages=(len(rows) - 1,),
-    )
+    title = f"Coverage of the {words}{100 * level:g} % band, {model_words(model)}"
+    return by_channel(result, f"coverage_{prefix}{model}", title, heads, cells, note)
 
 
 def _other_lengths(result: StudyResult) -> str:
@@ -224,35 +231,32 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     at = data.sel(model=model, variant=variant)
     numbers = ("mean", "lower", "upper", "uncertainty", "noise_floor")
     comparable = result.is_ensemble(model) and result.shows_paper
-    rows = []
-    for name in result.channels:
-        one = at.sel(channel=name)
-        block = float(one["block_length"])
-        row = [result.words_of(name), *(small_number(float(one[key])) for key in numbers)]
-        row.append(f"{block:.0f}" if np.isfinite(block) else MISSING)
-        rows.append((*row, *(PUBLISHED.get(name, (MISSING,) * 4) if comparable else ())))
-    means = [small_number(float(at[key].mean())) for key in numbers]
-    rows.append(("average", *means, "", *(PUBLISHED["average"] if comparable else ())))
+    paper = PUBLISHED if comparable else {}
+    none = (MISSING,) * 4 if comparable else ()
+
+    def cells(name: str) -> list[str]:
+        of_all = name == "average"
+        one = at.mean("channel", skipna=False) if of_all else at.sel(channel=name)
+        block = "" if of_all else number(one["block_length"], 0)
+        return [*(small_number(one[key]) for key in numbers), block, *paper.get(name, none)]
+
     quantiles = ("EV", "q0.025", "q0.975", "U")
-    columns = ("channel", *quantiles, "noise floor", "block (samples)")
+    heads = (*quantiles, "noise floor", "block (samples)")
     published = tuple(f"paper: {each}" for each in quantiles) if comparable else ()
     test = result.label_of(str(data.attrs["test"]))
     how = "blocks may cross joins, block length and bandwidth as printed in the paper"
     if variant == "recommended":
         how = "no block crosses a join, Politis–White blocks, Silverman's bandwidth"
-    return Table(
+    return by_channel(
+        result,
         f"jsd_{model}_{variant}",
         f"Divergence of the densities, {model_words(model)}, {test}: {variant} variant",
-        (*columns, *published),
-        tuple(rows),
+        (*heads, *published),
+        cells,
         f"Nats, 0 to ln 2; {how}. The noise floor is the divergence of the measurement from "
         "itself under two independent bootstraps: what a record of this length cannot tell from "
-        "none."
-        + (" The paper's columns are of another vessel in another tank." if comparable else "")
-        + conditional(result),
-        tuple(range(1, len(columns) + len(published))),
-        elsewhere=tuple(range(len(columns), len(columns) + len(published))),
-        averages=(len(rows) - 1,),
+        "none." + " The paper's columns are of another vessel in another tank." * comparable,
+        elsewhere=[1 + len(heads) + k for k in range(len(published))],
         folded=not result.is_ensemble(model) and any(map(result.is_ensemble, result.models)),
     )
 
@@ -280,4 +284,34 @@ def members(result: StudyResult) -> Section | None:
         )
     return (
         Section("members", "Members of the ensemble", figures=tuple(figures)) if figures else None
+    )
+
+
+def service(result: StudyResult) -> Section | None:
+    """Return errors against lead time of models that were judged in service."""
+    groups = {model: result.groups.get(f"nowcast/{model}") for model in result.models}
+    found = {model: each for model, each in groups.items() if each is not None}
+    if not found:
+        return None
+    first = next(iter(found.values()))
+    runs = [str(name) for name in first["run"].values]
+    figures = [
+        Drawing(
+            f"nowcast_{run}",
+            f"{run}: root mean square error in service against lead time, and what the model "
+            f"claims of it, over {int(first.attrs['starts'])} forecasts.",
+            partial(nowcast_figure, found, run),
+        )
+        for run in runs
+    ]
+    words = (
+        "Models of the first training set, played sample by sample. Waves after a start are "
+        "predicted from what the probes have measured until then."
+    )
+    return Section(
+        "service",
+        "In service",
+        (words,),
+        figures=tuple(figures),
+        tables=tuple(nowcast_blocks(found)),
     )

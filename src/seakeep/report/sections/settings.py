@@ -1,4 +1,4 @@
-"""Settings with where each comes from, training sets and test windows, versions."""
+"""Settings with where each comes from, how they were chosen, windows and versions."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ import numpy as np
 
 from seakeep.report.figures.common import model_words
 from seakeep.report.section import Section
-from seakeep.report.tables import Table
+from seakeep.report.tables import Table, number
 from seakeep.study import StudyResult
 from seakeep.study.plan import windows_overlap
 
 __all__ = [
+    "chosen",
     "finished",
     "settings",
     "test_overlap",
@@ -60,7 +61,7 @@ def _model_table(result: StudyResult) -> Table:
         "models",
         "Settings of the models, and where each comes from",
         ("model", "setting", "value", "from"),
-        tuple(rows),
+        rows,
         "Stated: in the study file. Preset: filled in by the model's preset, or the study's. "
         "Study: the study's seed. Default: none of them says anything.",
         folded=True,
@@ -179,7 +180,7 @@ def _windows_table(result: StudyResult) -> Table:
         "windows",
         "Training sets and test windows, the same for all models",
         ("use", "set", "instants", "left out"),
-        tuple(rows),
+        rows,
         "Of a training set: from the start of its span to its stop. A draw reads the last part, "
         f"{reads:.2f} s at most, delay history included{whole}. The delay history of a forecast is "
         "measured data just before the start; it may reach into a training span.",
@@ -298,5 +299,35 @@ def versions(result: StudyResult) -> Section:
     rows = [(words, str(result.attrs[key])) for words, key in told]
     rows.append(("finished", finished(result)))
     rows += [(name, str(each)) for name, each in json.loads(result.attrs["versions"]).items()]
-    table = Table("versions", "Versions and digest", ("what", "value"), tuple(rows))
+    table = Table("versions", "Versions and digest", ("what", "value"), rows)
     return Section("versions", "Versions and digest", tables=(table,))
+
+
+def chosen(result: StudyResult) -> Section | None:
+    """Return how settings were chosen; None where all are stated and no model looks ahead."""
+    rows = []
+    for model in result.models:
+        data = result.groups["chosen"].sel(model=model)
+        for name, text, ahead in zip(
+            data["training"].values, data["words"].values, data["look_ahead"].values, strict=True
+        ):
+            if text or ahead > 0:
+                note, *tried = str(text).splitlines() or ["stated"]
+                words = "; ".join([note, *map(str.strip, tried)])
+                rows.append((model_words(model), str(name), number(ahead, 2), words))
+    if not rows:
+        return None
+    words = (
+        "Settings that are not stated are chosen by free runs on training runs that are held out "
+        "in turn; test windows are never looked at. Mean error with its 95 % interval and the best "
+        "λ of each choice: what an observable is worth is the error of the choice without it. The "
+        "look-ahead is how long after the instant that is forecast the last wave that is read lies."
+    )
+    table = Table(
+        "chosen",
+        "Choices and look-ahead",
+        ("model", "training set", "look-ahead [s]", "chosen"),
+        rows,
+        numeric=(2,),
+    )
+    return Section("chosen", "How settings were chosen", words=(words,), tables=(table,))

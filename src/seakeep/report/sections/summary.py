@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +21,7 @@ from seakeep.study.describe import words_of_repeats
 from seakeep.study.judge import verdict, words_of_lost
 
 __all__ = [
+    "by_channel",
     "conditional",
     "findings",
     "glossary",
@@ -79,29 +82,35 @@ def heat_table(result: StudyResult) -> Table:
     """Median error of each channel in each test set, of the models that are not baselines."""
     models = judged_models(result)
     places = [(test, model) for test in result.tests for model in models]
-    rows = []
-    for name in [*result.channels, "average"]:
-        cells = [
-            float(
-                result.groups["statistics/boxes"]["median"]
-                .sel(test=test)
-                .sel(model=model, measure="nrmse", channel=name)
-            )
-            for test, model in places
-        ]
-        words = name if name == "average" else result.words_of(name)
-        rows.append((words, *(number(value, 2) for value in cells)))
-    heads = [f"{result.label_of(test)}: {model_words(model)}" for test, model in places]
-    return Table(
+    median = result.groups["statistics/boxes"]["median"].sel(measure="nrmse")
+    return by_channel(
+        result,
         "heat",
         "Median NRMSE, channel by channel",
-        ("channel", *heads),
-        tuple(rows),
-        "The darker, the worse; average: the paper's ANRMSE." + conditional(result),
-        tuple(range(1, len(heads) + 1)),
-        averages=(len(rows) - 1,),
-        heat=tuple(range(1, len(heads) + 1)),
+        [f"{result.label_of(test)}: {model_words(model)}" for test, model in places],
+        lambda name: [
+            number(median.sel(test=test, model=model, channel=name), 2) for test, model in places
+        ],
+        "The darker, the worse; average: the paper's ANRMSE.",
+        heat=range(1, len(places) + 1),
     )
+
+
+def by_channel(
+    result: StudyResult,
+    name: str,
+    title: str,
+    heads: Sequence[str],
+    cells: Callable[[str], Iterable[str]],
+    note: str,
+    **options: Any,
+) -> Table:
+    """Table of numbers with a row per channel, and one of averages; `cells` takes a channel."""
+    rows = [(result.words_of(each), *cells(each)) for each in result.channels]
+    rows.append(("average", *cells("average")))
+    note, numeric = note + conditional(result), range(1, len(heads) + 1)
+    columns, last = ("channel", *heads), [len(rows) - 1]
+    return Table(name, title, columns, rows, note, numeric, averages=last, **options)
 
 
 def _first_history(result: StudyResult) -> list[Drawing]:
@@ -128,20 +137,20 @@ def overview_table(result: StudyResult) -> Table:
             for measure in HEADING:
                 at = boxes.sel(model=model, measure=measure)
                 spread = float(at["upper_quartile"] - at["lower_quartile"])
-                row += [number(float(at["median"])), number(spread)]
+                row += [number(at["median"]), number(spread)]
             scaled = boxes["median"].sel(model=model, measure="training_nrmse")
             count = boxes.sel(model=model, measure="nrmse")["count"]
-            rows.append((*row, number(float(scaled)), str(int(count))))
+            rows.append((*row, number(scaled), str(int(count))))
     heads = [f"{words} {k}" for words in HEADING.values() for k in ("median", "IQR")]
     return Table(
         "overview",
         "ANRMSE and NAMMAE",
         ("test set", "model", *heads, "in training SD", "cells"),
-        tuple(rows),
+        rows,
         "Medians and inter-quartile ranges over all cells (training set × test window) of the "
         "average over the channels that are judged; in measured standard deviations, and ANRMSE "
         "in those of the training set too." + conditional(result),
-        tuple(range(2, 8)),
+        range(2, 8),
     )
 
 
