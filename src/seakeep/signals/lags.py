@@ -12,7 +12,7 @@ from scipy import fft
 
 from seakeep.arrays import FloatArray, IntArray, as_real, as_series, positive, time_step
 from seakeep.errors import DataError, RequestError
-from seakeep.signals.time_axis import check_order
+from seakeep.signals.time_axis import record
 
 __all__ = [
     "Lags",
@@ -337,8 +337,9 @@ def compare_motion(
     (0.1, 1.0)
     """
     reach = None if max_lag is None else positive(max_lag, "max_lag", "s")
-    t1, y1 = _present(series, time, "the series")
-    t2, y2 = _present(reference, reference_time, "the reference")
+    first = record(series, time, "the video")
+    second = record(reference, reference_time, "the reference")
+    (y1, t1), (y2, t2) = ((y[np.isfinite(y)], t[np.isfinite(y)]) for y, t in (first, second))
     reach = reach or min(LONGEST, 0.25 * float(min(np.ptp(t1), np.ptp(t2))))
     # Only instants whose partner lies inside the other record at every lag searched.
     common = (t1 >= t2[0] + reach) & (t1 <= t2[-1] - reach)
@@ -387,16 +388,3 @@ def compare_motion(
         rival_lag=np.nan if rival is None else float(lags[rival]),
         rival_correlation=np.nan if rival is None else float(values[rival]),
     )
-
-
-def _present(
-    series: npt.ArrayLike, time: npt.ArrayLike, name: str
-) -> tuple[FloatArray, FloatArray]:
-    """Instants and values of a record where it has values."""
-    y, t = as_real(series, name), as_real(time, f"the times of {name}", DataError)
-    if y.ndim != 1 or y.shape != t.shape:
-        raise RequestError(
-            f"{name} has shape {y.shape} and its times {t.shape}; one value per instant is needed."
-        )
-    there = np.isfinite(y)
-    return check_order(t[there], name), y[there]

@@ -22,6 +22,7 @@ __all__ = [
     "instant_text",
     "onto_uniform",
     "over_gaps",
+    "record",
     "span_text",
     "stretches",
     "uniform_step",
@@ -94,6 +95,19 @@ def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
             "restarted."
         )
     return t
+
+
+def record(series: npt.ArrayLike, time: npt.ArrayLike, owner: str) -> tuple[FloatArray, FloatArray]:
+    """Signal of an owner, not finite where it has gaps, and its instants in their order."""
+    x, t = as_real(series, f"the signal of {owner}"), check_order(time, owner)
+    if x.shape != t.shape:
+        raise RequestError(
+            f"the signal of {owner} has shape {x.shape} and its times {t.shape}; one value per "
+            "instant is needed."
+        )
+    if np.isfinite(x).sum() < 2:
+        raise DataError(f"the signal of {owner} has fewer than two values. Give a longer record.")
+    return x, t
 
 
 def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
