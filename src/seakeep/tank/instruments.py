@@ -66,17 +66,11 @@ class Played:
 
     def states(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Position, velocity and acceleration at any instants, each of shape (dof, time)."""
-        m = self.motion
-        position = scipy.interpolate.CubicHermiteSpline(m.time, m.position, m.velocity, axis=1)(
-            time
-        )
-        velocity = scipy.interpolate.CubicHermiteSpline(m.time, m.velocity, m.acceleration, axis=1)(
-            time
-        )
+        m, smooth = self.motion, scipy.interpolate
         return (
-            position,
-            velocity,
-            scipy.interpolate.CubicSpline(m.time, m.acceleration, axis=1)(time),
+            smooth.CubicHermiteSpline(m.time, m.position, m.velocity, axis=1)(time),
+            smooth.CubicHermiteSpline(m.time, m.velocity, m.acceleration, axis=1)(time),
+            smooth.CubicSpline(m.time, m.acceleration, axis=1)(time),
         )
 
     def ramp(self, time: FloatArray) -> FloatArray:

@@ -14,6 +14,7 @@ from seakeep.arrays import Progress
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import MARK, check_output, is_there, make_folder
+from seakeep.signals.panel import opencv
 from seakeep.tank.delivery import (
     CAMPAIGN,
     FIRST_LINE,
@@ -29,7 +30,7 @@ from seakeep.tank.hydrodynamics import excitation_at
 from seakeep.tank.instruments import Played, record_run, record_together
 from seakeep.tank.seas import Sea, sea_of_run
 from seakeep.tank.settings import TankSettings
-from seakeep.tank.video import SIDE_VIEW, check_video, render_side_view
+from seakeep.tank.video import SIDE_VIEW, render_side_view
 
 __all__ = ["check_settings", "generator", "noisy_truth", "play", "play_run", "truth"]
 
@@ -296,7 +297,7 @@ def play(
     chosen = _chosen(settings, names)
     filmed = _chosen(settings, videos) if (videos := list(videos)) else []
     if filmed:
-        check_video()
+        opencv("rendering")
     part = settings.model_copy(update={"runs": {n: settings.runs[n] for n in chosen}})
     rig = check_settings(part)
     folder = Path(out)
