@@ -29,6 +29,7 @@ from seakeep.tank.hydrodynamics import (
     load_hydrodynamics,
     radiation_kernel,
     response,
+    trapezoid,
 )
 from seakeep.tank.moorings import line_table, mooring_stiffness
 from seakeep.tank.seas import Sea
@@ -342,9 +343,9 @@ def _kernel_arrays(rig: Rig) -> tuple[npt.NDArray[np.int64], FloatArray]:
     """Pairs of degrees of freedom that have a memory, and their weights from the oldest lag."""
     values = rig.kernel.values
     pairs = np.argwhere(np.any(values != 0.0, axis=0))
-    weights = np.full(values.shape[0], rig.step)
-    weights[[0, -1]] *= 0.5
-    rows = (values * weights[:, None, None])[::-1, pairs[:, 0], pairs[:, 1]].T
+    rows = (values * trapezoid(len(values), rig.step)[:, None, None])[
+        ::-1, pairs[:, 0], pairs[:, 1]
+    ].T
     return pairs, np.ascontiguousarray(rows)
 
 
