@@ -10,7 +10,7 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import FloatArray, IntArray, as_real, as_series, positive, time_step
+from seakeep.arrays import FloatArray, IntArray, as_series, positive, time_step
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import record
 
@@ -86,13 +86,12 @@ def windowed_lags(
     """
     a, b = as_series(series), as_series(reference)
     time_step(dt)
-    if a.shape != b.shape or a.ndim != 1:
+    if a.shape != b.shape:
         raise RequestError(
             f"the two series must be one channel each, of one length; received shapes {a.shape} "
             f"and {b.shape}."
         )
-    for value, name in ((window, "window"), (largest_lag, "largest_lag")):
-        positive(value, name, "s")
+    positive(largest_lag, "largest_lag", "s")
     length, reach = round(window / dt), math.ceil(largest_lag / dt)
     if length < 4 or a.size < length + 2 * reach:
         raise RequestError(
@@ -164,13 +163,10 @@ def correlation_peak(
     """
     a, b = as_pair(first, second)
     step = time_step(dt)
-    limits = as_real(bounds, "bounds")
-    if limits.shape != (2,):
-        raise RequestError(f"bounds are a pair of lags, s; received {bounds!r}.")
-    low, high = float(np.floor(limits[0] / step)), float(np.ceil(limits[1] / step))
+    low, high = np.floor(bounds[0] / step), np.ceil(bounds[1] / step)
     if not low < high or max(abs(low), abs(high)) > a.size // 2:
         raise RequestError(
-            f"lags from {limits[0]:g} to {limits[1]:g} s cannot be sought in records of "
+            f"lags from {bounds[0]:g} to {bounds[1]:g} s cannot be sought in records of "
             f"{a.size * step:g} s: give a rising range within half their length."
         )
     lags = np.arange(int(low) - 1, int(high) + 2)

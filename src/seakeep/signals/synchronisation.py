@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import FloatArray, IntArray, as_real, positive
+from seakeep.arrays import FloatArray, IntArray, as_real
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import windowed_lags
 from seakeep.signals.time_axis import record, uniform_step
@@ -242,8 +242,6 @@ def clock_from_correlation(
     a, c = _whole(series, time, "the logger")
     b, t = _whole(reference, reference_time, "the reference")
     step = min(uniform_step(c, "the logger"), uniform_step(t, "the reference"))
-    window = positive(window, "window", "s")
-    largest_lag = positive(largest_lag, "largest_lag", "s")
     begin, end = max(c[0], t[0]), min(c[-1], t[-1])
     if end - begin < window + 2 * largest_lag:
         raise RequestError(
