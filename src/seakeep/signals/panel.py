@@ -150,6 +150,11 @@ class TrackingSettings:
             if wrong:
                 raise RequestError(f"{rule}; received {received}.")
 
+    @property
+    def stop(self) -> float | None:
+        """Edge of the stop band in use, Hz; None where nothing is filtered."""
+        return None if self.passband is None else self.stopband or 1.5 * self.passband
+
 
 def opencv(doing: str = "reading") -> Any:
     """Return OpenCV's module with a quiet decoder.

@@ -491,13 +491,14 @@ def find_pulses(trigger: FloatArray, time: FloatArray, name: str = "the trigger"
     noise = 1.4826 * float(np.median(np.abs(x)))
     # Wide stretches outvote spikes: the height is that of the sample in the middle of the time
     # spent above the noise.
-    rising, falling, peaks = _stretches(x, max(8 * noise, 0.02 * float(x.max())))
-    top = _weighted_median(peaks, falling - rising) if rising.size else float(x.max())
-    for _ in range(2 if rising.size else 0):
-        rising, falling, peaks = _stretches(x, 0.5 * top)
+    top = float(x.max())
+    level = max(8 * noise, 0.02 * top)
+    for _ in range(3):
+        rising, falling, peaks = _stretches(x, level)
         if not rising.size:
             break
         top = _weighted_median(peaks, falling - rising)
+        level = 0.5 * top
     if not rising.size or top < 6 * noise or top <= 0:
         raise DataError(
             f"{name} has no pulses that stand out of its noise (largest value {top:g} above the "
@@ -514,8 +515,9 @@ def find_pulses(trigger: FloatArray, time: FloatArray, name: str = "the trigger"
 
     rise, fall = crossing(rising), crossing(falling)
     width = fall - rise
-    usual = np.median(width[(peaks > 0.5 * top) & (peaks < 2 * top)])
-    sound = (peaks > 0.5 * top) & (peaks < 2 * top) & (width > 0.5 * usual) & (width < 2 * usual)
+    sound = (peaks > 0.5 * top) & (peaks < 2 * top)
+    usual = np.median(width[sound])
+    sound &= (width > 0.5 * usual) & (width < 2 * usual)
     rise, fall = rise[sound], fall[sound]
     return Pulses(0.5 * (rise + fall), rise, fall, sign * top)
 

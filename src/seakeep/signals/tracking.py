@@ -292,7 +292,7 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
                 f"the lamp {how.lamp} (x, y, radius) lies outside the picture of {video.path}, "
                 f"{width} × {height} pixels. Correct its place."
             )
-    stop = _stopband(how)
+    stop = how.stop
     if stop is not None and stop >= 0.5 * video.rate:
         raise RequestError(
             f"{video.path} has {video.rate:g} frames per second, so the low-pass filter cannot "
@@ -300,12 +300,6 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
             f"as high unless stated, lies below {0.5 * video.rate:g} Hz, or filter nothing "
             "(passband None; --passband 0)."
         )
-
-
-def _stopband(how: TrackingSettings) -> float | None:
-    if how.passband is None:
-        return None
-    return 1.5 * how.passband if how.stopband is None else how.stopband
 
 
 def _measure(
@@ -481,11 +475,10 @@ def _motions(
         there = np.flatnonzero(good)
         between = scipy.interpolate.PchipInterpolator(there, table[there], axis=0)
         table[filled] = between(np.flatnonzero(filled))
-    stop = _stopband(how)
-    if how.passband is not None and stop is not None:
+    if how.passband is not None:
         for begin, end in stretches(good | filled):
             if end - begin > 1:
-                table[begin:end] = low_pass(table[begin:end], 1.0 / rate, how.passband, stop)
+                table[begin:end] = low_pass(table[begin:end], 1.0 / rate, how.passband, how.stop)
     return dict(zip(("surge", "heave", "pitch"), table.T, strict=True)), filled
 
 
