@@ -115,11 +115,8 @@ def write_record(record: Record, folder: Path, kind: str) -> Path:
 def write_dataset(data: xr.Dataset, path: Path) -> None:
     """Write a Dataset to NetCDF, compressed, under a temporary name, then rename it."""
     with replacing(path) as temporary:
-        write_netcdf(temporary, data, _packing(data))
-
-
-def _packing(data: xr.Dataset) -> dict[str, dict[str, object]]:
-    return {str(name): {"zlib": True, "complevel": 4} for name in data.data_vars}
+        packed = {str(name): {"zlib": True, "complevel": 4} for name in data.data_vars}
+        write_netcdf(temporary, data, packed)
 
 
 def _filtered(settings: TankSettings) -> dict[str, str]:
