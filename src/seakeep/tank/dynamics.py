@@ -140,13 +140,11 @@ def _loop() -> ModuleType:
 
 
 def _viscous(settings: TankSettings, hydro: Hydrodynamics) -> tuple[FloatArray, ...]:
-    rigid, square, losses = (
-        settings.vessel.linear_damping,
-        settings.vessel.quadratic_damping,
-        settings.vessel.pool,
+    vessel, losses = settings.vessel, settings.vessel.pool
+    linear, quadratic = (
+        [each.surge, each.heave, each.pitch]
+        for each in (vessel.linear_damping, vessel.quadratic_damping)
     )
-    linear = [rigid.surge, rigid.heave, rigid.pitch]
-    quadratic = [square.surge, square.heave, square.pitch]
     pool = np.zeros(3)
     if hydro.pool is not None:
         linear += [0.0, losses.slosh_linear]

@@ -99,12 +99,11 @@ def play_run(settings: TankSettings, name: str, rig: Rig | None = None) -> Playe
     (name,) = _chosen(settings, [name])
     sea = _sea(settings, made, name)
     run = settings.runs[name]
-    length = run.startup + run.duration
     clocks = settings.instruments.clocks.values()
-    beyond = max(abs(c.offset) + 1e-6 * abs(c.drift) * length for c in clocks) + MARGIN
+    beyond = max(abs(c.offset) + 1e-6 * abs(c.drift) * run.length for c in clocks) + MARGIN
     margin = made.step * np.ceil(beyond / made.step)
-    motion = simulate(made, sea, length + 2 * margin, begin=-margin)
-    return Played(settings, made, sea, motion, length)
+    motion = simulate(made, sea, run.length + 2 * margin, begin=-margin)
+    return Played(settings, made, sea, motion, run.length)
 
 
 def _labelled(name: str) -> dict[str, str]:
@@ -114,9 +113,7 @@ def _labelled(name: str) -> dict[str, str]:
         "slosh": ("m", "moon-pool sloshing elevation"),
         "surge_slow": ("m", "slow part of surge"),
     }
-    if channel is not None:
-        return {"units": channel.units, "long_name": channel.long_name}
-    unit, label = extra[name]
+    unit, label = extra[name] if channel is None else (channel.units, channel.long_name)
     return {"units": unit, "long_name": label}
 
 
