@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import RequestError
 from seakeep.waves import GRAVITY, group_speed, phase_speed, wavelength_to_frequency, wavenumber
 
 
@@ -70,6 +70,7 @@ def test_shapes_broadcast():
     ("call", "message"),
     [
         (lambda: wavenumber(-1.0), "the frequency must be zero or positive, .*; received -1.0"),
+        (lambda: wavenumber(np.inf), "the frequency must be .* finite; received inf"),
         (lambda: wavenumber(np.nan), "the frequency must be zero or positive, .*; received nan"),
         (lambda: wavenumber(1.0, 0.0), "the water depth must be positive; received 0"),
         (
@@ -84,19 +85,8 @@ def test_what_is_no_wave(call, message):
         call()
 
 
-@pytest.mark.parametrize(
-    "function", [wavenumber, phase_speed, group_speed, wavelength_to_frequency]
-)
-@pytest.mark.parametrize(
-    ("value", "depth"), [(1.0, 1e308), (1.0, 1e-308), (1e-300, 3.6), (1e100, 3.6), (np.inf, 3.6)]
-)
-def test_what_overflows_is_refused(function, value, depth):
-    with pytest.raises((RequestError, DataError), match=r"between 1e-09 and 1e.09"):
-        function(value, depth)
-
-
 @pytest.mark.parametrize("value", [1e-9, 1e-3, 1.0, 1e3, 1e9])
 @pytest.mark.parametrize("depth", [1e-9, 1e-3, 1.0, 1e3, 1e9, np.inf])
-def test_no_number_in_range_overflows(value, depth):
+def test_no_number_of_a_sea_overflows(value, depth):
     for function in (wavenumber, phase_speed, group_speed, wavelength_to_frequency):
         assert np.isfinite(function(value, depth)).all()

@@ -25,6 +25,7 @@ __all__ = [
     "as_real",
     "as_series",
     "as_table",
+    "finite",
     "fraction",
     "number",
     "plain_number",
@@ -160,7 +161,7 @@ def as_series(
         )
     if array.size == 0:
         raise RequestError(f"{name} has shape {array.shape}; give at least one channel.")
-    return _finite(array, name)
+    return finite(array, name)
 
 
 def as_bundle(values: object, name: str = "the series", *, minimum: int = 2) -> FloatArray:
@@ -194,11 +195,12 @@ def as_bundle(values: object, name: str = "the series", *, minimum: int = 2) -> 
             f"{name} has {array.shape[-1]} sample(s); at least {minimum} are needed. Give a longer "
             "series."
         )
-    _finite(array.T, name)
+    finite(array.T, name)
     return np.atleast_2d(array)
 
 
-def _finite(array: FloatArray, name: str) -> FloatArray:
+def finite(array: FloatArray, name: str) -> FloatArray:
+    """Return an array of at least one axis as it is; refuse NaN and infinity."""
     there = np.isfinite(array)
     if not there.all():
         first = int(np.flatnonzero(~there.reshape(array.shape[0], -1).all(axis=1))[0])

@@ -275,39 +275,34 @@ def anrmse_differences(
             f"predicted holds forecasts of {counts} runs, per model, and measured {len(measured)} "
             "runs. Give every model one forecast of each run, and at least one of each."
         )
-    values, draws, blocks = [], [], 0.0
-    bounds, own_bounds = [], []
+    runs, draws, blocks = [], [], 0.0
     for seed, (each, *forecasts) in enumerate(zip(measured, *predicted, strict=True)):
         own, redrawn, held = _anrmse_of_run(forecasts, each, seed)
-        values.append(own)
+        runs.append(_with_bounds(own, redrawn, held, level))
         draws.append(redrawn)
         blocks += held
-        bounds.append(student_interval(_ratio(own), _ratio(redrawn), held, level, -1))
-        own_bounds.append(student_interval(own, redrawn, held, level, -1))
-    anrmses, pooled = np.stack(values, axis=-1), np.mean(draws, axis=0)
-    means = anrmses.mean(axis=-1)
-    lower, upper = np.stack(bounds, axis=-1)
-    all_lower, all_upper = student_interval(_ratio(means), _ratio(pooled), blocks, level, -1)
-    own_lower, own_upper = np.stack(own_bounds, axis=-1)
-    all_own = student_interval(means, pooled, blocks, level, -1)
-    grid, single = ("model", "run"), ("model",)
+    over_runs = {key: np.stack([run[key] for run in runs], axis=-1) for key in runs[0]}
+    means = over_runs["anrmse"].mean(axis=-1)
+    pooled = _with_bounds(means, np.mean(draws, axis=0), blocks, level)
     return xr.Dataset(
-        {
-            "anrmse": (grid, anrmses),
-            "anrmse_lower": (grid, own_lower),
-            "anrmse_upper": (grid, own_upper),
-            "change": (grid, _ratio(anrmses) - 1.0),
-            "lower": (grid, lower - 1.0),
-            "upper": (grid, upper - 1.0),
-            "all_anrmse": (single, means),
-            "all_anrmse_lower": (single, all_own[0]),
-            "all_anrmse_upper": (single, all_own[1]),
-            "all_change": (single, _ratio(means) - 1.0),
-            "all_lower": (single, all_lower - 1.0),
-            "all_upper": (single, all_upper - 1.0),
-        },
+        {key: (("model", "run"), values) for key, values in over_runs.items()}
+        | {f"all_{key}": (("model",), values) for key, values in pooled.items()},
         attrs={"level": level},
     )
+
+
+def _with_bounds(
+    anrmse: FloatArray, redrawn: FloatArray, blocks: float, level: float
+) -> dict[str, FloatArray]:
+    """ANRMSE of each model, its change from the first model, and the bounds of both."""
+    lower, upper = student_interval(anrmse, redrawn, blocks, level, -1)
+    change = (_ratio(anrmse), *student_interval(_ratio(anrmse), _ratio(redrawn), blocks, level, -1))
+    return {
+        "anrmse": anrmse,
+        "anrmse_lower": lower,
+        "anrmse_upper": upper,
+        **{key: each - 1.0 for key, each in zip(("change", *BOUNDS), change, strict=True)},
+    }
 
 
 def _ratio(values: FloatArray) -> FloatArray:
@@ -321,25 +316,19 @@ def _anrmse_of_run(
     forecasts: Sequence[xr.Dataset], measured: xr.Dataset, seed: int
 ) -> tuple[FloatArray, FloatArray, float]:
     """ANRMSE of several forecasts of a run, its draws (forecast, draw), and the blocks held."""
-    pairs = [pair(predicted=each, measured=measured) for each in forecasts]
-    known = [
-        {
+    cases = []
+    for each in forecasts:
+        of = pair(predicted=each, measured=measured)
+        known = {
             "training_std": [each[name].attrs.get("training_std", 0.0) for name in of.names],
             "noise_std": [measured[name].attrs.get("noise_std", 0.0) for name in of.names],
         }
-        for each, of in zip(forecasts, pairs, strict=True)
-    ]
-    arrays = [(of.arrays["predicted"], of.arrays["measured"]) for of in pairs]
-    block = max(_block(p, m) for p, m in arrays)
-    own = [
-        core.anrmse(predicted=p, measured=m, **k) for (p, m), k in zip(arrays, known, strict=True)
-    ]
-    redrawn = [
-        _redrawn(core.anrmse, p, m, k, block, seed) for (p, m), k in zip(arrays, known, strict=True)
-    ]
-    values = np.array(own, dtype=float)
-    draws = np.where(np.isnan(values)[:, None], np.nan, np.stack(redrawn))
-    return values, draws, arrays[0][1].shape[-2] / block
+        cases.append((of.arrays["predicted"], of.arrays["measured"], known))
+    block = max(_block(p, m) for p, m, _ in cases)
+    values = np.array([core.anrmse(predicted=p, measured=m, **k) for p, m, k in cases], dtype=float)
+    redrawn = np.stack([_redrawn(core.anrmse, p, m, k, block, seed) for p, m, k in cases])
+    draws = np.where(np.isnan(values)[:, None], np.nan, redrawn)
+    return values, draws, cases[0][1].shape[-2] / block
 
 
 is_slack: Measure[xr.Dataset, BoolArray] = labelled(core.is_slack, "channel", label="slackness")

@@ -72,19 +72,12 @@ def pair(**sides: xr.Dataset) -> Paired:
     names = channel_names(reference, first)
     reference = reference[names]
     lead = tuple(str(dim) for dim in reference[names[0]].dims if dim != "time")
-    for name in names:
-        if set(reference[name].dims) != {*lead, "time"}:
-            raise RequestError(
-                f"channel '{name}' of {first} has the dimensions {reference[name].dims} and "
-                f"'{names[0]}' has {reference[names[0]].dims}. Judge channels of the same "
-                "dimensions together."
-            )
-    arrays = {first: _stacked(reference, names, (*lead, "time"))}
+    arrays = {first: _stacked(reference, names, (*lead, "time"), first)}
     for side, data in others:
         _check_channels(names, reference, data, first, side)
         found = _at_instants(data[names], reference, side, first)
         further = _check_lead(found, reference, side, first)
-        values = _stacked(found, names, (*(dim for dim in lead if dim in further), "time"))
+        values = _stacked(found, names, (*(dim for dim in lead if dim in further), "time"), side)
         if further:
             missing = [axis for axis, dim in enumerate(lead) if dim not in further]
             shape = arrays[first].shape
@@ -93,7 +86,13 @@ def pair(**sides: xr.Dataset) -> Paired:
     return Paired(names, lead, arrays)
 
 
-def _stacked(data: xr.Dataset, names: list[str], order: tuple[str, ...]) -> FloatArray:
+def _stacked(data: xr.Dataset, names: list[str], order: tuple[str, ...], side: str) -> FloatArray:
+    for name in names:
+        if set(data[name].dims) != set(order):
+            raise RequestError(
+                f"channel '{name}' of {side} has the dimensions {data[name].dims}, and others have "
+                f"{order}. Judge channels of the same dimensions together."
+            )
     columns = [data[name].transpose(*order).values.astype(float, copy=False) for name in names]
     return np.stack(columns, axis=-1)
 
@@ -161,11 +160,5 @@ def _check_lead(data: xr.Dataset, reference: xr.Dataset, side: str, first: str) 
             raise RequestError(
                 f"{side} and {first} differ along the dimension '{dim}' ({data.sizes[dim]} and "
                 f"{reference.sizes[dim]} entries, or others). Select the same ones of both."
-            )
-    for name in data.data_vars:
-        if set(data[name].dims) != {*further, "time"}:
-            raise RequestError(
-                f"channel '{name}' of {side} has the dimensions {data[name].dims}, and others "
-                "have more. Judge channels of the same dimensions together."
             )
     return further

@@ -18,37 +18,31 @@ GRAVITY = 9.81
 """Acceleration of gravity, m/s²."""
 
 
-SMALLEST, LARGEST = 1e-9, 1e9
-"""Frequencies (rad/s), lengths and depths (m) other than zero that are taken for meant."""
-
-
 def _checked(name: str, value: npt.ArrayLike, infinite: bool = False) -> FloatArray:
     array = as_real(value, name)
-    sound = (array == 0) | ((array >= SMALLEST) & (array <= LARGEST))
-    if not np.all(sound | (np.isposinf(array) & infinite)):
+    if not np.all((array >= 0) & (np.isfinite(array) | infinite)):
         raise RequestError(
-            f"{name} must be zero or positive, and between {SMALLEST:g} and {LARGEST:g}; received "
-            f"{value!r}. Check its sign and its unit (rad/s for frequencies, m for lengths)."
+            f"{name} must be zero or positive, {'or infinite' if infinite else 'and finite'};"
+            f" received {value!r}. Check its sign and unit (rad/s for frequencies, m for lengths)."
         )
     return array
 
 
-def _checked_depth(depth: npt.ArrayLike) -> FloatArray:
-    array = _checked("the water depth", depth, infinite=True)
+def _length(name: str, value: npt.ArrayLike, infinite: bool = False) -> FloatArray:
+    array = _checked(name, value, infinite)
     if np.any(array == 0):
-        raise RequestError(
-            "the water depth must be positive; received 0. "
-            "Give it in metres, or numpy.inf for deep water."
-        )
+        raise RequestError(f"{name} must be positive; received 0. Give it in metres.")
     return array
 
 
-def _side_by_side(first: FloatArray, depth: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _side_by_side(first: FloatArray, depth: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """A quantity beside the water depth at which it is wanted."""
+    h = _length("the water depth", depth, infinite=True)
     try:
-        one, other = np.broadcast_arrays(first, depth)
+        one, other = np.broadcast_arrays(first, h)
     except ValueError:
         raise RequestError(
-            f"shapes {first.shape} and {depth.shape} (of the water depth) do not fit together. "
+            f"shapes {first.shape} and {h.shape} (of the water depth) do not fit together. "
             "Give one depth, or one per value."
         ) from None
     return one, other
@@ -87,7 +81,7 @@ def wavenumber(
     >>> round(float(2 * np.pi / k), 2)  # wavelength in metres
     2.11
     """
-    omega, h = _side_by_side(_checked("the frequency", frequency), _checked_depth(depth))
+    omega, h = _side_by_side(_checked("the frequency", frequency), depth)
     deep = omega**2 / gravity
     k = np.array(deep, dtype=float)
     finite = np.isfinite(h) & (omega > 0)
@@ -128,7 +122,7 @@ def phase_speed(
     RequestError
         As :func:`wavenumber`.
     """
-    omega, h = _side_by_side(_checked("the frequency", frequency), _checked_depth(depth))
+    omega, h = _side_by_side(_checked("the frequency", frequency), depth)
     k = wavenumber(omega, h, gravity)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(omega > 0, omega / k, np.sqrt(gravity * h))
@@ -158,7 +152,7 @@ def group_speed(
     RequestError
         As :func:`wavenumber`.
     """
-    omega, h = _side_by_side(_checked("the frequency", frequency), _checked_depth(depth))
+    omega, h = _side_by_side(_checked("the frequency", frequency), depth)
     two_kh = np.where(
         omega > 0, 2.0 * wavenumber(omega, h, gravity) * np.where(omega > 0, h, 1.0), 0
     )
@@ -192,9 +186,6 @@ def wavelength_to_frequency(
     RequestError
         If a wavelength or depth is not positive.
     """
-    length = _checked("the wavelength", wavelength)
-    if np.any(length == 0):
-        raise RequestError("the wavelength must be positive; received 0. Give it in metres.")
-    length, h = _side_by_side(length, _checked_depth(depth))
+    length, h = _side_by_side(_length("the wavelength", wavelength), depth)
     k = 2.0 * np.pi / length
     return np.sqrt(gravity * k * np.tanh(k * h))

@@ -107,7 +107,9 @@ def test_froude_refusals_and_density():
     assert froude_factor("N", 50.0, 1.025) == pytest.approx(1.025 * 125000)
     with pytest.raises(RequestError, match=r"the unit 'V' is not mechanical"):
         froude_factor("V", 50.0)
-    with pytest.raises(RequestError, match=r"the scale factor must be positive; received 0"):
+    with pytest.raises(
+        RequestError, match=r"scale factor must be positive \(a ratio\); received 0"
+    ):
         froude_factor("m", 0)
 
 

@@ -76,7 +76,7 @@ def test_an_infinite_margin_holds_everything():
 def test_leading_axes_that_differ_are_refused():
     bounds = np.zeros((3, 4, 2))
     with pytest.raises(
-        RequestError, match=r"\(3, 4, 2\) and measured \(2, 4, 2\); the axes before"
+        RequestError, match=r"\(3, 4, 2\) and measured \(2, 4, 2\); they do not fit"
     ):
         coverage(bounds, bounds, np.zeros((2, 4, 2)))
 

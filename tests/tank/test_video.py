@@ -92,8 +92,8 @@ def test_missing_opencv_names_the_extra(monkeypatch):
     import sys
 
     from seakeep.errors import RequestError
-    from seakeep.tank.video import check_video
+    from seakeep.signals.panel import opencv
 
     monkeypatch.setitem(sys.modules, "cv2", None)
     with pytest.raises(RequestError, match=r"pip install 'seakeep\[video\]'"):
-        check_video()
+        opencv("rendering")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -78,8 +78,6 @@ def _as_segments(segments: Sequence[int] | None, samples: int) -> IntArray:
     """Return the lengths of the pieces of which a series was joined; None is one piece."""
     if segments is None:
         return np.array([samples], dtype=np.intp)
-    if not isinstance(segments, Iterable):
-        raise RequestError(f"segments must be a list of lengths; received {segments!r}.")
     lengths = np.array([whole_number(item, "a segment") for item in segments], dtype=np.intp)
     if int(lengths.sum()) != samples:
         raise RequestError(
@@ -136,7 +134,7 @@ def lag_one_correlation(series: npt.ArrayLike, segments: Sequence[int] | None = 
 
 
 def _carlstein(x: FloatArray, segments: IntArray) -> float:
-    phi = abs(lag_one_correlation(x, [int(item) for item in segments]))
+    phi = abs(lag_one_correlation(x, segments.tolist()))
     if phi >= 1.0:
         return math.inf
     return float((2.0 * phi / ((1.0 - phi) * (1.0 + phi))) ** (2.0 / 3.0) * np.cbrt(x.size))
@@ -312,7 +310,6 @@ def bootstrap_indices(
     segments: Sequence[int] | None = None,
 ) -> IntArray:
     """Positions that redraw a series; the same for every series that must keep step with it."""
-    whole_number(n_samples, "n_samples")
     whole_number(n_series, "n_series")
     whole_number(block_length, "block_length")
     asked = f"n_series = {n_series} series of {n_samples} samples take"

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.arrays import FloatArray, as_real, fraction
+from seakeep.arrays import FloatArray, as_real, finite, fraction
 from seakeep.errors import DataError, RequestError
 
 __all__ = [
@@ -88,12 +88,7 @@ def band_scores(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayL
             f"lower has shape {low.shape}, upper {high.shape} and measured {y.shape}; all must be "
             "of the same shape (…, time, channel)."
         )
-    if not np.all(np.isfinite(y)):
-        raise DataError(
-            f"measured holds {int(np.count_nonzero(~np.isfinite(y)))} value(s) that are NaN or "
-            "infinite. Fill its gaps first, or calibrate on windows without them."
-        )
-    found: FloatArray = np.maximum(low - y, y - high)
+    found: FloatArray = np.maximum(low - finite(y, "measured"), y - high)
     return np.where(np.isnan(found), np.inf, found)
 
 

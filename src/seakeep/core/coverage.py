@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, fraction, number
+from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, finite, fraction, number
 from seakeep.errors import DataError, RequestError
 
 __all__ = [
@@ -80,33 +80,19 @@ def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
     >>> float(band.inside), float(band.below), float(band.width)
     (0.5, 0.25, 1.0)
     """
-    low, high = as_real(lower, "lower"), as_real(upper, "upper")
-    m = as_real(measured, "measured")
-    plain = m.ndim == 1 and low.ndim == 1
-    tail = slice(-1 if plain else -2, None)
-    shapes = {item.shape[tail] for item in (low, high, m)}
-    if m.ndim < 1 or len(shapes) != 1 or low.shape != high.shape or (not plain and m.ndim < 2):
+    low, high, m = _triple(lower, upper, measured)
+    plain = m.ndim == 1
+    if m.ndim < 1 or len({np.shape(each)[-2:] for each in (lower, upper, measured)}) > 1:
         raise RequestError(
-            f"lower has shape {low.shape}, upper {high.shape} and measured {m.shape}; all must "
-            "end in (time, channel) of the same size, or be series of the same length."
+            f"lower has shape {np.shape(lower)}, upper {np.shape(upper)} and measured "
+            f"{np.shape(measured)}; all must end in (time, channel) of the same size, or be series "
+            "of the same length."
         )
-    try:
-        np.broadcast_shapes(low.shape, m.shape)
-    except ValueError:
-        raise RequestError(
-            f"lower and upper have shape {low.shape} and measured {m.shape}; the axes before "
-            "(time, channel) must agree, or be missing in measured."
-        ) from None
-    if not np.all(np.isfinite(m)):
-        raise DataError(
-            f"measured holds {int(np.count_nonzero(~np.isfinite(m)))} value(s) that are NaN or "
-            "infinite. Fill its gaps first, or judge a window without them."
-        )
+    finite(m, "measured")
     if plain:
         low, high, m = low[:, None], high[:, None], m[:, None]
     if m.shape[-2] < 2:
         raise DataError(f"a window of {m.shape[-2]} instant(s) has no width to judge; give two.")
-    _check_order(low, high)
     lost = (np.isnan(low) | np.isnan(high)).any(axis=-2)
     below, above = (m < low).mean(axis=-2), (m > high).mean(axis=-2)
     width = (high - low).mean(axis=-2)
@@ -233,7 +219,11 @@ def _triple(
             f"lower has shape {low.shape}, upper {high.shape} and measured {y.shape}; they do not "
             "fit together."
         ) from None
-    _check_order(low, high)
+    if np.any(low > high):
+        raise RequestError(
+            f"lower exceeds upper at {int(np.count_nonzero(low > high))} instant(s); they are "
+            "given in the wrong order."
+        )
     return low, high, y
 
 
@@ -284,20 +274,15 @@ def coverage_table(
             "needed."
         )
     heights = None if waves is None else as_real(waves, "waves")
-    for name, values in (("measured", y), ("waves", heights)):
-        if values is not None and not np.all(np.isfinite(values)):
-            raise DataError(
-                f"{name} holds {int(np.count_nonzero(~np.isfinite(values)))} value(s) that are NaN "
-                "or infinite. Fill its gaps first, or judge windows without them."
-            )
+    finite(y, "measured")
     if heights is not None:
-        try:
-            heights = np.broadcast_to(heights, y.shape[:-1]).reshape(-1, y.shape[-2])
-        except ValueError:
+        if heights.shape != y.shape[y.ndim - 1 - heights.ndim : -1]:
             raise RequestError(
                 f"waves has shape {heights.shape}; {y.shape[:-1]} is expected, the height at each "
                 "instant."
-            ) from None
+            )
+        finite(np.atleast_1d(heights), "waves")
+        heights = np.broadcast_to(heights, y.shape[:-1]).reshape(-1, y.shape[-2])
     low, high, y = (each.reshape(-1, *y.shape[-2:]) for each in (low, high, y))
     whole = ~(np.isnan(low) | np.isnan(high)).any(axis=(1, 2))
     if not whole.any():
@@ -425,11 +410,3 @@ def box_statistics(values: npt.ArrayLike, reach: float = 1.5) -> BoxStatistics:
         count=int(x.size),
         left_out=int(everything.size - x.size),
     )
-
-
-def _check_order(low: FloatArray, high: FloatArray) -> None:
-    if np.any(low > high):
-        raise RequestError(
-            f"lower exceeds upper at {int(np.count_nonzero(low > high))} instant(s); they are "
-            "given in the wrong order."
-        )

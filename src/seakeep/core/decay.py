@@ -69,16 +69,16 @@ def free_decay(series: FloatArray, dt: float) -> Decay:
     """
     instants, values = _extremes(series)
     ranges = 0.5 * np.abs(np.diff(values))
-    nothing = np.empty(0)
+    nothing = Decay(np.nan, np.nan, np.nan, np.nan, 0, np.empty(0), np.empty(0))
     if ranges.size < 2:
-        return Decay(np.nan, np.nan, np.nan, np.nan, 0, nothing, nothing)
+        return nothing
     first = int(np.argmax(ranges))  # other modes die out before
     instants, ranges = instants[first:], ranges[first:]
     above = ranges >= SMALLEST * ranges.max()
     kept = int(np.argmin(above)) if not above.all() else ranges.size
     ranges = ranges[:kept]
     if kept < 2:
-        return Decay(np.nan, np.nan, np.nan, np.nan, 0, nothing, nothing)
+        return nothing
     decrements = 2 * np.log(ranges[:-1] / ranges[1:])
     amplitudes = np.sqrt(ranges[:-1] * ranges[1:])
     p, q = float(decrements.mean()), np.nan

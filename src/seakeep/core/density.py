@@ -6,7 +6,6 @@ r"""Kernel densities of a series, and their interval over bootstrapped series (p
 from __future__ import annotations
 
 import math
-import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -101,9 +100,7 @@ def _bandwidths(x: FloatArray, bandwidth: Bandwidth) -> FloatArray:
         width = np.where(inner > 0, np.minimum(spread, inner), spread)
         h: FloatArray = factor * width * x.shape[-1] ** -0.2
         return h
-    given: object = bandwidth
-    real = isinstance(given, numbers.Real) and not isinstance(given, bool)
-    if not real or not 0 < bandwidth < math.inf:
+    if not 0 < bandwidth < math.inf:
         raise RequestError(
             "a bandwidth must be 'paper', 'silverman' or a positive number; received "
             f"{bandwidth!r:.60}."

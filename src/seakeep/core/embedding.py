@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from seakeep.arrays import FloatArray, as_real, whole_number
+from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import RequestError
 
 __all__ = ["History", "TrainingWindow", "embed", "snapshot_matrices", "training_window", "unembed"]
@@ -72,13 +72,9 @@ def training_window(
     Raises
     ------
     RequestError
-        If a number is not a whole one, or negative.
+        If `history` is neither.
     """
-    delays = (state_delays, "state_delays"), (input_delays, "input_delays")
-    reach = max(whole_number(value, name, least=0) for value, name in delays)
-    whole_number(last, "last", least=0)
-    if window is not None:
-        whole_number(window, "window")
+    reach = max(state_delays, input_delays)
     if history not in ("before", "inside"):
         raise RequestError(f"history is 'before' or 'inside'; received {history!r}.")
     first = 0 if window is None else last - window + 1
@@ -116,9 +112,7 @@ def embed(series: FloatArray, delays: int, first: int, count: int) -> FloatArray
            [0., 1., 2., 3.]])
     """
     series = as_real(series, "the series")
-    for value, name in ((delays, "delays"), (first, "first"), (count, "count")):
-        whole_number(value, name, least=0)
-    if series.ndim != 2 or not 0 <= first - delays <= first + count <= series.shape[0]:
+    if series.ndim != 2 or not 0 <= first - delays <= first <= first + count <= series.shape[0]:
         raise RequestError(
             f"columns {first} to {first + count - 1} with {delays} delays do not lie in a series "
             f"of shape {series.shape}; (time, channel) with all of these samples is needed."
@@ -151,11 +145,7 @@ def unembed(columns: FloatArray, channels: int) -> FloatArray:
         If the rows are not whole blocks of channels.
     """
     columns = as_real(columns, "columns")
-    if (
-        columns.ndim != 2
-        or 0 in columns.shape
-        or columns.shape[0] % whole_number(channels, "channels")
-    ):
+    if columns.ndim != 2 or 0 in columns.shape or columns.shape[0] % channels:
         raise RequestError(
             f"columns has shape {columns.shape}; (channels * (delays + 1), count) with {channels} "
             "channels is needed."

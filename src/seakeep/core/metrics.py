@@ -6,6 +6,10 @@ standard deviation over the window with ddof = 1, and k = 1.
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
+from typing import TypeVar
+
 import numpy as np
 import numpy.typing as npt
 
@@ -87,13 +91,30 @@ def paired(
     return p, m, np.where(slack, np.nan, spread), ~slack
 
 
-def is_slack(
-    *,
-    predicted: npt.ArrayLike,
-    measured: npt.ArrayLike,
-    training_std: npt.ArrayLike | None = None,
-    noise_std: npt.ArrayLike | None = None,
-) -> BoolArray:
+Values = TypeVar("Values", bound=np.generic)
+
+
+def _measure(
+    of: Callable[[FloatArray, FloatArray, FloatArray, BoolArray], npt.NDArray[Values]],
+) -> Callable[..., npt.NDArray[Values]]:
+    """Make a measure of what :func:`paired` returns one of histories."""
+
+    def measure(
+        *,
+        predicted: npt.ArrayLike,
+        measured: npt.ArrayLike,
+        training_std: npt.ArrayLike | None = None,
+        noise_std: npt.ArrayLike | None = None,
+    ) -> npt.NDArray[Values]:
+        return of(*paired(predicted, measured, training_std, noise_std))
+
+    functools.update_wrapper(measure, of)
+    del measure.__wrapped__  # type: ignore[attr-defined]
+    return measure
+
+
+@_measure
+def is_slack(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray) -> BoolArray:
     """Say which channels are not judged, because the measurement barely moves or is noise.
 
     Parameters
@@ -119,7 +140,7 @@ def is_slack(
     >>> is_slack(predicted=measured, measured=measured)
     array([False,  True])
     """
-    return ~paired(predicted, measured, training_std, noise_std)[3]
+    return ~judged
 
 
 def slack_share(load: FloatArray, noise_std: float) -> float:
@@ -143,13 +164,8 @@ def slack_share(load: FloatArray, noise_std: float) -> float:
     return float(np.mean(load <= noise_std))
 
 
-def nrmse(
-    *,
-    predicted: npt.ArrayLike,
-    measured: npt.ArrayLike,
-    training_std: npt.ArrayLike | None = None,
-    noise_std: npt.ArrayLike | None = None,
-) -> FloatArray:
+@_measure
+def nrmse(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray) -> FloatArray:
     """Root mean square error of each channel, divided by its measured standard deviation.
 
     Parameters
@@ -185,17 +201,11 @@ def nrmse(
     >>> nrmse(predicted=0.9 * measured, measured=measured).round(2)
     array([0.1, 0.1])
     """
-    p, m, spread, _ = paired(predicted, measured, training_std, noise_std)
     return root_mean_square(p - m) / spread
 
 
-def anrmse(
-    *,
-    predicted: npt.ArrayLike,
-    measured: npt.ArrayLike,
-    training_std: npt.ArrayLike | None = None,
-    noise_std: npt.ArrayLike | None = None,
-) -> FloatArray:
+@_measure
+def anrmse(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray) -> FloatArray:
     """Average of :func:`nrmse` over the channels that can be judged (paper, equation ANRMSE).
 
     Parameters
@@ -213,16 +223,12 @@ def anrmse(
     RequestError, DataError
         As :func:`nrmse`.
     """
-    p, m, spread, judged = paired(predicted, measured, training_std, noise_std)
     return over_channels(root_mean_square(p - m) / spread, judged)
 
 
+@_measure
 def error_over_time(
-    *,
-    predicted: npt.ArrayLike,
-    measured: npt.ArrayLike,
-    training_std: npt.ArrayLike | None = None,
-    noise_std: npt.ArrayLike | None = None,
+    p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray
 ) -> FloatArray:
     """Error at each instant in measured SDs, averaged over the channels: ε(t) of the paper.
 
@@ -240,16 +246,12 @@ def error_over_time(
     RequestError, DataError
         As :func:`nrmse`.
     """
-    p, m, spread, judged = paired(predicted, measured, training_std, noise_std)
     return over_channels(np.abs(p - m) / spread[..., None, :], judged[..., None, :])
 
 
+@_measure
 def normalised_extremes_error(
-    *,
-    predicted: npt.ArrayLike,
-    measured: npt.ArrayLike,
-    training_std: npt.ArrayLike | None = None,
-    noise_std: npt.ArrayLike | None = None,
+    p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray
 ) -> FloatArray:
     """Mean absolute error of minimum and maximum of each channel, in measured SDs.
 
@@ -268,17 +270,11 @@ def normalised_extremes_error(
     RequestError, DataError
         As :func:`nrmse`.
     """
-    p, m, spread, _ = paired(predicted, measured, training_std, noise_std)
     return extremes_error(p, m) / spread
 
 
-def nammae(
-    *,
-    predicted: npt.ArrayLike,
-    measured: npt.ArrayLike,
-    training_std: npt.ArrayLike | None = None,
-    noise_std: npt.ArrayLike | None = None,
-) -> FloatArray:
+@_measure
+def nammae(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray) -> FloatArray:
     """Normalised average minimum/maximum absolute error (paper, equation NAMMAE).
 
     Parameters
@@ -296,17 +292,11 @@ def nammae(
     RequestError, DataError
         As :func:`nrmse`.
     """
-    p, m, spread, judged = paired(predicted, measured, training_std, noise_std)
     return over_channels(extremes_error(p, m) / spread, judged)
 
 
-def fit_percent(
-    *,
-    predicted: npt.ArrayLike,
-    measured: npt.ArrayLike,
-    training_std: npt.ArrayLike | None = None,
-    noise_std: npt.ArrayLike | None = None,
-) -> FloatArray:
+@_measure
+def fit_percent(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray) -> FloatArray:
     r"""Fit of each channel as MATLAB's ``compare`` states it, percent.
 
     Parameters
@@ -325,7 +315,6 @@ def fit_percent(
     RequestError, DataError
         As :func:`nrmse`.
     """
-    p, m, spread, _ = paired(predicted, measured, training_std, noise_std)
     norm = np.sqrt(np.sum((p - m) ** 2, axis=-2))
     out: FloatArray = 100.0 * (1.0 - norm / (spread * np.sqrt(m.shape[-2] - 1)))
     return out

@@ -76,14 +76,13 @@ def two_way_interval(
     True
     """
     tables = [as_real(each, "cells") for each in cells]
-    shapes = {each.shape[:2] for each in tables}
-    if len(shapes) != 1 or len(next(iter(shapes))) != 2 or 0 in next(iter(shapes)):
+    shape = tables[0].shape[:2] if tables else ()
+    if len(shape) != 2 or 0 in shape or any(each.shape[:2] != shape for each in tables):
         raise RequestError(
             "cells are arrays of one shape (row, column, …); received shapes "
             f"{', '.join(str(each.shape) for each in tables) or 'of none'}."
         )
     count, part = whole_number(n_series, "n_series"), fraction(level, "level")
-    shape = shapes.pop()
     rows, columns = (
         _positions(size, whole_number(block, "a block"), count, rng)
         for size, block in zip(shape, blocks, strict=True)

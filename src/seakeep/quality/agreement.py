@@ -141,6 +141,11 @@ def compare_sensors(
     found, motion, gain = _windows(x, y, dt, length, period, stuck)
     if not found.lag.size:
         return nothing
+    spans = [
+        slice(max(round((c - 0.5 * length) / dt), 0), round((c + 0.5 * length) / dt))
+        for c in found.centre
+    ]
+    error, moved = ([np.std(z[span]) ** 2 for span in spans] for z in (x - y, y))
     lags = found.lag[_together(found)]
     middle = float(np.median(lags))
     return Agreement(
@@ -151,20 +156,11 @@ def compare_sensors(
         lag_spread=float(1.4826 * np.median(np.abs(lags - middle))),
         growth=_growth(_windows(x, y, dt, 0.5 * length, period, stuck)[0], period),
         correlation=float(np.median(found.correlation)),
-        nrmse=_nrmse(x, y, dt, length, found),
+        nrmse=float(np.sqrt(np.mean(error) / np.mean(moved))),
         gain=gain,
         centre=found.centre,
         lags=found.lag,
     )
-
-
-def _nrmse(x: FloatArray, y: FloatArray, dt: float, length: float, found: Lags) -> float:
-    """NRMSE between two sensors over the windows that are compared."""
-    reach = 0.5 * length
-    spans = [(max(round((c - reach) / dt), 0), round((c + reach) / dt)) for c in found.centre]
-    error = [np.std(x[begin:end] - y[begin:end]) ** 2 for begin, end in spans]
-    motion = [np.std(y[begin:end]) ** 2 for begin, end in spans]
-    return float(np.sqrt(np.mean(error) / np.mean(motion)))
 
 
 def _windows(

@@ -185,18 +185,35 @@ def parse(text: str) -> Expression:
     >>> parse("square(`wave probe 1`) / 2 + heave").channels
     ('wave probe 1', 'heave')
     """
-    if not isinstance(text, str):
-        raise RequestError(f"an expression is text; received {type(text).__name__}.")
     if not text.strip():
         raise RequestError(f"the expression {text!r} is empty. Write one of {_ALLOWED}.")
     text = " ".join(text.strip().splitlines())
     plain, quoted = _unquoted(text)
+    channels: dict[str, None] = {}
+
+    def refusal(position: int, reason: str) -> RequestError:
+        return RequestError(
+            f"the expression {text!r} is not allowed: at character {position}, {reason}. "
+            f"Allowed are {_ALLOWED}; write names with blanks or signs between backticks."
+        )
+
+    def check(node: ast.expr) -> None:
+        source = ast.get_source_segment(plain, node) or plain
+        for stand_in, name in quoted.items():
+            source = source.replace(stand_in, f"`{name}`")
+        if isinstance(node, ast.Name):
+            channels[quoted.get(node.id, node.id)] = None
+        wrong, operands = _judged(node, source)
+        if wrong:
+            raise refusal(len(plain.encode()[: node.col_offset].decode()) + 1, wrong)
+        for each in operands:
+            check(each)
+
     try:
         tree = ast.parse(plain, mode="eval").body
     except SyntaxError as error:
-        raise _refusal(text, error.offset or 1, "this is not an arithmetic expression") from None
-    channels: dict[str, None] = {}
-    _check(tree, text, plain, quoted, channels)
+        raise refusal(error.offset or 1, "this is not an arithmetic expression") from None
+    check(tree)
     if not channels:
         raise RequestError(
             f"the expression {text!r} names no channel, so it would be a constant. "
@@ -218,48 +235,19 @@ def _unquoted(text: str) -> tuple[str, dict[str, str]]:
     return _QUOTED.sub(stand_in, text), quoted
 
 
-def _refusal(text: str, position: int, reason: str) -> RequestError:
-    return RequestError(
-        f"the expression {text!r} is not allowed: at character {position}, {reason}. "
-        f"Allowed are {_ALLOWED}; write names with blanks or signs between backticks."
-    )
-
-
-def _check(
-    node: ast.expr,
-    text: str,
-    plain: str,
-    quoted: Mapping[str, str],
-    channels: dict[str, None],
-) -> None:
-    """Refuse every node that is not on the list; collect the channels."""
-    position = len(plain.encode()[: node.col_offset].decode()) + 1
-
-    def inner(*nodes: ast.expr) -> None:
-        for each in nodes:
-            _check(each, text, plain, quoted, channels)
-
-    if _number(node) is not None:
-        return
-    if isinstance(node, ast.Name):
-        channels[quoted.get(node.id, node.id)] = None
-    elif isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
-        if isinstance(node.op, ast.Pow) and not _is_exponent(node.right):
-            raise _refusal(
-                text, position, f"an exponent is a number from -{GREATEST_EXPONENT:g} to "
-                f"{GREATEST_EXPONENT:g}",
-            )  # fmt: skip
-        inner(node.left, node.right)
-    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
-        inner(node.operand)
-    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
-        _check_call(node.func.id, len(node.args), text, position)
-        inner(*node.args)
-    else:
-        source = ast.get_source_segment(plain, node) or plain
-        for stand_in, name in quoted.items():
-            source = source.replace(stand_in, f"`{name}`")
-        raise _refusal(text, position, f"{source!r} is none of the allowed forms")
+def _judged(node: ast.expr, source: str) -> tuple[str, list[ast.expr]]:
+    """What is wrong with a node, empty for nothing, and its operands."""
+    if isinstance(node, ast.Name) or _number(node) is not None:
+        return "", []
+    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+        wrong = isinstance(node.op, ast.Pow) and not _is_exponent(node.right)
+        limits = f"an exponent is a number from -{GREATEST_EXPONENT:g} to {GREATEST_EXPONENT:g}"
+        return limits * wrong, [node.left, node.right]
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
+        return "", [node.operand]
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
+        return _wrong_call(node.func.id, len(node.args)), node.args
+    return f"{source!r} is none of the allowed forms", []
 
 
 def _number(node: ast.expr) -> float | None:
@@ -276,16 +264,16 @@ def _is_exponent(node: ast.expr) -> bool:
     return number is not None and number <= GREATEST_EXPONENT
 
 
-def _check_call(name: str, count: int, text: str, position: int) -> None:
+def _wrong_call(name: str, count: int) -> str:
+    """What is wrong with a call of a function with so many arguments; empty for nothing."""
     known = [*_FUNCTIONS, "mean", "average"]
     if name not in known:
-        near = did_you_mean(name, known)
-        raise _refusal(text, position, f"'{name}' is not a known function.{near}".rstrip("."))
+        return f"'{name}' is not a known function.{did_you_mean(name, known)}".rstrip(".")
     if name == "mean" and count > 1:
-        raise _refusal(
-            text, position, "'mean' is the mean of one channel over time; the average of several "
-            "channels, instant by instant, is 'average'",
-        )  # fmt: skip
-    if count == 0 or (count > 1 and name != "average"):
-        wanted = "one or more" if name == "average" else "one"
-        raise _refusal(text, position, f"'{name}' takes {wanted} argument(s), not {count}")
+        return (
+            "'mean' is the mean of one channel over time; the average of several channels, instant "
+            "by instant, is 'average'"
+        )
+    wanted = "one or more" if name == "average" else "one"
+    fits = count == 1 or (count > 1 and name == "average")
+    return "" if fits else f"'{name}' takes {wanted} argument(s), not {count}"

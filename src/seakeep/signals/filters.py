@@ -71,7 +71,11 @@ def lowpass_taps(
         "Move stopband away from passband, or lower the sampling rate first",
     )
     for extra in range(7):  # Kaiser's formula is a fit, some 3 dB short for short filters
-        taps = _kaiser_taps(edges, attenuation + extra)
+        count, beta = scipy.signal.kaiserord(attenuation + extra, 2 * (edges[1] - edges[0]))
+        count += 1 - count % 2
+        taps: FloatArray = scipy.signal.firwin(
+            count, sum(edges) / 2, window=("kaiser", beta), fs=1.0, scale=True
+        )
         if _deviation(taps, edges) <= 10 ** (-attenuation / 20):
             break
     return taps
@@ -80,15 +84,6 @@ def lowpass_taps(
 def _check_length(taps: float, what: str, remedy: str) -> None:
     asked = f"{what} with this attenuation needs about"
     check_size(asked, taps, MOST_TAPS, "taps", f"{remedy}.")
-
-
-def _kaiser_taps(edges: tuple[float, float], attenuation: float) -> FloatArray:
-    count, beta = scipy.signal.kaiserord(attenuation, 2 * (edges[1] - edges[0]))
-    count += 1 - count % 2
-    taps: FloatArray = scipy.signal.firwin(
-        count, sum(edges) / 2, window=("kaiser", beta), fs=1.0, scale=True
-    )
-    return taps
 
 
 def _deviation(taps: FloatArray, edges: tuple[float, float]) -> float:
@@ -160,13 +155,7 @@ def low_pass(
     array = as_series(series, channels=True)
     edge = 1.25 * passband if stopband is None else stopband
     taps = lowpass_taps(1.0 / time_step(dt), passband, edge, attenuation)
-    return apply_taps(array, taps)
-
-
-def apply_taps(array: FloatArray, taps: FloatArray) -> FloatArray:
-    """Filter along the first axis with symmetric taps, without delay and at unchanged length."""
-    half = taps.size // 2
-    extended = odd_extension(array, half)
+    extended = odd_extension(array, taps.size // 2)  # so that length and phase are unchanged
     columns = taps.reshape((-1,) + (1,) * (array.ndim - 1))
     filtered: FloatArray = scipy.signal.oaconvolve(extended, columns, mode="valid", axes=0)
     return filtered

@@ -7,7 +7,7 @@ lengths go with :math:`\lambda`, times with :math:`\lambda^{1/2}`, masses with
 
 from __future__ import annotations
 
-from seakeep.arrays import number
+from seakeep.arrays import positive
 from seakeep.conventions import base_powers
 from seakeep.errors import RequestError
 
@@ -43,9 +43,8 @@ def froude_factor(units: str, scale: float, density_ratio: float = 1.0) -> float
     >>> froude_factor("m/s^2", 50), round(froude_factor("rad/s", 50), 4)
     (1.0, 0.1414)
     """
-    for name, value in (("the scale factor", scale), ("the density ratio", density_ratio)):
-        if not 0 < number(value, name) < float("inf"):
-            raise RequestError(f"{name} must be positive; received {value!r}.")
+    positive(scale, "the scale factor", "a ratio")
+    positive(density_ratio, "the density ratio", "a ratio")
     length, time, mass, others = base_powers(units)
     if others:
         raise RequestError(

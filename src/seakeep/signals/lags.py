@@ -10,9 +10,9 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import FloatArray, IntArray, as_real, as_series, positive, time_step
+from seakeep.arrays import FloatArray, IntArray, as_series, positive, time_step
 from seakeep.errors import DataError, RequestError
-from seakeep.signals.time_axis import check_order
+from seakeep.signals.time_axis import record
 
 __all__ = [
     "Lags",
@@ -86,13 +86,12 @@ def windowed_lags(
     """
     a, b = as_series(series), as_series(reference)
     time_step(dt)
-    if a.shape != b.shape or a.ndim != 1:
+    if a.shape != b.shape:
         raise RequestError(
             f"the two series must be one channel each, of one length; received shapes {a.shape} "
             f"and {b.shape}."
         )
-    for value, name in ((window, "window"), (largest_lag, "largest_lag")):
-        positive(value, name, "s")
+    positive(largest_lag, "largest_lag", "s")
     length, reach = round(window / dt), math.ceil(largest_lag / dt)
     if length < 4 or a.size < length + 2 * reach:
         raise RequestError(
@@ -164,13 +163,10 @@ def correlation_peak(
     """
     a, b = as_pair(first, second)
     step = time_step(dt)
-    limits = as_real(bounds, "bounds")
-    if limits.shape != (2,):
-        raise RequestError(f"bounds are a pair of lags, s; received {bounds!r}.")
-    low, high = float(np.floor(limits[0] / step)), float(np.ceil(limits[1] / step))
+    low, high = np.floor(bounds[0] / step), np.ceil(bounds[1] / step)
     if not low < high or max(abs(low), abs(high)) > a.size // 2:
         raise RequestError(
-            f"lags from {limits[0]:g} to {limits[1]:g} s cannot be sought in records of "
+            f"lags from {bounds[0]:g} to {bounds[1]:g} s cannot be sought in records of "
             f"{a.size * step:g} s: give a rising range within half their length."
         )
     lags = np.arange(int(low) - 1, int(high) + 2)
@@ -337,8 +333,9 @@ def compare_motion(
     (0.1, 1.0)
     """
     reach = None if max_lag is None else positive(max_lag, "max_lag", "s")
-    t1, y1 = _present(series, time, "the series")
-    t2, y2 = _present(reference, reference_time, "the reference")
+    first = record(series, time, "the video")
+    second = record(reference, reference_time, "the reference")
+    (y1, t1), (y2, t2) = ((y[np.isfinite(y)], t[np.isfinite(y)]) for y, t in (first, second))
     reach = reach or min(LONGEST, 0.25 * float(min(np.ptp(t1), np.ptp(t2))))
     # Only instants whose partner lies inside the other record at every lag searched.
     common = (t1 >= t2[0] + reach) & (t1 <= t2[-1] - reach)
@@ -387,16 +384,3 @@ def compare_motion(
         rival_lag=np.nan if rival is None else float(lags[rival]),
         rival_correlation=np.nan if rival is None else float(values[rival]),
     )
-
-
-def _present(
-    series: npt.ArrayLike, time: npt.ArrayLike, name: str
-) -> tuple[FloatArray, FloatArray]:
-    """Instants and values of a record where it has values."""
-    y, t = as_real(series, name), as_real(time, f"the times of {name}", DataError)
-    if y.ndim != 1 or y.shape != t.shape:
-        raise RequestError(
-            f"{name} has shape {y.shape} and its times {t.shape}; one value per instant is needed."
-        )
-    there = np.isfinite(y)
-    return check_order(t[there], name), y[there]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -137,18 +137,13 @@ def find_leakage(
                 best = Leakage(0.0, height, index, at * step, begin, phase)
     if best is None:
         return None
-    share = float(repeated.mean())
-    return Leakage(
-        share, best.correlation, best.training, best.training_start, best.test_start, best.phase
-    )
+    return replace(best, share=float(repeated.mean()))
 
 
 def _analytic(series: FloatArray) -> ComplexArray:
     centred = series - series.mean()
-    out: ComplexArray = scipy.signal.hilbert(centred, fft.next_fast_len(centred.size))[
-        : centred.size
-    ]
-    return out
+    out: ComplexArray = scipy.signal.hilbert(centred, fft.next_fast_len(centred.size))
+    return out[: centred.size]
 
 
 def is_regular(series: npt.ArrayLike) -> bool:

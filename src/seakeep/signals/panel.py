@@ -8,7 +8,6 @@ downwards from the centre of the upper left pixel. Needs OpenCV, the extra ``vid
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -108,9 +107,8 @@ class TrackingSettings:
     stopband: float | None = None
 
     def __post_init__(self) -> None:
-        for name, unit in (("rest", "s"), ("tolerance", "a part"), ("max_speed", "m/s")):
-            positive(getattr(self, name), name, unit)
-        for name, unit in (("metres_per_pixel", "m"), ("passband", "Hz"), ("stopband", "Hz")):
+        units = {"rest": "s", "tolerance": "a part", "max_speed": "m/s", "metres_per_pixel": "m"}
+        for name, unit in (units | dict.fromkeys(("passband", "stopband"), "Hz")).items():
             if getattr(self, name) is not None:
                 positive(getattr(self, name), name, unit)
         for name in ("panel", "panel_place", "camera_pitch", "origin", "lamp"):
@@ -130,7 +128,8 @@ class TrackingSettings:
                 repr(self.downstream),
             ),
             (
-                not _are_colours(self.lower, self.upper),
+                not len(self.lower) == len(self.upper) == 3
+                or not all(0 <= a <= b <= 255 for a, b in zip(self.lower, self.upper, strict=True)),
                 "lower (--threshold) and upper are (red, green, blue), each 0 to 255 and lower not "
                 "above upper",
                 f"{self.lower} and {self.upper}",
@@ -151,15 +150,20 @@ class TrackingSettings:
             if wrong:
                 raise RequestError(f"{rule}; received {received}.")
 
+    @property
+    def stop(self) -> float | None:
+        """Edge of the stop band in use, Hz; None where nothing is filtered."""
+        return None if self.passband is None else self.stopband or 1.5 * self.passband
 
-def _are_colours(lower: Sequence[int], upper: Sequence[int]) -> bool:
-    if not len(lower) == len(upper) == 3:
-        return False
-    return all(0 <= low <= high <= 255 for low, high in zip(lower, upper, strict=True))
 
+def opencv(doing: str = "reading") -> Any:
+    """Return OpenCV's module with a quiet decoder.
 
-def opencv() -> Any:
-    """Return OpenCV's module with a quiet decoder."""
+    Raises
+    ------
+    RequestError
+        If it is not installed; `doing` says what it is needed for.
+    """
     # What FFmpeg prints about a damaged file, our own message says in a sentence.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
@@ -167,7 +171,7 @@ def opencv() -> Any:
         import cv2
     except ImportError as error:
         raise RequestError(
-            "reading a video needs OpenCV, which is not installed. "
+            f"{doing} a video needs OpenCV, which is not installed. "
             "Install the extra: pip install 'seakeep[video]'."
         ) from error
     return cv2

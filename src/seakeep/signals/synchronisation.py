@@ -14,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import FloatArray, IntArray, as_real, positive
+from seakeep.arrays import FloatArray, IntArray, as_real
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import windowed_lags
-from seakeep.signals.time_axis import as_seconds, check_order, uniform_step
+from seakeep.signals.time_axis import record, uniform_step
 
 __all__ = [
     "Clock",
@@ -179,26 +179,19 @@ def clock_from_pulses(
     >>> round(clock.offset, 4), round(1e6 * clock.drift, 1), clock.count
     (0.3, 20.0, 5)
     """
-    sides = [
-        (*_record(trigger, time, "the logger", gaps=True), "the logger's trigger"),
-        (
-            *_record(reference_trigger, reference_time, "the reference", gaps=True),
-            "the reference's trigger",
-        ),
-    ]
-    found = [find_pulses(values, times, name) for values, times, name in sides]
-    own, other, modulus = match_pulses(
+    sides = (
+        record(trigger, time, "the logger"),
+        record(reference_trigger, reference_time, "the reference"),
+    )
+    names = "the logger's trigger", "the reference's trigger"
+    found = [find_pulses(*side, name) for side, name in zip(sides, names, strict=True)]
+    *chosen, modulus = match_pulses(
         found[0].centres, found[1].centres, expected_offset, LARGEST_DRIFT
     )
+    centres = [pulses.centres[at] for pulses, at in zip(found, chosen, strict=True)]
     fast = int(np.median(np.diff(sides[1][1])) <= np.median(np.diff(sides[0][1])))
-    chosen = (own, other)
-    template = pulse_template(
-        sides[fast][0], sides[fast][1], found[fast], found[fast].centres[chosen[fast]]
-    )
-    timed = [
-        time_pulses(values, times, found[i].centres[chosen[i]], template)
-        for i, (values, times, _) in enumerate(sides)
-    ]
+    template = pulse_template(*sides[fast], found[fast], centres[fast])
+    timed = [time_pulses(*side, at, template) for side, at in zip(sides, centres, strict=True)]
     errors = np.hypot(timed[0][1], timed[1][1])
     sound = np.isfinite(errors) & np.isfinite(timed[0][0]) & np.isfinite(timed[1][0])
     if not sound.any():
@@ -246,11 +239,9 @@ def clock_from_correlation(
     RequestError
         If a record is shorter than the window, or a signal and its times differ in length.
     """
-    a, c = _record(series, time, "the logger")
-    b, t = _record(reference, reference_time, "the reference")
+    a, c = _whole(series, time, "the logger")
+    b, t = _whole(reference, reference_time, "the reference")
     step = min(uniform_step(c, "the logger"), uniform_step(t, "the reference"))
-    window = positive(window, "window", "s")
-    largest_lag = positive(largest_lag, "largest_lag", "s")
     begin, end = max(c[0], t[0]), min(c[-1], t[-1])
     if end - begin < window + 2 * largest_lag:
         raise RequestError(
@@ -278,24 +269,17 @@ def clock_from_correlation(
     return replace(clock, method="correlation of windows")
 
 
-def _record(
-    signal: npt.ArrayLike, time: npt.ArrayLike, owner: str, gaps: bool = False
-) -> tuple[FloatArray, FloatArray]:
-    """Signal of a logger and the readings of its clock; gaps are NaN where they are allowed."""
-    x, t = as_real(signal, f"the signal of {owner}"), as_seconds(time, owner)
-    if x.ndim != 1 or x.shape != t.shape:
-        raise RequestError(
-            f"the signal of {owner} has shape {x.shape} and its times {t.shape}; one value per "
-            "instant is needed."
-        )
+def _whole(signal: npt.ArrayLike, time: npt.ArrayLike, owner: str) -> tuple[FloatArray, FloatArray]:
+    """Signal without gaps of a logger, and the readings of its clock."""
+    x, t = record(signal, time, owner)
     lost = np.flatnonzero(~np.isfinite(x))
-    if lost.size > (x.size - 2 if gaps else 0):
+    if lost.size:
         raise DataError(
             f"the signal of {owner} has {lost.size} missing or infinite value(s), the first at "
             f"sample {lost[0]}. Bridge the gap (seakeep.signals.bridge), or use the record before "
             "or after it."
         )
-    return x, check_order(t, owner)
+    return x, t
 
 
 def clock_from_shared(
@@ -327,8 +311,8 @@ def clock_from_shared(
         As :func:`clock_from_correlation`.
     """
     first = clock_from_correlation(series, time, reference, reference_time, window, largest_lag)
-    a, c = _record(series, time, "the logger")
-    b, t = _record(reference, reference_time, "the reference")
+    a, c = _whole(series, time, "the logger")
+    b, t = _whole(reference, reference_time, "the reference")
     offset, drift = first.offset, first.drift
     turned = np.median(np.diff(c)) < np.median(np.diff(t))  # the spline is of the faster one
     if turned:
@@ -507,13 +491,14 @@ def find_pulses(trigger: FloatArray, time: FloatArray, name: str = "the trigger"
     noise = 1.4826 * float(np.median(np.abs(x)))
     # Wide stretches outvote spikes: the height is that of the sample in the middle of the time
     # spent above the noise.
-    rising, falling, peaks = _stretches(x, max(8 * noise, 0.02 * float(x.max())))
-    top = _weighted_median(peaks, falling - rising) if rising.size else float(x.max())
-    for _ in range(2 if rising.size else 0):
-        rising, falling, peaks = _stretches(x, 0.5 * top)
+    top = float(x.max())
+    level = max(8 * noise, 0.02 * top)
+    for _ in range(3):
+        rising, falling, peaks = _stretches(x, level)
         if not rising.size:
             break
         top = _weighted_median(peaks, falling - rising)
+        level = 0.5 * top
     if not rising.size or top < 6 * noise or top <= 0:
         raise DataError(
             f"{name} has no pulses that stand out of its noise (largest value {top:g} above the "
@@ -530,8 +515,9 @@ def find_pulses(trigger: FloatArray, time: FloatArray, name: str = "the trigger"
 
     rise, fall = crossing(rising), crossing(falling)
     width = fall - rise
-    usual = np.median(width[(peaks > 0.5 * top) & (peaks < 2 * top)])
-    sound = (peaks > 0.5 * top) & (peaks < 2 * top) & (width > 0.5 * usual) & (width < 2 * usual)
+    sound = (peaks > 0.5 * top) & (peaks < 2 * top)
+    usual = np.median(width[sound])
+    sound &= (width > 0.5 * usual) & (width < 2 * usual)
     rise, fall = rise[sound], fall[sound]
     return Pulses(0.5 * (rise + fall), rise, fall, sign * top)
 

@@ -22,6 +22,7 @@ __all__ = [
     "instant_text",
     "onto_uniform",
     "over_gaps",
+    "record",
     "span_text",
     "stretches",
     "uniform_step",
@@ -75,25 +76,39 @@ def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
             f"({int(np.sum(~np.isfinite(t)))} in all). Remove these rows, or repair the times."
         )
     steps = np.diff(t)
-
-    def instant(sample: int) -> str:
-        return f"{instant_text(t[sample], float(np.median(np.abs(steps))))} s"
-
     if np.any(steps == 0):
         at = int(np.flatnonzero(steps == 0)[0])
         raise DataError(
-            f"the times of {name} repeat: {instant(at)} stands at samples {at} and {at + 1} "
+            f"the times of {name} repeat: {_shown(t, at)} stands at samples {at} and {at + 1} "
             f"({int(np.sum(steps == 0))} repetitions in all). Remove the double rows, or raise the "
             "number of decimals the logger writes."
         )
     if np.any(steps < 0):
         at = int(np.flatnonzero(steps < 0)[0])
         raise DataError(
-            f"the times of {name} are not sorted: {instant(at + 1)} follows {instant(at)} at "
+            f"the times of {name} are not sorted: {_shown(t, at + 1)} follows {_shown(t, at)} at "
             f"sample {at + 1}. Sort the rows by time, or split the file where the clock was "
             "restarted."
         )
     return t
+
+
+def _shown(t: FloatArray, sample: int | np.intp) -> str:
+    """Instant of a sample in a message."""
+    return f"{instant_text(t[sample], float(np.median(np.abs(np.diff(t)))))} s"
+
+
+def record(series: npt.ArrayLike, time: npt.ArrayLike, owner: str) -> tuple[FloatArray, FloatArray]:
+    """Signal of an owner, not finite where it has gaps, and its instants in their order."""
+    x, t = as_real(series, f"the signal of {owner}"), check_order(time, owner)
+    if x.shape != t.shape:
+        raise RequestError(
+            f"the signal of {owner} has shape {x.shape} and its times {t.shape}; one value per "
+            "instant is needed."
+        )
+    if np.isfinite(x).sum() < 2:
+        raise DataError(f"the signal of {owner} has fewer than two values. Give a longer record.")
+    return x, t
 
 
 def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
@@ -152,25 +167,21 @@ def printed_tolerance(t: FloatArray, step: float) -> float:
 def _irregularity(t: FloatArray, name: str) -> str:
     steps = np.diff(t)
     usual = float(np.median(steps))
-
-    def instant(sample: int) -> str:
-        return f"{instant_text(t[sample], usual)} s"
-
     counts = steps / usual
     gaps = np.flatnonzero(counts > 1.5)
     if gaps.size and np.max(np.abs(counts - np.rint(counts))) < 0.1:
         longest = gaps[np.argmax(steps[gaps])]
         return (
-            f"the times of {name} have {gaps.size} gap(s): after t = {instant(int(gaps[0]))}, "
+            f"the times of {name} have {gaps.size} gap(s): after t = {_shown(t, gaps[0])}, "
             f"{int(np.rint(counts[gaps[0]])) - 1} sample(s) of {usual:g} s are missing; the "
-            f"longest gap, after t = {instant(int(longest))}, lasts {steps[longest]:g} s. Fill the "
+            f"longest gap, after t = {_shown(t, longest)}, lasts {steps[longest]:g} s. Fill the "
             "gap, or use the record before or after it."
         )
     at = int(np.argmax(np.abs(steps - usual)))
     return (
         f"the times of {name} are not uniform: steps run from {steps.min():g} to {steps.max():g} s "
-        f"(median {usual:g} s), the oddest after t = {instant(at)}. Interpolate the series onto a "
-        "uniform step before reading it, or split it where the clock changed."
+        f"(median {usual:g} s), the oddest after t = {_shown(t, at)}. Interpolate the series onto "
+        "a uniform step before reading it, or split it where the clock changed."
     )
 
 
@@ -293,7 +304,7 @@ def onto_uniform(
     array([ 5.,  6., nan,  7.,  8.])
     """
     report = inspect_times(time, name)
-    t, x = as_seconds(time, name), as_real(series, f"the series of {name}")
+    t, x = check_order(time, name), as_real(series, f"the series of {name}")
     if x.shape[:1] != t.shape:
         raise RequestError(
             f"the series of {name} has shape {x.shape} and its times {t.shape}; one value per "

@@ -235,7 +235,16 @@ def track_video(
     usual = _usual_panel(seen, how, str(path))
     pixels = int(np.prod(size if how.region is None else how.region[2:]))
     flag, quality = _judge(seen, usual, how, 1.0 / rate, pixels)
-    _warn_of_flags(path, flag)
+    bad = int(np.sum(flag != FLAGS["good"]))
+    if 2 * bad > flag.size:
+        counts = ", ".join(
+            f"{np.sum(flag == code)} {name}" for name, code in FLAGS.items() if np.any(flag == code)
+        )
+        warn(
+            f"{path}: {bad} of {flag.size} frames are flagged ({counts}). Look at the contact "
+            "sheet; correct the thresholds, state a region, or raise tolerance for a lens that "
+            "distorts."
+        )
     motion, bridged = _motions(seen, flag == FLAGS["good"], usual, how, rate, str(path))
     picture = np.full(count, -1)
     picture[frames] = np.arange(frames.size)
@@ -283,7 +292,7 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
                 f"the lamp {how.lamp} (x, y, radius) lies outside the picture of {video.path}, "
                 f"{width} × {height} pixels. Correct its place."
             )
-    stop = _stopband(how)
+    stop = how.stop
     if stop is not None and stop >= 0.5 * video.rate:
         raise RequestError(
             f"{video.path} has {video.rate:g} frames per second, so the low-pass filter cannot "
@@ -291,12 +300,6 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
             f"as high unless stated, lies below {0.5 * video.rate:g} Hz, or filter nothing "
             "(passband None; --passband 0)."
         )
-
-
-def _stopband(how: TrackingSettings) -> float | None:
-    if how.passband is None:
-        return None
-    return 1.5 * how.passband if how.stopband is None else how.stopband
 
 
 def _measure(
@@ -333,19 +336,6 @@ def _on_grid(frames: list[int] | range, rows: list[list[float]]) -> dict[str, Fl
     table = np.full((frames[-1] + 1, len(FIELDS)), np.nan)
     table[list(frames)] = rows
     return dict(zip(FIELDS, table.T, strict=True))
-
-
-def _warn_of_flags(path: Path | str, flag: IntArray) -> None:
-    bad = int(np.sum(flag != FLAGS["good"]))
-    if 2 * bad > flag.size:
-        counts = ", ".join(
-            f"{np.sum(flag == code)} {name}" for name, code in FLAGS.items() if np.any(flag == code)
-        )
-        warn(
-            f"{path}: {bad} of {flag.size} frames are flagged ({counts}). Look at the contact "
-            "sheet; correct the thresholds, state a region, or raise tolerance for a lens that "
-            "distorts."
-        )
 
 
 def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, Any]:
@@ -479,17 +469,16 @@ def _motions(
     table[~good] = np.nan
     filled = np.zeros(good.size, dtype=bool)
     for begin, end in stretches(~good):
-        if begin > 0 and end < good.size and end - begin <= how.bridge * rate + 1e-9:
-            filled[begin:end] = True
+        inner = begin > 0 and end < good.size
+        filled[begin:end] = inner and end - begin <= how.bridge * rate + 1e-9
     if filled.any():
         there = np.flatnonzero(good)
         between = scipy.interpolate.PchipInterpolator(there, table[there], axis=0)
         table[filled] = between(np.flatnonzero(filled))
-    stop = _stopband(how)
-    if how.passband is not None and stop is not None:
+    if how.passband is not None:
         for begin, end in stretches(good | filled):
             if end - begin > 1:
-                table[begin:end] = low_pass(table[begin:end], 1.0 / rate, how.passband, stop)
+                table[begin:end] = low_pass(table[begin:end], 1.0 / rate, how.passband, how.stop)
     return dict(zip(("surge", "heave", "pitch"), table.T, strict=True)), filled
 
 

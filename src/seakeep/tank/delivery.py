@@ -62,14 +62,6 @@ def _header(name: str, unit: str) -> str:
     return f"{name} [{unit}]"
 
 
-def _time_decimals(record: Record) -> int:
-    """Decimals that hold the clock's readings: as many as needed up to six."""
-    for decimals in range(1, 6):
-        if np.allclose(np.round(record.time[:4], decimals), record.time[:4], atol=1e-9):
-            return decimals
-    return 6
-
-
 def write_text(path: Path, text: str) -> None:
     """Write a text file under a temporary name, then rename it."""
     with replacing(path) as temporary:
@@ -79,7 +71,10 @@ def write_text(path: Path, text: str) -> None:
 def _csv(record: Record) -> str:
     heads = [_header("time", "s")]
     heads += [_header(name, column.unit) for name, column in record.columns.items()]
-    decimals = [_time_decimals(record)] + [c.decimals for c in record.columns.values()]
+    # As many decimals as the clock's readings need, up to six.
+    start = record.time[:4]
+    needed = (d for d in range(1, 6) if np.allclose(np.round(start, d), start, atol=1e-9))
+    decimals = [next(needed, 6)] + [c.decimals for c in record.columns.values()]
     line = ",".join(f"%.{d}f" for d in decimals) + "\n"
     columns = [record.time] + [c.values for c in record.columns.values()]
     # Adding zero turns the −0.0 of rounding into 0.0.
@@ -115,11 +110,8 @@ def write_record(record: Record, folder: Path, kind: str) -> Path:
 def write_dataset(data: xr.Dataset, path: Path) -> None:
     """Write a Dataset to NetCDF, compressed, under a temporary name, then rename it."""
     with replacing(path) as temporary:
-        write_netcdf(temporary, data, _packing(data))
-
-
-def _packing(data: xr.Dataset) -> dict[str, dict[str, object]]:
-    return {str(name): {"zlib": True, "complevel": 4} for name in data.data_vars}
+        packed = {str(name): {"zlib": True, "complevel": 4} for name in data.data_vars}
+        write_netcdf(temporary, data, packed)
 
 
 def _filtered(settings: TankSettings) -> dict[str, str]:

@@ -29,6 +29,7 @@ from seakeep.tank.hydrodynamics import (
     load_hydrodynamics,
     radiation_kernel,
     response,
+    trapezoid,
 )
 from seakeep.tank.moorings import line_table, mooring_stiffness
 from seakeep.tank.seas import Sea
@@ -139,13 +140,11 @@ def _loop() -> ModuleType:
 
 
 def _viscous(settings: TankSettings, hydro: Hydrodynamics) -> tuple[FloatArray, ...]:
-    rigid, square, losses = (
-        settings.vessel.linear_damping,
-        settings.vessel.quadratic_damping,
-        settings.vessel.pool,
+    vessel, losses = settings.vessel, settings.vessel.pool
+    linear, quadratic = (
+        [each.surge, each.heave, each.pitch]
+        for each in (vessel.linear_damping, vessel.quadratic_damping)
     )
-    linear = [rigid.surge, rigid.heave, rigid.pitch]
-    quadratic = [square.surge, square.heave, square.pitch]
     pool = np.zeros(3)
     if hydro.pool is not None:
         linear += [0.0, losses.slosh_linear]
@@ -342,9 +341,9 @@ def _kernel_arrays(rig: Rig) -> tuple[npt.NDArray[np.int64], FloatArray]:
     """Pairs of degrees of freedom that have a memory, and their weights from the oldest lag."""
     values = rig.kernel.values
     pairs = np.argwhere(np.any(values != 0.0, axis=0))
-    weights = np.full(values.shape[0], rig.step)
-    weights[[0, -1]] *= 0.5
-    rows = (values * weights[:, None, None])[::-1, pairs[:, 0], pairs[:, 1]].T
+    rows = (values * trapezoid(len(values), rig.step)[:, None, None])[
+        ::-1, pairs[:, 0], pairs[:, 1]
+    ].T
     return pairs, np.ascontiguousarray(rows)
 
 

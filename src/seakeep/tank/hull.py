@@ -68,13 +68,8 @@ class Hydrostatics:
 def _square(nx: int, ny: int) -> FloatArray:
     """Points on the boundary of the square [−1, 1]², counter-clockwise, shape (point, 2)."""
     x, y = np.linspace(-1, 1, nx + 1)[:-1], np.linspace(-1, 1, ny + 1)[:-1]
-    sides = [
-        np.column_stack([x, np.full(nx, -1.0)]),
-        np.column_stack([np.full(ny, 1.0), y]),
-        np.column_stack([-x, np.full(nx, 1.0)]),
-        np.column_stack([np.full(ny, -1.0), -y]),
-    ]
-    return np.concatenate(sides)
+    below, right = _at(x[:, None], -1.0), np.column_stack([np.full(ny, 1.0), y])
+    return np.concatenate([below, right, -below, -right])
 
 
 def _superellipse(square: FloatArray, half: tuple[float, float], exponent: float) -> FloatArray:
@@ -152,10 +147,9 @@ def _patches(
         patches.append(_ring(_between(_at(high, pool.lid), _at(high, pool.shelf), 1)))
         lid = _rectangle(half_high, pool.centre, pool.lid, (nx, ny))
         patches.append((lid[0], lid[1][:, ::-1]))
-    inner = square * half_low + [opening.centre, 0.0]
     # As fine as the hull: a coarser one lets irregular frequencies through above 14 rad/s.
     centre = _rectangle(half_low, opening.centre, hull.internal_lid, (nx, ny))
-    ring = _ring(_between(_at(inner, hull.internal_lid), contour(hull.internal_lid), 7))
+    ring = _ring(_between(_at(low, hull.internal_lid), contour(hull.internal_lid), 7))
     internal = (
         np.concatenate([ring[0], centre[0]]),
         np.concatenate([ring[1], centre[1][:, ::-1] + len(ring[0])]),

@@ -213,6 +213,13 @@ def passive_damping(hydro: Hydrodynamics, step: float = 0.02) -> tuple[FloatArra
     return omega, _passive(tapered)
 
 
+def trapezoid(count: int, step: float) -> FloatArray:
+    """Weights of the trapezoidal rule."""
+    weights = np.full(count, step)
+    weights[[0, -1]] *= 0.5
+    return weights
+
+
 def radiation_kernel(
     hydro: Hydrodynamics, step: float = 0.01, length: float = KERNEL_LENGTH
 ) -> Kernel:
@@ -222,17 +229,14 @@ def radiation_kernel(
     """
     omega, damping = passive_damping(hydro)
     lags = step * np.arange(round(length / step) + 1, dtype=float)
-    weights = np.full(omega.size, omega[1])
-    weights[[0, -1]] *= 0.5
-    flat = damping.reshape(omega.size, -1) * weights[:, None]
+    flat = damping.reshape(omega.size, -1) * trapezoid(omega.size, omega[1])[:, None]
     values = (2.0 / np.pi) * np.cos(np.outer(lags, omega)) @ flat
     band = (hydro.omega >= 2.0) & (hydro.omega <= POOL_TAPER[0])
     if not np.any(band):
         band = np.ones(hydro.omega.size, dtype=bool)
     added = 0.5 * (hydro.added_mass + hydro.added_mass.swapaxes(1, 2))[band]
-    lag_weights = np.full(lags.size, step)
-    lag_weights[[0, -1]] *= 0.5
-    sines = np.sin(np.outer(hydro.omega[band], lags)) * lag_weights / hydro.omega[band, None]
+    sines = np.sin(np.outer(hydro.omega[band], lags)) * trapezoid(lags.size, step)
+    sines /= hydro.omega[band, None]
     infinite = added + (sines @ values).reshape(added.shape)
     shape = hydro.mass.shape
     return Kernel(lags, values.reshape(-1, *shape), infinite.mean(axis=0), omega, damping)
@@ -241,8 +245,7 @@ def radiation_kernel(
 def kernel_coefficients(kernel: Kernel, omega: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Added mass and damping that a kernel reproduces, each of shape (frequency, dof, dof)."""
     frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
-    weights = np.full(kernel.lags.size, kernel.lags[1])
-    weights[[0, -1]] *= 0.5
+    weights = trapezoid(kernel.lags.size, kernel.lags[1])
     flat = kernel.values.reshape(kernel.lags.size, -1) * weights[:, None]
     phase = np.outer(frequencies, kernel.lags)
     shape = (-1, *kernel.infinite_mass.shape)
@@ -262,25 +265,24 @@ def _inside(hydro: Hydrodynamics, omega: npt.ArrayLike) -> FloatArray:
     return wanted
 
 
+def _between(hydro: Hydrodynamics, values: ComplexArray, omega: npt.ArrayLike) -> ComplexArray:
+    """Values between the solver's frequencies, by cubic splines."""
+    parts = np.stack([values.real, values.imag], axis=-1)
+    found = scipy.interpolate.CubicSpline(hydro.omega, parts, axis=0)(_inside(hydro, omega))
+    return np.asarray(found[..., 0] + 1j * found[..., 1], dtype=complex)
+
+
 def excitation_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
     """Wave excitation per metre of amplitude, shape (frequency, dof), by cubic splines.
 
     Raises RequestError if a frequency lies outside the file's band.
     """
-    wanted = _inside(hydro, omega)
-    parts = np.stack([hydro.excitation.real, hydro.excitation.imag], axis=-1)
-    values = scipy.interpolate.CubicSpline(hydro.omega, parts, axis=0)(wanted)
-    result: ComplexArray = np.asarray(values[..., 0] + 1j * values[..., 1], dtype=complex)
-    return result
+    return _between(hydro, hydro.excitation, omega)
 
 
 def far_field_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
     """Forms of the outgoing waves between the solver's frequencies, by cubic splines."""
-    wanted = _inside(hydro, omega)
-    parts = np.stack([hydro.far_field.real, hydro.far_field.imag], axis=-1)
-    values = scipy.interpolate.CubicSpline(hydro.omega, parts, axis=0)(wanted)
-    result: ComplexArray = np.asarray(values[..., 0] + 1j * values[..., 1], dtype=complex)
-    return result
+    return _between(hydro, hydro.far_field, omega)
 
 
 def impedance(

@@ -66,17 +66,11 @@ class Played:
 
     def states(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Position, velocity and acceleration at any instants, each of shape (dof, time)."""
-        m = self.motion
-        position = scipy.interpolate.CubicHermiteSpline(m.time, m.position, m.velocity, axis=1)(
-            time
-        )
-        velocity = scipy.interpolate.CubicHermiteSpline(m.time, m.velocity, m.acceleration, axis=1)(
-            time
-        )
+        m, smooth = self.motion, scipy.interpolate
         return (
-            position,
-            velocity,
-            scipy.interpolate.CubicSpline(m.time, m.acceleration, axis=1)(time),
+            smooth.CubicHermiteSpline(m.time, m.position, m.velocity, axis=1)(time),
+            smooth.CubicHermiteSpline(m.time, m.velocity, m.acceleration, axis=1)(time),
+            smooth.CubicSpline(m.time, m.acceleration, axis=1)(time),
         )
 
     def ramp(self, time: FloatArray) -> FloatArray:
@@ -169,7 +163,7 @@ def _probes(
     return columns
 
 
-def _mru(played: Played, time: FloatArray, rng: np.random.Generator) -> dict[str, Column]:
+def _mru(played: Played, time: FloatArray, _: float, rng: np.random.Generator) -> dict[str, Column]:
     noise = played.settings.instruments
     q, v, a = played.states(time)
     zero = np.zeros(time.size)
@@ -205,7 +199,9 @@ def _immersed(played: Played, time: FloatArray, line: int) -> npt.NDArray[np.boo
     return under
 
 
-def _loads(played: Played, time: FloatArray, rng: np.random.Generator) -> dict[str, Column]:
+def _loads(
+    played: Played, time: FloatArray, _: float, rng: np.random.Generator
+) -> dict[str, Column]:
     instruments = played.settings.instruments
     true = played.loads(time)
     # Whether a line is wet changes slowly: every tenth sample finds the crossings.
@@ -221,10 +217,21 @@ def _loads(played: Played, time: FloatArray, rng: np.random.Generator) -> dict[s
     return columns
 
 
-def _video(played: Played, time: FloatArray, rng: np.random.Generator) -> dict[str, Column]:
+def _video(
+    played: Played, time: FloatArray, _: float, rng: np.random.Generator
+) -> dict[str, Column]:
     surge = played.states(time)[0][0]
     noisy = surge + played.settings.instruments.surge_noise * rng.standard_normal(time.size)
     return {"surge": Column("m", noisy, 5)}
+
+
+_MAKERS: dict[Logger, Callable[..., dict[str, Column]]] = {
+    "wave_probes": _probes,
+    "mru": _mru,
+    "loads": _loads,
+    "video": _video,
+}
+"""What each logger records of a run at instants, from a run, instants, rate and generator."""
 
 
 def _pulse(
@@ -240,16 +247,13 @@ def _pulse(
 def record_run(played: Played, rng: np.random.Generator) -> list[Record]:
     """Record a run with all instruments, each in its own clock and with its own noise."""
     settings = played.settings.instruments
-    makers: dict[Logger, Callable[[FloatArray, np.random.Generator], dict[str, Column]]] = {
-        "wave_probes": lambda t, r: _probes(played, t, settings.clocks["wave_probes"].rate, r),
-        "mru": lambda t, r: _mru(played, t, r),
-        "loads": lambda t, r: _loads(played, t, r),
-        "video": lambda t, r: _video(played, t, r),
-    }
     records = []
-    for (name, make), child in zip(makers.items(), rng.spawn(len(makers)), strict=True):
-        readings, instants = clock_instants(settings.clocks[name], played.length)
-        columns = _pulse(settings, name, instants, child) | make(instants, child)
+    for (name, make), child in zip(_MAKERS.items(), rng.spawn(len(_MAKERS)), strict=True):
+        clock = settings.clocks[name]
+        readings, instants = clock_instants(clock, played.length)
+        columns = _pulse(settings, name, instants, child) | make(
+            played, instants, clock.rate, child
+        )
         records.append(Record(name, readings, columns))
     return records
 
@@ -257,7 +261,7 @@ def record_run(played: Played, rng: np.random.Generator) -> list[Record]:
 def record_together(played: Played, rate: float, rng: np.random.Generator) -> Record:
     """Record a run with all instruments on one logger of the given rate (Hz)."""
     time, _ = clock_instants(ClockSettings(rate=rate), played.length)
-    first, second, third, fourth = rng.spawn(4)
-    columns = _probes(played, time, rate, first) | _mru(played, time, second)
-    columns |= _loads(played, time, third) | _video(played, time, fourth)
+    columns: dict[str, Column] = {}
+    for make, child in zip(_MAKERS.values(), rng.spawn(len(_MAKERS)), strict=True):
+        columns |= make(played, time, rate, child)
     return Record("all", time, columns)

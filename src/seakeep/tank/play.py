@@ -14,6 +14,7 @@ from seakeep.arrays import Progress
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import MARK, check_output, is_there, make_folder
+from seakeep.signals.panel import opencv
 from seakeep.tank.delivery import (
     CAMPAIGN,
     FIRST_LINE,
@@ -29,7 +30,7 @@ from seakeep.tank.hydrodynamics import excitation_at
 from seakeep.tank.instruments import Played, record_run, record_together
 from seakeep.tank.seas import Sea, sea_of_run
 from seakeep.tank.settings import TankSettings
-from seakeep.tank.video import SIDE_VIEW, check_video, render_side_view
+from seakeep.tank.video import SIDE_VIEW, render_side_view
 
 __all__ = ["check_settings", "generator", "noisy_truth", "play", "play_run", "truth"]
 
@@ -98,12 +99,11 @@ def play_run(settings: TankSettings, name: str, rig: Rig | None = None) -> Playe
     (name,) = _chosen(settings, [name])
     sea = _sea(settings, made, name)
     run = settings.runs[name]
-    length = run.startup + run.duration
     clocks = settings.instruments.clocks.values()
-    beyond = max(abs(c.offset) + 1e-6 * abs(c.drift) * length for c in clocks) + MARGIN
+    beyond = max(abs(c.offset) + 1e-6 * abs(c.drift) * run.length for c in clocks) + MARGIN
     margin = made.step * np.ceil(beyond / made.step)
-    motion = simulate(made, sea, length + 2 * margin, begin=-margin)
-    return Played(settings, made, sea, motion, length)
+    motion = simulate(made, sea, run.length + 2 * margin, begin=-margin)
+    return Played(settings, made, sea, motion, run.length)
 
 
 def _labelled(name: str) -> dict[str, str]:
@@ -113,9 +113,7 @@ def _labelled(name: str) -> dict[str, str]:
         "slosh": ("m", "moon-pool sloshing elevation"),
         "surge_slow": ("m", "slow part of surge"),
     }
-    if channel is not None:
-        return {"units": channel.units, "long_name": channel.long_name}
-    unit, label = extra[name]
+    unit, label = extra[name] if channel is None else (channel.units, channel.long_name)
     return {"units": unit, "long_name": label}
 
 
@@ -296,7 +294,7 @@ def play(
     chosen = _chosen(settings, names)
     filmed = _chosen(settings, videos) if (videos := list(videos)) else []
     if filmed:
-        check_video()
+        opencv("rendering")
     part = settings.model_copy(update={"runs": {n: settings.runs[n] for n in chosen}})
     rig = check_settings(part)
     folder = Path(out)

@@ -17,6 +17,7 @@ from seakeep.signals import (
     wave_spectrum,
 )
 from seakeep.signals.time_axis import over_gaps
+from seakeep.signals.waves import paper_welch
 from seakeep.tank.instruments import Played, record_run
 from seakeep.tank.play import generator
 from seakeep.tank.settings import TankSettings
@@ -78,13 +79,8 @@ class Row:
 
 
 def paper_peak(elevation: npt.ArrayLike, dt: float) -> tuple[float, FloatArray, FloatArray]:
-    """Peak period by the paper's Welch settings, with the frequencies and the spectrum.
-
-    The paper's segments of 2¹² samples at 500 Hz are kept in seconds.
-    """
-    segment = round(2**12 * 0.002 / dt)
-    overlap, padded = round(2**7 * 0.002 / dt), round(2**16 * 0.002 / dt)
-    frequency, density = wave_spectrum(elevation, dt, segment, overlap, padded)
+    """Peak period by the paper's Welch settings, with the frequencies and the spectrum."""
+    frequency, density = wave_spectrum(elevation, dt, *paper_welch(dt))
     return float(1.0 / frequency[np.argmax(density)]), frequency, density
 
 
@@ -160,16 +156,14 @@ def matrix_rows(settings: TankSettings, realised: list[Realised]) -> list[dict[s
     """Test matrix as in the paper's first table, one row per sea, with realised heights."""
     depth = settings.facility.water_depth
     rows: list[dict[str, str]] = []
-    seas: dict[str, list[Realised]] = {}
+    seas: dict[tuple[str, str], list[Realised]] = {}
     for each in realised:
         run = settings.runs[each.run]
         if run.spectrum is not None:
             high = run.nominal_height or run.spectrum.height
             stated = "" if high is None else f"{high:.2f}"
-            label = f"{stated}|{run.spectrum.kind.replace('_', '–').title()}"
-            seas.setdefault(label, []).append(each)
-    for label, runs in seas.items():
-        nominal, kind = label.split("|")
+            seas.setdefault((stated, run.spectrum.kind.replace("_", "–").title()), []).append(each)
+    for (nominal, kind), runs in seas.items():
         values = np.array([r.significant_height for r in runs])
         spread = values.std(ddof=1) if values.size > 1 else 0.0
         rows.append(

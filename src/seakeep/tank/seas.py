@@ -178,7 +178,7 @@ def sea_of_run(
     low, high = facility.wave_band
     if run.spectrum is not None:
         sea = irregular_sea(run.spectrum, facility.water_depth, rng)
-        asked = (run.spectrum.band[0], run.spectrum.band[1])
+        asked = run.spectrum.band
         height = 4.0 * float(np.sqrt(0.5 * np.sum(sea.amplitude**2)))
     else:
         length, height = run.wavelength or 0.0, run.height or 0.0
@@ -189,7 +189,7 @@ def sea_of_run(
         shortest, longest = (
             2 * np.pi / float(wavenumber(2 * np.pi * f, facility.water_depth)) for f in (high, low)
         )
-        wanted = f"{asked[0]:.3g}" if asked[0] == asked[1] else f"{asked[0]:.3g}–{asked[1]:.3g}"
+        wanted = "–".join(dict.fromkeys(f"{f:.3g}" for f in asked))
         raise RequestError(
             f"runs.{name} asks for waves of {wanted} Hz; the wave maker covers {low:g}–{high:g} Hz "
             f"(wavelengths of {shortest:.2f}–{longest:.1f} m). Change the wave, or "

@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
-from seakeep.errors import RequestError, SeakeepError
+from seakeep.errors import SeakeepError
+from seakeep.signals.panel import opencv
 from seakeep.tank.instruments import Played, clock_instants, trigger
 
 __all__ = [
@@ -23,7 +24,6 @@ __all__ = [
     "PANEL",
     "PANEL_HEIGHT",
     "SIDE_VIEW",
-    "check_video",
     "frame_of",
     "pixel_of",
     "render_side_view",
@@ -45,24 +45,6 @@ NOISE = 3.0  # grey levels
 NOISE_FRAMES = 12
 HULL = ((-0.70, 0.20), (-0.62, -0.06), (-0.47, -0.083), (0.42, -0.083), (0.64, -0.03), (0.68, 0.20))
 """Outline of the CK-14e-like hull, m from the place at rest; any hull is drawn so."""
-
-
-def check_video() -> Any:
-    """Return OpenCV's module.
-
-    Raises
-    ------
-    RequestError
-        If it is not installed.
-    """
-    try:
-        import cv2
-    except ImportError as error:
-        raise RequestError(
-            "rendering a video needs OpenCV, which is not installed. "
-            "Install the extra: pip install 'seakeep[video]'."
-        ) from error
-    return cv2
 
 
 def pixel_of(x: npt.ArrayLike, z: npt.ArrayLike) -> FloatArray:
@@ -175,7 +157,7 @@ def side_view(played: Played, rng: np.random.Generator, instants: npt.ArrayLike)
 
     At the given reference instants. Raises RequestError if OpenCV is not installed.
     """
-    cv2 = check_video()
+    cv2 = opencv("rendering")
     time = np.asarray(instants, dtype=float)
     instruments = played.settings.instruments
     position, _, _ = played.states(time)
@@ -207,7 +189,7 @@ def render_side_view(
     SeakeepError
         If it cannot write MP4 files here.
     """
-    cv2 = check_video()
+    cv2 = opencv("rendering")
     clock = played.settings.instruments.clocks["video"]
     _, instants = clock_instants(clock, played.length if length is None else length)
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
