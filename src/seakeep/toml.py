@@ -474,39 +474,26 @@ def _shown(value: object) -> str:
 
 def _place(loc: list[str], root: type[BaseModel]) -> tuple[type[BaseModel] | None, str, int]:
     """Table in which the last key stands, that key's description, and how many keys count."""
-    table: type[BaseModel] | None = root
-    owner, description, annotation = table, "", None
+    here: Any = root
+    owner, description = root, ""
     for depth, key in enumerate(loc):
-        if table is not None:
-            owner = table
-            fields = {field.alias or name: field for name, field in table.model_fields.items()}
-            if key not in fields:
-                if (others := getattr(table, "others", None)) is None:
-                    return owner, "", depth + 1
-                table = others
-                continue
-            annotation, description = fields[key].annotation, fields[key].description or ""
-        elif (values := _values_in(annotation)) is not None:
-            annotation = values
-        else:
+        if here is None:
             return owner, description, depth
-        table = _table_in(annotation)
+        if typing.get_origin(here) is dict:
+            here = _within(typing.get_args(here)[1])
+            continue
+        owner = here
+        fields = {field.alias or name: field for name, field in owner.model_fields.items()}
+        if key in fields:
+            here, description = _within(fields[key].annotation), fields[key].description or ""
+        elif (here := getattr(owner, "others", None)) is None:
+            return owner, "", depth + 1
     return owner, description, len(loc)
 
 
-def _values_in(annotation: Any) -> Any:
-    """Return what the values of a dict may be that an annotation allows, behind unions."""
-    if typing.get_origin(annotation) is dict:
-        return typing.get_args(annotation)[1]
-    found = (_values_in(each) for each in typing.get_args(annotation))
-    return next((values for values in found if values is not None), None)
-
-
-def _table_in(annotation: Any) -> type[BaseModel] | None:
-    """Return the table that an annotation allows, behind unions and annotations."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _within(annotation: Any) -> Any:
+    """Return the table or the dict that an annotation allows, behind unions and annotations."""
+    if typing.get_origin(annotation) is dict or hasattr(annotation, "model_fields"):
         return annotation
-    if typing.get_origin(annotation) is dict:
-        return None
-    found = (_table_in(each) for each in typing.get_args(annotation))
-    return next((table for table in found if table is not None), None)
+    found = map(_within, typing.get_args(annotation))
+    return next((each for each in found if each is not None), None)
