@@ -16,7 +16,7 @@ from seakeep.errors import DataError, did_you_mean
 from seakeep.formats.columns import Columns
 from seakeep.formats.reader import Options
 
-__all__ = ["read_netcdf"]
+__all__ = ["opened_netcdf", "read_netcdf"]
 
 WIDEST = 64
 """Columns of a two-dimensional set beyond which it is a picture or a field, not channels."""
@@ -28,7 +28,7 @@ def read_netcdf(path: Path, options: Options) -> Columns:
     A set of shape (time, n) is split: by the labels of its second dimension, or ``NAME_1`` to
     ``NAME_n``. `group` may be left out where one group alone holds channels.
     """
-    dataset = _opened(path, options.group)
+    dataset = opened_netcdf(path, options.group)
     flat: dict[str, xr.DataArray] = {}
     faults: dict[str, str] = {}
     for name, variable in dataset.variables.items():
@@ -71,7 +71,8 @@ def _text(attribute: Any) -> str:
         return attribute.decode("latin-1")
 
 
-def _opened(path: Path, group: str | None) -> xr.Dataset:
+def opened_netcdf(path: Path, group: str | None = None) -> xr.Dataset:
+    """Variables of a NetCDF or HDF5 file; a DataError says where it is cut off or damaged."""
     with path.open("rb") as file:
         classic = file.read(3) == b"CDF"
     try:
