@@ -214,7 +214,8 @@ def _missing(path: Path) -> MissingFileError:
             f"{path} does not exist: there is no folder {path.parent}. Correct the path."
         )
     near = did_you_mean(path.name, beside)
-    nearest = sorted(difflib.get_close_matches(path.name, beside, SHOWN, cutoff=0.0))
+    beside.sort(key=lambda name: -difflib.SequenceMatcher(None, path.name, name).ratio())
+    nearest = sorted(beside[:SHOWN])
     listed = ", ".join(nearest) or "nothing"
     if len(beside) > SHOWN:
         listed = f"{len(beside)} names, the nearest of them {listed}"
