@@ -48,6 +48,7 @@ __all__ = [
     "in_seconds",
     "lengths",
     "number",
+    "optional",
     "parse_length",
     "read_toml",
     "refusal",
@@ -209,6 +210,11 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, populate_by_name=True)
     others: ClassVar[type[BaseModel] | None] = None
     """What a key is whose name the user chooses, where fixed keys stand beside such keys."""
+
+
+def optional(description: str, default: Any = None) -> Any:
+    """Key that may be left out; its description is the remedy in a message."""
+    return Field(default=default, description=description)
 
 
 def number(value: float | Length) -> float:
