@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import struct
 import warnings
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,7 +12,7 @@ import xarray as xr
 
 from seakeep.errors import DataError, did_you_mean
 from seakeep.formats.columns import Columns
-from seakeep.formats.reader import Options
+from seakeep.formats.reader import Options, decoding
 
 __all__ = ["opened_netcdf", "read_netcdf"]
 
@@ -75,23 +73,14 @@ def opened_netcdf(path: Path, group: str | None = None) -> xr.Dataset:
     """Variables of a NetCDF or HDF5 file; a DataError says where it is cut off or damaged."""
     with path.open("rb") as file:
         classic = file.read(3) == b"CDF"
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UnicodeWarning)  # units in another encoding: see _text
-            how: dict[str, Any] = {"engine": "scipy"}
-            if not classic:
-                how = {"engine": "h5netcdf", "group": _group(path, group), "phony_dims": "sort"}
-            with xr.open_dataset(path, decode_times=False, **how) as opened:
-                return opened.load()
-    except DataError:
-        raise
-    except (OSError, ValueError, TypeError, KeyError, IndexError, EOFError, RuntimeError,
-            AttributeError, MemoryError, struct.error, zlib.error) as error:  # fmt: skip
-        raise DataError(
-            f"{path} cannot be read as NetCDF or HDF5: cut off, damaged or of another kind "
-            f"({str(error).splitlines()[0] if str(error) else type(error).__name__}). "
-            "Copy or download it again."
-        ) from None
+    what = "NetCDF or HDF5: cut off, damaged or of another kind"
+    with decoding(path, what, "Copy or download it again."), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnicodeWarning)  # units in another encoding: see _text
+        how: dict[str, Any] = {"engine": "scipy"}
+        if not classic:
+            how = {"engine": "h5netcdf", "group": _group(path, group), "phony_dims": "sort"}
+        with xr.open_dataset(path, decode_times=False, **how) as opened:
+            return opened.load()
 
 
 def _group(path: Path, wanted: str | None) -> str | None:
