@@ -126,28 +126,13 @@ def _length(value: object) -> Length:
     return found
 
 
-def _finite(length: Length) -> Length:
-    if not math.isfinite(length.value):
-        raise ValueError("this length must be finite")
-    return length
+def _is(words: str, fits: Callable[[float], bool]) -> AfterValidator:
+    def check(length: Length) -> Length:
+        if not fits(length.value):
+            raise ValueError(f"this length must be {words}")
+        return length
 
-
-def _not_negative(length: Length) -> Length:
-    if not 0 <= length.value < math.inf:
-        raise ValueError("this length must be finite and not negative")
-    return length
-
-
-def _some(length: Length) -> Length:
-    if not length.value > 0:
-        raise ValueError("this length must be positive")
-    return length
-
-
-def _positive(length: Length) -> Length:
-    if not 0 < length.value < math.inf:
-        raise ValueError("this length must be finite and positive")
-    return length
+    return AfterValidator(check)
 
 
 def _rising(span: tuple[float | Length, float | Length]) -> tuple[float | Length, float | Length]:
@@ -177,25 +162,27 @@ Count = Annotated[int, Field(ge=1)]
 Names = Annotated[tuple[str, ...], Field(strict=False)]
 Duration = Annotated[
     Annotated[Positive, Tag("<number>")]
-    | Annotated[_Length, AfterValidator(_positive), Tag("<length>")],
+    | Annotated[_Length, _is("finite and positive", lambda x: 0 < x < math.inf), Tag("<length>")],
     _PERIODS,
 ]
 """A positive duration: seconds or a :class:`Length`."""
 Instant = Annotated[
     Annotated[Finite, Tag("<number>")]
-    | Annotated[_Length, AfterValidator(_finite), Tag("<length>")],
+    | Annotated[_Length, _is("finite", math.isfinite), Tag("<length>")],
     _PERIODS,
 ]
 """An instant: seconds or a :class:`Length`."""
 Delay = Annotated[
     Annotated[int, Field(ge=0), Tag("<number>")]
-    | Annotated[_Length, AfterValidator(_not_negative), Tag("<length>")],
+    | Annotated[
+        _Length, _is("finite and not negative", lambda x: 0 <= x < math.inf), Tag("<length>")
+    ],
     _PERIODS,
 ]
 """A number of samples, or a :class:`Length` that becomes samples once the step is known."""
 Window = Annotated[
     Annotated[int, Field(ge=2), Tag("<number>")]
-    | Annotated[_Length, AfterValidator(_some), Tag("<length>")],
+    | Annotated[_Length, _is("positive", lambda x: x > 0), Tag("<length>")],
     _PERIODS,
 ]
 """The same, of at least two samples; ``"inf T"`` stands for all there are."""
@@ -323,8 +310,7 @@ def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
             f"{path} is not valid TOML: {error}. Write texts in quotes, lists in [ ], "
             "one 'key = value' per line, and each table and key once." + _if_no_toml(path, what)
         ) from None
-    others = {kind: keys for kind, keys in KNOWN_BY.items() if kind != what}
-    for other, keys in others.items():
+    for other, keys in KNOWN_BY.items():
         tables = [f"[{key}]" for key in keys if key in found]
         if tables and not any(key in found for key in KNOWN_BY[what]):
             raise RequestError(
