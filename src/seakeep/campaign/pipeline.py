@@ -514,7 +514,7 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
         step = uniform_step(groups[home[name]]["time"].to_numpy(), f"run '{run.name}'")
         own |= derive(own, name, settings, step, run.name)
     for key, data in groups.items():
-        groups[key] = _with(data, channels[key])
+        groups[key] = _dataset(data.variables["time"], channels[key], data.attrs)
     return replace(run, groups=groups, late=tuple(late))
 
 
@@ -523,11 +523,13 @@ def variables_of(data: xr.Dataset) -> dict[str, xr.Variable]:
     return {str(name): each for name, each in data.variables.items() if name != "time"}
 
 
-def _with(data: xr.Dataset, channels: Mapping[str, xr.Variable]) -> xr.Dataset:
-    """Add the channels, and flags, that a Dataset does not have yet."""
-    new = {name: each for name, each in channels.items() if name not in data.variables}
-    flags = {name: new.pop(name) for name in list(new) if name.endswith("_flags")}
-    return data.assign(new).assign_coords(flags) if new else data
+def _dataset(
+    time: xr.Variable, channels: Mapping[str, xr.Variable], attributes: Mapping[Any, Any]
+) -> xr.Dataset:
+    """Channels as variables, their flags as coordinates."""
+    flags = {name: each for name, each in channels.items() if name.endswith("_flags")}
+    data = {name: each for name, each in channels.items() if name not in flags}
+    return xr.Dataset(data, {"time": time, **flags}, attributes)
 
 
 def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
@@ -537,23 +539,21 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
     instant, where every logger recorded; samples that are missing become NaN.
     """
     time = _axis(run, dt) if time is None else time
-    out = xr.Dataset(coords={"time": ("time", time, next(iter(run.groups.values()))["time"].attrs)})
+    channels: dict[str, xr.Variable] = {}
     for group in run.groups.values():
-        out = out.assign(_on_axis(group, time, dt, run.settings.preparation, run.name))
-        for name in group.coords:
-            if str(name).endswith("_flags"):
-                given = group.variables[name]
-                flags = _flags_at(given.to_numpy(), group["time"].to_numpy(), time, dt)
-                out.coords[str(name)] = ("time", flags, given.attrs)
-    channels = variables_of(out)
+        channels |= _on_axis(group, time, dt, run.settings.preparation, run.name)
     for name in run.late:
         channels |= derive(channels, name, run.settings, dt, run.name)
-    out = _with(out, channels)
-    for name in list(out.data_vars):
-        if f"{name}_flags" in out.coords:
-            lost = (out[f"{name}_flags"].to_numpy() & MISSING) > 0
-            out[name] = out[name].copy(data=np.where(lost, np.nan, out[name].to_numpy()))
-    return replace(run, data=out[[name for name in run.settings.channel_names if name in out]])
+    out = {}
+    for name in run.settings.channel_names:
+        if name in channels:
+            out[name] = channels[name]
+            if (flags := channels.get(f"{name}_flags")) is not None:
+                lost = (flags.to_numpy() & MISSING) > 0
+                out[name] = out[name].copy(data=np.where(lost, np.nan, out[name].to_numpy()))
+                out[f"{name}_flags"] = flags
+    attributes = next(iter(run.groups.values()))["time"].attrs
+    return replace(run, data=_dataset(xr.Variable("time", time, attributes), out, {}))
 
 
 def _axis(run: Run, dt: float) -> FloatArray:
@@ -599,7 +599,8 @@ def _instant(group: xr.Dataset, at: int) -> str:
 
 def _on_axis(
     group: xr.Dataset, wanted: FloatArray, dt: float, settings: PreparationSettings, run: str
-) -> dict[str, tuple[str, FloatArray, dict[str, object]]]:
+) -> dict[str, xr.Variable]:
+    """Channels of a logger and their flags at other instants."""
     time = group["time"].to_numpy()
     own = uniform_step(time, f"run '{run}'")
     channels = {name: group.variables[name] for name in group.data_vars}
@@ -617,10 +618,15 @@ def _on_axis(
     else:
         series = series[: wanted.size]
     filtered = {"low_pass": low} if low else {}
-    return {
-        str(name): ("time", series[:, i].copy(), {**channel.attrs, **filtered})
+    out = {
+        str(name): xr.Variable("time", series[:, i].copy(), {**channel.attrs, **filtered})
         for i, (name, channel) in enumerate(channels.items())
     }
+    for name, flags in group.variables.items():
+        if str(name).endswith("_flags"):
+            new = _flags_at(flags.to_numpy(), time, wanted, dt)
+            out[str(name)] = xr.Variable("time", new, flags.attrs)
+    return out
 
 
 def _flags_at(flags: Any, time: FloatArray, wanted: FloatArray, dt: float) -> Any:
