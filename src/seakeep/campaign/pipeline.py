@@ -177,9 +177,8 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
     for key, path in paths.items():
         options = settings.files
         if key:
-            own = settings.instruments[key]
-            keys = ("time", "time_unit", "sampling_rate")
-            stated = {k: getattr(own, k) for k in keys if getattr(own, k) is not None}
+            keys = {"time", "time_unit", "sampling_rate"}
+            stated = settings.instruments[key].model_dump(include=keys, exclude_none=True)
             options = options.model_copy(update=stated)
         columns = reader(path, options.known())
         if key and time_column(columns, options.time) is not None:
@@ -240,8 +239,7 @@ def channels_of(settings: CampaignSettings, run: RunSettings) -> dict[str, Chann
     """Channel map of a run: the campaign's, with the keys that the run replaces."""
     chosen = dict(settings.channels)
     for name, own in run.channels.items():
-        stated = {key: getattr(own, key) for key in own.model_fields_set}
-        chosen[name] = chosen[name].model_copy(update=stated)
+        chosen[name] = chosen[name].model_copy(update=own.model_dump(exclude_unset=True))
     return chosen
 
 

@@ -56,7 +56,7 @@ def read_netcdf(path: Path, options: Options) -> Columns:
     units = {
         name: _text(array.attrs["units"]) for name, array in flat.items() if "units" in array.attrs
     }
-    return Columns(values, units, faults, headers={name: name for name in [*values, *faults]})
+    return Columns(values, units, faults)
 
 
 def _text(attribute: Any) -> str:

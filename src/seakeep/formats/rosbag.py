@@ -182,9 +182,7 @@ def _columns(path: Path, rows: _Rows, begin: int) -> Columns:
         )
     units = {name: unit for name in values if (unit := _unit(rows.kind, name)) is not None}
     units |= dict.fromkeys(times, "s")
-    values = {**times, **values}
-    headers = {name: name for name in [*values, *faults]}
-    return Columns(values=values, units=units, faults=faults, headers=headers)
+    return Columns({**times, **values}, units, faults)
 
 
 def _seconds(instants: list[int], begin: int) -> FloatArray:

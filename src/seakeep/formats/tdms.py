@@ -134,7 +134,7 @@ def _columns(path: Path, channels: list[Any], data: list[npt.NDArray[Any]]) -> C
     if time is not None and not any(name.lower() == "time" for name in names):
         values = {"time": time, **values}
         units["time"] = "s"
-    return Columns(values=values, units=units, headers={name: name for name in values})
+    return Columns(values, units)
 
 
 def _seconds(instants: npt.NDArray[Any]) -> FloatArray:
