@@ -18,7 +18,7 @@ from seakeep.errors import DataError
 from seakeep.formats import Columns
 from seakeep.formats.columns import is_unit, named_unit
 from seakeep.signals import encounter_period, repeated_waves, uniform_step, waves_part
-from seakeep.signals.time_axis import over_gaps
+from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import energy_period, tapered_power
 
 __all__ = [
@@ -381,16 +381,12 @@ def _fault(column: str, files: Sequence[File]) -> tuple[str, Literal["", "short"
         return f"has gaps in {_listed(gapped)}", "long"
     if all(_step_of(f.table.values[column]) == 1.0 for f in files):
         return "it counts; if it counts seconds, state time = …", ""
-    longest = max(_longest(m) / (f.rate or np.inf) for f, m in zip(files, missing, strict=True))
-    if not any(m.any() for m in missing):
-        return "", ""
-    return "", "short" if longest <= SHORT_GAP else "long"
-
-
-def _longest(missing: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> int:
-    """Samples of the longest stretch that is missing."""
-    there = np.flatnonzero(np.concatenate([[True], ~missing, [True]]))
-    return int(np.diff(there).max()) - 1
+    lengths = [
+        (end - start) / (f.rate or np.inf)
+        for f, m in zip(files, missing, strict=True)
+        for start, end in stretches(m)
+    ]
+    return "", "" if not lengths else "short" if max(lengths) <= SHORT_GAP else "long"
 
 
 def _rising_column(table: Columns) -> str | None:

@@ -391,19 +391,21 @@ def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
         return
     time = data["time"].to_numpy()
     missing = ~np.isfinite(data[gapped[0]].to_numpy())
-    starts, ends = np.array(stretches(missing)).T
     step = float(np.median(np.diff(time)))
-    lengths = ends - starts
-    longest = int(np.argmax(lengths))
-    first, worst = (instant_text(time[starts[at]], step) for at in (0, longest))
+    gaps = stretches(missing)
+
+    def said(gap: tuple[int, int]) -> str:
+        count = gap[1] - gap[0]
+        begin = instant_text(time[gap[0]], step)
+        return f"t = {begin} s ({count} samples, {count * step:.4g} s)"
+
     others = f" (also in {', '.join(gapped[1:])})" if gapped[1:] else ""
     raise DataError(
         f"run '{run}' ({path}): channel '{gapped[0]}' has {int(missing.sum())} missing values of "
-        f"{missing.size} in {starts.size} gap(s), the first at t = {first} s ({lengths[0]} "
-        f"samples, {lengths[0] * step:.4g} s), the longest at t = {worst} s "
-        f"({lengths[longest]} samples, {lengths[longest] * step:.4g} s)"
-        f"{others}. Repair the file, leave the channel out, or cut the gap off with record = "
-        f"[start, end] in [runs.{run}]; or state gaps = 'mask' or 'bridge' in [preparation]."
+        f"{missing.size} in {len(gaps)} gap(s), the first at {said(gaps[0])}, the longest at "
+        f"{said(max(gaps, key=lambda gap: gap[1] - gap[0]))}{others}. Repair the file, leave the "
+        f"channel out, or cut the gap off with record = [start, end] in [runs.{run}]; or state "
+        "gaps = 'mask' or 'bridge' in [preparation]."
     )
 
 

@@ -42,8 +42,6 @@ from seakeep.toml import in_seconds, lengths, parse_length
 
 __all__ = ["Campaign", "Progress", "read_campaign"]
 
-"""Called after each run with how many are done, how many there are, and the run's name."""
-
 SHOWN_RUNS = 6
 """Runs that a campaign's representation names."""
 
