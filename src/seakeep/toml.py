@@ -138,8 +138,7 @@ def _is(words: str, fits: Callable[[float], bool]) -> AfterValidator:
 def _rising(span: tuple[float | Length, float | Length]) -> tuple[float | Length, float | Length]:
     start, end = (each.value if isinstance(each, Length) else each for each in span)
     mixed = isinstance(span[0], Length) != isinstance(span[1], Length)
-    known = not (math.isnan(start) or math.isnan(end)) and start < math.inf and end > -math.inf
-    if not known or not (start < end or mixed):
+    if not (start < math.inf and end > -math.inf and (start < end or mixed)):
         raise ValueError(
             "a span is [start, end] in seconds of the file's clock or in encounter periods "
             "('10 T'), start before end; 'inf' stands for the end of the record"
