@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -242,8 +241,11 @@ def _by_name(paths: Sequence[Path], own: Sequence[set[str]]) -> list[tuple[str, 
     stems = [re.split(r"[_-]+", _stem(path)) for path in paths]
     keys = []
     for words, columns in zip(stems, own, strict=True):
-        alike = [s[::-1] for s, other in zip(stems, own, strict=True) if _alike(columns, other)]
-        at = len(words) - (len(os.path.commonprefix(alike)) if len(alike) > 1 else 1)
+        alike = [s for s, other in zip(stems, own, strict=True) if _alike(columns, other)]
+        count = 0
+        while count < len(words) and len({tuple(s[-count - 1 :]) for s in alike}) == 1:
+            count += 1
+        at = len(words) - (count if len(alike) > 1 else 1)
         keys.append(("_".join(words[:at]), "_".join(words[at:])))
     return keys
 
