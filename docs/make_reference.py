@@ -157,8 +157,10 @@ def tables_of(annotation):
 def shown(field):
     """Default of a key in words."""
     default = field.default
-    if default is PydanticUndefined:
-        return "needed" if field.is_required() else "none"
+    if field.is_required():
+        return "needed"
+    if default in (PydanticUndefined, {}):
+        return "none"
     if default is None or default == ():
         return "–"
     return f"`{str(default).lower() if isinstance(default, bool) else repr(default)}`"

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seakeep.conventions import (
+    MOTIONS,
     canonical_channel,
-    canonical_names,
     conversion,
     is_elevation,
     si_unit,
@@ -66,8 +66,10 @@ def test_units(unit, si, factor):
     assert conversion(unit, si) == pytest.approx(factor, rel=1e-14)
 
 
-@pytest.mark.parametrize("name", canonical_names())
-def test_every_canonical_unit_is_si(name):
+@pytest.mark.parametrize("kind", ["", "_rate", "_acceleration"])
+@pytest.mark.parametrize("quantity", [*MOTIONS, "eta"])
+def test_every_canonical_unit_is_si(quantity, kind):
+    name = quantity + kind
     channel = canonical_channel(name)
     assert si_unit(channel.units) == channel.units
     assert conversion(channel.units, channel.units) == 1.0
@@ -78,6 +80,8 @@ def test_every_canonical_unit_is_si(name):
 def test_families_of_channels():
     assert canonical_channel("eta_fwd").long_name == "wave elevation fwd"
     assert canonical_channel("mooring_port").units == "N"
+    assert canonical_channel("mooring_bow").long_name == "bow mooring load"
+    assert canonical_channel("heave_fwd") is None
     assert canonical_channel("mooring_bow_rate").units == "N/s"
     assert canonical_channel("mooring_aft_port_acceleration").units == "N/s^2"
     assert canonical_channel("eta_rate").symbol == r"\dot{\eta}"

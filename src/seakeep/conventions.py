@@ -24,7 +24,6 @@ __all__ = [
     "Channel",
     "base_powers",
     "canonical_channel",
-    "canonical_names",
     "conversion",
     "displayed",
     "is_elevation",
@@ -54,53 +53,26 @@ class Channel:
     symbol: str
 
 
-_MOTIONS = {
-    "surge": ("m", "x"),
-    "sway": ("m", "y"),
-    "heave": ("m", "z"),
-    "roll": ("rad", r"\phi"),
-    "pitch": ("rad", r"\theta"),
-    "yaw": ("rad", r"\psi"),
-}
-MOTIONS = tuple(_MOTIONS)
+MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 """Motions of a rigid body, in the order of its six degrees of freedom."""
-_FIXED = {
-    "mooring_bow": ("N", "bow mooring load", r"M_\mathrm{bow}"),
-    "mooring_stern": ("N", "stern mooring load", r"M_\mathrm{stern}"),
+_QUANTITIES = {
+    "surge": ("m", "surge", "x"),
+    "sway": ("m", "sway", "y"),
+    "heave": ("m", "heave", "z"),
+    "roll": ("rad", "roll", r"\phi"),
+    "pitch": ("rad", "pitch", r"\theta"),
+    "yaw": ("rad", "yaw", r"\psi"),
+    "eta": ("m", "wave elevation", r"\eta"),
+    "mooring": ("N", "mooring load", "M"),
 }
 _DERIVATIVES = {
     "": ("", "{}"),
     "rate": ("/s", r"\dot{{{}}}"),
     "acceleration": ("/s^2", r"\ddot{{{}}}"),
 }
-_QUANTITIES = {"eta": ("m", "wave elevation", r"\eta"), "mooring": ("N", "mooring load", "M")}
-_PLACED = re.compile(r"(eta|mooring)(?:_([a-z0-9_]+?))??(?:_(rate|acceleration))?\Z")
-
-
-@lru_cache(maxsize=1)
-def _table() -> dict[str, Channel]:
-    table = {}
-    for motion, (unit, symbol) in _MOTIONS.items():
-        for suffix, (per, accent) in _DERIVATIVES.items():
-            name = f"{motion}_{suffix}".removesuffix("_")
-            label = f"{motion} {suffix}".strip()
-            table[name] = Channel(name, unit + per, label, accent.format(symbol))
-    for name, (unit, label, symbol) in _FIXED.items():
-        table[name] = Channel(name, unit, label, symbol)
-    return table
-
-
-def canonical_names() -> list[str]:
-    """Names of the canonical channels that have a fixed name.
-
-    Returns
-    -------
-    list of str
-        Motions, their rates and accelerations, and the mooring loads. Besides these, ``eta`` and
-        any ``eta_…`` is a wave elevation in metres (``eta_…_rate`` in m/s), and any ``mooring_…``
-        a load in newtons (``mooring_…_rate`` in N/s).
-    """
-    return list(_table())
+_NAME = re.compile(
+    rf"(?:({'|'.join(MOTIONS)})|(eta|mooring)(?:_([a-z0-9_]+?))??)(?:_(rate|acceleration))?\Z"
+)
 
 
 def canonical_channel(name: str) -> Channel | None:
@@ -125,17 +97,17 @@ def canonical_channel(name: str) -> Channel | None:
     >>> canonical_channel("propeller_torque") is None
     True
     """
-    known = _table().get(name)
-    if known is not None:
-        return known
-    if (match := _PLACED.match(name)) is None:
+    if (match := _NAME.match(name)) is None:
         return None
-    kind, place, suffix = (part or "" for part in match.groups())
-    unit, words, letter = _QUANTITIES[kind]
+    motion, quantity, place, suffix = (part or "" for part in match.groups())
+    unit, words, letter = _QUANTITIES[motion or quantity]
     per, accent = _DERIVATIVES[suffix]
     place = place.replace("_", " ")
+    label = f"{words} {place}".strip()
+    if quantity == "mooring" and place in ("bow", "stern"):
+        label = f"{place} {words}"
     symbol = accent.format(letter) + (rf"_\mathrm{{{place}}}" if place else "")
-    return Channel(name, unit + per, " ".join(filter(None, (words, place, suffix))), symbol)
+    return Channel(name, unit + per, f"{label} {suffix}".strip(), symbol)
 
 
 def is_elevation(name: str, rates: bool = False) -> bool:

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any
 from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
 
 if TYPE_CHECKING:
-    import h5py
     import xarray as xr
 
     from seakeep.arrays import FloatArray
@@ -215,8 +214,8 @@ def _missing(path: Path) -> MissingFileError:
             f"{path} does not exist: there is no folder {path.parent}. Correct the path."
         )
     near = did_you_mean(path.name, beside)
-    likeness = {name: difflib.SequenceMatcher(None, path.name, name).ratio() for name in beside}
-    nearest = sorted(sorted(beside, key=lambda name: -likeness[name])[:SHOWN])
+    beside.sort(key=lambda name: -difflib.SequenceMatcher(None, path.name, name).ratio())
+    nearest = sorted(beside[:SHOWN])
     listed = ", ".join(nearest) or "nothing"
     if len(beside) > SHOWN:
         listed = f"{len(beside)} names, the nearest of them {listed}"
@@ -333,11 +332,8 @@ def read_sealed(path: Path | str) -> io.BytesIO:
     MissingFileError
         If there is no such file, or it cannot be read.
     DataError
-        If its checksum is missing or another one, or values of it lie in other files.
+        If its checksum is missing or another one.
     """
-    # Here, so that commands that read no such file start without HDF5.
-    import h5py
-
     content, stated = _content(read_bytes(path))
     if hashlib.sha256(content).hexdigest() != stated:
         why = "its checksum is another one" if stated else "it has no checksum at its end"
@@ -345,27 +341,7 @@ def read_sealed(path: Path | str) -> io.BytesIO:
             f"{path} was cut off, altered or damaged, or seakeep did not write it: {why}. Copy it "
             "again, or remove it and make it anew."
         )
-    kept = io.BytesIO(content)
-    with h5py.File(kept, "r") as file:
-        if outside := next(_outside(file), None):
-            raise DataError(
-                f"{path}: the values of {outside} lie in another file, which seakeep does not "
-                "write. Remove it and make it anew."
-            )
-    return kept
-
-
-def _outside(group: h5py.Group) -> Iterator[str]:
-    """Names of a group and those below it whose values HDF5 would take from other files."""
-    import h5py
-
-    for name in group:
-        if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
-            yield name
-        elif isinstance(item := group[name], h5py.Group):
-            yield from _outside(item)
-        elif isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
-            yield name
+    return io.BytesIO(content)
 
 
 def write_sealed(

@@ -48,6 +48,7 @@ __all__ = [
     "in_seconds",
     "lengths",
     "number",
+    "optional",
     "parse_length",
     "read_toml",
     "refusal",
@@ -125,35 +126,19 @@ def _length(value: object) -> Length:
     return found
 
 
-def _finite(length: Length) -> Length:
-    if not math.isfinite(length.value):
-        raise ValueError("this length must be finite")
-    return length
+def _is(words: str, fits: Callable[[float], bool]) -> AfterValidator:
+    def check(length: Length) -> Length:
+        if not fits(length.value):
+            raise ValueError(f"this length must be {words}")
+        return length
 
-
-def _not_negative(length: Length) -> Length:
-    if not 0 <= length.value < math.inf:
-        raise ValueError("this length must be finite and not negative")
-    return length
-
-
-def _some(length: Length) -> Length:
-    if not length.value > 0:
-        raise ValueError("this length must be positive")
-    return length
-
-
-def _positive(length: Length) -> Length:
-    if not 0 < length.value < math.inf:
-        raise ValueError("this length must be finite and positive")
-    return length
+    return AfterValidator(check)
 
 
 def _rising(span: tuple[float | Length, float | Length]) -> tuple[float | Length, float | Length]:
     start, end = (each.value if isinstance(each, Length) else each for each in span)
     mixed = isinstance(span[0], Length) != isinstance(span[1], Length)
-    known = not (math.isnan(start) or math.isnan(end)) and start < math.inf and end > -math.inf
-    if not known or not (start < end or mixed):
+    if not (start < math.inf and end > -math.inf and (start < end or mixed)):
         raise ValueError(
             "a span is [start, end] in seconds of the file's clock or in encounter periods "
             "('10 T'), start before end; 'inf' stands for the end of the record"
@@ -176,25 +161,27 @@ Count = Annotated[int, Field(ge=1)]
 Names = Annotated[tuple[str, ...], Field(strict=False)]
 Duration = Annotated[
     Annotated[Positive, Tag("<number>")]
-    | Annotated[_Length, AfterValidator(_positive), Tag("<length>")],
+    | Annotated[_Length, _is("finite and positive", lambda x: 0 < x < math.inf), Tag("<length>")],
     _PERIODS,
 ]
 """A positive duration: seconds or a :class:`Length`."""
 Instant = Annotated[
     Annotated[Finite, Tag("<number>")]
-    | Annotated[_Length, AfterValidator(_finite), Tag("<length>")],
+    | Annotated[_Length, _is("finite", math.isfinite), Tag("<length>")],
     _PERIODS,
 ]
 """An instant: seconds or a :class:`Length`."""
 Delay = Annotated[
     Annotated[int, Field(ge=0), Tag("<number>")]
-    | Annotated[_Length, AfterValidator(_not_negative), Tag("<length>")],
+    | Annotated[
+        _Length, _is("finite and not negative", lambda x: 0 <= x < math.inf), Tag("<length>")
+    ],
     _PERIODS,
 ]
 """A number of samples, or a :class:`Length` that becomes samples once the step is known."""
 Window = Annotated[
     Annotated[int, Field(ge=2), Tag("<number>")]
-    | Annotated[_Length, AfterValidator(_some), Tag("<length>")],
+    | Annotated[_Length, _is("positive", lambda x: x > 0), Tag("<length>")],
     _PERIODS,
 ]
 """The same, of at least two samples; ``"inf T"`` stands for all there are."""
@@ -209,6 +196,11 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, populate_by_name=True)
     others: ClassVar[type[BaseModel] | None] = None
     """What a key is whose name the user chooses, where fixed keys stand beside such keys."""
+
+
+def optional(description: str, default: Any = None) -> Any:
+    """Key that may be left out; its description is the remedy in a message."""
+    return Field(default=default, description=description)
 
 
 def number(value: float | Length) -> float:
@@ -317,8 +309,7 @@ def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
             f"{path} is not valid TOML: {error}. Write texts in quotes, lists in [ ], "
             "one 'key = value' per line, and each table and key once." + _if_no_toml(path, what)
         ) from None
-    others = {kind: keys for kind, keys in KNOWN_BY.items() if kind != what}
-    for other, keys in others.items():
+    for other, keys in KNOWN_BY.items():
         tables = [f"[{key}]" for key in keys if key in found]
         if tables and not any(key in found for key in KNOWN_BY[what]):
             raise RequestError(
@@ -474,39 +465,26 @@ def _shown(value: object) -> str:
 
 def _place(loc: list[str], root: type[BaseModel]) -> tuple[type[BaseModel] | None, str, int]:
     """Table in which the last key stands, that key's description, and how many keys count."""
-    table: type[BaseModel] | None = root
-    owner, description, annotation = table, "", None
+    here: Any = root
+    owner, description = root, ""
     for depth, key in enumerate(loc):
-        if table is not None:
-            owner = table
-            fields = {field.alias or name: field for name, field in table.model_fields.items()}
-            if key not in fields:
-                if (others := getattr(table, "others", None)) is None:
-                    return owner, "", depth + 1
-                table = others
-                continue
-            annotation, description = fields[key].annotation, fields[key].description or ""
-        elif (values := _values_in(annotation)) is not None:
-            annotation = values
-        else:
+        if here is None:
             return owner, description, depth
-        table = _table_in(annotation)
+        if typing.get_origin(here) is dict:
+            here = _within(typing.get_args(here)[1])
+            continue
+        owner = here
+        fields = {field.alias or name: field for name, field in owner.model_fields.items()}
+        if key in fields:
+            here, description = _within(fields[key].annotation), fields[key].description or ""
+        elif (here := getattr(owner, "others", None)) is None:
+            return owner, "", depth + 1
     return owner, description, len(loc)
 
 
-def _values_in(annotation: Any) -> Any:
-    """Return what the values of a dict may be that an annotation allows, behind unions."""
-    if typing.get_origin(annotation) is dict:
-        return typing.get_args(annotation)[1]
-    found = (_values_in(each) for each in typing.get_args(annotation))
-    return next((values for values in found if values is not None), None)
-
-
-def _table_in(annotation: Any) -> type[BaseModel] | None:
-    """Return the table that an annotation allows, behind unions and annotations."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _within(annotation: Any) -> Any:
+    """Return the table or the dict that an annotation allows, behind unions and annotations."""
+    if typing.get_origin(annotation) is dict or hasattr(annotation, "model_fields"):
         return annotation
-    if typing.get_origin(annotation) is dict:
-        return None
-    found = (_table_in(each) for each in typing.get_args(annotation))
-    return next((table for table in found if table is not None), None)
+    found = map(_within, typing.get_args(annotation))
+    return next((each for each in found if each is not None), None)

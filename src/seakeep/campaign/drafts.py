@@ -6,6 +6,7 @@ import math
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 
 import tomlkit
@@ -20,7 +21,6 @@ from seakeep.campaign.guesses import (
     arranged,
     guess_channels,
     is_trigger,
-    rising_column,
     seas_of,
     waves_of_name,
 )
@@ -81,7 +81,7 @@ def draft_campaign(
     known = {key: value for key, value in (options or {}).items() if value is not None}
     settings = validated(FileSettings, known, "options", "draft").known()
     tables = [read_columns(path, settings) for path in paths]
-    read = arranged(paths, tables, _times(tables))
+    read = arranged(paths, tables)
     guesses = guess_channels(read)
     if not any(guess.channel for guess in guesses):
         _refuse(read)
@@ -98,11 +98,7 @@ def draft_campaign(
         *_preparation(read, guesses, seas),
         *_model(guesses),
     ]
-    return "\n".join(map(_printable, lines)) + "\n"
-
-
-def _printable(line: str) -> str:
-    return re.sub(r"[\x00-\x08\x0a-\x1f\x7f]", "?", line)
+    return "\n".join(re.sub(r"[\x00-\x08\x0a-\x1f\x7f]", "?", line) for line in lines) + "\n"
 
 
 def _value(value: object) -> str:
@@ -111,16 +107,7 @@ def _value(value: object) -> str:
 
 
 def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _value(name)
-
-
-def _times(tables: Sequence[Columns]) -> list[str | None]:
-    """Time column of each file, by its name; else by its values, where no file states its rate."""
-    named = [time_column(table) for table in tables]
-    return [
-        rising_column(table) if time is None and table.sampling_rate is None else time
-        for table, time in zip(tables, named, strict=True)
-    ]
+    return str(tomlkit.key(name).as_string())
 
 
 def _refuse(files: Sequence[File]) -> None:
@@ -248,30 +235,25 @@ def _runs(
         if kind := _kind(name, seas):
             source = "name" if waves_of_name(name) else "spectrum"
             yield f"waves = {_value(kind)} # guessed from its {source}"
-        if name in roles:
-            role, why = roles[name]
-        else:
-            role, why = "unused", f"it has no file of {', '.join(sorted(loggers - set(own)))}"
+        lacking = f"it has no file of {', '.join(sorted(loggers - set(own)))}"
+        role, why = roles.get(name, ("unused", lacking))
         yield f"role = {_value(role)} # {why}"
         if len(names) == 1:
             yield "# train = [0.0, 60.0]  # s; in place of role, with test = [60.0, inf]"
-        yield from _span_and_sea(name, role, seas, name == names[0])
+        sea, is_first = seas.get(name), name == names[0]
+        # Training keeps the onset, since steady waves hold one frequency.
+        if sea is not None and sea.start > 0 and role == "test":
+            yield f"span = [{sea.start:.2f}, inf] # s; guessed: the waves have come to the vessel"
+        elif is_first:
+            yield "# span = [10.0, inf]  # s; cut the start-up of the waves off"
+        if sea is not None and sum(sea.group == each.group for each in seas.values()) > 1:
+            group = _value(f"waves of {sea.group}")
+            yield f"sea_state = {group} # guessed: the same waves come again"
+        elif is_first:
+            yield "# sea_state = 'A'  # one word for runs in one sea, which studies judge together"
         if set(own) != {""}:
             yield from ("", f"[runs.{_key(name)}.files]")
             yield from (f"{_key(logger)} = {_value(path)}" for logger, path in own.items())
-
-
-def _span_and_sea(run: str, role: str, seas: Mapping[str, Sea], is_first: bool) -> Iterator[str]:
-    """Where forecasts start; training keeps the onset, since steady waves hold one frequency."""
-    sea = seas.get(run)
-    if sea is not None and sea.start > 0 and role == "test":
-        yield f"span = [{sea.start:.2f}, inf] # s; guessed: the waves have come to the vessel"
-    elif is_first:
-        yield "# span = [10.0, inf]  # s; cut the start-up of the waves off"
-    if sea is not None and sum(sea.group == each.group for each in seas.values()) > 1:
-        yield f"sea_state = {_value(f'waves of {sea.group}')} # guessed: the same waves come again"
-    elif is_first:
-        yield "# sea_state = 'A'  # one word for runs in one sea, which studies judge together"
 
 
 def _kind(run: str, seas: Mapping[str, Sea]) -> str | None:
@@ -288,8 +270,7 @@ def _roles(names: Sequence[str], seas: Mapping[str, Sea]) -> dict[str, tuple[str
     """
     if len(names) == 1:
         return {names[0]: ("train", "the only run")}
-    still = [name for name in names if seas and name not in seas]
-    moved = [name for name in names if name not in still]
+    moved = [name for name in names if name in seas or not seas]
     irregular = [name for name in moved if _kind(name, seas) != "regular"]
     mixed = 0 < len(irregular) < len(moved)
     order = irregular if mixed else moved
@@ -297,9 +278,9 @@ def _roles(names: Sequence[str], seas: Mapping[str, Sea]) -> dict[str, tuple[str
     why = "guessed: one run whose waves lie within those of the others tests, these train"
     if mixed:
         why = "guessed: irregular runs train" + (" but one, the rest tests" if tests else "")
-    roles = {n: ("test" if n in tests or n not in order else "train", why) for n in moved}
     unused = ("unused", "guessed: no waves were found, as in still water or decay tests")
-    return {name: roles.get(name, unused) for name in names}
+    trains = {name: "train" for name in order if name not in tests}
+    return {n: (trains.get(n, "test"), why) if n in moved else unused for n in names}
 
 
 def _tests_of(names: Sequence[str], seas: Mapping[str, Sea]) -> set[str]:
@@ -314,13 +295,11 @@ def _tests_of(names: Sequence[str], seas: Mapping[str, Sea]) -> set[str]:
         return {names[-1]}
 
     def reach(group: list[str]) -> tuple[float, int, float]:
-        own, outside = seas[group[0]], 0.0
-        others = [seas[name] for name in names if name not in group]
-        for value, rest in (
-            (own.height, [sea.height for sea in others]),
-            (own.period, [sea.period for sea in others]),
-        ):
-            outside += math.log(max(min(rest) / value, value / max(rest), 1.0))
+        own, others = seas[group[0]], [seas[name] for name in names if name not in group]
+        outside = 0.0
+        for value in (attrgetter("height"), attrgetter("period")):
+            rest = list(map(value, others))
+            outside += math.log(max(min(rest) / value(own), value(own) / max(rest), 1.0))
         nearest = min(abs(math.log(sea.period / own.period)) for sea in others)
         return outside, len(group), nearest if own.regular else -names.index(group[0])
 
@@ -379,7 +358,7 @@ def _inputs(guesses: Sequence[Guess]) -> list[Guess]:
 def _model(guesses: Sequence[Guess]) -> Iterator[str]:
     """Motions as states, waves as inputs, delays in encounter periods."""
     mapped = {guess.channel: guess for guess in guesses if guess.channel}
-    kinds = [MOTIONS, [f"{m}_rate" for m in MOTIONS], [f"{m}_acceleration" for m in MOTIONS]]
+    kinds = [[m + kind for m in MOTIONS] for kind in ("", "_rate", "_acceleration")]
     usable = [n for n, g in mapped.items() if g.gaps != "long" and not g.at_rest]
     moved = [[name for name in usable if name in kind] for kind in kinds]
     rest = [name for name in usable if not is_elevation(name, rates=True)]

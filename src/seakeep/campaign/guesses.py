@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -12,13 +12,13 @@ from typing import Literal
 import numpy as np
 
 from seakeep.arrays import FloatArray
-from seakeep.campaign.readers import time_step_of, time_unit_of
+from seakeep.campaign.readers import time_column, time_step_of, time_unit_of
 from seakeep.conventions import MOTIONS, canonical_channel, conversion, si_unit
 from seakeep.errors import DataError
 from seakeep.formats import Columns
 from seakeep.formats.columns import is_unit, named_unit
 from seakeep.signals import encounter_period, repeated_waves, uniform_step, waves_part
-from seakeep.signals.time_axis import over_gaps
+from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import energy_period, tapered_power
 
 __all__ = [
@@ -29,7 +29,6 @@ __all__ = [
     "guess_channels",
     "is_trigger",
     "is_wave",
-    "rising_column",
     "seas_of",
     "suggest_channel",
     "waves_of_name",
@@ -144,27 +143,24 @@ def _series(file: File, column: str) -> FloatArray | None:
 @np.errstate(over="ignore", invalid="ignore")
 def seas_of(files: Sequence[File], guesses: Sequence[Guess], wave: Guess) -> dict[str, Sea]:
     """Waves, as one probe recorded them, of each run that has some; decay tests have none."""
-    seas, waves, rates = {}, {}, {}
+    found = {}
     for file in files:
         series = _series(file, wave.column) if file.logger == wave.logger else None
         if series is not None and (sea := _sea(file, series)) is not None:
-            seas[file.run], waves[file.run], rates[file.run] = sea, series, float(file.rate or 1.0)
-    highest = max((sea.height for sea in seas.values()), default=0.0)
-    seas = {run: sea for run, sea in seas.items() if sea.height > STILL * highest}
-    rate = min((rates[run] for run in seas), default=1.0)
+            found[file.run] = sea, series, float(file.rate or 1.0)
+    highest = max((sea.height for sea, *_ in found.values()), default=0.0)
+    found = {run: each for run, each in found.items() if each[0].height > STILL * highest}
+    rate = min((own for *_, own in found.values()), default=1.0)
     groups = repeated_waves(
         {
-            run: np.interp(
-                np.arange(0, series.size, rates[run] / rate), np.arange(series.size), series
-            )
-            for run, series in waves.items()
-            if run in seas
+            run: np.interp(np.arange(0, series.size, own / rate), np.arange(series.size), series)
+            for run, (_, series, own) in found.items()
         },
         1.0 / rate,
     )
     return {
         run: replace(sea, group=groups[run], start=_start(run, files, guesses))
-        for run, sea in seas.items()
+        for run, (sea, *_) in found.items()
     }
 
 
@@ -258,15 +254,18 @@ def _alike(one: set[str], other: set[str]) -> bool:
     return len(one & other) >= 0.5 * min(len(one), len(other))
 
 
-def arranged(
-    paths: Sequence[Path], tables: Sequence[Columns], times: Sequence[str | None]
-) -> list[File]:
+def arranged(paths: Sequence[Path], tables: Sequence[Columns]) -> list[File]:
     """Find out which file belongs to which run and logger.
 
     Files are of several loggers where those of one run have different columns, and those of one
     logger the same: ``RUN/LOGGER.csv`` or ``RUN_LOGGER.csv``. Otherwise each file is a run, called
     as its folder where the files are called alike.
     """
+    # By its name; else by its values, where no file states its rate.
+    times = [
+        time_column(table) or (None if table.sampling_rate else _rising_column(table))
+        for table in tables
+    ]
     own = [
         {n for n in table.names if n != time and not is_trigger(n)}
         for table, time in zip(tables, times, strict=True)
@@ -279,11 +278,8 @@ def arranged(
         folders = [_by_folder(path)[0] for path in paths]
         if len(set(stems)) == 1 and len(set(folders)) > 1:
             stems = folders
-        taken: list[str] = []
-        count: Counter[str] = Counter()
-        for stem in stems:
-            taken.append(_free(stem, taken, count))
-        keys = [(name, "") for name in taken]
+        taken: Counter[str] = Counter()
+        keys = [(_free(stem, taken), "") for stem in stems]
     return [
         File(path, run, logger, table, time)
         for path, (run, logger), table, time in zip(paths, keys, tables, times, strict=True)
@@ -302,20 +298,20 @@ def _fits(keys: Sequence[tuple[str, str]], own: Sequence[set[str]]) -> bool:
     return True
 
 
-def _free(stem: str, taken: Iterable[str], count: Counter[str]) -> str:
+def _free(stem: str, taken: Counter[str]) -> str:
     """Name that is not taken: the stem, or the stem and the next number."""
     name = stem
     while name in taken:
-        count[stem] += 1
-        name = f"{stem}_{count[stem] + 1}"
+        taken[stem] += 1
+        name = f"{stem}_{taken[stem]}"
+    taken[name] = 1
     return name
 
 
 def guess_channels(files: Sequence[File]) -> list[Guess]:
     """Guess a channel for each column of the first file of each logger."""
     found: list[Guess] = []
-    taken: set[str] = set()
-    count: Counter[str] = Counter()
+    taken: Counter[str] = Counter()
     loggers = {file.logger: file for file in reversed(files)}
     for logger in dict.fromkeys(file.logger for file in files):
         first, same = loggers[logger], [file for file in files if file.logger == logger]
@@ -324,8 +320,7 @@ def guess_channels(files: Sequence[File]) -> list[Guess]:
                 continue
             guess = _guess(column, same)
             if guess.channel is not None:
-                guess = replace(guess, channel=_free(guess.channel, taken, count))
-                taken.add(str(guess.channel))
+                guess = replace(guess, channel=_free(guess.channel, taken))
             found.append(guess)
     return _resting(found, files)
 
@@ -340,9 +335,7 @@ def _resting(guesses: Sequence[Guess], files: Sequence[File]) -> list[Guess]:
             size = max(float(high - low) for low, high in spans)
             target = si_unit(str(guess.unit))
             sizes[guess.channel] = target, size * conversion(str(guess.unit), target)
-    largest: dict[str, float] = {}
-    for target, size in sizes.values():
-        largest[target] = max(size, largest.get(target, 0.0))
+    largest = {unit: max(x for u, x in sizes.values() if u == unit) for unit, _ in sizes.values()}
     rests = {name for name, (unit, size) in sizes.items() if size <= AT_REST * largest[unit]}
     return [replace(each, at_rest=True) if each.channel in rests else each for each in guesses]
 
@@ -388,19 +381,15 @@ def _fault(column: str, files: Sequence[File]) -> tuple[str, Literal["", "short"
         return f"has gaps in {_listed(gapped)}", "long"
     if all(_step_of(f.table.values[column]) == 1.0 for f in files):
         return "it counts; if it counts seconds, state time = …", ""
-    longest = max(_longest(m) / (f.rate or np.inf) for f, m in zip(files, missing, strict=True))
-    if not any(m.any() for m in missing):
-        return "", ""
-    return "", "short" if longest <= SHORT_GAP else "long"
+    lengths = [
+        (end - start) / (f.rate or np.inf)
+        for f, m in zip(files, missing, strict=True)
+        for start, end in stretches(m)
+    ]
+    return "", "" if not lengths else "short" if max(lengths) <= SHORT_GAP else "long"
 
 
-def _longest(missing: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> int:
-    """Samples of the longest stretch that is missing."""
-    there = np.flatnonzero(np.concatenate([[True], ~missing, [True]]))
-    return int(np.diff(there).max()) - 1
-
-
-def rising_column(table: Columns) -> str | None:
+def _rising_column(table: Columns) -> str | None:
     """Name of the first column that rises evenly, as times do; None if there is none.
 
     One that a unit says to be something else is none, nor is one that counts 1, 2, 3.

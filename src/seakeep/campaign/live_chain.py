@@ -8,7 +8,7 @@ after it are there: it differs from the offline one by what the ends of the wind
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -206,9 +206,13 @@ class LiveChain:
             firsts = [float(self._instants(key)[0]) for key in self._rows]
             self._origin = firsts[0]
             self._given = int(np.ceil((max(firsts) - firsts[0] + self.delay) / self.dt - 1e-6))
-        ready = self._ready()
+        ready = 0
+        if self._origin is not None:
+            newest = min(float(self._instants(key)[-1]) for key in self._rows)
+            ready = int(np.floor((newest - self.delay - self._origin) / self.dt + 1e-9)) + 1
         if ready - self._given < self.every:
-            return self._none()
+            empty = dict.fromkeys(self._template.settings.channel_names, ("time", np.empty(0)))
+            return xr.Dataset(empty, coords={"time": np.empty(0)})
         found = self._made(self._given, ready)
         self._given = ready
         self._trim()
@@ -264,13 +268,6 @@ class LiveChain:
                 "Send rows of it up to the others' instants, NaN in its columns."
             )
 
-    def _ready(self) -> int:
-        """Number of the model sample up to before which all are ready."""
-        if self._origin is None:
-            return 0
-        newest = min(float(self._instants(key)[-1]) for key in self._rows)
-        return int(np.floor((newest - self.delay - self._origin) / self.dt + 1e-9)) + 1
-
     def _made(self, first: int, stop: int) -> xr.Dataset:
         """Model samples of these numbers, by the chain over the whole window."""
         template, dt, origin = self._template, self.dt, self._origin
@@ -293,11 +290,6 @@ class LiveChain:
         assert data is not None
         names = list(self._template.settings.channel_names)
         return data[names].reset_coords(drop=True).isel(time=slice(max(first - low, 0), stop - low))
-
-    def _none(self) -> xr.Dataset:
-        names: Sequence[str] = self._template.settings.channel_names
-        empty = {name: ("time", np.empty(0)) for name in names}
-        return xr.Dataset(empty, coords={"time": np.empty(0)})
 
     def _trim(self) -> None:
         """Forget rows that have left the window."""

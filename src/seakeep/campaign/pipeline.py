@@ -32,7 +32,6 @@ from seakeep.campaign.guesses import is_wave
 from seakeep.campaign.readers import (
     counts_samples,
     find_column,
-    labelled_table,
     time_column,
     time_step_of,
     times_of,
@@ -178,9 +177,8 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
     for key, path in paths.items():
         options = settings.files
         if key:
-            own = settings.instruments[key]
-            keys = ("time", "time_unit", "sampling_rate")
-            stated = {k: getattr(own, k) for k in keys if getattr(own, k) is not None}
+            keys = {"time", "time_unit", "sampling_rate"}
+            stated = settings.instruments[key].model_dump(include=keys, exclude_none=True)
             options = options.model_copy(update=stated)
         columns = reader(path, options.known())
         if key and time_column(columns, options.time) is not None:
@@ -241,8 +239,7 @@ def channels_of(settings: CampaignSettings, run: RunSettings) -> dict[str, Chann
     """Channel map of a run: the campaign's, with the keys that the run replaces."""
     chosen = dict(settings.channels)
     for name, own in run.channels.items():
-        stated = {key: getattr(own, key) for key in own.model_fields_set}
-        chosen[name] = chosen[name].model_copy(update=stated)
+        chosen[name] = chosen[name].model_copy(update=own.model_dump(exclude_unset=True))
     return chosen
 
 
@@ -303,71 +300,50 @@ def _homes(run: Run, channels: Mapping[str, ChannelSettings]) -> dict[str, str]:
 
 def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings]) -> xr.Dataset:
     """Channels of one logger, gaps and jitter as they are."""
-    path = logger.path
-    columns = [each.column or name for name, each in channels.items()]
-    table = labelled_table(path, logger.columns, logger.options, columns)
-    instants = run.clocks[logger.name].reference(table["time"].to_numpy())
-    is_reference = logger.name == next(iter(run.loggers))
-    table = table.assign_coords(time=table["time"].copy(data=instants))
-    table = _recorded(table, run, is_reference)
-    changed = run.own.channels
+    time = run.clocks[logger.name].reference(logger.time)
+    kept = _recorded(time, run, logger)
     variables = {}
     for name, each in channels.items():
-        if not (name in changed and "unit" in changed[name].model_fields_set):
-            _refuse_other_unit(table, name, each, run.name, path)
-        variables[name] = ("time", *_converted(table, name, each, path))
-    out = xr.Dataset(variables, {"time": table["time"]})
-    for name, position in run.settings.rig.positions.items():
-        if name in out:
-            out[name].attrs["x_position"] = float(position)
-    return out
+        values, attributes = _converted(name, each, run, logger)
+        variables[name] = ("time", values[kept], attributes)
+    coordinate = ("time", time[kept], {"units": "s", "long_name": "time"})
+    return xr.Dataset(variables, {"time": coordinate})
 
 
-def _recorded(table: xr.Dataset, run: Run, is_reference: bool) -> xr.Dataset:
+def _recorded(time: FloatArray, run: Run, logger: Logger) -> slice | BoolArray:
     """Part of a file that `record` asks for."""
     if run.own.record is None:
-        return table
+        return slice(None)
     start, end = (number(edge) for edge in run.own.record)
-    time = table["time"].to_numpy()
     step, key = float(np.median(np.diff(time))), f"runs.{run.name}.record"
     whole = float(time[0]), float(time[-1])
-    if is_reference:
+    if logger.name == next(iter(run.loggers)):
         _refuse_outside(key, (start, end), whole, step, step * (1 + 1e-6))
     _refuse_empty(key, (start, end), time, step, whole)
-    return table.isel(time=(time >= start) & (time <= end))
-
-
-def _column(table: xr.Dataset, name: str, settings: ChannelSettings) -> xr.DataArray:
-    """Column of a channel, by name or full header."""
-    wanted = settings.column or name
-    found = table.get(wanted)
-    if found is None:
-        found = next(c for c in table.data_vars.values() if c.attrs["long_name"] == wanted)
-    return found
-
-
-def _refuse_other_unit(
-    table: xr.Dataset, name: str, settings: ChannelSettings, run: str, path: Path
-) -> None:
-    """Refuse a unit that is stated for all runs where this run's file says another one."""
-    stated = settings.unit
-    said = str(_column(table, name, settings).attrs.get("units", "")).strip()
-    if stated is None or said in ("", "-", "1") or not is_unit(said) or same_unit(said, stated):
-        return
-    raise RequestError(
-        f"channels.{name}: the unit '{stated}' is stated, and run '{run}' ({path}) says "
-        f"'{said}' for the column '{settings.column or name}'. Leave unit out where the files say "
-        f"it; or, if this file is wrong, state the unit in [runs.{run}.channels.{name}]."
-    )
+    return (time >= start) & (time <= end)
 
 
 def _converted(
-    table: xr.Dataset, name: str, settings: ChannelSettings, path: Path
+    name: str, settings: ChannelSettings, run: Run, logger: Logger
 ) -> tuple[FloatArray, dict[str, Any]]:
     """Values and attributes of a channel."""
-    wanted = settings.column or name
-    column = _column(table, name, settings)
-    unit = settings.unit if settings.unit is not None else column.attrs.get("units")
+    wanted, path = settings.column or name, logger.path
+    column = find_column(path, logger.columns, wanted)
+    said, stated = logger.columns.units.get(column), settings.unit
+    changed = run.own.channels.get(name)
+    if (
+        stated is not None
+        and not (changed and "unit" in changed.model_fields_set)
+        and said not in (None, "", "-", "1")
+        and is_unit(said)
+        and not same_unit(said, stated)
+    ):
+        raise RequestError(
+            f"channels.{name}: the unit '{stated}' is stated, and run '{run.name}' ({path}) says "
+            f"'{said}' for the column '{wanted}'. Leave unit out where the files say it; or, if "
+            f"this file is wrong, state the unit in [runs.{run.name}.channels.{name}]."
+        )
+    unit = said if stated is None else stated
     if unit is None:
         raise RequestError(
             f"channels.{name}: the column '{wanted}' of {path} states no unit. Add unit = '…' to "
@@ -376,13 +352,15 @@ def _converted(
     canonical = canonical_channel(name)
     target = canonical.units if canonical else si_unit(unit)
     factor = conversion(unit, target, f"channel '{name}' (column '{wanted}' of {path})")
-    values = settings.sign * factor * (column.to_numpy().astype(float) + settings.offset)
+    values = settings.sign * factor * (logger.columns.values[column] + settings.offset)
     attributes: dict[str, Any] = {
         "units": target,
         "long_name": long_name_of(name, settings.long_name),
     }
     if settings.accuracy is not None:
         attributes["accuracy"] = factor * settings.accuracy
+    if (position := run.settings.rig.positions.get(name)) is not None:
+        attributes["x_position"] = float(position)
     return values, attributes
 
 
@@ -413,19 +391,21 @@ def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
         return
     time = data["time"].to_numpy()
     missing = ~np.isfinite(data[gapped[0]].to_numpy())
-    starts, ends = np.array(stretches(missing)).T
     step = float(np.median(np.diff(time)))
-    lengths = ends - starts
-    longest = int(np.argmax(lengths))
-    first, worst = (instant_text(time[starts[at]], step) for at in (0, longest))
+    gaps = stretches(missing)
+
+    def said(gap: tuple[int, int]) -> str:
+        count = gap[1] - gap[0]
+        begin = instant_text(time[gap[0]], step)
+        return f"t = {begin} s ({count} samples, {count * step:.4g} s)"
+
     others = f" (also in {', '.join(gapped[1:])})" if gapped[1:] else ""
     raise DataError(
         f"run '{run}' ({path}): channel '{gapped[0]}' has {int(missing.sum())} missing values of "
-        f"{missing.size} in {starts.size} gap(s), the first at t = {first} s ({lengths[0]} "
-        f"samples, {lengths[0] * step:.4g} s), the longest at t = {worst} s "
-        f"({lengths[longest]} samples, {lengths[longest] * step:.4g} s)"
-        f"{others}. Repair the file, leave the channel out, or cut the gap off with record = "
-        f"[start, end] in [runs.{run}]; or state gaps = 'mask' or 'bridge' in [preparation]."
+        f"{missing.size} in {len(gaps)} gap(s), the first at {said(gaps[0])}, the longest at "
+        f"{said(max(gaps, key=lambda gap: gap[1] - gap[0]))}{others}. Repair the file, leave the "
+        f"channel out, or cut the gap off with record = [start, end] in [runs.{run}]; or state "
+        "gaps = 'mask' or 'bridge' in [preparation]."
     )
 
 
@@ -534,7 +514,7 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
         step = uniform_step(groups[home[name]]["time"].to_numpy(), f"run '{run.name}'")
         own |= derive(own, name, settings, step, run.name)
     for key, data in groups.items():
-        groups[key] = _with(data, channels[key])
+        groups[key] = _dataset(data.variables["time"], channels[key], data.attrs)
     return replace(run, groups=groups, late=tuple(late))
 
 
@@ -543,11 +523,13 @@ def variables_of(data: xr.Dataset) -> dict[str, xr.Variable]:
     return {str(name): each for name, each in data.variables.items() if name != "time"}
 
 
-def _with(data: xr.Dataset, channels: Mapping[str, xr.Variable]) -> xr.Dataset:
-    """Add the channels, and flags, that a Dataset does not have yet."""
-    new = {name: each for name, each in channels.items() if name not in data.variables}
-    flags = {name: new.pop(name) for name in list(new) if name.endswith("_flags")}
-    return data.assign(new).assign_coords(flags) if new else data
+def _dataset(
+    time: xr.Variable, channels: Mapping[str, xr.Variable], attributes: Mapping[Any, Any]
+) -> xr.Dataset:
+    """Channels as variables, their flags as coordinates."""
+    flags = {name: each for name, each in channels.items() if name.endswith("_flags")}
+    data = {name: each for name, each in channels.items() if name not in flags}
+    return xr.Dataset(data, {"time": time, **flags}, attributes)
 
 
 def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
@@ -557,23 +539,21 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
     instant, where every logger recorded; samples that are missing become NaN.
     """
     time = _axis(run, dt) if time is None else time
-    out = xr.Dataset(coords={"time": ("time", time, next(iter(run.groups.values()))["time"].attrs)})
+    channels: dict[str, xr.Variable] = {}
     for group in run.groups.values():
-        out = out.assign(_on_axis(group, time, dt, run.settings.preparation, run.name))
-        for name in group.coords:
-            if str(name).endswith("_flags"):
-                given = group.variables[name]
-                flags = _flags_at(given.to_numpy(), group["time"].to_numpy(), time, dt)
-                out.coords[str(name)] = ("time", flags, given.attrs)
-    channels = variables_of(out)
+        channels |= _on_axis(group, time, dt, run.settings.preparation, run.name)
     for name in run.late:
         channels |= derive(channels, name, run.settings, dt, run.name)
-    out = _with(out, channels)
-    for name in list(out.data_vars):
-        if f"{name}_flags" in out.coords:
-            lost = (out[f"{name}_flags"].to_numpy() & MISSING) > 0
-            out[name] = out[name].copy(data=np.where(lost, np.nan, out[name].to_numpy()))
-    return replace(run, data=out[[name for name in run.settings.channel_names if name in out]])
+    out = {}
+    for name in run.settings.channel_names:
+        if name in channels:
+            out[name] = channels[name]
+            if (flags := channels.get(f"{name}_flags")) is not None:
+                lost = (flags.to_numpy() & MISSING) > 0
+                out[name] = out[name].copy(data=np.where(lost, np.nan, out[name].to_numpy()))
+                out[f"{name}_flags"] = flags
+    attributes = next(iter(run.groups.values()))["time"].attrs
+    return replace(run, data=_dataset(xr.Variable("time", time, attributes), out, {}))
 
 
 def _axis(run: Run, dt: float) -> FloatArray:
@@ -594,11 +574,9 @@ def _axis(run: Run, dt: float) -> FloatArray:
     key = next((key for key in keys if getattr(stated, key) is not None), "dt")
     asked = f"preparation.{key} = {getattr(stated, key) or dt:g}"
     channels = len(run.settings.channel_names)
-    samples: float = (end - begin) / dt  # may be beyond whole numbers
-    if (end - origin) / dt < 1e15:
-        first = int(np.ceil((begin - origin) / dt - 1e-6))
-        last = int(np.floor((end - origin) / dt * (1 + 1e-9) + 1e-6))
-        samples = last - first
+    first = np.ceil((begin - origin) / dt - 1e-6)
+    last = np.floor((end - origin) / dt * (1 + 1e-9) + 1e-6)
+    samples = float(last - first)
     if samples < 1:
         raise RequestError(
             f"run '{run.name}' of {end - begin:g} s is shorter than two steps of {dt:g} s. Correct "
@@ -610,7 +588,7 @@ def _axis(run: Run, dt: float) -> FloatArray:
         f"Take a larger step, or a part of the run (record in [runs.{run.name}]).",
         LONG_NUMBERS,
     )
-    instants: FloatArray = origin + dt * np.arange(first, last + 1, dtype=float)
+    instants: FloatArray = origin + dt * np.arange(first, last + 1)
     return instants
 
 
@@ -621,14 +599,17 @@ def _instant(group: xr.Dataset, at: int) -> str:
 
 def _on_axis(
     group: xr.Dataset, wanted: FloatArray, dt: float, settings: PreparationSettings, run: str
-) -> dict[str, tuple[str, FloatArray, dict[str, object]]]:
+) -> dict[str, xr.Variable]:
+    """Channels of a logger and their flags at other instants."""
     time = group["time"].to_numpy()
     own = uniform_step(time, f"run '{run}'")
     channels = {name: group.variables[name] for name in group.data_vars}
     series = np.column_stack([channel.to_numpy() for channel in channels.values()])
-    filtered = settings.low_pass is not None and settings.low_pass[1] < 0.5 / own
-    if filtered and settings.low_pass is not None:
-        series = low_pass(series, own, *settings.low_pass)
+    low = settings.low_pass
+    if low is not None and low[1] >= 0.5 / own:
+        low = None
+    if low is not None:
+        series = low_pass(series, own, *low)
     if strays(own, time.size, dt) or abs(wanted[0] - time[0]) > 0.05 * own:
         # The last instant may lie a rounding beyond the record.
         clipped = np.clip(wanted, time[0], time[-1])
@@ -636,12 +617,15 @@ def _on_axis(
         series = resample(series, time, clipped, settings.attenuation, anti_alias=not fine)
     else:
         series = series[: wanted.size]
-    out = {}
-    for i, (name, channel) in enumerate(channels.items()):
-        attributes = dict(channel.attrs)
-        if filtered and settings.low_pass is not None:
-            attributes["low_pass"] = tuple(settings.low_pass)
-        out[str(name)] = ("time", series[:, i].copy(), attributes)
+    filtered = {"low_pass": low} if low else {}
+    out = {
+        str(name): xr.Variable("time", series[:, i].copy(), {**channel.attrs, **filtered})
+        for i, (name, channel) in enumerate(channels.items())
+    }
+    for name, flags in group.variables.items():
+        if str(name).endswith("_flags"):
+            new = _flags_at(flags.to_numpy(), time, wanted, dt)
+            out[str(name)] = xr.Variable("time", new, flags.attrs)
     return out
 
 
@@ -650,11 +634,9 @@ def _flags_at(flags: Any, time: FloatArray, wanted: FloatArray, dt: float) -> An
     half = 0.5 * max(dt, float(time[1] - time[0])) * (1 + 1e-9)
     begin = np.searchsorted(time, wanted - half)
     end = np.searchsorted(time, wanted + half, side="right")
-    out = np.zeros(wanted.size, dtype=np.int16)
-    for bit in range(8):
-        seen = np.concatenate([[0], np.cumsum((flags >> bit) & 1)])
-        out |= ((seen[end] > seen[begin]).astype(np.int16) << bit).astype(np.int16)
-    return out
+    edges = np.column_stack([begin, end]).ravel()
+    seen = np.bitwise_or.reduceat(np.append(flags, 0), edges)[::2]
+    return np.where(begin < end, seen, 0).astype(np.int16)
 
 
 def strays(own: float, samples: int, dt: float) -> bool:

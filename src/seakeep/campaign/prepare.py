@@ -42,8 +42,6 @@ from seakeep.toml import in_seconds, lengths, parse_length
 
 __all__ = ["Campaign", "Progress", "read_campaign"]
 
-"""Called after each run with how many are done, how many there are, and the run's name."""
-
 SHOWN_RUNS = 6
 """Runs that a campaign's representation names."""
 
@@ -299,13 +297,12 @@ class Campaign:
         waves = self.settings.period_runs if periods else ()
         channel = self.period_channel() if periods else ""
         settings = self._in_seconds(self.settings.campaign.encounter_period)
-        both = dict.fromkeys([*timed, *waves]) if wanted else {}
-        again = [self.files_of(name) for name in both if name in wanted]
-        reader.again = frozenset(path for files in again for path in files.values())
+        again = [name for name in wanted if name in (*timed, *waves)]
+        reader.again = {path for name in again for path in self.files_of(name).values()}
         found = survey(
             settings, self.files_of, timed, waves, channel, reader, progress, wanted, failures
         )
-        reader.again = frozenset()
+        reader.again = set()
         one = {n: {"": Clock()} for n in wanted if n not in several}
         return replace(found, clocks={**one, **found.clocks})
 
@@ -578,11 +575,11 @@ class _ReadOnce:
 
     Parameters
     ----------
-    again : frozenset of Path
+    again : set of Path
         Files that are read a second time, after the survey of all runs.
     """
 
-    again: frozenset[Path] = frozenset()
+    again: set[Path] = field(default_factory=set)
     kept: dict[tuple[Path, Options], Columns] = field(default_factory=dict)
 
     def __call__(self, path: Path, options: Options) -> Columns:

@@ -103,13 +103,7 @@ def read_table(
         If the file is damaged, a cell is not a number, or times are missing, repeated or unsorted.
     """
     path, options = Path(path), options or FileSettings()
-    return labelled_table(path, read_columns(path, options.known()), options, columns)
-
-
-def labelled_table(
-    path: Path, table: Columns, options: FileSettings, columns: Iterable[str] | None
-) -> xr.Dataset:
-    """Columns of a file as :func:`read_table` gives them."""
+    table = read_columns(path, options.known())
     time_name, time = times_of(path, table, options)
     # A run has one `time`: a column of that name beside the stated one is left out.
     others = [name for name in table.names if name not in (time_name, "time")]

@@ -27,9 +27,12 @@ from seakeep.toml import (
     Finite,
     Instant,
     Names,
+    NotNegative,
+    Pair,
     Positive,
     Span,
     Table,
+    optional,
     parse_length,
 )
 
@@ -52,72 +55,69 @@ __all__ = [
 class GeneralSettings(Table):
     """``[campaign]``: what the campaign is called, its scale and its encounter period."""
 
-    name: str = Field(default="", description="a name for titles and tables")
-    description: str = Field(default="", description="free text")
-    scale_factor: Positive = Field(
-        default=1.0, description="full-scale length over model length, such as 30.0"
+    name: str = optional("a name for titles and tables", "")
+    description: str = optional("free text", "")
+    scale_factor: Positive = optional("full-scale length over model length, such as 30.0", 1.0)
+    encounter_period: Positive | None = optional(
+        "mean encounter period in seconds; left out, it is measured"
     )
-    encounter_period: Positive | None = Field(
-        default=None, description="mean encounter period in seconds; left out, it is measured"
+    period_channel: str | None = optional(
+        "the wave channel whose zero-up-crossings define the encounter period"
     )
-    period_channel: str | None = Field(
-        default=None,
-        description="the wave channel whose zero-up-crossings define the encounter period",
-    )
-    period_hysteresis: Annotated[float, Field(ge=0, lt=1)] = Field(
-        default=0.0,
-        description="fraction of its standard deviation by which a wave must pass its mean "
+    period_hysteresis: Annotated[float, Field(ge=0, lt=1)] = optional(
+        "fraction of its standard deviation by which a wave must pass its mean "
         "either way "
         "to count; 0, the paper's, counts all. Still water around the waves never counts",
+        0.0,
     )
 
 
 class RigSettings(Table):
     """``[rig]``: the basin and where things stand in it."""
 
-    water_depth: Annotated[float, AfterValidator(_depth)] | None = Field(
-        default=None, description="water depth in metres; inf, without quotes, for deep water"
+    water_depth: Annotated[float, AfterValidator(_depth)] | None = optional(
+        "water depth in metres; inf, without quotes, for deep water"
     )
-    wave_direction: Finite | None = Field(
-        default=None, description="direction in which the waves run, degrees from the x axis"
+    wave_direction: Finite | None = optional(
+        "direction in which the waves run, degrees from the x axis"
     )
-    frame: str | None = Field(default=None, description="words that describe the frame")
-    positions: dict[str, Finite] = Field(
-        default_factory=dict, description="channel = x position in metres, along the waves"
+    frame: str | None = optional("words that describe the frame")
+    positions: dict[str, Finite] = optional("channel = x position in metres, along the waves", {})
+
+
+class TimesSettings(Table):
+    """What a file's times are, in ``[files]`` and ``[instruments.NAME]``."""
+
+    time: str | None = optional("the name of the time column")
+    time_unit: str | None = optional("unit of the time column, such as 'ms'")
+    sampling_rate: Positive | None = optional(
+        "samples per second, for files that have no time column"
+    )
+    sampling_rate_assumed: bool = optional(
+        "true while sampling_rate is a guess: prepare warns until it is removed", False
     )
 
 
-class FileSettings(Table):
+class FileSettings(TimesSettings):
     """``[files]``: how the files of the runs are to be read; all of it is optional."""
 
-    time: str | None = Field(default=None, description="the name of the time column")
-    time_unit: str | None = Field(default=None, description="unit of the time column, such as 'ms'")
-    sampling_rate: Positive | None = Field(
-        default=None, description="samples per second, for files that have no time column"
+    delimiter: Literal[",", ";", "\t", " "] | None = optional(
+        "',' or ';' or '\\t', or ' ' for any number of blanks"
     )
-    sampling_rate_assumed: bool = Field(
-        default=False,
-        description="true while sampling_rate is a guess: prepare warns until it is removed",
+    decimal: Literal[".", ","] | None = optional("'.' or ','")
+    comment: Annotated[str, Field(min_length=1)] | None = optional(
+        "the mark that starts a comment line; '#' and '%' are known"
     )
-    delimiter: Literal[",", ";", "\t", " "] | None = Field(
-        default=None, description="',' or ';' or '\\t', or ' ' for any number of blanks"
+    skip_rows: Annotated[int, Field(ge=0)] = optional(
+        "lines to leave out at the head of the file", 0
     )
-    decimal: Literal[".", ","] | None = Field(default=None, description="'.' or ','")
-    comment: Annotated[str, Field(min_length=1)] | None = Field(
-        default=None, description="the mark that starts a comment line; '#' and '%' are known"
+    encoding: str | None = optional(
+        "of a text file, such as 'utf-8', 'cp1252' or 'utf-16-le'; left out, UTF-8, "
+        "UTF-16 with its mark, or Windows-1252 (Latin-1)"
     )
-    skip_rows: Annotated[int, Field(ge=0)] = Field(
-        default=0, description="lines to leave out at the head of the file"
-    )
-    encoding: str | None = Field(
-        default=None,
-        description="of a text file, such as 'utf-8', 'cp1252' or 'utf-16-le'; left out, UTF-8, "
-        "UTF-16 with its mark, or Windows-1252 (Latin-1)",
-    )
-    group: str | None = Field(
-        default=None,
-        description="the part of a file that is read, where it holds several: the group of a TDMS, "
-        "HDF5 or NetCDF file, the topic of a ROS 2 bag or MCAP file",
+    group: str | None = optional(
+        "the part of a file that is read, where it holds several: the group of a TDMS, "
+        "HDF5 or NetCDF file, the topic of a ROS 2 bag or MCAP file"
     )
 
     def known(self) -> Options:
@@ -132,27 +132,18 @@ class ChannelSettings(Table):
     to the reading, in the file's unit, before the sign.
     """
 
-    column: str | None = Field(
-        default=None, description="the column in the file; left out, the channel's own name"
+    column: str | None = optional("the column in the file; left out, the channel's own name")
+    instrument: str | None = optional("whose file holds it, where several files have such a column")
+    unit: str | None = optional("unit of the column, such as 'mm'; left out, the file's header")
+    unit_assumed: bool = optional(
+        "true while unit is a guess: prepare warns until it is removed", False
     )
-    instrument: str | None = Field(
-        default=None, description="whose file holds it, where several files have such a column"
+    sign: Literal[1, -1] = optional("1 or -1", 1)
+    offset: Finite = optional("added to the reading, in the file's unit, before the sign", 0.0)
+    accuracy: NotNegative | None = optional(
+        "standard uncertainty of the instrument, in the file's unit (type B)"
     )
-    unit: str | None = Field(
-        default=None, description="unit of the column, such as 'mm'; left out, the file's header"
-    )
-    unit_assumed: bool = Field(
-        default=False, description="true while unit is a guess: prepare warns until it is removed"
-    )
-    sign: Literal[1, -1] = Field(default=1, description="1 or -1")
-    offset: Finite = Field(
-        default=0.0, description="added to the reading, in the file's unit, before the sign"
-    )
-    accuracy: Annotated[Finite, Field(ge=0)] | None = Field(
-        default=None,
-        description="standard uncertainty of the instrument, in the file's unit (type B)",
-    )
-    long_name: str | None = Field(default=None, description="name for labels")
+    long_name: str | None = optional("name for labels")
 
 
 def _rising_band(band: tuple[float, float]) -> tuple[float, float]:
@@ -197,12 +188,12 @@ LONGEST_NAME = 100
 some."""
 ChannelName = Annotated[str, AfterValidator(_channel_name)]
 RunName = Annotated[str, AfterValidator(_run_name)]
-Band = Annotated[tuple[Positive, Positive], Field(strict=False), AfterValidator(_rising_band)]
+Band = Annotated[Pair, AfterValidator(_rising_band)]
 TwoColumns = Annotated[tuple[str, str], Field(strict=False)]
 Vector = Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]
 
 
-class InstrumentSettings(Table):
+class InstrumentSettings(TimesSettings):
     """``[instruments.NAME]``: a logger with a file of its own in each run, and its clock.
 
     The clock is found from a trigger that the reference records too, from a signal that both
@@ -210,42 +201,21 @@ class InstrumentSettings(Table):
     `drift` as stated, or the reference's own clock.
     """
 
-    sampling_rate: Positive | None = Field(
-        default=None, description="samples per second; times are counted where the file has none"
+    trigger: str | None = optional("the column that holds the trigger")
+    trigger_unit: str | None = optional("unit of the trigger, for the eye")
+    shared: TwoColumns | None = optional(
+        "[own column, reference's column] of one signal both record"
     )
-    sampling_rate_assumed: bool = Field(
-        default=False,
-        description="true while sampling_rate is a guess: prepare warns until it is removed",
+    correlated: TwoColumns | None = optional(
+        "[own column, reference's column] of signals that go together"
     )
-    time: str | None = Field(default=None, description="the name of its time column")
-    time_unit: str | None = Field(default=None, description="unit of its time column, such as 'ms'")
-    trigger: str | None = Field(default=None, description="the column that holds the trigger")
-    trigger_unit: str | None = Field(default=None, description="unit of the trigger, for the eye")
-    shared: TwoColumns | None = Field(
-        default=None, description="[own column, reference's column] of one signal both record"
-    )
-    correlated: TwoColumns | None = Field(
-        default=None, description="[own column, reference's column] of signals that go together"
-    )
-    window: Duration = Field(
-        default=20.0, description="length of correlation windows, s or periods"
-    )
-    largest_lag: Duration = Field(
-        default=5.0, description="lags searched on either side, s or periods"
-    )
-    offset: Finite | None = Field(
-        default=None, description="reading of its clock at reference time 0, s"
-    )
-    drift: Finite | None = Field(default=None, description="drift of its clock, ppm")
-    metres_per_pixel: Positive | None = Field(
-        default=None, description="of a camera, in the vessel's plane"
-    )
-    panel: Annotated[tuple[Positive, Positive], Field(strict=False)] | None = Field(
-        default=None, description="[length, height] of the panel that a camera tracks, m"
-    )
-    panel_height: Finite | None = Field(
-        default=None, description="of the panel's centre above the centre of gravity, m"
-    )
+    window: Duration = optional("length of correlation windows, s or periods", 20.0)
+    largest_lag: Duration = optional("lags searched on either side, s or periods", 5.0)
+    offset: Finite | None = optional("reading of its clock at reference time 0, s")
+    drift: Finite | None = optional("drift of its clock, ppm")
+    metres_per_pixel: Positive | None = optional("of a camera, in the vessel's plane")
+    panel: Pair | None = optional("[length, height] of the panel that a camera tracks, m")
+    panel_height: Finite | None = optional("of the panel's centre above the centre of gravity, m")
 
     @model_validator(mode="after")
     def _one_way(self) -> InstrumentSettings:
@@ -262,12 +232,10 @@ class InstrumentsSettings(Table):
     others: ClassVar = InstrumentSettings
     __pydantic_extra__: dict[str, InstrumentSettings] = Field(init=False)
 
-    reference: str | None = Field(
-        default=None, description="the logger whose clock is the time of all; the first by default"
+    reference: str | None = optional(
+        "the logger whose clock is the time of all; the first by default"
     )
-    pool_drift: bool = Field(
-        default=True, description="true: one drift per logger for all runs that agree"
-    )
+    pool_drift: bool = optional("true: one drift per logger for all runs that agree", True)
 
     @property
     def loggers(self) -> dict[str, InstrumentSettings]:
@@ -308,55 +276,40 @@ Step = Literal[
 class DerivedSettings(Table):
     """``[derived.NAME]``: a channel made from others, by an expression or by a named step."""
 
-    expression: str | None = Field(
-        default=None,
-        description="such as '0.5*(acc_sb + acc_ps)', on SI values; knows + - * / **, square, abs, "
-        "sqrt, sin, cos, mean (over time) and average (of several channels)",
+    expression: str | None = optional(
+        "such as '0.5*(acc_sb + acc_ps)', on SI values; knows + - * / **, square, abs, "
+        "sqrt, sin, cos, mean (over time) and average (of several channels)"
     )
     source: str | None = Field(
         default=None, alias="from", description="the channel that the step works on"
     )
-    step: Step | None = Field(
-        default=None, description="what to do with the channel named by 'from'"
+    step: Step | None = optional("what to do with the channel named by 'from'")
+    times: Literal[1, 2] | None = optional("integrate once or twice")
+    band: Band | None = optional("[low, high] in Hz, kept by 'integrate' and 'band_pass'")
+    passband: Positive | None = optional("edge of the pass band, Hz")
+    stopband: Positive | None = optional("edge of the stop band, Hz")
+    position: str | None = optional(
+        "'complementary_filter': the measured position that gives the slow part"
     )
-    times: Literal[1, 2] | None = Field(default=None, description="integrate once or twice")
-    band: Band | None = Field(
-        default=None,
-        description="[low, high] in Hz, kept by 'integrate' and 'band_pass'",
+    crossover: Positive | None = optional(
+        "'complementary_filter': where both count half, below the waves, Hz"
     )
-    passband: Positive | None = Field(
-        default=None,
-        description="edge of the pass band, Hz",
+    offset: Vector | None = optional(
+        "'transfer': [x, y, z] from the measured to the wanted point, m, in the body's "
+        "axes (x downstream, z up)"
     )
-    stopband: Positive | None = Field(default=None, description="edge of the stop band, Hz")
-    position: str | None = Field(
-        default=None,
-        description="'complementary_filter': the measured position that gives the slow part",
+    axis: Literal["x", "y", "z"] | None = optional(
+        "direction of a channel that is not called surge, sway or heave"
     )
-    crossover: Positive | None = Field(
-        default=None,
-        description="'complementary_filter': where both count half, below the waves, Hz",
+    components: Annotated[tuple[str, str, str], Field(strict=False)] | None = optional(
+        "'remove_gravity': accelerometers along x, y and z of the body"
     )
-    offset: Vector | None = Field(
-        default=None,
-        description="'transfer': [x, y, z] from the measured to the wanted point, m, in the body's "
-        "axes (x downstream, z up)",
+    zeroed: bool | None = optional(
+        "'remove_gravity': true where readings were set to zero at rest, false where "
+        "the one along z reads +9.81 m/s^2 there"
     )
-    axis: Literal["x", "y", "z"] | None = Field(
-        default=None, description="direction of a channel that is not called surge, sway or heave"
-    )
-    components: Annotated[tuple[str, str, str], Field(strict=False)] | None = Field(
-        default=None, description="'remove_gravity': accelerometers along x, y and z of the body"
-    )
-    zeroed: bool | None = Field(
-        default=None,
-        description="'remove_gravity': true where readings were set to zero at rest, false where "
-        "the one along z reads +9.81 m/s^2 there",
-    )
-    unit: str | None = Field(
-        default=None, description="unit of the result; needed by expressions for free names"
-    )
-    long_name: str | None = Field(default=None, description="name for labels")
+    unit: str | None = optional("unit of the result; needed by expressions for free names")
+    long_name: str | None = optional("name for labels")
 
     @model_validator(mode="after")
     def _one_way(self) -> DerivedSettings:
@@ -382,9 +335,8 @@ class RedundantSettings(Table):
     """``[redundant.NAME]``: channels that measure one quantity; the first is trusted."""
 
     channels: Names = Field(description="two channels or more of one unit, the trusted one first")
-    window: Duration | None = Field(
-        default=None,
-        description="length of the windows compared, s or periods; by default 4 dominant periods",
+    window: Duration | None = optional(
+        "length of the windows compared, s or periods; by default 4 dominant periods"
     )
 
     @model_validator(mode="after")
@@ -410,37 +362,31 @@ class PreparationSettings(Table):
     those of the preset.
     """
 
-    preset: Literal["paper", "recommended"] | None = Field(
-        default=None,
-        description="'paper' or 'recommended'; left out, the filters (not the rate) of the preset "
-        "of the study, else of [model]",
+    preset: Literal["paper", "recommended"] | None = optional(
+        "'paper' or 'recommended'; left out, the filters (not the rate) of the preset "
+        "of the study, else of [model]"
     )
-    sampling_rate: Positive | None = Field(default=None, description="samples per second, Hz")
-    dt: Positive | None = Field(default=None, description="time step in seconds")
-    steps_per_period: Annotated[int, Field(ge=4)] | None = Field(
-        default=None, description="samples per mean encounter period; 32 is the paper's"
+    sampling_rate: Positive | None = optional("samples per second, Hz")
+    dt: Positive | None = optional("time step in seconds")
+    steps_per_period: Annotated[int, Field(ge=4)] | None = optional(
+        "samples per mean encounter period; 32 is the paper's"
     )
-    attenuation: Annotated[float, Field(ge=50, le=200)] = Field(
-        default=60.0, description="attenuation above the new Nyquist frequency, dB, at least 50"
+    attenuation: Annotated[float, Field(ge=50, le=200)] = optional(
+        "attenuation above the new Nyquist frequency, dB, at least 50", 60.0
     )
-    low_pass: Band | None = Field(
-        default=None,
-        description="[pass, stop] in Hz, of all channels sampled fast enough",
-    )
-    anti_alias: bool = Field(
-        default=True, description="false: take samples without a filter at the new Nyquist"
-    )
-    gaps: Literal["refuse", "mask", "bridge"] = Field(
-        default="refuse",
-        description="'refuse': an error; 'mask': NaN where samples are missing; 'bridge': short "
+    low_pass: Band | None = optional("[pass, stop] in Hz, of all channels sampled fast enough")
+    anti_alias: bool = optional("false: take samples without a filter at the new Nyquist", True)
+    gaps: Literal["refuse", "mask", "bridge"] = optional(
+        "'refuse': an error; 'mask': NaN where samples are missing; 'bridge': short "
         "gaps filled and flagged, NaN in the others",
+        "refuse",
     )
-    longest_gap: Positive = Field(default=0.25, description="longest gap that 'bridge' fills, s")
-    jitter: Literal["refuse", "interpolate"] = Field(
-        default="refuse", description="'refuse' or 'interpolate' times that are not uniform"
+    longest_gap: Positive = optional("longest gap that 'bridge' fills, s", 0.25)
+    jitter: Literal["refuse", "interpolate"] = optional(
+        "'refuse' or 'interpolate' times that are not uniform", "refuse"
     )
-    outliers: Literal["flag", "replace"] = Field(
-        default="flag", description="'flag', or 'replace' by what is interpolated across them"
+    outliers: Literal["flag", "replace"] = optional(
+        "'flag', or 'replace' by what is interpolated across them", "flag"
     )
 
     @model_validator(mode="before")
@@ -481,35 +427,22 @@ class RunSettings(Table):
     used for both. `record` cuts the files before anything else is done with them.
     """
 
-    file: str | None = Field(default=None, description="the file, relative to the campaign file")
-    files: dict[str, str] = Field(
-        default_factory=dict, description="instrument = its file, relative to the campaign file"
+    file: str | None = optional("the file, relative to the campaign file")
+    files: dict[str, str] = optional("instrument = its file, relative to the campaign file", {})
+    sea_state: str = optional("a name for the sea state", "")
+    waves: Literal["regular", "irregular", "still"] | None = optional(
+        "'regular', 'irregular', or 'still' of a free decay"
     )
-    sea_state: str = Field(default="", description="a name for the sea state")
-    waves: Literal["regular", "irregular", "still"] | None = Field(
-        default=None, description="'regular', 'irregular', or 'still' of a free decay"
+    role: Literal["train", "test", "unused"] | None = optional("'train', 'test' or 'unused'")
+    span: Span | None = optional("[start, end] in s or periods ('10 T'): the part used")
+    train: Span | None = optional("[start, end] in s or periods, used for training")
+    test: Span | None = optional("[start, end] in s or periods, used for testing")
+    record: Span | None = optional("[start, end] in s or periods: the part read")
+    channels: dict[str, ChannelSettings] = optional(
+        "keys of [channels.NAME] that differ in this run", {}
     )
-    role: Literal["train", "test", "unused"] | None = Field(
-        default=None, description="'train', 'test' or 'unused'"
-    )
-    span: Span | None = Field(
-        default=None, description="[start, end] in s or periods ('10 T'): the part used"
-    )
-    train: Span | None = Field(
-        default=None, description="[start, end] in s or periods, used for training"
-    )
-    test: Span | None = Field(
-        default=None, description="[start, end] in s or periods, used for testing"
-    )
-    record: Span | None = Field(
-        default=None, description="[start, end] in s or periods: the part read"
-    )
-    channels: dict[str, ChannelSettings] = Field(
-        default_factory=dict, description="keys of [channels.NAME] that differ in this run"
-    )
-    probe_offset: Finite | None = Field(
-        default=None,
-        description="metres by which this run's elevations are carried, positive downstream",
+    probe_offset: Finite | None = optional(
+        "metres by which this run's elevations are carried, positive downstream"
     )
 
     @property
@@ -560,21 +493,16 @@ class ModelSettings(Table):
         init=False
     )
 
-    kind: str = Field(
-        default="hankel_dmdc",
-        description="'hankel_dmdc', 'bayesian_hankel_dmdc', or any other registered kind, such as "
-        "'arx'",
+    kind: str = optional(
+        "'hankel_dmdc', 'bayesian_hankel_dmdc', or any other registered kind, such as 'arx'",
+        "hankel_dmdc",
     )
-    preset: Literal["paper", "recommended"] | None = Field(
-        default=None, description="'paper' or 'recommended'"
-    )
+    preset: Literal["paper", "recommended"] | None = optional("'paper' or 'recommended'")
     states: Annotated[tuple[str, ...], Field(strict=False, min_length=1)] = Field(
         description="list of channels that the model forecasts"
     )
-    inputs: Names = Field(default=(), description="list of channels that drive the model")
-    stop: Instant | None = Field(
-        default=None, description="end of the training window, s or periods such as '60 T'"
-    )
+    inputs: Names = optional("list of channels that drive the model", ())
+    stop: Instant | None = optional("end of the training window, s or periods such as '60 T'")
 
     def arguments(self) -> dict[str, Any]:
         """Keys of the constructor that the file states.

@@ -125,21 +125,15 @@ def survey(
         name: _left_out(name, error, name in period_runs, name in clock_runs and name not in clocks)
         for name, error in bad.items()
     }
-    _warn({name: words for name, words in left_out.items() if name not in asked}, doubts, channel)
+    for words in (words for name, words in left_out.items() if name not in asked):
+        warn(words)
+    kind = ClocksKind.PERIOD
+    warn_of([Finding(kind, run, channel, *two, "s") for run, two in doubts.items()], set())
     if settings.instruments.pool_drift:
         _pool(clocks)
     for each in clocks.values():
         each.update({logger: without_doubtful_drift(clock) for logger, clock in each.items()})
     return Survey(clocks, periods, left_out, doubts)
-
-
-def _warn(
-    left_out: Mapping[str, str], doubts: Mapping[str, tuple[float, float]], channel: str
-) -> None:
-    for words in left_out.values():
-        warn(words)
-    found = [Finding(ClocksKind.PERIOD, run, channel, *two, "s") for run, two in doubts.items()]
-    warn_of(found, set())
 
 
 def _pool(clocks: Mapping[str, dict[str, Clock]]) -> None:

@@ -37,10 +37,7 @@ def derivation_order(
     try:
         return list(TopologicalSorter(graph).static_order())
     except CycleError as error:
-        circle = error.args[1][:0:-1]
-        first = min(map(list(derived).index, circle))
-        at = circle.index(list(derived)[first])
-        shown = " -> ".join((*circle[at:], *circle[: at + 1]))
+        shown = " -> ".join(reversed(error.args[1]))
         raise RequestError(
             f"derived channels need one another in a circle: {shown}. Make one of them from "
             "measured channels."
@@ -82,7 +79,7 @@ def needed_channels(settings: CampaignSettings, wanted: Collection[str]) -> set[
 
 
 def _cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
-    yield from _channel_mistakes(settings)
+    yield from _unit_mistakes(settings)
     yield from _derived_mistakes(settings)
     yield from _name_mistakes(settings)
     wave = settings.campaign.period_channel
@@ -167,23 +164,20 @@ def _instrument_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
                 )
 
 
-def _channel_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
-    tables: list[tuple[tuple[str, ...], str, ChannelSettings]]
-    tables = [(("channels", name), name, each) for name, each in settings.channels.items()]
+def _unit_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
+    tables: dict[tuple[str, ...], ChannelSettings | DerivedSettings]
+    tables = {("channels", name): each for name, each in settings.channels.items()}
+    tables |= {("derived", name): each for name, each in settings.derived.items()}
     for run, of_run in settings.runs.items():
-        tables += [(("runs", run, "channels", n), n, each) for n, each in of_run.channels.items()]
-    for place, name, each in tables:
-        try:
-            _check_unit(name, each)
-        except RequestError as error:
-            yield Mistake((*place, "unit"), str(error))
-
-
-def _check_unit(name: str, settings: ChannelSettings | DerivedSettings) -> None:
-    if settings.unit is None:
-        return
-    canonical = canonical_channel(name)
-    conversion(settings.unit, canonical.units if canonical else si_unit(settings.unit), name)
+        tables |= {("runs", run, "channels", n): each for n, each in of_run.channels.items()}
+    for place, each in tables.items():
+        if each.unit is not None:
+            canonical = canonical_channel(place[-1])
+            try:
+                target = canonical.units if canonical else si_unit(each.unit)
+                conversion(each.unit, target, place[-1])
+            except RequestError as error:
+                yield Mistake((*place, "unit"), str(error))
 
 
 def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
@@ -194,11 +188,7 @@ def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
         if name in settings.channels:
             yield Mistake(place, f"[channels.{name}] exists too. Rename one of them.")
         try:
-            _check_unit(name, each)
-        except RequestError as error:
-            yield Mistake((*place, "unit"), str(error))
-        try:
-            sources = sources_of(name, each, settings.channel_names)
+            sources = sources_of(name, each, names)
         except RequestError as error:
             sound = False
             yield Mistake((*place, "expression"), str(error))
@@ -207,10 +197,10 @@ def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
         for source in sources:
             if source not in names:
                 near = did_you_mean(source, names)
-                words = (
-                    f"the channel '{source}' does not exist.{near} Channels: {', '.join(names)}."
+                yield Mistake(
+                    (*place, key),
+                    f"the channel '{source}' does not exist.{near} Channels: {', '.join(names)}.",
                 )
-                yield Mistake((*place, key), words)
         if each.expression is not None and each.unit is None and canonical_channel(name) is None:
             yield Mistake(
                 (*place, "unit"),
@@ -219,6 +209,6 @@ def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
             )
     if sound:
         try:
-            derivation_order(settings.derived, settings.channel_names)
+            derivation_order(settings.derived, names)
         except RequestError as error:
             yield Mistake(("derived",), str(error))

@@ -34,15 +34,10 @@ def refuse_foreign(path: Path, head: bytes) -> None:
 
 def refuse_text(path: Path, head: bytes, kind: str) -> None:
     """Refuse text under the name of a binary format."""
-    if _is_text(head):
+    printable = all(byte >= 0x20 or byte in b"\t\n\r\f" for byte in head)
+    if printable and len(head) >= 8 and b"\x7f" not in head:
         shown = head[:24].decode("latin-1").splitlines()[0] if head.strip() else ""
         raise DataError(
             f"{path} is not a valid {kind} file: it holds text and starts with {shown!r}. If it is "
             "a table, name it .csv or .txt; else copy or export it again."
         )
-
-
-def _is_text(head: bytes) -> bool:
-    """Whether bytes are printable: no control characters but white space."""
-    plain = all(byte >= 0x20 or byte in b"\t\n\r\f" for byte in head)
-    return plain and len(head) >= 8 and b"\x7f" not in head

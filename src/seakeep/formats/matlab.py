@@ -14,7 +14,7 @@ from pymatreader import read_mat
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError
 from seakeep.formats.columns import Columns, check_lengths, unique_names
-from seakeep.formats.reader import Options
+from seakeep.formats.reader import Options, decoding
 
 __all__ = ["read_matlab"]
 
@@ -53,21 +53,11 @@ def _loaded(path: Path) -> dict[str, Any]:
     with path.open("rb") as file:
         hdf5 = file.read(len(_VERSION_73)) == _VERSION_73
     version = "version 7.3" if hdf5 else "version 5"
-    try:
+    what = f"a MATLAB file of {version}: cut off or damaged"
+    with decoding(path, what, "Save it again from MATLAB."), warnings.catch_warnings():
         opaque = _opaque(path) if hdf5 else {}
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of classes: they are not channels
-            content = read_mat(path, ignore_fields=[name.rpartition("/")[2] for name in opaque])
-    except DataError:
-        raise
-    # On a damaged file scipy, h5py and pymatreader raise the errors of their dependencies.
-    except Exception as error:
-        said = str(error).splitlines()[0] if str(error) else type(error).__name__
-        said = "structs and cells nest without end" if isinstance(error, RecursionError) else said
-        raise DataError(
-            f"{path} cannot be read as a MATLAB file of {version}: cut off or damaged ({said}). "
-            "Save it again from MATLAB."
-        ) from None
+        warnings.simplefilter("ignore")  # of classes: they are not channels
+        content = read_mat(path, ignore_fields=[name.rpartition("/")[2] for name in opaque])
     # HDF5 keeps no order, and pymatreader hands names on as a set.
     tidy: dict[str, Any] = _tidy(content, in_order=hdf5)
     if opaque and not tidy:
@@ -130,46 +120,37 @@ def _rate(found: Mapping[str, Any]) -> float | None:
     return None
 
 
-def _texts(value: Any) -> list[str] | None:
-    if isinstance(value, str):
-        return None
-    cells = list(np.atleast_1d(np.asarray(value, dtype=object)))
-    return [cell.strip() for cell in cells] if all(isinstance(c, str) for c in cells) else None
-
-
 def _first(found: Mapping[str, Any], keys: tuple[str, ...]) -> Any:
     return next((found[key] for key in keys if key in found), None)
+
+
+def _texts(found: Mapping[str, Any], keys: tuple[str, ...]) -> list[str]:
+    """Texts of a list under one of the keys; none where it holds others."""
+    value = _first(found, keys)
+    cells = [] if isinstance(value, str) else list(np.atleast_1d(np.asarray(value, dtype=object)))
+    return [cell.strip() for cell in cells] if all(isinstance(c, str) for c in cells) else []
 
 
 def _units(found: Mapping[str, Any]) -> dict[str, str]:
     units = _first(found, _UNIT_KEYS)
     if isinstance(units, dict):
         return {name: unit for name, unit in units.items() if isinstance(unit, str)}
-    names, listed = _texts(_first(found, _NAME_KEYS)), None if units is None else _texts(units)
-    if names and listed and len(names) == len(listed):
-        return dict(zip(names, listed, strict=True))
-    return {}
+    names, listed = _texts(found, _NAME_KEYS), _texts(found, _UNIT_KEYS)
+    return dict(zip(names, listed, strict=True)) if len(names) == len(listed) else {}
 
 
 def _named_matrix(path: Path, found: Mapping[str, Any]) -> dict[str, FloatArray]:
     """Columns of a matrix beside which their names stand; empty if there is none."""
-    raw = _first(found, _NAME_KEYS)
-    names = None if raw is None else _texts(raw)
+    names = _texts(found, _NAME_KEYS)
     if not names:
         return {}
-    matrices = {k: v for k, v in found.items() if isinstance(v, np.ndarray) and v.ndim == 2}
+    arrays = {k: v for k, v in found.items() if isinstance(v, np.ndarray) and v.dtype.kind in "fiu"}
+    matrices = {key: array for key, array in arrays.items() if array.ndim == 2}
     for key, matrix in matrices.items():
-        if not np.issubdtype(matrix.dtype, np.number):
-            continue
         rows, columns = matrix.shape
         if columns == len(names):
-            out = {n: matrix[:, i].astype(float) for i, n in enumerate(names)}
-            vectors = {
-                k: v.astype(float)
-                for k, v in found.items()
-                if isinstance(v, np.ndarray) and v.dtype.kind in "fiu" and v.shape == (rows,)
-            }
-            return {**vectors, **out}
+            beside = {k: v.astype(float) for k, v in arrays.items() if v.shape == (rows,)}
+            return {**beside, **{n: matrix[:, i].astype(float) for i, n in enumerate(names)}}
         if rows == len(names):
             raise _transposed(path, key, matrix.shape)
     shapes = ", ".join(f"{key} {value.shape}" for key, value in matrices.items()) or "none"
@@ -189,10 +170,8 @@ def _transposed(path: Path, key: str, shape: tuple[int, ...]) -> DataError:
 def _vectors(path: Path, found: Mapping[str, Any]) -> dict[str, FloatArray]:
     vectors, matrices = {}, {}
     for name, value in found.items():
-        array = np.asarray(value) if not isinstance(value, str | dict) else np.empty(0, object)
-        if not (np.issubdtype(array.dtype, np.number) or array.dtype == bool) or array.size < 2:
-            continue
-        if np.iscomplexobj(array) or array.ndim > 2:
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiub" or array.ndim > 2 or array.size < 2:
             continue
         if array.ndim == 1:
             vectors[name] = array.astype(float)

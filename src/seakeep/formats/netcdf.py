@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import struct
 import warnings
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,9 +12,9 @@ import xarray as xr
 
 from seakeep.errors import DataError, did_you_mean
 from seakeep.formats.columns import Columns
-from seakeep.formats.reader import Options
+from seakeep.formats.reader import Options, decoding
 
-__all__ = ["read_netcdf"]
+__all__ = ["opened_netcdf", "read_netcdf"]
 
 WIDEST = 64
 """Columns of a two-dimensional set beyond which it is a picture or a field, not channels."""
@@ -28,7 +26,7 @@ def read_netcdf(path: Path, options: Options) -> Columns:
     A set of shape (time, n) is split: by the labels of its second dimension, or ``NAME_1`` to
     ``NAME_n``. `group` may be left out where one group alone holds channels.
     """
-    dataset = _opened(path, options.group)
+    dataset = opened_netcdf(path, options.group)
     flat: dict[str, xr.DataArray] = {}
     faults: dict[str, str] = {}
     for name, variable in dataset.variables.items():
@@ -58,7 +56,7 @@ def read_netcdf(path: Path, options: Options) -> Columns:
     units = {
         name: _text(array.attrs["units"]) for name, array in flat.items() if "units" in array.attrs
     }
-    return Columns(values, units, faults, headers={name: name for name in [*values, *faults]})
+    return Columns(values, units, faults)
 
 
 def _text(attribute: Any) -> str:
@@ -71,26 +69,18 @@ def _text(attribute: Any) -> str:
         return attribute.decode("latin-1")
 
 
-def _opened(path: Path, group: str | None) -> xr.Dataset:
+def opened_netcdf(path: Path, group: str | None = None) -> xr.Dataset:
+    """Variables of a NetCDF or HDF5 file; a DataError says where it is cut off or damaged."""
     with path.open("rb") as file:
         classic = file.read(3) == b"CDF"
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UnicodeWarning)  # units in another encoding: see _text
-            how: dict[str, Any] = {"engine": "scipy"}
-            if not classic:
-                how = {"engine": "h5netcdf", "group": _group(path, group), "phony_dims": "sort"}
-            with xr.open_dataset(path, decode_times=False, **how) as opened:
-                return opened.load()
-    except DataError:
-        raise
-    except (OSError, ValueError, TypeError, KeyError, IndexError, EOFError, RuntimeError,
-            AttributeError, MemoryError, struct.error, zlib.error) as error:  # fmt: skip
-        raise DataError(
-            f"{path} cannot be read as NetCDF or HDF5: cut off, damaged or of another kind "
-            f"({str(error).splitlines()[0] if str(error) else type(error).__name__}). "
-            "Copy or download it again."
-        ) from None
+    what = "NetCDF or HDF5: cut off, damaged or of another kind"
+    with decoding(path, what, "Copy or download it again."), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnicodeWarning)  # units in another encoding: see _text
+        how: dict[str, Any] = {"engine": "scipy"}
+        if not classic:
+            how = {"engine": "h5netcdf", "group": _group(path, group), "phony_dims": "sort"}
+        with xr.open_dataset(path, decode_times=False, **how) as opened:
+            return opened.load()
 
 
 def _group(path: Path, wanted: str | None) -> str | None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from seakeep.errors import DataError, SeakeepError
 from seakeep.formats.columns import Columns
 
-__all__ = ["Options", "Reader"]
+__all__ = ["Options", "Reader", "decoding"]
 
 
 @dataclass(frozen=True)
@@ -65,3 +67,16 @@ class Reader:
     signatures: tuple[bytes, ...] = ()
     suffixes: tuple[str, ...] = ()
     folder_mark: str = ""
+
+
+@contextmanager
+def decoding(path: Path, what: str, mend: str) -> Iterator[None]:
+    """Report what a library raises on a damaged file: errors of all its dependencies."""
+    try:
+        yield
+    except SeakeepError:
+        raise
+    except Exception as error:
+        said = str(error).splitlines()[0] if str(error) else type(error).__name__
+        said = "structs and cells nest without end" if isinstance(error, RecursionError) else said
+        raise DataError(f"{path} cannot be read as {what} ({said}). {mend}") from None

@@ -16,7 +16,7 @@ import numpy as np
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.formats.columns import Columns
-from seakeep.formats.reader import Options
+from seakeep.formats.reader import Options, decoding
 
 __all__ = ["read_recording"]
 
@@ -51,20 +51,16 @@ def read_recording(path: Path, options: Options) -> Columns:
     beside = path.parent / "metadata.yaml"
     place = path.parent if path.suffix.lower() == ".db3" and beside.is_file() else path
     store = typesys.get_typestore(typesys.Stores.LATEST)
-    try:
-        with highlevel.AnyReader([place], default_typestore=store) as reader:
-            begin = int(reader.start_time)
-            rows = _read_topic(path, reader, options.group)
-    except (RequestError, DataError):
-        raise
-    # On a damaged file rosbags raises the errors of its dependencies: SQLite, YAML, decompression,
-    # assert.
-    except Exception as error:
-        said = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise DataError(
-            f"{path} cannot be read as a recording of ROS 2: cut off, damaged or of another kind "
-            f"({said}). Copy it again; `ros2 bag reindex` repairs a bag that was not closed."
-        ) from None
+    with (
+        decoding(
+            path,
+            "a recording of ROS 2: cut off, damaged or of another kind",
+            "Copy it again; `ros2 bag reindex` repairs a bag that was not closed.",
+        ),
+        highlevel.AnyReader([place], default_typestore=store) as reader,
+    ):
+        begin = int(reader.start_time)
+        rows = _read_topic(path, reader, options.group)
     return _columns(path, rows, begin)
 
 
@@ -186,9 +182,7 @@ def _columns(path: Path, rows: _Rows, begin: int) -> Columns:
         )
     units = {name: unit for name in values if (unit := _unit(rows.kind, name)) is not None}
     units |= dict.fromkeys(times, "s")
-    values = {**times, **values}
-    headers = {name: name for name in [*values, *faults]}
-    return Columns(values=values, units=units, faults=faults, headers=headers)
+    return Columns({**times, **values}, units, faults)
 
 
 def _seconds(instants: list[int], begin: int) -> FloatArray:

@@ -6,11 +6,11 @@ Needs nptdms, the extra ``tdms`` (its licence is the LGPL, so it is never instal
 from __future__ import annotations
 
 import logging
-import struct
+import os
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.formats.columns import Columns, check_lengths
-from seakeep.formats.reader import Options
+from seakeep.formats.reader import Options, decoding
 
 __all__ = ["read_tdms"]
 
@@ -40,48 +40,43 @@ def read_tdms(path: Path, options: Options) -> Columns:
             f"{path} is a TDMS file; reading it needs nptdms, which is not installed. "
             "Install the extra: pip install 'seakeep[tdms]'."
         ) from error
-    _check_whole(path)
-    logging.getLogger("nptdms").setLevel(logging.ERROR)  # the error below says what is wrong
-    try:
-        # Opened here, since nptdms leaves a file open whose head it cannot read.
-        with path.open("rb") as raw, nptdms.TdmsFile.open(raw) as file:
+    logging.getLogger("nptdms").setLevel(logging.ERROR)  # the error says what is wrong
+    # Opened here, since nptdms leaves a file open whose head it cannot read.
+    with (
+        decoding(
+            path,
+            "a TDMS file: cut off or damaged",
+            "Copy it again, or export it from LabVIEW or DIAdem.",
+        ),
+        path.open("rb") as raw,
+    ):
+        _check_whole(raw)
+        with nptdms.TdmsFile.open(raw) as file:
             channels = [
                 channel
                 for channel in _chosen(path, file, options.group)
                 if len(channel) > 1 and np.dtype(channel.dtype or object).kind in "fiubM"
             ]
             data = [np.asarray(channel[:]) for channel in channels]
-    except (ValueError, TypeError, OSError, EOFError, KeyError, IndexError, AttributeError,
-            struct.error, MemoryError, OverflowError, UnicodeDecodeError) as error:  # fmt: skip
-        if isinstance(error, RequestError):
-            raise
-        raise _damaged(path, str(error) or type(error).__name__) from None
     return _columns(path, channels, data)
 
 
-def _check_whole(path: Path) -> None:
+def _check_whole(raw: BinaryIO) -> None:
     """Refuse a file whose segments do not end where it ends.
 
     Each segment starts with 28 bytes: ``TDSm``, two numbers of four bytes, and the lengths of what
     follows. nptdms leaves an incomplete last segment out, with a line in a log.
     """
-    size, at = path.stat().st_size, 0
-    with path.open("rb") as raw:
-        while at < size:
-            raw.seek(at)
-            head = raw.read(LEAD_IN)
-            if len(head) < LEAD_IN or head[:4] != b"TDSm":
-                raise _damaged(path, f"no segment starts at byte {at}")
-            at += LEAD_IN + int.from_bytes(head[12:20], "little")
+    size, at = raw.seek(0, os.SEEK_END), 0
+    while at < size:
+        raw.seek(at)
+        head = raw.read(LEAD_IN)
+        if len(head) < LEAD_IN or head[:4] != b"TDSm":
+            raise ValueError(f"no segment starts at byte {at}")
+        at += LEAD_IN + int.from_bytes(head[12:20], "little")
     if at > size:
-        raise _damaged(path, f"its last segment is not complete, the file ends at byte {size}")
-
-
-def _damaged(path: Path, said: str) -> DataError:
-    return DataError(
-        f"{path} cannot be read as a TDMS file: cut off or damaged ({said}). Copy it again, or "
-        "export it from LabVIEW or DIAdem."
-    )
+        raise ValueError(f"its last segment is not complete, the file ends at byte {size}")
+    raw.seek(0)
 
 
 def _chosen(path: Path, file: Any, wanted: str | None) -> Sequence[Any]:
@@ -139,7 +134,7 @@ def _columns(path: Path, channels: list[Any], data: list[npt.NDArray[Any]]) -> C
     if time is not None and not any(name.lower() == "time" for name in names):
         values = {"time": time, **values}
         units["time"] = "s"
-    return Columns(values=values, units=units, headers={name: name for name in values})
+    return Columns(values, units)
 
 
 def _seconds(instants: npt.NDArray[Any]) -> FloatArray:

@@ -303,11 +303,9 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 def _numeric(cells: list[str]) -> bool:
     """Whether these are the cells of a row of data: numbers, or nothing where one is missing."""
-    numbers = [bool(_NUMBER.match(cell)) for cell in cells]
-    known = [
-        number or cell.lower() in _MISSING for number, cell in zip(numbers, cells, strict=True)
-    ]
-    return any(numbers) and all(known)
+    return any(map(_NUMBER.match, cells)) and all(
+        _NUMBER.match(cell) or cell.lower() in _MISSING for cell in cells
+    )
 
 
 def _units(cells: list[str], headers: list[str]) -> list[str] | None:

@@ -21,7 +21,7 @@ from seakeep.conventions import is_elevation
 from seakeep.core import metrics
 from seakeep.core.bands import band_error_over_time
 from seakeep.errors import DataError, SeakeepError
-from seakeep.formats.limits import open_hdf5
+from seakeep.formats.netcdf import opened_netcdf
 from seakeep.models.calibration import Judged, envelope_of, found_margin, held_out
 from seakeep.models.engine import group_series, read_groups
 from seakeep.models.interface import Json
@@ -532,8 +532,7 @@ def true_channels(study: Study, plan: Plan, runs: Runs, test: str) -> FloatArray
                 f"the study names the folder {folder} of true channels, and {path.name} is not in "
                 "it. Play the tank again, or leave study.truth out."
             )
-        with open_hdf5(path):  # whoever wrote it
-            truths[run] = xr.load_dataset(path, engine="h5netcdf", decode_times=False)
+        truths[run] = opened_netcdf(path)
     out = []
     for window in plan.tests[test]:
         true = truths[window.run]
