@@ -576,9 +576,8 @@ def regular_response(groups: Mapping[str, xr.Dataset], test: str) -> xr.Dataset:
     SDs, whose squares add up to that of the NRMSE; ``phase_lead`` is that of the forecast before
     the measurement, degrees.
     """
-    data, runs = groups[f"tests/{test}"], groups["runs"]
-    frequencies = runs["wave_frequency"].sel(run=data["run"].values.astype(str)).values
-    parts = np.array([_parts(data, model, frequencies) for model in data["model"].values])
+    data = groups[f"tests/{test}"]
+    parts = np.array([_parts(groups, test, model) for model in data["model"].values])
     keys = ("error_offset", "error_wave", "error_rest", "amplitude_ratio", "phase_lead")
     return xr.Dataset(
         {key: (("model", "channel"), parts[:, k]) for k, key in enumerate(keys)},
@@ -586,27 +585,37 @@ def regular_response(groups: Mapping[str, xr.Dataset], test: str) -> xr.Dataset:
     )
 
 
-def _parts(data: xr.Dataset, model: str, frequencies: FloatArray) -> list[FloatArray]:
+def _parts(groups: Mapping[str, xr.Dataset], test: str, model: str) -> list[FloatArray]:
     """Errors and responses of a model, each of shape (channel,)."""
-    time, measured = data["time"].values, data["measured"].values
-    squares, responses = [], []
-    one = data.sel(model=model, measure="nrmse")
-    forecasts, slack = one["mean"].values, np.isnan(one["error"].values)
-    for row, column in zip(*np.nonzero(data["judged"].values), strict=True):
-        found, response = _in_waves(
-            time, frequencies[column], forecasts[row, column], measured[column]
-        )
-        squares.append(np.where(slack[row, column], np.nan, found))
-        responses.append(np.where(slack[row, column], np.nan, response))
-    known, answer = np.stack(squares), np.stack(responses)
+    judged = groups[f"tests/{test}"]["judged"].values
+    squares, responses = _responses(groups, test, model)
+    known, answer = squares[:, judged], responses[judged]
     lost = np.isnan(known).all(axis=(0, 1))
     known[..., lost], answer[..., lost] = 0.0, 1.0
-    errors = np.sqrt(np.nanmean(np.maximum(known, 0.0), axis=0))
+    errors = np.sqrt(np.nanmean(np.maximum(known, 0.0), axis=1))
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         warnings.simplefilter("ignore", RuntimeWarning)  # a constant forecast has no phase
         direction = np.nanmean(answer / np.abs(answer), axis=0)
     columns_of = [*errors, np.nanmedian(np.abs(answer), axis=0), np.degrees(np.angle(direction))]
     return [np.where(lost, np.nan, each) for each in columns_of]
+
+
+def _responses(
+    groups: Mapping[str, xr.Dataset], test: str, model: str
+) -> tuple[FloatArray, npt.NDArray[np.complex128]]:
+    """:func:`_in_waves` over (training, window, channel); NaN where one is not judged."""
+    data = groups[f"tests/{test}"]
+    frequencies = groups["runs"]["wave_frequency"].sel(run=data["run"].values.astype(str)).values
+    time, measured = data["time"].values, data["measured"].values
+    one = data.sel(model=model, measure="nrmse")
+    forecasts, slack = one["mean"].values, np.isnan(one["error"].values)
+    squares = np.full((3, *slack.shape), np.nan)
+    responses = np.full(slack.shape, np.nan, dtype=complex)
+    for cell in zip(*np.nonzero(data["judged"].values), strict=True):
+        place = frequencies[cell[1]], forecasts[cell], measured[cell[1]]
+        squares[:, *cell], responses[cell] = _in_waves(time, *place)
+    squares[:, slack], responses[slack] = np.nan, np.nan
+    return squares, responses
 
 
 def _in_waves(
@@ -631,13 +640,4 @@ def phase_leads(groups: Mapping[str, xr.Dataset], test: str, model: str) -> Floa
 
     NaN where a cell or a channel is not judged.
     """
-    data = groups[f"tests/{test}"]
-    frequencies = groups["runs"]["wave_frequency"].sel(run=data["run"].values.astype(str)).values
-    time, measured = data["time"].values, data["measured"].values
-    one = data.sel(model=model, measure="nrmse")
-    forecasts, errors = one["mean"].values, one["error"].values
-    out = np.full(errors.shape, np.nan)
-    for row, column in zip(*np.nonzero(data["judged"].values), strict=True):
-        place = frequencies[column], forecasts[row, column], measured[column]
-        out[row, column] = np.degrees(np.angle(_in_waves(time, *place)[1]))
-    return np.where(np.isnan(errors), np.nan, out)
+    return np.degrees(np.angle(_responses(groups, test, model)[1]))
