@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from seakeep.models import HankelEnsemble
     from seakeep.report.tables import Table
 
-__all__ = ["calibrate"]
-
 
 def calibrate(
     ensemble: Annotated[

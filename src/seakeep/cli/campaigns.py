@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from seakeep.campaign import Campaign
 
-__all__ = ["datasets", "init", "prepare"]
-
 SHOWN = 12
 """Findings that prepare prints at most: what fits a screen beside the files' names."""
 

@@ -13,8 +13,6 @@ from seakeep.cli.options import CampaignFile, ModelFile, read_files
 from seakeep.errors import SeakeepError
 from seakeep.files import check_output, check_report, make_folder
 
-__all__ = ["check"]
-
 
 def check(
     model: ModelFile,

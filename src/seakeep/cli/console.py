@@ -20,17 +20,6 @@ from seakeep.errors import SeakeepWarning
 if TYPE_CHECKING:
     from seakeep.report.tables import Table
 
-__all__ = [
-    "Progress",
-    "messages",
-    "print_table",
-    "progress_bar",
-    "results",
-    "tell_warnings",
-    "worker_count",
-]
-
-
 SECONDS_BETWEEN_LINES = 5.0
 PIPE_WIDTH = 140
 """Columns of a table that goes to a file or a pipe, where nobody can widen the window."""

@@ -15,8 +15,6 @@ from seakeep.files import check_place
 if TYPE_CHECKING:
     from seakeep.models import Model
 
-__all__ = ["export"]
-
 
 def export(
     model: ModelFile,

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from seakeep.models import Model
     from seakeep.study import Comparison
 
-__all__ = ["compare", "fit", "forecast"]
-
 TABLE = "comparison.csv"
 DIFFERENCES = "differences.csv"
 ERRORS = "errors_by_run"

@@ -16,23 +16,6 @@ if TYPE_CHECKING:
 
     from seakeep.campaign import Campaign
 
-__all__ = [
-    "DEFAULT_LEVEL",
-    "BandKind",
-    "CampaignFile",
-    "Degrees",
-    "FullScale",
-    "Level",
-    "ModelFile",
-    "ModelKey",
-    "Scheduler",
-    "Steps",
-    "Workers",
-    "checked_count",
-    "member_executor",
-    "read_files",
-]
-
 DEFAULT_LEVEL = 0.95
 
 CampaignFile = Annotated[Path, typer.Argument(help="Campaign file.", metavar="CAMPAIGN.toml")]

@@ -17,8 +17,6 @@ from seakeep.cli.options import Scheduler, checked_count
 if TYPE_CHECKING:
     from seakeep.study import StudyResult
 
-__all__ = ["report", "reproduce", "study"]
-
 Found = TypeVar("Found")
 Preset = Literal["paper", "recommended"]
 

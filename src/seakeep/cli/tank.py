@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from seakeep.tank.realised import Realised
     from seakeep.tank.settings import TankSettings
 
-__all__ = ["tank"]
-
 
 def tank(
     out: Annotated[

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from seakeep.signals import MotionAgreement, Track
 
-__all__ = ["track"]
-
 TRACK, SHEET = "track", "contact sheet"
 HEADER = r"time \[s\],surge \[m\],heave \[m\],pitch \[deg\],centroid_x \[pixel\],"
 DECIMALS = {"s": 6, "m": 6, "deg": 5, "pixel": 3, "pixel^2": 1, "1": 4}

@@ -21,8 +21,6 @@ from seakeep.cli.options import (
 from seakeep.errors import RequestError
 from seakeep.files import check_output, check_place, replacing
 
-__all__ = ["tune"]
-
 
 def tune(
     campaign: CampaignFile,

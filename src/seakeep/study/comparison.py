@@ -28,19 +28,6 @@ from seakeep.study.fit import warn_of_repeats, warn_of_waves
 from seakeep.study.full_scale import to_full_scale
 from seakeep.toml import parse_length
 
-__all__ = [
-    "Comparison",
-    "at_full_scale",
-    "compare",
-    "compare_models",
-    "comparison_table",
-    "difference_table",
-    "forecast_at_full_scale",
-    "in_degrees",
-    "instant_of",
-    "samples_of",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class Comparison:

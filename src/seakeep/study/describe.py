@@ -21,8 +21,6 @@ from seakeep.study.judge import wave_frequency
 from seakeep.study.plan import Plan, between, training_samples, whole_span
 from seakeep.study.settings import Study
 
-__all__ = ["describe_study", "words_of_repeats"]
-
 Runs = Mapping[str, xr.Dataset]
 
 POSITIVE = {

@@ -13,7 +13,7 @@ from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepError, warn
-from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, outside_training
+from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, Spec, outside_training
 from seakeep.models.labelled import mean_period
 from seakeep.models.settings import Select
 from seakeep.models.slow import warn_of_slow_motions
@@ -21,19 +21,8 @@ from seakeep.models.specs import left_open
 from seakeep.quality import warn_of_runs
 from seakeep.signals import find_leakage
 from seakeep.study.plan import between
-from seakeep.study.resolve import Spec, build_spec, can_align, counts_in_periods, mistakes_of
+from seakeep.study.resolve import build_spec, can_align, counts_in_periods, mistakes_of
 from seakeep.toml import Length, refusal
-
-__all__ = [
-    "Repeat",
-    "find_repeat",
-    "fit_baselines",
-    "fit_campaign",
-    "repeats_of",
-    "training_runs",
-    "warn_of_repeats",
-    "warn_of_waves",
-]
 
 NOTHING_TRAINS = (
     "no run of the campaign trains a model. Give one role = 'train', or a span "

@@ -7,8 +7,6 @@ import xarray as xr
 from seakeep.errors import RequestError
 from seakeep.signals.froude import froude_factor
 
-__all__ = ["to_full_scale"]
-
 ATTRIBUTES = {"dt": "s", "start": "s", "encounter_period": "s", "train_span": "s",
                "test_span": "s", "water_depth": "m",
                "reads_input_until": "s", "input_predicted_from": "s",

@@ -28,28 +28,6 @@ from seakeep.models.executor import in_order
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
 
-__all__ = [
-    "BANDS",
-    "MEASURES",
-    "VARIANTS",
-    "average_of",
-    "band_of",
-    "band_parts",
-    "box_table",
-    "coverage_table",
-    "difference_table",
-    "is_regular",
-    "joined",
-    "judge",
-    "median_of",
-    "references_of",
-    "regular_response",
-    "training_order",
-    "verdict",
-    "wave_frequency",
-]
-
-
 BANDS = ("all", "low", "wave")
 """ε(t) as a whole, and in its two bands."""
 MEASURES = ("nrmse", "nammae", "training_nrmse")

@@ -18,8 +18,6 @@ from seakeep.models.live import Servable, held_samples
 from seakeep.quality import warn_of_runs
 from seakeep.study.comparison import samples_of
 
-__all__ = ["PERIODS", "SHARE", "labelled_skill", "nowcast", "nowcasts"]
-
 STARTS = 24
 """Forecasts of a run: enough for a root mean square known to a seventh."""
 PERIODS = 5

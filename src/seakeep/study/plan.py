@@ -16,28 +16,13 @@ import xarray as xr
 from seakeep.campaign import load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import DataError, RequestError
-from seakeep.models import Needs
+from seakeep.models import Needs, Spec
 from seakeep.models.calibration import BandScale
 from seakeep.models.selection import groups_of
 from seakeep.models.settings import periods_to_samples
 from seakeep.models.slow import warn_of_slow_motions
-from seakeep.study.resolve import ResolvedModel, Spec, can_align, resolve_model
+from seakeep.study.resolve import ResolvedModel, can_align, resolve_model
 from seakeep.study.settings import Study, StudySettings, TestSetSettings, TrainingSettings
-
-__all__ = [
-    "Plan",
-    "TestWindow",
-    "TrainingSet",
-    "between",
-    "choose_tests",
-    "choose_training",
-    "make_plan",
-    "needs_of",
-    "random_stream",
-    "training_samples",
-    "warn_of_slow_study",
-    "windows_overlap",
-]
 
 Runs = Mapping[str, xr.Dataset]
 

@@ -27,8 +27,6 @@ from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
 from seakeep.study.store import StudyResult, read_result, storing, versions
 
-__all__ = ["ACTS", "SLOW", "Act", "Size", "read_reproduction", "reproduce"]
-
 NOTE = (
     "Virtual tank: a made-up vessel in made-up seas, so no number here replicates the paper's. Its "
     "raw files come from four loggers with clocks of their own, with noise, drop-outs and slap, "

@@ -21,16 +21,6 @@ from seakeep.models.settings import Folds
 from seakeep.models.specs import left_open
 from seakeep.toml import Length, Mistake, lengths
 
-__all__ = [
-    "ResolvedModel",
-    "Spec",
-    "build_spec",
-    "can_align",
-    "counts_in_periods",
-    "mistakes_of",
-    "resolve_model",
-]
-
 Source = Literal["stated", "preset", "study", "default"]
 
 TABLES = {"alignment": ProbeAlignment, "select": Select}

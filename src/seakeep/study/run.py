@@ -30,8 +30,6 @@ from seakeep.study.store import (
 )
 from seakeep.study.units import Unit, choice_of, choose, collect, compute, units_of
 
-__all__ = ["run_study"]
-
 
 def run_study(
     study: Study,

@@ -24,15 +24,6 @@ from seakeep.sizes import MOST_SERIES
 from seakeep.study.resolve import mistakes_of
 from seakeep.toml import Count, Mistake, Names, Positive, Table, read_toml, refusal, validated
 
-__all__ = [
-    "Study",
-    "StudyModelSettings",
-    "StudySettings",
-    "TestSetSettings",
-    "TrainingSettings",
-    "read_study",
-]
-
 FORMAT = 7
 """Goes into digest and result: raise it when the same settings give other arrays than before."""
 

@@ -25,18 +25,6 @@ from seakeep.errors import SHOWN, RequestError, SeakeepError, warn
 from seakeep.files import SEAL, check_report, is_there, read_bytes, read_sealed, replacing
 from seakeep.study.settings import FORMAT
 
-__all__ = [
-    "RESULT",
-    "StorageError",
-    "StudyResult",
-    "UnitFolder",
-    "read_result",
-    "relabel",
-    "storing",
-    "versions",
-    "write_result",
-]
-
 RESULT = "study.nc"
 NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 HEADER = "study.json"

@@ -36,8 +36,6 @@ from seakeep.study.nowcast import PERIODS, SHARE, labelled_skill, nowcast
 from seakeep.study.plan import Plan, TestWindow, TrainingSet, between
 from seakeep.study.settings import Study
 
-__all__ = ["Unit", "choice_of", "choose", "collect", "compute", "fit_training", "units_of"]
-
 Runs = Mapping[str, xr.Dataset]
 Arrays = dict[str, npt.NDArray[Any]]
 Read = Callable[["Unit"], Arrays]
