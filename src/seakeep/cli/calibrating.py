@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import messages, print_table, progress_bar, results
+from seakeep.cli.console import print_table, progress_bar, say, show
 from seakeep.cli.options import (
     DEFAULT_LEVEL,
     CampaignFile,
@@ -142,19 +142,16 @@ def calibrate(
     assert calibrated.calibration is not None
     spans = calibrated.calibration.spans.items()
     used = [f"{name} {span_text(*span, calibrated.dt)}" for name, span in spans]
-    results().print(f"Calibrated on {', '.join(used)}: judge it on other instants.", soft_wrap=True)
+    show(f"Calibrated on {', '.join(used)}: judge it on other instants.")
     calibrated.save(out)
     whole = sum(calibrated.calibration.windows.values())
     if whole / (whole + 1) < calibrated.calibration.found.level:
-        messages().print(
+        say(
             "Note: errors that last for a whole window are seen only once in each. Counted as "
             f"such, {counted(whole, 'window')} would support {100 * whole / (whole + 1):.0f} %; "
             "more windows make the margin surer.",
-            soft_wrap=True,
         )
-    messages().print(
-        f"Wrote {out}. Judge it elsewhere with: seakeep compare {out} {campaign} --band calibrated"
-    )
+    say(f"Wrote {out}. Judge it elsewhere with: seakeep compare {out} {campaign} --band calibrated")
 
 
 def _instant(

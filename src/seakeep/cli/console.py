@@ -50,6 +50,16 @@ def messages() -> Console:
     return _console(getattr(sys.stderr, "rich_proxied_file", sys.stderr))
 
 
+def say(text: str, style: str | None = None) -> None:
+    """Print a message."""
+    messages().print(text, style=style)
+
+
+def show(text: str) -> None:
+    """Print a line of results, which the terminal may wrap."""
+    results().print(text, soft_wrap=True)
+
+
 @lru_cache(maxsize=1)
 def _console(stream: IO[str]) -> Console:
     return Console(file=stream, highlight=False, soft_wrap=True, markup=False, emoji=False)
@@ -130,7 +140,7 @@ def tell_warnings() -> Iterator[None]:
             if str(message) in seen:  # of several models, once
                 return
             seen.add(str(message))
-            messages().print(f"Note: {message}", style="yellow")
+            say(f"Note: {message}", style="yellow")
         else:
             told(message, category, filename, lineno, None, line)
 

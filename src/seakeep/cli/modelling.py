@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from seakeep.cli.console import messages, print_table, progress_bar, results
+from seakeep.cli.console import print_table, progress_bar, say, show
 from seakeep.cli.options import (
     DEFAULT_LEVEL,
     BandKind,
@@ -81,7 +81,7 @@ def fit(
                 identified.spectral_radii(executor=executor, progress=progress)
     typer.echo(identified.summary())
     identified.save(out)
-    messages().print(f"Wrote {out}. Judge it with: seakeep compare {out} {campaign}")
+    say(f"Wrote {out}. Judge it with: seakeep compare {out} {campaign}")
 
 
 def forecast(
@@ -192,7 +192,7 @@ def forecast(
     status = result.attrs["status"]
     begin = instant_text(float(result.attrs["start"]), identified.dt)
     reads = look_ahead_words(float(result.attrs.get("reads_input_until", 0.0)))
-    messages().print(
+    say(
         f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
         f"t = {begin} s, status {status}{reads and f'; {reads}'}.{scaled}"
     )
@@ -311,7 +311,7 @@ def compare(
             print_table(block)
         written.append(write_differences(differences, out / DIFFERENCES))
     written += _draw({name: found[name] for name in names}, figures, differences)
-    messages().print("Wrote " + ", ".join(map(str, written)))
+    say("Wrote " + ", ".join(map(str, written)))
     if not all(each.complete for name in names for each in found[name]):
         raise typer.Exit(1)
 
@@ -350,7 +350,7 @@ def _nowcast(
         print_table(block)
     written = [write_nowcasts(found, table)]
     written += [save_figure(nowcast_figure(found, run), path) for run, path in drawn.items()]
-    messages().print("Wrote " + ", ".join(map(str, written)))
+    say("Wrote " + ", ".join(map(str, written)))
 
 
 def _named(files: list[Path]) -> dict[str, Path]:
@@ -362,7 +362,7 @@ def _named(files: list[Path]) -> dict[str, Path]:
 def _figures(runs: list[str], out: Path, suffix: str) -> dict[str, Path]:
     """File of the figure of each run, and of all runs (""), where figures can be drawn."""
     if find_spec("matplotlib") is None:
-        messages().print(
+        say(
             "Note: no figures, because matplotlib is not installed. "
             "Install it with: pip install 'seakeep[figures]'"
         )
@@ -395,7 +395,7 @@ def _print_comparison(tables: Mapping[str, xr.Dataset], kinds: Mapping[str, str]
         print_table(block)
     for name, table in tables.items():
         for text in band_findings(table):
-            results().print(f"{name}, {text}" if several else text, soft_wrap=True)
+            show(f"{name}, {text}" if several else text)
 
 
 def _draw(
@@ -449,7 +449,7 @@ def _band(
         _refuse(given | {"--scheduler": scheduler is not None}, alone)
     kept = [each.calibration for each in ensembles if each.calibration is not None]
     if kept and band is None:
-        messages().print(
+        say(
             "Note: the ensemble is calibrated, and the band shown is that of its members. "
             "--band calibrated shows the calibrated one."
         )

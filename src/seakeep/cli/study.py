@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 import typer
 
 from seakeep.arrays import Progress
-from seakeep.cli.console import print_table, progress_bar, results
+from seakeep.cli.console import print_table, progress_bar, show
 from seakeep.cli.options import Scheduler, checked_count
 
 if TYPE_CHECKING:
@@ -61,8 +61,8 @@ def study(
     )
     print_table(overview_table(found), note=False)
     for text in findings(found):
-        results().print(text, soft_wrap=True)
-    results().print(f"\nReport: {page}", soft_wrap=True)
+        show(text)
+    show(f"\nReport: {page}")
 
 
 def _write_study(_: Path, found: StudyResult, __: Executor | None = None) -> Path:
@@ -124,8 +124,8 @@ def reproduce(
     found, page = _run(out, count, scheduler, play, _write_reproduction)
     print_table(acts_table(found), note=False)
     for act in (act for act in ACTS if act.name in found):
-        results().print(f"{act.title}: {act.sentence}", soft_wrap=True)
-    results().print(f"\nReport: {page}", soft_wrap=True)
+        show(f"{act.title}: {act.sentence}")
+    show(f"\nReport: {page}")
 
 
 def report(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import messages, progress_bar
+from seakeep.cli.console import progress_bar, say
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing, write_netcdf
 
@@ -217,14 +217,14 @@ def _summary(track: Track, written: list[Path]) -> None:
         if name != "good" and (count := int((track["flag"] == code).sum()))
     ]
     facts = track.attributes
-    messages().print(
+    say(
         f"{track.time.size} frames at {facts['frame_rate']:g} Hz; flagged: "
         f"{', '.join(flagged) or 'none'} ({int(track['bridged'].sum())} bridged); "
         f"{1e3 * facts['metres_per_pixel']:.4g} mm per pixel ({facts['calibration']}); "
         f"{facts['camera']}."
     )
     if written:
-        messages().print("Wrote " + ", ".join(map(str, written)))
+        say("Wrote " + ", ".join(map(str, written)))
 
 
 def _compare(track: Track, reference: xr.Dataset, max_lag: float | None) -> None:
@@ -238,13 +238,13 @@ def _compare(track: Track, reference: xr.Dataset, max_lag: float | None) -> None
         time = reference["time"].to_numpy()
         found = compare_motion(track[name], track.time, factor * other.to_numpy(), time, max_lag)
         shown, unit = (1e3, "mm") if unit == "m" else displayed(unit)
-        messages().print(
+        say(
             f"{name} against the MRU: correlation {found.correlation:.4f}, video late by "
             f"{found.lag:+.3f} s, RMS difference {shown * found.rms:.3g} {unit}, "
             f"{found.samples} samples"
         )
         if doubt := _doubt(found):
-            messages().print(f"Note: {name}: {doubt}", style="yellow")
+            say(f"Note: {name}: {doubt}", style="yellow")
 
 
 def _doubt(found: MotionAgreement) -> str:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from seakeep.cli.console import messages, progress_bar
+from seakeep.cli.console import progress_bar, say
 from seakeep.cli.options import (
     CampaignFile,
     ModelKey,
@@ -105,13 +105,13 @@ def tune(
         text = tuned_campaign(before, model, found.spec, varied, preset_of(settings), samples)
         place.write_text(text, encoding="utf-8")
     kept.unlink(missing_ok=True)
-    messages().print(f"Wrote {target}. Fit it with: seakeep fit {target} -o model.nc")
+    say(f"Wrote {target}. Fit it with: seakeep fit {target} -o model.nc")
     if not found.table.sizes["trial"]:
         return
     with replacing(tried) as place:
         plain_cells(found.table.to_dataframe()).to_csv(place, index=False)
-    messages().print(f"Wrote {tried}: all that was tried.")
+    say(f"Wrote {tried}: all that was tried.")
     if find_spec("matplotlib"):
         from seakeep.report.style import save_figure
 
-        messages().print(f"Wrote {save_figure(found.figure(), picture)}.")
+        say(f"Wrote {save_figure(found.figure(), picture)}.")
