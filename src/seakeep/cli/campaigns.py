@@ -196,16 +196,14 @@ def _list(context: typer.Context) -> None:
     table.add_column("value", overflow="fold")
     for each in DATASETS:
         table.add_row("name", each.name, style="bold")
-        table.add_row("what", each.title)
-        table.add_row("origin", each.origin)
-        table.add_row("licence", each.licence)
-        table.add_row("cite", each.reference)
-        table.add_row("here", state_of(each, folder))
-        if each.note:
-            table.add_row("note", each.note)
-        table.add_row("files", "with their SHA-256")
-        for name, checksum in each.files:
-            table.add_row("", f"{name}  {checksum}")
+        facts = {"what": each.title, "origin": each.origin, "licence": each.licence}
+        facts |= {"cite": each.reference, "here": state_of(each, folder), "note": each.note}
+        facts["files"] = "\n".join(
+            ["with their SHA-256", *(f"{name}  {checksum}" for name, checksum in each.files)]
+        )
+        for key, value in facts.items():
+            if value:
+                table.add_row(key, value)
         table.add_section()
     results().print(table)
 

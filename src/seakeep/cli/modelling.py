@@ -196,8 +196,9 @@ def forecast(
         f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
         f"t = {begin} s, status {status}{reads and f'; {reads}'}.{scaled}"
     )
-    lost = int(result.attrs.get("diverged", 0)) == result.sizes.get("member")
-    if lost or not (members or is_usable(str(status))):
+    members_left = result.sizes.get("member", 0) - int(result.attrs.get("diverged", 0))
+    usable = members_left > 0 if "member" in result.dims else is_usable(str(status))
+    if not usable:
         raise typer.Exit(1)
 
 

@@ -25,7 +25,7 @@ from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, froude_factor
 from seakeep.signals.time_axis import span_text
 from seakeep.study.fit import warn_of_repeats, warn_of_waves
-from seakeep.study.full_scale import to_full_scale
+from seakeep.study.full_scale import times, to_full_scale
 from seakeep.toml import parse_length
 
 
@@ -183,12 +183,8 @@ def with_degrees(run: xr.Dataset) -> xr.Dataset:
     for name, variable in run.data_vars.items():
         units = str(variable.attrs.get("units", ""))
         factor, target = displayed(units)
-        if target == units:
-            continue
-        out[name] = variable * factor
-        out[name].attrs = {**variable.attrs, "units": target}
-        for key in {"training_std", "noise_std"} & set(variable.attrs):
-            out[name].attrs[key] = factor * float(variable.attrs[key])
+        if target != units:
+            out[name] = times(variable, factor).assign_attrs(units=target)
     return out
 
 

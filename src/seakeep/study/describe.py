@@ -42,11 +42,10 @@ def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset
         "training": _training(plan, runs),
         "runs": _runs(plan, runs),
         **{f"prepared/{name}": _prepared(run) for name, run in runs.items()},
+        "repeats": _repeats(study.campaign, plan, runs),
+        "spectra": _spectra(plan, runs),
     }
-    if (repeats := _repeats(study.campaign, plan, runs)) is not None:
-        groups["repeats"] = repeats
-    spectra = _spectra(plan, runs)
-    return {**groups, **({"spectra": spectra} if spectra is not None else {})}
+    return {name: group for name, group in groups.items() if group is not None}
 
 
 def _repeats(campaign: Campaign, plan: Plan, runs: Runs) -> xr.Dataset | None:
@@ -145,28 +144,25 @@ def _prepared(run: xr.Dataset) -> xr.Dataset:
 
 
 def _training(plan: Plan, runs: Runs) -> xr.Dataset:
-    single = all(len(each.spans) == 1 for each in plan.training)
     edges = np.full((2, len(plan.training), len(runs)), np.nan)
     for number, each in enumerate(plan.training):
         for run, *span in each.spans:
             edges[:, number, list(runs).index(run)] = span
+    left_out = [", ".join(each.left_out) for each in plan.training]
     out = xr.Dataset(
         {
             "begin": (("training", "of_run"), edges[0], {"units": "s"}),
             "end": (("training", "of_run"), edges[1], {"units": "s"}),
-            "left_out": (
-                "training",
-                np.array([", ".join(each.left_out) for each in plan.training], dtype=object),
-            ),
+            "left_out": ("training", np.array(left_out, dtype=object)),
         },
         coords={"training": [each.name for each in plan.training], "of_run": list(runs)},
     )
-    if single:
-        out["run"] = ("training", np.array([e.spans[0][0] for e in plan.training], dtype=object))
-        out["stop"] = ("training", np.array([e.spans[0][2] for e in plan.training]))
-        longest = training_samples(plan.needs) * plan.dt
-        lengths = [min(longest, e.spans[0][2] - e.spans[0][1]) for e in plan.training]
-        out["reads"] = ("training", np.array(lengths), {"units": "s"})
+    if all(len(each.spans) == 1 for each in plan.training):
+        names, begins, stops = zip(*(each.spans[0] for each in plan.training), strict=True)
+        lengths = np.subtract(stops, begins).clip(max=training_samples(plan.needs) * plan.dt)
+        out["run"] = ("training", np.array(names, dtype=object))
+        out["stop"] = ("training", np.array(stops))
+        out["reads"] = ("training", lengths, {"units": "s"})
     return out
 
 

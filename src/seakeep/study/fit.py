@@ -285,10 +285,7 @@ def repeats_of(
         return {}
     missing = [name for name in training if name not in tested]
     prepared = dict(tested) | (load_prepared(campaign, names=missing) if missing else {})
-    pieces = {
-        name: prepared[name].sel(time=slice(first - 1e-6, stop + 1e-6))
-        for name, (first, stop) in training.items()
-    }
+    pieces = {name: between(prepared[name], span) for name, span in training.items()}
     found: dict[str, Repeat] = {}
     for name, run in tested.items():
         part = _test_part(run, pieces.get(name))
@@ -307,9 +304,8 @@ def warn_of_repeats(model: Model, campaign: Campaign, tested: Mapping[str, xr.Da
 
 
 def _test_part(run: xr.Dataset, trained: xr.Dataset | None) -> xr.Dataset:
-    span = run.attrs.get("test_span")
-    if span is not None:
-        return run.sel(time=slice(span[0] - 1e-6, span[1] + 1e-6))
+    if "test_span" in run.attrs:
+        return between(run, run.attrs["test_span"])
     if trained is not None:  # a test on the training part repeats by definition
         return run.sel(time=slice(float(trained["time"][-1]) + 1e-6, None))
     return run

@@ -214,7 +214,9 @@ def _compute_all(
     report(done, total, f"fitting and forecasting, {taken}")
     # What is chosen serves several models: they wait for it.
     ready = [unit for unit in left if (choice := choices[unit]) is None or choice not in todo]
-    items = deque((unit, _choice(folder, choices.get(unit))) for unit in [*todo, *ready])
+    known = {unit: choice for unit in ready if (choice := choices[unit]) is not None}
+    items: deque[tuple[Unit, Arrays | None]] = deque((unit, None) for unit in todo)
+    items.extend((u, _arrays(folder, known[u]) if u in known else None) for u in ready)
     try:
         for (unit, _), arrays in as_finished(_work, (plan, dict(runs)), items, executor):
             folder.write(unit.name, arrays)
@@ -226,11 +228,6 @@ def _compute_all(
         raise WorkerLostError(
             f"{error} What was finished is kept: the same command continues where it stopped."
         ) from None
-
-
-def _choice(folder: UnitFolder, choice: Unit | None) -> Arrays | None:
-    """What an earlier run of the study has chosen for a unit."""
-    return None if choice is None else _arrays(folder, choice)
 
 
 def _work(data: tuple[Plan, dict[str, xr.Dataset]], item: tuple[Unit, Arrays | None]) -> Arrays:
