@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import sys
 import time
 import warnings
@@ -63,15 +62,6 @@ def show(text: str) -> None:
 @lru_cache(maxsize=1)
 def _console(stream: IO[str]) -> Console:
     return Console(file=stream, highlight=False, soft_wrap=True, markup=False, emoji=False)
-
-
-def worker_count(workers: int | None) -> int:
-    """Number of workers that was asked for; by default one per core that may be used."""
-    if workers is not None:
-        return workers
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 @contextmanager

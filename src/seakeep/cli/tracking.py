@@ -176,11 +176,7 @@ def _labelled(track: Track) -> xr.Dataset:
     }
     time = ("time", track.time, {"units": "s", "long_name": "time"})
     out = xr.Dataset(data, {"time": time}, dict(track.attributes))
-    flags = out["flag"]
-    flags.attrs |= {
-        "flag_values": list(FLAGS.values()),
-        "flag_meanings": " ".join(FLAGS),
-    }
+    out["flag"].attrs |= {"flag_values": list(FLAGS.values()), "flag_meanings": " ".join(FLAGS)}
     return out
 
 
@@ -194,7 +190,7 @@ def _marked(picture: bytes) -> bytes:
 def _as_csv(tracked: xr.Dataset) -> str:
     """Columns with units in brackets; angles in degrees, as loggers write them; NaN is empty."""
     import numpy as np
-    import xarray as xr
+    import pandas as pd
 
     columns = {}
     for name, values in {"time": tracked["time"], **tracked.data_vars}.items():
@@ -203,8 +199,8 @@ def _as_csv(tracked: xr.Dataset) -> str:
             unit, numbers = "deg", np.rad2deg(numbers)
         if np.issubdtype(numbers.dtype, np.floating):
             numbers = np.round(numbers, DECIMALS[unit]) + 0.0
-        columns[f"{name} [{'-' if unit == '1' else unit}]"] = ("row", numbers)
-    text: str = xr.Dataset(columns).to_dataframe().to_csv(index=False, lineterminator="\n")
+        columns[f"{name} [{'-' if unit == '1' else unit}]"] = numbers
+    text: str = pd.DataFrame(columns).to_csv(index=False, lineterminator="\n")
     return text
 
 

@@ -26,6 +26,7 @@ from seakeep.signals import encounter_period, froude_factor
 from seakeep.signals.time_axis import span_text
 from seakeep.study.fit import warn_of_repeats, warn_of_waves
 from seakeep.study.full_scale import times, to_full_scale
+from seakeep.study.plan import named
 from seakeep.toml import parse_length
 
 
@@ -322,7 +323,7 @@ def compare_models(
         for name, run in prepared.items():
             how: dict[str, Any] = {}
             if is_ensemble(model):
-                tell = None if members is None else _named(members, name)
+                tell = named(members, f"{name}, ")
                 how = {"level": level, "band": band, "executor": executor, "progress": tell}
             each = _compare_run(model, run, name, first, count, history, lead, how)
             found[label].append(each)
@@ -364,10 +365,6 @@ def _warn_of_known(model: Model, compared: Comparison) -> None:
                 f"{words} ({span_text(begin, end, model.dt)}): this shows memory, not skill. Test "
                 "elsewhere (--run, --start, --steps)."
             )
-
-
-def _named(tell: Progress, run: str) -> Progress:
-    return lambda done, total, what: tell(done, total, f"{run}, {what}")
 
 
 def _compare_run(
@@ -545,7 +542,7 @@ def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
     }
     return xr.Dataset(
         {
-            name: ("channel", np.array([float(values[channel]) for channel in names]))
+            name: ("channel", values[names].to_array().values.astype(float))
             for name, values in each.items()
         }
         | (_interval_entries(p, m, names) if intervals else {})
@@ -576,10 +573,9 @@ def _interval_entries(p: xr.Dataset, m: xr.Dataset, names: Sequence[str]) -> dic
     pair = {"predicted": p, "measured": m}
     out: dict[str, Any] = {}
     for key, each in (("nrmse", metrics.nrmse), ("nammae", metrics.normalised_extremes_error)):
-        found = each(**pair, interval=INTERVAL)
-        for bound in found["bound"].values:
-            at = found.sel(bound=bound)
-            out[f"{key}_{bound}"] = ("channel", np.array([float(at[name]) for name in names]))
+        found = each(**pair, interval=INTERVAL)[names].to_array()
+        for bound in metrics.BOUNDS:
+            out[f"{key}_{bound}"] = ("channel", found.sel(bound=bound).values)
     for key, average in (("anrmse", metrics.anrmse), ("mean_nammae", metrics.nammae)):
         for bound, value in zip(metrics.BOUNDS, average(**pair, interval=INTERVAL), strict=True):
             out[f"{key}_{bound}"] = float(value)
@@ -603,7 +599,7 @@ def _band_entries(comparison: Comparison, slack: xr.Dataset) -> dict[str, Any]:
     lower, upper = (comparison.band.sel(statistic=key, drop=True) for key in ("lower", "upper"))
     found = statistics.coverage(lower, upper, comparison.measured)
     inside = 100.0 * found["inside"].values
-    judged = ~np.array([bool(slack[str(name)]) for name in found["channel"].values])
+    judged = ~slack.to_array().values
     attrs = comparison.forecast.attrs
     return {
         "coverage": ("channel", inside),

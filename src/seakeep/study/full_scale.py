@@ -65,10 +65,8 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
         if "x_position" in variable.attrs:
             out[name].attrs["x_position"] = scale * float(variable.attrs["x_position"])
     out.attrs = dict(run.attrs) | {"scale": "full", "scale_factor": float(scale)}
-    for key, unit in ATTRIBUTES.items():
-        if key not in run.attrs:
-            continue
-        by = clock if unit == "s" else scale
+    for key in ATTRIBUTES.keys() & run.attrs:
+        by = clock if ATTRIBUTES[key] == "s" else scale
         value = run.attrs[key]
         pair = isinstance(value, tuple | list)
         out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)

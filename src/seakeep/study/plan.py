@@ -81,6 +81,14 @@ def random_stream(seed: int, purpose: str) -> np.random.Generator:
     return np.random.default_rng([seed, zlib.crc32(purpose.encode())])
 
 
+def named(progress: Progress | None, words: str) -> Progress | None:
+    """Put words before what a progress names."""
+    if progress is None:
+        return None
+    report = progress
+    return lambda done, total, name: report(done, total, f"{words}{name}")
+
+
 def between(run: xr.Dataset, span: tuple[float, float]) -> xr.Dataset:
     """Part of a run between two of its own instants, both included."""
     slack = 1e-6 * float(run.attrs.get("dt", 1.0))

@@ -16,7 +16,7 @@ from seakeep.models.executor import WorkerLostError, as_finished
 from seakeep.sizes import LONG_CELLS, MOST_CELLS, check_size
 from seakeep.study.describe import describe_study, words_of_repeats
 from seakeep.study.judge import judge, words_of_lost
-from seakeep.study.plan import Plan, make_plan, training_samples, warn_of_slow_study
+from seakeep.study.plan import Plan, make_plan, named, training_samples, warn_of_slow_study
 from seakeep.study.settings import Study
 from seakeep.study.store import (
     RESULT,
@@ -94,9 +94,7 @@ def run_study(
         found = relabel(found, _labels(study))
         hand_on(found)
         return found
-    plan, runs = make_plan(
-        study, lambda done, total, name: report(done, total, f"preparing {name}")
-    )
+    plan, runs = make_plan(study, named(report, "preparing "))
     warn_of_slow_study(plan, runs)
     taken = _taken(plan)
     folder.open(study.name)
