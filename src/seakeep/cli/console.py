@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
 from rich.console import Console
 
@@ -85,21 +85,15 @@ def progress_bar(what: str) -> Iterator[Progress]:
 
         yield line
         return
-    import rich.progress
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
+    from rich import progress as rich
     from rich.table import Column
 
-    bar = rich.progress.Progress(
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=20),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[name]}", table_column=Column(ratio=1, no_wrap=True)),
+    bar = rich.Progress(
+        rich.TextColumn("{task.description}"),
+        rich.BarColumn(bar_width=20),
+        rich.MofNCompleteColumn(),
+        rich.TimeRemainingColumn(),
+        rich.TextColumn("{task.fields[name]}", table_column=Column(ratio=1, no_wrap=True)),
         console=console,
         transient=True,
         expand=True,
@@ -118,23 +112,16 @@ def tell_warnings() -> Iterator[None]:
     """Print warnings of seakeep as one line each, and leave the others to Python."""
     told, seen = warnings.showwarning, set[str]()
 
-    def show(
-        message: Warning | str,
-        category: type[Warning],
-        filename: str,
-        lineno: int,
-        file: object = None,
-        line: str | None = None,
-    ) -> None:
+    def once(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
         if issubclass(category, SeakeepWarning):
             if str(message) in seen:  # of several models, once
                 return
             seen.add(str(message))
             say(f"Note: {message}", style="yellow")
         else:
-            told(message, category, filename, lineno, None, line)
+            told(message, category, *where, **more)
 
     with warnings.catch_warnings():
         warnings.simplefilter("always", SeakeepWarning)
-        warnings.showwarning = show
+        warnings.showwarning = once
         yield

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 TABLE = "comparison.csv"
 DIFFERENCES = "differences.csv"
-ERRORS = "errors_by_run"
+ERRORS, NOWCAST = "errors_by_run", "nowcast_"
 FOR_ENSEMBLES = (
     "is for ensembles, and {} holds a single model. Leave it out, or fit an ensemble (kind = "
     "'bayesian_hankel_dmdc' in [model])."
@@ -273,7 +273,9 @@ def compare(
     fitted = {name: load_model(path) for name, path in names.items()}
     shown = _band(fitted, level, band, scheduler)
     read = read_campaign(campaign)
-    figures = _figures(run or read.test_runs, out, format_)
+    runs = run or read.test_runs
+    names_of_figures = [f"{NOWCAST}{each}" for each in runs] if nowcast else [*runs, ERRORS]
+    figures = _figures(names_of_figures, out, format_)
     used = read_files(read, *model)
     check_output(out / TABLE, "table", used, "run,channel,channel_units,.*")
     check_output(out / DIFFERENCES, "table", used, "run,wave_period,model,.*")
@@ -286,7 +288,7 @@ def compare(
         stated = {option: value is not None for option, value in given.items()}
         _refuse(stated | {"--full-scale": full_scale, "--radians": not degrees}, NO_NOWCAST)
         serving = {n: each for n, each in fitted.items() if n in names or hasattr(each, "live")}
-        _nowcast(serving, read, run or read.test_runs, steps, shown["level"], out, figures, used)
+        _nowcast(serving, read, runs, steps, shown["level"], out, figures, used)
         return
     with member_executor(workers, scheduler) as executor, progress_bar("Comparing") as progress:
         found = compare_models(
@@ -342,15 +344,13 @@ def _nowcast(
 
     table = out / "nowcast.csv"
     check_output(table, "table", used, HEADER)
-    drawn = {name: each.with_name(f"nowcast_{each.name}") for name, each in figures.items() if name}
-    for path in drawn.values():
-        check_output(path, "figure", used)
     with progress_bar("Playing") as progress:
         found = nowcasts(models, campaign, runs, steps, level=level, progress=progress)
     for block in nowcast_blocks(found):
         print_table(block)
     written = [write_nowcasts(found, table)]
-    written += [save_figure(nowcast_figure(found, run), path) for run, path in drawn.items()]
+    for name, path in figures.items():
+        written.append(save_figure(nowcast_figure(found, name.removeprefix(NOWCAST)), path))
     say("Wrote " + ", ".join(map(str, written)))
 
 
@@ -360,15 +360,15 @@ def _named(files: list[Path]) -> dict[str, Path]:
     return {p.stem if stems.count(p.stem) == 1 else str(p.with_suffix("")): p for p in files}
 
 
-def _figures(runs: list[str], out: Path, suffix: str) -> dict[str, Path]:
-    """File of the figure of each run, and of all runs (""), where figures can be drawn."""
+def _figures(names: list[str], out: Path, suffix: str) -> dict[str, Path]:
+    """Files of figures by name, where figures can be drawn."""
     if find_spec("matplotlib") is None:
         say(
             "Note: no figures, because matplotlib is not installed. "
             "Install it with: pip install 'seakeep[figures]'"
         )
         return {}
-    return {run: out / f"{run or ERRORS}.{suffix}" for run in (*runs, "")}
+    return {name: out / f"{name}.{suffix}" for name in names}
 
 
 def _with_baselines(fitted: Mapping[str, Model], campaign: Campaign) -> dict[str, Model]:
@@ -414,7 +414,7 @@ def _draw(
         figure = overlay_figure(dict(zip(found, of_run, strict=True)))
         written.append(save_figure(figure, figures[of_run[0].run]))
     if differences is not None:
-        written.append(save_figure(error_figure(differences), figures[""]))
+        written.append(save_figure(error_figure(differences), figures[ERRORS]))
     return written
 
 
