@@ -13,10 +13,10 @@ from typing import IO, TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from seakeep.arrays import Progress
 from seakeep.errors import SeakeepWarning
 
 if TYPE_CHECKING:
+    from seakeep.arrays import Progress
     from seakeep.report.tables import Table
 
 SECONDS_BETWEEN_LINES = 5.0
